@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_COMMON_LINK_LINK_H
+#define DT_COMMON_LINK_LINK_H
+/*
+ * One small interface in front of every CAN transport a Linux program of ours uses.
+ *
+ *   unix:PATH    a bus of processes on this machine, no CAN driver needed. The first to open it serves
+ *                the others (SOCK_SEQPACKET); every frame reaches every other process on it.
+ *   can:IF       SocketCAN: can0, vcan0, ... with FD, kernel receive times, error frames, SO_RXQ_OVFL.
+ *   slcan:DEV    a serial or USB adapter that speaks SLCAN; 'd' 'D' 'b' 'B' for FD as the CANable 2.
+ *                slcan:DEV@BAUD sets the line's speed (default 3000000; no matter on USB).
+ *   log:FILE     candump text (candump -L form). Opened for reading it delivers the file's frames with
+ *                the file's times and then DT_E_CLOSED; opened for writing it appends ("-" = stdout).
+ *
+ * A link is used by one thread. Nothing blocks except link_receive, for at most its timeout.
+ * Losses never pass in silence: link_counters tells them.
+ */
+#include <stdint.h>
+
+#include "common/error.h"
+#include "common/frame.h"
+
+struct link;
+
+enum link_mode {
+	LINK_READ_WRITE,
+	LINK_READ, /* log: a file to read */
+	LINK_WRITE, /* log: a file to write */
+};
+
+struct link_counters {
+	uint64_t sent, received;
+	uint64_t send_retried;  /* the queue was full, the frame went later */
+	uint64_t send_lost;     /* the queue stayed full, the frame was dropped and DT_E_FULL returned */
+	uint64_t receive_lost;  /* the kernel or a peer's queue dropped it before us */
+	uint64_t errors;        /* error frames received */
+	uint64_t malformed;     /* text or bytes that are no frame, skipped */
+	uint64_t restarts;      /* interface went down and came back, or a peer came back */
+};
+
+/* Opens url. On error returns NULL and writes one line of explanation (no newline) into message, which
+ * has room for size bytes: "unix:/tmp/bus: no such directory, ..." */
+struct link *link_open(const char *url, enum link_mode mode, char *message, unsigned size);
+
+/* 0, DT_E_FULL (queue stayed full for 10 ms), DT_E_CLOSED, DT_E_LINK, or DT_E_ARGUMENT (a frame this
+ * transport cannot carry). frame->time_us is written to log: links; 0 there means now. */
+DT_MUST_USE int link_send(struct link *link, const struct frame *frame);
+
+/* 1 with a frame in *frame, 0 when timeout_ms passed without one (0 = do not wait, negative = for ever),
+ * DT_E_CLOSED at the end of a log, DT_E_LINK. A SocketCAN interface that is down is waited for and
+ * counted, it is not an error. Error reports arrive as frames with FRAME_ERROR. A log line that is not
+ * a frame is skipped and counted; link_line tells where the last frame stood. time_us is never 0 on
+ * return: kernel time for can:, else the time it was read, or the log's. */
+DT_MUST_USE int link_receive(struct link *link, struct frame *frame, int timeout_ms);
+
+/* A descriptor that polls readable when link_receive may have something, or -1 (log:). */
+int link_descriptor(const struct link *link);
+
+/* Line number of the last frame of a log: link, else 0. */
+uint64_t link_line(const struct link *link);
+
+const struct link_counters *link_counters(const struct link *link);
+const char *link_url(const struct link *link);
+
+/* Flushes and frees; NULL is allowed. 0 or DT_E_SYSTEM if what was written could not be kept. */
+int link_close(struct link *link);
+
+#endif

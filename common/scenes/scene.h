@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_COMMON_SCENES_SCENE_H
+#define DT_COMMON_SCENES_SCENE_H
+/*
+ * A scene: what is dropped, how, and with which sensors, read from an .ini file. Linux side only (host
+ * and bench). The keys stand in scene.def. A scene is data: no formula lives here, so that the bench's
+ * plant and the host's model share none.
+ */
+#include "common/error.h"
+
+enum { SCENE_MESSAGE_MAX = 512 };
+
+struct scene {
+	char name[64];  /* key `name` before any section, e.g. "geometry-2A" */
+	char title[128]; /* key `title`, for reports */
+#define SCENE_KEY(section, key, min, max, initial, doc) double section##_##key;
+#include "common/scenes/scene.def"
+#undef SCENE_KEY
+};
+
+/* Reads and checks file. 0, or DT_E_* with "FILE:LINE: what is wrong, what was expected" in message and
+ * *scene unchanged. Unknown sections and keys, missing or repeated keys, text that is no number, values
+ * out of range or not finite are all errors, and so are combinations that make no product: gates not in
+ * order, separation beyond the drop height, a plate without stiffness. */
+DT_MUST_USE int scene_read(struct scene *scene, const char *file, char message[SCENE_MESSAGE_MAX]);
+
+/* The same for values changed after reading, e.g. an angle from the command line; where names it in the
+ * message. */
+DT_MUST_USE int scene_check(const struct scene *scene, const char *where, char message[SCENE_MESSAGE_MAX]);
+
+#endif

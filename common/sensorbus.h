@@ -1,0 +1,77 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_COMMON_SENSORBUS_H
+#define DT_COMMON_SENSORBUS_H
+/*
+ * The simulated sensor bus between a firmware port without hardware (posix, qemu) and the bench.
+ *
+ * Two byte pipes. At every sample instant the port writes one request and reads one answer; the plant
+ * integrates exactly up to that instant, so time stands still in between and the result does not depend
+ * on the machine's load. CAN frames ride along: what the firmware sent since the last request goes with
+ * the request, what it is to receive comes with the answer. All integers little endian, no padding:
+ *
+ *   request:  SENSORBUS_REQUEST_BYTES, then `frames` frames
+ *   answer:   SENSORBUS_ANSWER_BYTES, then `frames` frames
+ *   frame:    id u16, flags u8 (FRAME_*), length u8, data[length]
+ *
+ * Virtual time counts from the reset of the firmware; tick_ms + k/7 or k/10 ms is exact. An output edge
+ * carries its own time in us, inside the span since the request before, so that a compare event is
+ * applied between the samples where it belongs.
+ * Packing and unpacking is freestanding; any context.
+ */
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/frame.h"
+
+enum {
+	SENSORBUS_OUTPUTS = 4, /* bits 0-3 of the io word */
+	SENSORBUS_REQUEST_BYTES = 28,
+	SENSORBUS_ANSWER_BYTES = 32,
+	SENSORBUS_FRAMES_MAX = 16, /* in one request or answer */
+	SENSORBUS_FRAME_BYTES_MAX = 4 + 64,
+	SENSORBUS_MESSAGE_MAX = SENSORBUS_ANSWER_BYTES + SENSORBUS_FRAMES_MAX * SENSORBUS_FRAME_BYTES_MAX,
+};
+
+enum {
+	SENSORBUS_X = 1,  /* X of both sensors, 7 kHz, index 0-6 */
+	SENSORBUS_YZ = 2, /* Y and Z of both sensors, 10 kHz, index 0-9 */
+};
+
+struct sensorbus_request {
+	uint32_t tick_ms;
+	uint8_t group; /* SENSORBUS_X and/or SENSORBUS_YZ; both only for index 0 */
+	uint8_t index; /* sample within the tick */
+	uint16_t outputs; /* io word's output bits at this instant, all edges applied */
+	uint8_t edges;    /* bit i: output i changed at edge_us[i] since the request before */
+	uint8_t frames;   /* frames that follow */
+	uint8_t reset;    /* 1 in the first request after a reset */
+	uint8_t reserved;
+	uint32_t edge_us[SENSORBUS_OUTPUTS]; /* virtual us since reset, modulo 2^32 */
+};
+
+struct sensorbus_answer {
+	int16_t codes[6];   /* S1 X Y Z, S2 X Y Z, 1/32 g; only the group asked for counts */
+	uint16_t inputs;    /* io word's input bits */
+	uint8_t captures;   /* bit 0, 1: upper, lower gate's beam was broken at capture_us[] */
+	uint8_t frames;     /* frames that follow */
+	uint32_t capture_us[2];
+	uint8_t ready;      /* bit 0 X, bit 1 YZ: the converter delivered; 0 = overrun */
+	uint8_t stop;       /* 1: the bench ends the run, the port exits with 0 */
+	uint16_t bus_errors; /* CAN errors since the answer before */
+	uint8_t bus_off;    /* 1: the controller is bus-off now */
+	uint8_t tx_blocked; /* 1: the bus takes no frame now */
+	uint16_t reserved;
+};
+
+/* Each returns the bytes it wrote or read. Buffers hold at least the fixed length. */
+size_t sensorbus_put_request(uint8_t *out, const struct sensorbus_request *request);
+size_t sensorbus_get_request(const uint8_t *in, struct sensorbus_request *request);
+size_t sensorbus_put_answer(uint8_t *out, const struct sensorbus_answer *answer);
+size_t sensorbus_get_answer(const uint8_t *in, struct sensorbus_answer *answer);
+
+/* A frame: put returns bytes written (4 + length); sensorbus_frame_head reads the 4 bytes of the head
+ * and returns the data bytes that follow, or DT_E_LENGTH above 64. */
+size_t sensorbus_put_frame(uint8_t *out, const struct frame *frame);
+int sensorbus_frame_head(const uint8_t *in, struct frame *frame);
+
+#endif

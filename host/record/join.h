@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_JOIN_H
+#define DT_HOST_RECORD_JOIN_H
+/*
+ * Frames to channels: puts the blocks of one capture in their places by tick, counts every gap, repeat,
+ * reorder and corrupt block, and says what to ask for again until the capture's CRC-32 agrees. The same
+ * code serves live reception, replay and files. Frames that are no blocks or capture ends are ignored.
+ *
+ * Live use: feed every received frame; after the capture end arrived and while !join_complete, send the
+ * requests join_next_gap tells; when done, or given up, take the record.
+ */
+#include "common/frame.h"
+#include "host/record/record.h"
+
+struct join;
+
+/* NULL without memory. The join keeps the last 2 048 ticks until a capture end says which count. */
+struct join *join_create(void);
+void join_destroy(struct join *join);
+
+/* 1 if a capture end arrived with it and a drop begins to be collectable, else 0. */
+int join_feed(struct join *join, const struct frame *frame);
+
+/* A capture end is known, for any drop. */
+bool join_has_capture(const struct join *join);
+
+/* Every block of the capture is held and the CRC-32 agrees. */
+bool join_complete(const struct join *join);
+
+/* The first missing run with last - first + 1 <= limit, starting at or after (sensor, tick) in the order S1
+ * then S2; false when there is none. When nothing is missing and yet the CRC-32 disagrees, see
+ * join_forget. */
+bool join_next_gap(const struct join *join, unsigned sensor, uint32_t tick_ms, uint32_t limit,
+		   struct record_gap *gap);
+
+/* Drops every block of the capture, so that all of it is asked for again: a corrupt block slipped through
+ * its CRC-8. */
+void join_forget(struct join *join);
+
+/* CRC-32 as computed over what is held; only meaningful when nothing is missing. */
+uint32_t join_crc32(const struct join *join);
+
+/* Moves the capture, complete or not, into *record (initialised by the call) and makes room for the next
+ * one. Without a capture end the longest run of ticks held is taken and flagged crc_unknown. DT_E_EMPTY
+ * when no block was ever held. */
+DT_MUST_USE int join_take(struct join *join, struct record *record);
+
+#endif

@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_RECORD_H
+#define DT_HOST_RECORD_RECORD_H
+/*
+ * A record: one drop, or one foreign recording, as channels at their native rates. Everything that
+ * reads (live frames, candump, LCM, CSV, delimited text) ends here, everything that analyses starts here.
+ *
+ * Memory belongs to the record: record_init, fill, record_free. No thread safety needed or given.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+
+/* What is known of one sample; 0 is a good one. A sample keeps its place whatever it is. */
+enum {
+	SAMPLE_LOST = 1u << 0,    /* its frame never came; value is NAN */
+	SAMPLE_BAD = 1u << 1,     /* the firmware marked it not taken, or the file holds no number; value is NAN */
+	SAMPLE_CLIPPED = 1u << 2, /* beyond the sensor's range or at full scale; value as read */
+	SAMPLE_SPIKE = 1u << 3,   /* set by the analysis */
+};
+
+/* What is remarkable about a channel or a record. Bits; names by record_flag_name. */
+enum {
+	RECORD_FLAG_LOST = 1u << 0,       /* "lost_samples" */
+	RECORD_FLAG_BAD = 1u << 1,        /* "bad_samples" */
+	RECORD_FLAG_CLIPPED = 1u << 2,    /* "clipped" */
+	RECORD_FLAG_INCOMPLETE = 1u << 3, /* "incomplete": the capture's CRC-32 could not be reached */
+	RECORD_FLAG_NO_CRC = 1u << 4,     /* "crc_unknown": frames, but no capture end */
+	RECORD_FLAG_SLOW_FRAME = 1u << 5, /* "slow_frame" */
+	RECORD_FLAG_NO_IMPACT = 1u << 6,  /* "no_impact" */
+	RECORD_FLAG_FAULT = 1u << 7,      /* "fault" */
+	RECORD_FLAG_UNEVEN = 1u << 8,     /* "uneven_sampling": the time column deviates from its mean step */
+	RECORD_FLAG_FULL_SCALE = 1u << 9, /* "full_scale" */
+	RECORD_FLAG_OVERRUN = 1u << 10,   /* "overrun" */
+};
+
+struct channel {
+	char name[32];      /* "S1X", or the name given in --columns */
+	double rate_hz;     /* native rate */
+	double start_s;     /* time of sample 0, s after the record's first instant; sample k is at start_s + k/rate_hz */
+	size_t count;       /* samples */
+	double *value_g;    /* [count]; NAN where SAMPLE_LOST or SAMPLE_BAD */
+	uint8_t *sample;    /* [count], SAMPLE_* bits */
+	double range_g;     /* sensor range when known, else 0 */
+	unsigned flags;     /* RECORD_FLAG_* */
+};
+
+struct record_gap {
+	unsigned sensor;        /* 1 or 2 */
+	uint32_t first_tick_ms; /* inclusive */
+	uint32_t last_tick_ms;
+};
+
+/* What happened to the frames of the capture on their way. */
+struct record_counters {
+	uint64_t blocks;     /* distinct blocks held */
+	uint64_t repeated;   /* a block that was already there */
+	uint64_t reordered;  /* a live block older than the one before it */
+	uint64_t corrupt;    /* CRC-8 does not agree; not used */
+	uint64_t gaps;       /* runs of ticks that were missing when the capture end came */
+	uint64_t resent;     /* blocks that came on request */
+	uint64_t conflicting;/* repeated with other samples: the first is kept */
+};
+
+struct record {
+	char file[4096];   /* as given on the command line, or the link's URL */
+	char format[16];   /* "live" "candump" "lcm" "csv" "delimited" "lvm" */
+	struct channel *channels;
+	size_t channel_count;
+
+	/* Of a drop by our tower; zero for foreign recordings. */
+	bool is_drop;
+	uint16_t drop_id;
+	uint16_t marks;            /* WIRE_MARK_* */
+	uint32_t first_tick_ms, last_tick_ms;
+	double trigger_s;          /* after the first instant; NAN if unknown */
+	double frame_speed_m_s;    /* between the gates; NAN if unknown */
+	uint32_t crc32;            /* as sent in the capture end */
+	bool crc_known, crc_agrees;
+	struct record_counters counters;
+	struct record_gap *gaps;   /* what stayed missing */
+	size_t gap_count;
+
+	uint64_t lost_samples;     /* over all channels */
+	unsigned flags;            /* RECORD_FLAG_*, union over channels and the drop's own */
+};
+
+void record_init(struct record *record);
+void record_free(struct record *record);
+
+/* Appends an empty channel with room for count samples, all SAMPLE_LOST; NULL without memory. The pointer
+ * is valid until the next call. */
+struct channel *record_add_channel(struct record *record, const char *name, double rate_hz, size_t count);
+
+/* NULL if there is none of that name. */
+const struct channel *record_channel(const struct record *record, const char *name);
+
+/* Recomputes lost_samples and every flag that follows from samples, gaps, CRC and marks. Readers call it
+ * last. */
+void record_finish(struct record *record);
+
+/* Name of the lowest flag bit in flags; "" for 0. */
+const char *record_flag_name(unsigned flags);
+
+#endif

@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_REPORT_REPORT_H
+#define DT_HOST_REPORT_REPORT_H
+/*
+ * An analysis for people and programs: a table for the terminal, JSON, and one self-contained HTML page.
+ * The functions only read what they are given.
+ */
+#include <stdio.h>
+
+#include "common/scenes/scene.h"
+#include "host/estimate/estimate.h"
+#include "host/model/model.h"
+#include "host/record/record.h"
+
+struct report {
+	const struct record *record;
+	const struct analysis *analysis;
+	const struct scene *scene;                 /* NULL: none was given */
+	const struct model_prediction *prediction; /* NULL: no scene */
+};
+
+/* The result table. 0 or DT_E_SYSTEM. */
+DT_MUST_USE int report_text(const struct report *report, FILE *out);
+
+/* One JSON object and a newline; keys in snake_case with units, numbers in full precision, NAN as null. */
+DT_MUST_USE int report_json(const struct report *report, FILE *out);
+
+/* One HTML file without outside references; pictures are SVG made by gnuplot, which is run for it. 0, or
+ * DT_E_SYSTEM with a line in message. */
+DT_MUST_USE int report_html(const struct report *report, const char *file, char *message, size_t size);
+
+#endif
