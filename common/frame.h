@@ -14,7 +14,7 @@ enum {
 	FRAME_ESI = 1u << 2,      /* FD: the sender is error-passive */
 	FRAME_EXTENDED = 1u << 3, /* 29-bit identifier */
 	FRAME_REMOTE = 1u << 4,   /* classic remote request: no data, length = length asked for */
-	FRAME_ERROR = 1u << 5,    /* not a frame of the bus: an error report, id = SocketCAN error class bits */
+	FRAME_ERROR = 1u << 5, /* not a frame of the bus: an error report, id = SocketCAN error class bits */
 };
 
 struct frame {

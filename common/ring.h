@@ -17,16 +17,16 @@
 
 struct ring {
 	unsigned char *storage;
-	uint32_t entry_size; /* bytes */
-	uint32_t count;      /* entries, a power of two */
+	uint32_t entry_size;   /* bytes */
+	uint32_t count;        /* entries, a power of two */
 	_Atomic uint32_t head; /* entries ever written; wraps */
 	_Atomic uint32_t tail; /* entries ever read; wraps */
 };
 
-#define RING_OVER(array)                                                                              \
-	{                                                                                             \
-		.storage = (unsigned char *)(array), .entry_size = (uint32_t)sizeof((array)[0]),      \
-		.count = (uint32_t)(sizeof(array) / sizeof((array)[0]))                               \
+#define RING_OVER(array)                                                                         \
+	{                                                                                        \
+		.storage = (unsigned char *)(array), .entry_size = (uint32_t)sizeof((array)[0]), \
+		.count = (uint32_t)(sizeof(array) / sizeof((array)[0]))                          \
 	}
 
 /* Producer: copies one entry in. DT_E_FULL leaves the ring as it was. */

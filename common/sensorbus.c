@@ -45,13 +45,13 @@ size_t sensorbus_put_request(uint8_t *out, const struct sensorbus_request *reque
 size_t sensorbus_get_request(const uint8_t *in, struct sensorbus_request *request)
 {
 	*request = (struct sensorbus_request){
-		.tick_ms = get32(in),
-		.group = in[4],
-		.index = in[5],
-		.outputs = get16(in + 6),
-		.edges = in[8],
-		.frames = in[9],
-		.reset = in[10],
+	        .tick_ms = get32(in),
+	        .group = in[4],
+	        .index = in[5],
+	        .outputs = get16(in + 6),
+	        .edges = in[8],
+	        .frames = in[9],
+	        .reset = in[10],
 	};
 	for (int i = 0; i < SENSORBUS_OUTPUTS; i++)
 		request->edge_us[i] = get32(in + 12 + 4 * i);
@@ -81,15 +81,15 @@ size_t sensorbus_put_answer(uint8_t *out, const struct sensorbus_answer *answer)
 size_t sensorbus_get_answer(const uint8_t *in, struct sensorbus_answer *answer)
 {
 	*answer = (struct sensorbus_answer){
-		.inputs = get16(in + 12),
-		.captures = in[14],
-		.frames = in[15],
-		.capture_us = {get32(in + 16), get32(in + 20)},
-		.ready = in[24],
-		.stop = in[25],
-		.bus_errors = get16(in + 26),
-		.bus_off = in[28],
-		.tx_blocked = in[29],
+	        .inputs = get16(in + 12),
+	        .captures = in[14],
+	        .frames = in[15],
+	        .capture_us = {get32(in + 16), get32(in + 20)},
+	        .ready = in[24],
+	        .stop = in[25],
+	        .bus_errors = get16(in + 26),
+	        .bus_off = in[28],
+	        .tx_blocked = in[29],
 	};
 	for (int i = 0; i < 6; i++)
 		answer->codes[i] = (int16_t)get16(in + 2 * i);

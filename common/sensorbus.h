@@ -39,8 +39,8 @@ enum {
 
 struct sensorbus_request {
 	uint32_t tick_ms;
-	uint8_t group; /* SENSORBUS_X and/or SENSORBUS_YZ; both only for index 0 */
-	uint8_t index; /* sample within the tick */
+	uint8_t group;    /* SENSORBUS_X and/or SENSORBUS_YZ; both only for index 0 */
+	uint8_t index;    /* sample within the tick */
 	uint16_t outputs; /* io word's output bits at this instant, all edges applied */
 	uint8_t edges;    /* bit i: output i changed at edge_us[i] since the request before */
 	uint8_t frames;   /* frames that follow */
@@ -50,16 +50,16 @@ struct sensorbus_request {
 };
 
 struct sensorbus_answer {
-	int16_t codes[6];   /* S1 X Y Z, S2 X Y Z, 1/32 g; only the group asked for counts */
-	uint16_t inputs;    /* io word's input bits */
-	uint8_t captures;   /* bit 0, 1: upper, lower gate's beam was broken at capture_us[] */
-	uint8_t frames;     /* frames that follow */
+	int16_t codes[6]; /* S1 X Y Z, S2 X Y Z, 1/32 g; only the group asked for counts */
+	uint16_t inputs;  /* io word's input bits */
+	uint8_t captures; /* bit 0, 1: upper, lower gate's beam was broken at capture_us[] */
+	uint8_t frames;   /* frames that follow */
 	uint32_t capture_us[2];
-	uint8_t ready;      /* bit 0 X, bit 1 YZ: the converter delivered; 0 = overrun */
-	uint8_t stop;       /* 1: the bench ends the run, the port exits with 0 */
+	uint8_t ready;       /* bit 0 X, bit 1 YZ: the converter delivered; 0 = overrun */
+	uint8_t stop;        /* 1: the bench ends the run, the port exits with 0 */
 	uint16_t bus_errors; /* CAN errors since the answer before */
-	uint8_t bus_off;    /* 1: the controller is bus-off now */
-	uint8_t tx_blocked; /* 1: the bus takes no frame now */
+	uint8_t bus_off;     /* 1: the controller is bus-off now */
+	uint8_t tx_blocked;  /* 1: the bus takes no frame now */
 	uint16_t reserved;
 };
 

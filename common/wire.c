@@ -4,7 +4,8 @@
 #include "common/crc.h"
 
 /* Every layout must fit a frame that CAN FD has. */
-#define FD_HAS(n) ((n) <= 8 || (n) == 12 || (n) == 16 || (n) == 20 || (n) == 24 || (n) == 32 || (n) == 48 || (n) == 64)
+#define FD_HAS(n) \
+	((n) <= 8 || (n) == 12 || (n) == 16 || (n) == 20 || (n) == 24 || (n) == 32 || (n) == 48 || (n) == 64)
 #define WIRE_LAYOUT(layout, doc) _Static_assert(FD_HAS(WIRE_LENGTH_##layout), "wire.def: " #layout);
 #include "common/wire.def"
 _Static_assert(WIRE_SAMPLE_OFFSET + WIRE_SAMPLE_BYTES == WIRE_LENGTH_block, "block");
@@ -93,11 +94,11 @@ static bool carries(const struct frame *frame, uint8_t length)
 	}
 #include "common/wire.def"
 
-#define WIRE_LAYOUT(layout, doc)                                                          \
-	int wire_unpack_##layout(const struct frame *frame, struct wire_##layout *m)      \
-	{                                                                                 \
-		const uint8_t *p = frame->data;                                           \
-		if (!carries(frame, WIRE_LENGTH_##layout))                                \
+#define WIRE_LAYOUT(layout, doc)                                                     \
+	int wire_unpack_##layout(const struct frame *frame, struct wire_##layout *m) \
+	{                                                                            \
+		const uint8_t *p = frame->data;                                      \
+		if (!carries(frame, WIRE_LENGTH_##layout))                           \
 			return DT_E_LENGTH;
 #define WIRE_FIELD(layout, type, name, scale, unit, doc) p = get_##type(p, &m->name);
 #define WIRE_ARRAY(layout, type, name, count, scale, unit, doc) \
@@ -158,7 +159,7 @@ uint32_t wire_hash(void)
 #define WIRE_COUNTER(name, doc) #name ";"
 #define WIRE_PARAMETER(name, index, unit, min, max, initial, doc) #name " " #index " " #min " " #max ";"
 #include "common/wire.def"
-		;
+	        ;
 
 	return crc32(CRC32_INIT, (const uint8_t *)text, sizeof(text) - 1);
 }

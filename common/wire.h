@@ -33,14 +33,18 @@ enum { WIRE_SIZE_u8 = 1, WIRE_SIZE_i8 = 1, WIRE_SIZE_u16 = 2, WIRE_SIZE_i16 = 2,
 #define WIRE_LAYOUT(layout, doc) struct wire_##layout {
 #define WIRE_FIELD(layout, type, name, scale, unit, doc) wire_##type name;
 #define WIRE_ARRAY(layout, type, name, count, scale, unit, doc) wire_##type name[count];
-#define WIRE_END(layout) };
+#define WIRE_END(layout) \
+	}                \
+	;
 #include "common/wire.def"
 
 /* WIRE_LENGTH_layout, bytes on the wire */
 #define WIRE_LAYOUT(layout, doc) enum { WIRE_LENGTH_##layout = 0
 #define WIRE_FIELD(layout, type, name, scale, unit, doc) +WIRE_SIZE_##type
 #define WIRE_ARRAY(layout, type, name, count, scale, unit, doc) +(WIRE_SIZE_##type * (count))
-#define WIRE_END(layout) };
+#define WIRE_END(layout) \
+	}                \
+	;
 #include "common/wire.def"
 
 enum {
@@ -101,10 +105,10 @@ enum wire_parameter_number {
 
 enum {
 	WIRE_SENSORS = 2,
-	WIRE_X_PER_TICK = 7,       /* 7 kHz */
-	WIRE_YZ_PER_TICK = 10,     /* 10 kHz */
-	WIRE_SAMPLE_BYTES = 54,    /* of one block: 7 X, 10 Y, 10 Z */
-	WIRE_SAMPLE_OFFSET = 10,   /* first sample byte in a block */
+	WIRE_X_PER_TICK = 7,     /* 7 kHz */
+	WIRE_YZ_PER_TICK = 10,   /* 10 kHz */
+	WIRE_SAMPLE_BYTES = 54,  /* of one block: 7 X, 10 Y, 10 Z */
+	WIRE_SAMPLE_OFFSET = 10, /* first sample byte in a block */
 	WIRE_CRC8_OFFSET = 9,
 	WIRE_COUNTS_PER_G = 32,
 	WIRE_SAMPLE_NOT_TAKEN = -32768,
@@ -123,8 +127,8 @@ enum {
 /* Pack *m into *frame: id, length, flags and data; time_us is left alone. A block's crc8 is not
  * computed here: see wire_seal_block. Unpack returns DT_E_LENGTH, with *m unchanged, if the frame does
  * not have the layout's length or is not a data frame. */
-#define WIRE_LAYOUT(layout, doc)                                                                       \
-	void wire_pack_##layout(struct frame *frame, uint32_t id, const struct wire_##layout *m);      \
+#define WIRE_LAYOUT(layout, doc)                                                                  \
+	void wire_pack_##layout(struct frame *frame, uint32_t id, const struct wire_##layout *m); \
 	DT_MUST_USE int wire_unpack_##layout(const struct frame *frame, struct wire_##layout *m);
 #include "common/wire.def"
 

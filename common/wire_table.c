@@ -14,24 +14,26 @@
 #define WIRE_LAYOUT(layout, doc) struct bytes_##layout {
 #define WIRE_FIELD(layout, type, name, scale, unit, doc) uint8_t name[WIRE_SIZE_##type];
 #define WIRE_ARRAY(layout, type, name, count, scale, unit, doc) uint8_t name[WIRE_SIZE_##type * (count)];
-#define WIRE_END(layout) };
+#define WIRE_END(layout) \
+	}                \
+	;
 #include "common/wire.def"
 
 #define WIRE_LAYOUT(layout, doc) static const struct wire_field fields_##layout[] = {
-#define WIRE_FIELD(layout, type, name, scale, unit, doc)                                     \
-	{#name, unit, doc, scale, offsetof(struct bytes_##layout, name), WIRE_SIZE_##type, 1, \
-	 SIGNED_##type},
-#define WIRE_ARRAY(layout, type, name, count, scale, unit, doc)                                   \
-	{#name, unit, doc, scale, offsetof(struct bytes_##layout, name), WIRE_SIZE_##type, count, \
-	 SIGNED_##type},
-#define WIRE_END(layout) };
+#define WIRE_FIELD(layout, type, name, scale, unit, doc) \
+	{#name, unit, doc, scale, offsetof(struct bytes_##layout, name), WIRE_SIZE_##type, 1, SIGNED_##type},
+#define WIRE_ARRAY(layout, type, name, count, scale, unit, doc)                                    \
+	{#name, unit,         doc, scale, offsetof(struct bytes_##layout, name), WIRE_SIZE_##type, \
+	 count, SIGNED_##type},
+#define WIRE_END(layout) \
+	}                \
+	;
 #include "common/wire.def"
 
-#define WIRE_LAYOUT(layout, doc)                                                                \
-	static const struct wire_layout layout_##layout = {#layout, doc, fields_##layout,       \
-							   COUNT(fields_##layout), WIRE_LENGTH_##layout};
+#define WIRE_LAYOUT(layout, doc)                                                          \
+	static const struct wire_layout layout_##layout = {#layout, doc, fields_##layout, \
+	                                                   COUNT(fields_##layout), WIRE_LENGTH_##layout};
 #include "common/wire.def"
-
 
 const struct wire_layout *const wire_layouts[] = {
 #define WIRE_LAYOUT(layout, doc) &layout_##layout,
@@ -46,7 +48,8 @@ const struct wire_message wire_messages[] = {
 const size_t wire_message_count = COUNT(wire_messages);
 
 const struct wire_parameter_info wire_parameters[] = {
-#define WIRE_PARAMETER(name, index, unit, min, max, initial, doc) {#name, unit, doc, index, min, max, initial},
+#define WIRE_PARAMETER(name, index, unit, min, max, initial, doc) \
+	{#name, unit, doc, index, min, max, initial},
 #include "common/wire.def"
 };
 

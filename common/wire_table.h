@@ -13,10 +13,10 @@ struct wire_field {
 	const char *name;
 	const char *unit;
 	const char *doc;
-	double scale;        /* physical value = raw value x scale */
-	uint8_t offset;      /* first byte */
-	uint8_t size;        /* bytes of one element */
-	uint8_t count;       /* elements; 1 for a plain field */
+	double scale;   /* physical value = raw value x scale */
+	uint8_t offset; /* first byte */
+	uint8_t size;   /* bytes of one element */
+	uint8_t count;  /* elements; 1 for a plain field */
 	uint8_t is_signed;
 };
 

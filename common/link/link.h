@@ -24,18 +24,18 @@ struct link;
 
 enum link_mode {
 	LINK_READ_WRITE,
-	LINK_READ, /* log: a file to read */
+	LINK_READ,  /* log: a file to read */
 	LINK_WRITE, /* log: a file to write */
 };
 
 struct link_counters {
 	uint64_t sent, received;
-	uint64_t send_retried;  /* the queue was full, the frame went later */
-	uint64_t send_lost;     /* the queue stayed full, the frame was dropped and DT_E_FULL returned */
-	uint64_t receive_lost;  /* the kernel or a peer's queue dropped it before us */
-	uint64_t errors;        /* error frames received */
-	uint64_t malformed;     /* text or bytes that are no frame, skipped */
-	uint64_t restarts;      /* interface went down and came back, or a peer came back */
+	uint64_t send_retried; /* the queue was full, the frame went later */
+	uint64_t send_lost;    /* the queue stayed full, the frame was dropped and DT_E_FULL returned */
+	uint64_t receive_lost; /* the kernel or a peer's queue dropped it before us */
+	uint64_t errors;       /* error frames received */
+	uint64_t malformed;    /* text or bytes that are no frame, skipped */
+	uint64_t restarts;     /* interface went down and came back, or a peer came back */
 };
 
 /* Opens url. On error returns NULL and writes one line of explanation (no newline) into message, which

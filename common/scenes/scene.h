@@ -11,7 +11,7 @@
 enum { SCENE_MESSAGE_MAX = 512 };
 
 struct scene {
-	char name[64];  /* key `name` before any section, e.g. "geometry-2A" */
+	char name[64];   /* key `name` before any section, e.g. "geometry-2A" */
 	char title[128]; /* key `title`, for reports */
 #define SCENE_KEY(section, key, min, max, initial, doc) double section##_##key;
 #include "common/scenes/scene.def"

@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * The simulated sensor bus: bytes written by hand and the way there and back.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include "common/error.h"
+#include "common/sensorbus.h"
+
+static void request_bytes(void **state)
+{
+	static const uint8_t bytes[SENSORBUS_REQUEST_BYTES] = {
+	        0x78, 0x56, 0x34, 0x12, 3, 0, 0x0B, 0x00, 2, 1, 1, 0, 0, 0, 0, 0, 0xD2, 0x04, 0, 0};
+	struct sensorbus_request request = {.tick_ms = 0x12345678,
+	                                    .group = SENSORBUS_X | SENSORBUS_YZ,
+	                                    .outputs = 0x000B,
+	                                    .edges = 2,
+	                                    .frames = 1,
+	                                    .reset = 1,
+	                                    .edge_us = {0, 1234}};
+	struct sensorbus_request back;
+	uint8_t out[SENSORBUS_REQUEST_BYTES];
+
+	(void)state;
+	assert_int_equal(sensorbus_put_request(out, &request), SENSORBUS_REQUEST_BYTES);
+	assert_memory_equal(out, bytes, sizeof(bytes));
+	assert_int_equal(sensorbus_get_request(bytes, &back), SENSORBUS_REQUEST_BYTES);
+	assert_memory_equal(&back, &request, sizeof(back));
+}
+
+static void answer_bytes(void **state)
+{
+	static const uint8_t bytes[SENSORBUS_ANSWER_BYTES] = {
+	        1, 0, 0xFF, 0xFF, 0,    0x80, 4,    0, 5, 0, 6, 0, 0xF0, 0x03, 2, 1,
+	        0, 0, 0,    0,    0x40, 0xE2, 0x01, 0, 3, 1, 9, 0, 1,    1,    0, 0};
+	struct sensorbus_answer back;
+	uint8_t out[SENSORBUS_ANSWER_BYTES];
+
+	(void)state;
+	assert_int_equal(sensorbus_get_answer(bytes, &back), SENSORBUS_ANSWER_BYTES);
+	assert_int_equal(back.codes[0], 1);
+	assert_int_equal(back.codes[1], -1);
+	assert_int_equal(back.codes[2], -32768);
+	assert_int_equal(back.codes[5], 6);
+	assert_int_equal(back.inputs, 0x3F0);
+	assert_int_equal(back.captures, 2);
+	assert_int_equal(back.frames, 1);
+	assert_int_equal(back.capture_us[1], 123456);
+	assert_int_equal(back.ready, 3);
+	assert_int_equal(back.stop, 1);
+	assert_int_equal(back.bus_errors, 9);
+	assert_int_equal(back.bus_off, 1);
+	assert_int_equal(back.tx_blocked, 1);
+	assert_int_equal(sensorbus_put_answer(out, &back), SENSORBUS_ANSWER_BYTES);
+	assert_memory_equal(out, bytes, sizeof(bytes));
+}
+
+static void frame_bytes(void **state)
+{
+	static const uint8_t bytes[] = {0x01, 0x02, 0x03, 3, 9, 8, 7};
+	static const uint8_t too_long[] = {0x01, 0x02, 0x03, 65};
+	struct frame frame = {.id = 0x201, .flags = FRAME_FD | FRAME_BRS, .length = 3, .data = {9, 8, 7}};
+	struct frame back = {0};
+	uint8_t out[SENSORBUS_FRAME_BYTES_MAX];
+
+	(void)state;
+	assert_int_equal(sensorbus_put_frame(out, &frame), sizeof(bytes));
+	assert_memory_equal(out, bytes, sizeof(bytes));
+	assert_int_equal(sensorbus_frame_head(bytes, &back), 3);
+	assert_int_equal(back.id, 0x201);
+	assert_int_equal(back.flags, FRAME_FD | FRAME_BRS);
+	assert_int_equal(sensorbus_frame_head(too_long, &back), DT_E_LENGTH);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(request_bytes),
+	        cmocka_unit_test(answer_bytes),
+	        cmocka_unit_test(frame_bytes),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,233 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * The wire: bytes written by hand against pack and unpack, every layout there and back with random
+ * content, refusals, and the tables against the structs.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <string.h>
+
+#include "common/crc.h"
+#include "common/wire.h"
+#include "common/wire_table.h"
+
+static void command_has_the_bytes_of_the_design(void **state)
+{
+	static const uint8_t bytes[8] = {2, 7, 0x34, 0x12, 0xEF, 0xBE, 0xAD, 0xDE};
+	struct wire_command command = {.op = 2, .sequence = 7, .token = 0x1234, .argument = 0xDEADBEEF};
+	struct wire_command back = {0};
+	struct frame frame = {.time_us = 99};
+
+	(void)state;
+	wire_pack_command(&frame, WIRE_ID_COMMAND, &command);
+	assert_int_equal(frame.id, 0x201);
+	assert_int_equal(frame.length, 8);
+	assert_int_equal(frame.flags, 0);
+	assert_int_equal(frame.time_us, 99);
+	assert_memory_equal(frame.data, bytes, 8);
+	assert_int_equal(wire_unpack_command(&frame, &back), 0);
+	assert_int_equal(back.argument, 0xDEADBEEF);
+	assert_int_equal(back.token, 0x1234);
+}
+
+static void block_has_the_bytes_of_the_design(void **state)
+{
+	struct wire_block block = {.drop_id = 0x0102, .tick_ms = 0x03040506, .status = 0x17, .io = 0x0809};
+	struct wire_block back;
+	struct frame frame;
+	uint8_t expected[64] = {0x02, 0x01, 0x06, 0x05, 0x04, 0x03, 0x17, 0x09, 0x08};
+	uint8_t without_crc[63];
+
+	(void)state;
+	block.x[0] = -32768;
+	block.x[6] = 0x0A0B;
+	block.y[0] = -2;
+	block.z[9] = 16000;
+	expected[11] = 0x80; /* x[0] at 10 */
+	expected[22] = 0x0B; /* x[6] at 10 + 12 */
+	expected[23] = 0x0A;
+	expected[24] = 0xFE; /* y[0] at 10 + 14 */
+	expected[25] = 0xFF;
+	expected[62] = 0x80; /* z[9] = 0x3E80 at 44 + 18 */
+	expected[63] = 0x3E;
+
+	wire_pack_block(&frame, WIRE_ID_BLOCK_S2, &block);
+	wire_seal_block(&frame);
+	memcpy(without_crc, expected, 9);
+	memcpy(without_crc + 9, expected + 10, 54);
+	expected[9] = crc8(CRC8_INIT, without_crc, sizeof(without_crc));
+	assert_int_equal(frame.id, 0x281);
+	assert_int_equal(frame.length, 64);
+	assert_int_equal(frame.flags, FRAME_FD | FRAME_BRS);
+	assert_memory_equal(frame.data, expected, 64);
+	assert_int_equal(wire_check_block(&frame), 0);
+	assert_int_equal(wire_unpack_block(&frame, &back), 0);
+	assert_int_equal(back.x[0], -32768);
+	assert_int_equal(back.z[9], 16000);
+}
+
+static void any_flipped_bit_of_a_block_is_seen(void **state)
+{
+	struct wire_block block = {.drop_id = 1, .tick_ms = 1234, .x = {1, 2, 3, 4, 5, 6, 7}};
+	struct frame frame;
+
+	(void)state;
+	wire_pack_block(&frame, WIRE_ID_BLOCK_S1, &block);
+	wire_seal_block(&frame);
+	for (unsigned bit = 0; bit < 64 * 8; bit++) {
+		frame.data[bit / 8] ^= (uint8_t)(1u << (bit % 8));
+		assert_int_equal(wire_check_block(&frame), DT_E_CORRUPT);
+		frame.data[bit / 8] ^= (uint8_t)(1u << (bit % 8));
+	}
+	frame.length = 48;
+	assert_int_equal(wire_check_block(&frame), DT_E_LENGTH);
+}
+
+static uint32_t random_state;
+
+static uint8_t random_byte(void)
+{
+	random_state = random_state * 1664525u + 1013904223u;
+	return (uint8_t)(random_state >> 24);
+}
+
+/* Random data through unpack and pack of one layout must come back byte for byte. */
+#define WIRE_LAYOUT(layout, doc)                                                      \
+	static void there_and_back_##layout(struct frame *frame)                      \
+	{                                                                             \
+		struct wire_##layout message;                                         \
+		struct frame back = {0};                                              \
+		frame->length = WIRE_LENGTH_##layout;                                 \
+		assert_int_equal(wire_unpack_##layout(frame, &message), 0);           \
+		wire_pack_##layout(&back, frame->id, &message);                       \
+		assert_int_equal(back.length, frame->length);                         \
+		assert_memory_equal(back.data, frame->data, frame->length);           \
+		frame->length = (uint8_t)(frame->length - 1);                         \
+		assert_int_equal(wire_unpack_##layout(frame, &message), DT_E_LENGTH); \
+		frame->length = WIRE_LENGTH_##layout;                                 \
+		frame->flags = FRAME_ERROR;                                           \
+		assert_int_equal(wire_unpack_##layout(frame, &message), DT_E_LENGTH); \
+		frame->flags = 0;                                                     \
+	}
+#include "common/wire.def"
+
+static void every_layout_there_and_back(void **state)
+{
+	struct frame frame = {.id = 0x123};
+
+	(void)state;
+	random_state = 20;
+	for (int round = 0; round < 100; round++) {
+		for (int i = 0; i < 64; i++)
+			frame.data[i] = random_byte();
+#define WIRE_LAYOUT(layout, doc) there_and_back_##layout(&frame);
+#include "common/wire.def"
+	}
+}
+
+static void tables_agree_with_the_structs(void **state)
+{
+	struct wire_block block = {0};
+	struct frame frame;
+	const struct wire_message *message = wire_message_of(0x181);
+
+	(void)state;
+	assert_non_null(message);
+	assert_string_equal(message->name, "BLOCK_S1");
+	assert_string_equal(message->sender, "tower");
+	assert_int_equal(message->layout->length, 64);
+	assert_int_equal(message->layout->field_count, 8);
+	block.tick_ms = 4000000000u;
+	block.y[3] = -12345;
+	wire_pack_block(&frame, 0x181, &block);
+	assert_int_equal(wire_field_value(&message->layout->fields[1], frame.data, 0), 4000000000);
+	assert_int_equal(wire_field_value(&message->layout->fields[6], frame.data, 3), -12345);
+	assert_null(wire_message_of(0x7FF));
+	for (size_t i = 0; i < wire_layout_count; i++) {
+		size_t bytes = 0;
+
+		for (size_t f = 0; f < wire_layouts[i]->field_count; f++) {
+			assert_int_equal(wire_layouts[i]->fields[f].offset, bytes);
+			bytes += (size_t)wire_layouts[i]->fields[f].size * wire_layouts[i]->fields[f].count;
+		}
+		assert_int_equal(bytes, wire_layouts[i]->length);
+	}
+}
+
+static void identifiers_are_those_of_cia_301_for_node_1(void **state)
+{
+	/* CiA 301 table: NMT 0, SYNC 80, EMCY 81, TIME 100, TPDO1-4 181 281 381 481, RPDO1-2 201 301,
+	 * SDO 581 601, heartbeat 701 */
+	static const uint32_t expected[] = {0x000, 0x080, 0x081, 0x100, 0x181, 0x281, 0x381, 0x481, 0x201,
+	                                    0x301, 0x581, 0x601, 0x681, 0x682, 0x683, 0x684, 0x701, 0x77F};
+
+	(void)state;
+	assert_int_equal(wire_message_count, sizeof(expected) / sizeof(expected[0]));
+	for (size_t i = 0; i < wire_message_count; i++) {
+		assert_int_equal(wire_messages[i].id, expected[i]);
+		for (size_t j = 0; j < i; j++)
+			assert_int_not_equal(wire_messages[i].id, wire_messages[j].id);
+	}
+}
+
+static void names_of_numbers_that_are_none(void **state)
+{
+	(void)state;
+	assert_string_equal(wire_state_name(0), "BOOT");
+	assert_string_equal(wire_state_name(10), "FAULT_MOVING");
+	assert_string_equal(wire_state_name(11), "?");
+	assert_string_equal(wire_fault_name(1), "ESTOP");
+	assert_string_equal(wire_fault_name(200), "?");
+	assert_string_equal(wire_op_name(3), "ABORT");
+	assert_string_equal(wire_op_name(0), "?");
+	assert_string_equal(wire_mark_name(15), "?");
+	assert_string_equal(wire_check_text(99), "?");
+	assert_string_equal(wire_counter_name(255), "?");
+	assert_int_equal(wire_fault_emcy(3), 0x8130);
+	assert_int_equal(wire_state_moving(WIRE_STATE_FALLING), 1);
+	assert_int_equal(wire_state_moving(WIRE_STATE_ARMED), 0);
+	assert_string_equal(error_text(0), "done");
+	assert_string_equal(error_text(-9), "wrong token");
+	assert_string_equal(error_text(-100), "unknown error");
+}
+
+static void fd_lengths(void **state)
+{
+	(void)state;
+	assert_int_equal(wire_fd_length(0), 0);
+	assert_int_equal(wire_fd_length(8), 8);
+	assert_int_equal(wire_fd_length(9), 12);
+	assert_int_equal(wire_fd_length(33), 48);
+	assert_int_equal(wire_fd_length(64), 64);
+	assert_int_equal(wire_fd_length(65), 0);
+	assert_int_not_equal(wire_hash(), 0);
+}
+
+static void parameters_hold_their_own_limits(void **state)
+{
+	(void)state;
+	for (int i = 0; i < WIRE_PARAMETERS; i++) {
+		assert_true(wire_parameters[i].min <= wire_parameters[i].initial);
+		assert_true(wire_parameters[i].initial <= wire_parameters[i].max);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(command_has_the_bytes_of_the_design),
+	        cmocka_unit_test(block_has_the_bytes_of_the_design),
+	        cmocka_unit_test(any_flipped_bit_of_a_block_is_seen),
+	        cmocka_unit_test(every_layout_there_and_back),
+	        cmocka_unit_test(tables_agree_with_the_structs),
+	        cmocka_unit_test(identifiers_are_those_of_cia_301_for_node_1),
+	        cmocka_unit_test(names_of_numbers_that_are_none),
+	        cmocka_unit_test(fd_lengths),
+	        cmocka_unit_test(parameters_hold_their_own_limits),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
