@@ -5,7 +5,8 @@
  * One small interface in front of every CAN transport a Linux program of ours uses.
  *
  *   unix:PATH    a bus of processes on this machine, no CAN driver needed. The first to open it serves
- *                the others (SOCK_SEQPACKET); every frame reaches every other process on it.
+ *                the others (SOCK_SEQPACKET); every frame reaches every other process on it. When the server
+ *                goes, the others go on with one of them as the server.
  *   can:IF       SocketCAN: can0, vcan0, ... with FD, kernel receive times, error frames, SO_RXQ_OVFL.
  *   slcan:DEV    a serial or USB adapter that speaks SLCAN; 'd' 'D' 'b' 'B' for FD as the CANable 2.
  *                slcan:DEV@BAUD sets the line's speed (default 3000000; no matter on USB).
@@ -35,19 +36,21 @@ struct link_counters {
 	uint64_t receive_lost; /* the kernel or a peer's queue dropped it before us */
 	uint64_t errors;       /* error frames received */
 	uint64_t malformed;    /* text or bytes that are no frame, skipped */
-	uint64_t restarts;     /* interface went down and came back, or a peer came back */
+	uint64_t restarts;     /* interface went down and came back, or the bus has a new server */
 };
 
 /* Opens url. On error returns NULL and writes one line of explanation (no newline) into message, which
  * has room for size bytes: "unix:/tmp/bus: no such directory, ..." */
 struct link *link_open(const char *url, enum link_mode mode, char *message, unsigned size);
 
-/* 0, DT_E_FULL (queue stayed full for 10 ms), DT_E_CLOSED, DT_E_LINK, or DT_E_ARGUMENT (a frame this
- * transport cannot carry). frame->time_us is written to log: links; 0 there means now. */
+/* 0, DT_E_FULL (queue stayed full for 10 ms), DT_E_CLOSED, DT_E_LINK, DT_E_SYSTEM (a log that cannot be
+ * written), DT_E_STATE (opened for reading), or DT_E_ARGUMENT (a frame this transport cannot carry, or none
+ * at all). frame->time_us is written to log: links; 0 there means now. */
 DT_MUST_USE int link_send(struct link *link, const struct frame *frame);
 
 /* 1 with a frame in *frame, 0 when timeout_ms passed without one (0 = do not wait, negative = for ever),
- * DT_E_CLOSED at the end of a log, DT_E_LINK. A SocketCAN interface that is down is waited for and
+ * DT_E_CLOSED at the end of a log or when a bus cannot be joined again, DT_E_LINK, DT_E_SYSTEM, DT_E_STATE
+ * (opened for writing). A SocketCAN interface that is down is waited for and
  * counted, it is not an error. Error reports arrive as frames with FRAME_ERROR. A log line that is not
  * a frame is skipped and counted; link_line tells where the last frame stood. time_us is never 0 on
  * return: kernel time for can:, else the time it was read, or the log's. */

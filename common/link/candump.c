@@ -1,0 +1,267 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "common/link/candump.h"
+
+#include <string.h>
+
+#include "common/link/transport.h"
+
+#define ERROR_BIT 0x20000000u
+#define SECOND_DIGITS_MAX 12 /* so that microseconds fit 63 bits */
+#define INTERFACE_MAX 64
+
+enum { FLAG_BRS = 1, FLAG_ESI = 2, FLAG_ALL = 7 };
+
+/* clang-format off */
+/* Value of a hex digit plus one; 0 for every other byte. */
+static const uint8_t digit_value[256] = {
+	['0'] = 1, ['1'] = 2, ['2'] = 3, ['3'] = 4, ['4'] = 5, ['5'] = 6, ['6'] = 7, ['7'] = 8, ['8'] = 9,
+	['9'] = 10, ['A'] = 11, ['B'] = 12, ['C'] = 13, ['D'] = 14, ['E'] = 15, ['F'] = 16,
+	['a'] = 11, ['b'] = 12, ['c'] = 13, ['d'] = 14, ['e'] = 15, ['f'] = 16,
+};
+/* clang-format on */
+
+/* What is left of the line. Every step eats what it understood; a step that fails leaves `at` where the
+ * line stopped making sense. */
+struct text {
+	const char *at, *end;
+};
+
+static int peek(const struct text *text)
+{
+	return text->at < text->end ? (unsigned char)*text->at : -1;
+}
+
+static bool eat(struct text *text, char c)
+{
+	if (text->at == text->end || *text->at != c)
+		return false;
+	text->at++;
+	return true;
+}
+
+static unsigned eat_blanks(struct text *text)
+{
+	const char *start = text->at;
+
+	while (text->at < text->end && (*text->at == ' ' || *text->at == '\t'))
+		text->at++;
+	return (unsigned)(text->at - start);
+}
+
+/* -1 if there is no hex digit. */
+static int eat_nibble(struct text *text)
+{
+	int value = text->at < text->end ? digit_value[(unsigned char)*text->at] - 1 : -1;
+
+	if (value >= 0)
+		text->at++;
+	return value;
+}
+
+static bool is_decimal(int c)
+{
+	return c >= '0' && c <= '9';
+}
+
+/* At most max decimal digits into *value; how many there were. */
+static int eat_decimals(struct text *text, int max, int64_t *value)
+{
+	int digits = 0;
+
+	for (*value = 0; digits < max && is_decimal(peek(text)); digits++)
+		*value = *value * 10 + (*text->at++ - '0');
+	return digits;
+}
+
+static bool eat_time(struct text *text, int64_t *time_us)
+{
+	int64_t seconds, decimals = 0, below_us;
+	int digits = 0;
+
+	if (!eat(text, '(') || eat_decimals(text, SECOND_DIGITS_MAX, &seconds) == 0)
+		return false;
+	if (eat(text, '.')) {
+		digits = eat_decimals(text, 6, &decimals);
+		(void)eat_decimals(text, 3, &below_us);
+	}
+	for (; digits < 6; digits++)
+		decimals *= 10;
+	*time_us = seconds * 1000000 + decimals;
+	return eat(text, ')');
+}
+
+static bool eat_interface(struct text *text)
+{
+	const char *start;
+
+	if (eat_blanks(text) == 0)
+		return false;
+	start = text->at;
+	while (peek(text) > ' ' && peek(text) != 127)
+		text->at++;
+	return text->at > start && eat_blanks(text) > 0;
+}
+
+/* A wrong identifier is reported where it begins. */
+static bool eat_id(struct text *text, struct frame *frame)
+{
+	const char *start = text->at;
+	uint32_t id = 0;
+	int nibble, digits = 0;
+
+	for (; digits < 8 && (nibble = eat_nibble(text)) >= 0; digits++)
+		id = id << 4 | (uint32_t)nibble;
+	if (digits == 8)
+		frame->flags = (id & ERROR_BIT) != 0 ? FRAME_ERROR : FRAME_EXTENDED;
+	frame->id = (frame->flags & FRAME_ERROR) != 0 ? id ^ ERROR_BIT : id;
+	if ((digits == 3 || digits == 8) && frame->id <= (digits == 3 ? 0x7FFu : 0x1FFFFFFFu) &&
+	    eat(text, '#'))
+		return true;
+	text->at = start;
+	return false;
+}
+
+static bool eat_fd_flags(struct text *text, struct frame *frame)
+{
+	int nibble = eat_nibble(text);
+
+	if (nibble < 0 || nibble > FLAG_ALL)
+		return false;
+	frame->flags |= FRAME_FD;
+	if ((nibble & FLAG_BRS) != 0)
+		frame->flags |= FRAME_BRS;
+	if ((nibble & FLAG_ESI) != 0)
+		frame->flags |= FRAME_ESI;
+	return true;
+}
+
+static void eat_data(struct text *text, struct frame *frame)
+{
+	unsigned length = 0;
+
+	while (length < FRAME_DATA_MAX && text->end - text->at >= 2) {
+		unsigned high = digit_value[(unsigned char)text->at[0]];
+		unsigned low = digit_value[(unsigned char)text->at[1]];
+
+		if (high == 0 || low == 0)
+			break;
+		frame->data[length++] = (uint8_t)((high - 1) << 4 | (low - 1));
+		text->at += 2;
+	}
+	frame->length = (uint8_t)length;
+}
+
+static void eat_remote_length(struct text *text, struct frame *frame)
+{
+	int nibble = eat_nibble(text);
+
+	frame->flags |= FRAME_REMOTE;
+	frame->length = nibble < 0 ? 0 : (uint8_t)nibble;
+}
+
+static bool eat_content(struct text *text, struct frame *frame)
+{
+	if (eat(text, 'R')) {
+		eat_remote_length(text, frame);
+		return true;
+	}
+	if (eat(text, '#') && !eat_fd_flags(text, frame))
+		return false;
+	eat_data(text, frame);
+	return true;
+}
+
+/* Blanks, a direction, the line's end; nothing else. */
+static bool eat_tail(struct text *text)
+{
+	if (eat_blanks(text) > 0 && (eat(text, 'R') || eat(text, 'T')))
+		eat_blanks(text);
+	(void)eat(text, '\r');
+	(void)eat(text, '\n');
+	return text->at == text->end;
+}
+
+int candump_parse(const char *line, size_t length, struct frame *frame, unsigned *column)
+{
+	struct text text = {line, line + length};
+	struct frame parsed = {0};
+
+	if (peek(&text) != '(')
+		return 0;
+	if (!eat_time(&text, &parsed.time_us) || !eat_interface(&text) || !eat_id(&text, &parsed) ||
+	    !eat_content(&text, &parsed) || !link_frame_valid(&parsed) || !eat_tail(&text)) {
+		*column = (unsigned)(text.at - line) + 1u;
+		return DT_E_FORMAT;
+	}
+	*frame = parsed;
+	return 1;
+}
+
+static const char hex_digits[16] = "0123456789ABCDEF";
+
+static char *put_decimal(char *p, uint64_t value, int digits_min)
+{
+	char reversed[20];
+	int digits = 0;
+
+	for (; value != 0 || digits < digits_min; value /= 10)
+		reversed[digits++] = (char)('0' + value % 10);
+	while (digits > 0)
+		*p++ = reversed[--digits];
+	return p;
+}
+
+static char *put_id(char *p, const struct frame *frame)
+{
+	uint32_t id = (frame->flags & FRAME_ERROR) != 0 ? frame->id | ERROR_BIT : frame->id;
+	int digits = (frame->flags & (FRAME_EXTENDED | FRAME_ERROR)) != 0 ? 8 : 3;
+
+	while (digits-- > 0)
+		*p++ = hex_digits[id >> (4 * digits) & 15u];
+	return p;
+}
+
+static char *put_content(char *p, const struct frame *frame)
+{
+	unsigned length = frame->length < FRAME_DATA_MAX ? frame->length : FRAME_DATA_MAX;
+
+	*p++ = '#';
+	if ((frame->flags & FRAME_REMOTE) != 0) {
+		*p++ = 'R';
+		if (length > 0)
+			*p++ = hex_digits[length & 15u];
+		return p;
+	}
+	if ((frame->flags & FRAME_FD) != 0) {
+		*p++ = '#';
+		*p++ = hex_digits[((frame->flags & FRAME_BRS) != 0 ? FLAG_BRS : 0) |
+		                  ((frame->flags & FRAME_ESI) != 0 ? FLAG_ESI : 0)];
+	}
+	for (unsigned i = 0; i < length; i++) {
+		*p++ = hex_digits[frame->data[i] >> 4];
+		*p++ = hex_digits[frame->data[i] & 15u];
+	}
+	return p;
+}
+
+size_t candump_format(char line[CANDUMP_LINE_MAX], const struct frame *frame, const char *interface)
+{
+	uint64_t time_us = frame->time_us > 0 ? (uint64_t)frame->time_us : 0;
+	size_t name_length = strnlen(interface, INTERFACE_MAX);
+	char *p = line;
+
+	*p++ = '(';
+	p = put_decimal(p, time_us / 1000000, 10);
+	*p++ = '.';
+	p = put_decimal(p, time_us % 1000000, 6);
+	*p++ = ')';
+	*p++ = ' ';
+	memcpy(p, interface, name_length);
+	p += name_length;
+	*p++ = ' ';
+	p = put_id(p, frame);
+	p = put_content(p, frame);
+	*p++ = '\n';
+	*p = '\0';
+	return (size_t)(p - line);
+}
