@@ -53,13 +53,11 @@ const struct wire_parameter_info wire_parameters[] = {
 #include "common/wire.def"
 };
 
-static const char *const state_names[] = {
-#define WIRE_STATE(NAME, moving, doc) #NAME,
-#include "common/wire.def"
-};
-
-static const uint8_t state_moving[] = {
-#define WIRE_STATE(NAME, moving, doc) moving,
+static const struct {
+	const char *name, *text;
+	uint8_t moving;
+} states[] = {
+#define WIRE_STATE(NAME, moving, doc) {#NAME, doc, moving},
 #include "common/wire.def"
 };
 
@@ -105,12 +103,17 @@ int64_t wire_field_value(const struct wire_field *field, const uint8_t *data, un
 
 const char *wire_state_name(unsigned state)
 {
-	return state < WIRE_STATES ? state_names[state] : "?";
+	return state < WIRE_STATES ? states[state].name : "?";
+}
+
+const char *wire_state_text(unsigned state)
+{
+	return state < WIRE_STATES ? states[state].text : "?";
 }
 
 int wire_state_moving(unsigned state)
 {
-	return state < WIRE_STATES ? state_moving[state] : 0;
+	return state < WIRE_STATES ? states[state].moving : 0;
 }
 
 const char *wire_fault_name(unsigned fault)

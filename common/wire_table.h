@@ -58,6 +58,7 @@ int64_t wire_field_value(const struct wire_field *field, const uint8_t *data, un
 
 /* Names and texts; "?" for a number that wire.def does not have. */
 const char *wire_state_name(unsigned state);
+const char *wire_state_text(unsigned state);
 const char *wire_fault_name(unsigned fault);
 const char *wire_fault_text(unsigned fault);
 uint16_t wire_fault_emcy(unsigned fault);

@@ -1,0 +1,78 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_FIRMWARE_ACQUIRE_H
+#define DT_FIRMWARE_ACQUIRE_H
+/*
+ * Samples into ticks. Each millisecond both sensors give 7 X and 10 Y and Z; a sample that did not come
+ * keeps its place as WIRE_SAMPLE_NOT_TAKEN and is counted. Finished ticks wait in a short queue for main.
+ *
+ * Context: interrupt, except acquire_init (before interrupts), acquire_take and acquire_pack (main).
+ * Counts are 1/32 g. Clipping is judged against the parameter range_counts.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/frame.h"
+#include "common/ring.h"
+#include "common/wire.h"
+#include "firmware/parameter.h"
+
+enum {
+	ACQUIRE_QUEUE = 16,        /* ticks that main may be behind before one is lost */
+	ACQUIRE_CLOCK_TICKS = 100, /* the sample clocks are judged over this many */
+	ACQUIRE_SAMPLES_PER_TICK = 2 * (WIRE_X_PER_TICK + 2 * WIRE_YZ_PER_TICK),
+};
+
+struct acquire_samples {
+	int16_t x[WIRE_X_PER_TICK], y[WIRE_YZ_PER_TICK], z[WIRE_YZ_PER_TICK];
+};
+
+/* Everything the two blocks of one millisecond are made from. */
+struct acquire_tick {
+	uint32_t tick_ms;
+	uint16_t drop_id;
+	uint16_t io;    /* at the tick, and WIRE_IO_OVERRUN */
+	uint16_t marks; /* WIRE_MARK_* that this tick gives the drop */
+	uint8_t status[WIRE_SENSORS];
+	struct acquire_samples sensor[WIRE_SENSORS];
+};
+
+/* What is known when a tick begins. */
+struct acquire_head {
+	uint32_t tick_ms;
+	uint16_t drop_id, io, marks;
+	uint8_t state; /* WIRE_STATE_* */
+};
+
+struct acquire {
+	const struct parameters *parameters;
+	volatile uint32_t *counters;
+	struct acquire_tick tick; /* the one being filled */
+	bool open;
+	uint8_t x_count, yz_count;
+	uint8_t clock_ticks;
+	uint16_t clock_x, clock_yz;
+	bool clocks_good; /* over the last ACQUIRE_CLOCK_TICKS X:YZ was 7:10 exactly */
+	struct ring queue;
+	struct acquire_tick storage[ACQUIRE_QUEUE];
+};
+
+void acquire_init(struct acquire *acquire, const struct parameters *parameters, volatile uint32_t *counters);
+
+/* Ends the tick that is open, if any, and queues it. */
+void acquire_close(struct acquire *acquire);
+
+/* Opens the next. */
+void acquire_open(struct acquire *acquire, const struct acquire_head *head);
+
+/* The next sample instant has come; ready false = the converter did not deliver, the codes are nothing. */
+void acquire_x(struct acquire *acquire, const int16_t code[WIRE_SENSORS], bool ready);
+void acquire_yz(struct acquire *acquire, const int16_t y[WIRE_SENSORS], const int16_t z[WIRE_SENSORS],
+                bool ready);
+
+/* Main: the oldest finished tick, or DT_E_EMPTY. */
+DT_MUST_USE int acquire_take(struct acquire *acquire, struct acquire_tick *tick);
+
+/* Main: the sealed block of sensor 0 (S1) or 1 (S2). */
+void acquire_pack(const struct acquire_tick *tick, unsigned sensor, uint32_t id, struct frame *frame);
+
+#endif

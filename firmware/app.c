@@ -1,0 +1,284 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "firmware/app.h"
+
+#include "common/memory.h"
+#include "firmware/command.h"
+
+enum {
+	BEAT_MS = 100, /* heartbeat, status, capture end */
+	STATUS_PHASE_MS = 50,
+	SYNC_MS = 1000,
+	SYNC_COUNTER_MAX = 240, /* CiA 301 */
+	DAY_MS = 86400000,
+	FRAMES_PER_POLL = 8,
+	TICKS_PER_POLL = 4,
+	NMT_BOOT_UP = 0,
+	NMT_OPERATIONAL = 5,
+	NMT_PRE_OPERATIONAL = 127,
+	ERROR_GENERIC = 1 << 0, /* CiA 301 error register */
+	ERROR_COMMUNICATION = 1 << 4,
+	ERROR_OURS = 1 << 7,
+};
+
+static struct app app;
+
+void app_init(enum port_reset cause)
+{
+	memset(&app, 0, sizeof(app));
+	parameters_init(&app.parameters);
+	sequence_init(&app.sequence, &app.parameters, app.counters, cause); /* first: the magnet */
+	acquire_init(&app.acquire, &app.parameters, app.counters);
+	health_init(&app.health, &app.parameters, app.counters);
+	capture_init(&app.capture, &app.parameters);
+	stream_init(&app.stream, app.counters);
+	app.tick_ms = UINT32_MAX; /* the first tick is 0 */
+	app.seen_ms = UINT32_MAX;
+}
+
+struct sequence_view app_view(const struct app *a)
+{
+	uint16_t io = port_io();
+
+	return (struct sequence_view){
+	        .now_us = port_time_us(),
+	        .io = io,
+	        .checks = health_checks(&a->health, io),
+	        .clocks_good = a->acquire.clocks_good,
+	        .hash_differs = a->health.host_here && !a->health.host_hash_good,
+	};
+}
+
+/* ---- interrupt ---- */
+
+void app_on_tick(void)
+{
+	struct sequence_view view;
+
+	acquire_close(&app.acquire);
+	app.tick_ms++;
+	health_tick(&app.health, app.tick_ms);
+	view = app_view(&app);
+	sequence_tick(&app.sequence, &view, app.tick_ms);
+	acquire_open(&app.acquire, &(struct acquire_head){
+	                                   .tick_ms = app.tick_ms,
+	                                   .drop_id = app.sequence.drop_id,
+	                                   .io = port_io(),
+	                                   .marks = sequence_tick_marks(&app.sequence),
+	                                   .state = app.sequence.state,
+	                           });
+}
+
+void app_on_x(int16_t s1x, int16_t s2x, bool ready)
+{
+	acquire_x(&app.acquire, (const int16_t[]){s1x, s2x}, ready);
+}
+
+void app_on_yz(int16_t s1y, int16_t s1z, int16_t s2y, int16_t s2z, bool ready)
+{
+	acquire_yz(&app.acquire, (const int16_t[]){s1y, s2y}, (const int16_t[]){s1z, s2z}, ready);
+}
+
+void app_on_gate(unsigned gate, uint32_t time_us)
+{
+	sequence_gate(&app.sequence, gate, time_us);
+}
+
+/* ---- main ---- */
+
+static struct sequence snapshot(void)
+{
+	struct sequence now;
+
+	port_lock();
+	now = app.sequence;
+	port_unlock();
+	return now;
+}
+
+static void send_heartbeat(uint8_t state)
+{
+	struct wire_heartbeat heartbeat = {.nmt_state = NMT_OPERATIONAL, .wire_hash = wire_hash()};
+	struct frame frame;
+
+	if (!app.started)
+		heartbeat.nmt_state = NMT_BOOT_UP;
+	else if (state == WIRE_STATE_BOOT)
+		heartbeat.nmt_state = NMT_PRE_OPERATIONAL;
+	app.started = true;
+	wire_pack_heartbeat(&frame, WIRE_ID_HEARTBEAT_TOWER, &heartbeat);
+	stream_send(&app.stream, &frame);
+}
+
+static void send_status(const struct sequence *now)
+{
+	uint16_t io = port_io();
+	struct wire_status status = {
+	        .state = now->state,
+	        .fault = now->fault,
+	        .drop_id = now->drop_id,
+	        .io = io,
+	};
+	struct wire_counter counter = {.index = app.next_counter, .value = app.counters[app.next_counter]};
+	struct frame frame;
+
+	port_lock();
+	status.checks = health_checks(&app.health, io);
+	port_unlock();
+	wire_pack_status(&frame, WIRE_ID_STATUS, &status);
+	stream_send(&app.stream, &frame);
+	wire_pack_counter(&frame, WIRE_ID_COUNTER, &counter);
+	stream_send(&app.stream, &frame);
+	app.next_counter = (uint8_t)((app.next_counter + 1u) % WIRE_COUNTERS);
+}
+
+static void send_time(uint32_t tick_ms)
+{
+	struct wire_time time = {.ms = tick_ms % DAY_MS, .days = (uint16_t)(tick_ms / DAY_MS)};
+	struct frame frame;
+
+	app.sync_counter = (uint8_t)(app.sync_counter % SYNC_COUNTER_MAX + 1u);
+	wire_pack_sync(&frame, WIRE_ID_SYNC, &(struct wire_sync){.counter = app.sync_counter});
+	stream_send(&app.stream, &frame);
+	wire_pack_time(&frame, WIRE_ID_TIME, &time);
+	stream_send(&app.stream, &frame);
+}
+
+static void send_emergency(uint8_t fault)
+{
+	static const uint16_t codes[WIRE_FAULTS] = {
+#define WIRE_FAULT(NAME, emcy, doc) emcy,
+#include "common/wire.def"
+	};
+	struct wire_emcy emcy = {.code = codes[fault], .fault = fault, .tick_ms = app.tick_ms};
+	struct frame frame;
+
+	if (fault != WIRE_FAULT_NONE)
+		emcy.error_register = ERROR_GENERIC;
+	if (emcy.code >> 8 == 0x81)
+		emcy.error_register |= ERROR_COMMUNICATION;
+	if (emcy.code >> 8 == 0xFF)
+		emcy.error_register |= ERROR_OURS;
+	wire_pack_emcy(&frame, WIRE_ID_EMCY, &emcy);
+	stream_send(&app.stream, &frame);
+}
+
+void app_send_capture_end(struct app *a)
+{
+	struct sequence now = snapshot();
+	struct wire_capture_end end = {
+	        .drop_id = now.drop_id,
+	        .marks = (uint16_t)(now.marks | a->capture.marks),
+	        .first_tick_ms = a->capture.first_ms,
+	        .last_tick_ms = a->capture.last_ms,
+	        .trigger_us = a->capture.trigger_us,
+	        .crc32 = a->capture.crc32,
+	        .frame_speed_mm_s = now.frame_speed_mm_s,
+	};
+	struct frame frame;
+
+	wire_pack_capture_end(&frame, WIRE_ID_CAPTURE_END, &end);
+	stream_send(&a->stream, &frame);
+	a->capture_end_ms = a->tick_ms;
+}
+
+/* The ticks that the interrupt has finished: into the ring, and out. */
+static void take_ticks(void)
+{
+	enum capture_phase before = app.capture.phase;
+	struct acquire_tick tick;
+
+	for (unsigned i = 0; i < TICKS_PER_POLL && acquire_take(&app.acquire, &tick) == 0; i++) {
+		health_samples(&app.health, &tick);
+		capture_put(&app.capture, &tick);
+		stream_tick(&app.stream, &tick);
+	}
+	if (before == CAPTURE_ROLLING && app.capture.phase != CAPTURE_ROLLING) {
+		port_lock();
+		sequence_triggered(&app.sequence);
+		port_unlock();
+	}
+	if (capture_work(&app.capture)) {
+		port_lock();
+		sequence_full(&app.sequence);
+		port_unlock();
+		app_send_capture_end(&app);
+	}
+}
+
+static void receive(void)
+{
+	struct frame frame;
+
+	for (unsigned i = 0; i < FRAMES_PER_POLL && port_can_receive(&frame) == 1; i++)
+		command_handle(&app, &frame);
+}
+
+/* A bus-off disarms; in motion the drop goes on without the bus. */
+static void disarm(void)
+{
+	port_lock();
+	if (app.sequence.state == WIRE_STATE_ARMED)
+		sequence_fault(&app.sequence, WIRE_FAULT_BUS_OFF);
+	port_unlock();
+}
+
+static void watch_bus(const struct sequence *now)
+{
+	bool bus_off;
+
+	app.counters[WIRE_COUNTER_bus_errors] = port_can_errors(&bus_off);
+	if (bus_off && !app.bus_was_off) {
+		app.counters[WIRE_COUNTER_bus_offs]++;
+		disarm();
+	}
+	if (!bus_off && app.bus_was_off && now->fault != WIRE_FAULT_BUS_OFF)
+		send_emergency(WIRE_FAULT_BUS_OFF);
+	app.bus_was_off = bus_off;
+}
+
+static void watch_fault(const struct sequence *now)
+{
+	if (now->fault == app.fault_reported)
+		return;
+	send_emergency(now->fault);
+	app.fault_reported = now->fault;
+}
+
+/* A multiple of the period has passed since the last tick seen; also when main is late. */
+static bool due(uint32_t tick_ms, uint32_t phase_ms, uint32_t period_ms)
+{
+	return (tick_ms + phase_ms) / period_ms != (app.seen_ms + phase_ms) / period_ms;
+}
+
+/* What is due in the tick that has just begun. */
+static void beat(const struct sequence *now, uint32_t tick_ms)
+{
+	port_watchdog_kick();
+	app.counters[WIRE_COUNTER_ticks_late] += tick_ms - app.seen_ms - 1;
+	if (due(tick_ms, 0, SYNC_MS))
+		send_time(tick_ms);
+	if (due(tick_ms, 0, BEAT_MS))
+		send_heartbeat(now->state);
+	if (due(tick_ms, STATUS_PHASE_MS, BEAT_MS))
+		send_status(now);
+	app.seen_ms = tick_ms;
+	if (now->state == WIRE_STATE_CAPTURED && tick_ms - app.capture_end_ms >= BEAT_MS)
+		app_send_capture_end(&app);
+	stream_resend(&app.stream, &app.capture);
+}
+
+void app_poll(void)
+{
+	struct sequence now;
+	uint32_t tick_ms;
+
+	stream_flush(&app.stream);
+	take_ticks();
+	receive();
+	now = snapshot();
+	watch_bus(&now);
+	watch_fault(&now);
+	tick_ms = app.tick_ms;
+	if (tick_ms != app.seen_ms)
+		beat(&now, tick_ms);
+}

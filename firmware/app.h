@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_FIRMWARE_APP_H
+#define DT_FIRMWARE_APP_H
+/*
+ * The whole firmware behind the calls of a port. All state is one static struct app in app.c, its members the
+ * modules. A port calls app_init once, then from its interrupts app_on_*, and app_poll from its main loop
+ * as often as it can, at least once a millisecond.
+ *
+ * Order at a millisecond boundary: gates captured before it, app_on_tick, then the samples of index 0. The
+ * first app_on_tick after app_init is tick 0. Codes are 1/32 g. The interrupts never interrupt each other.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "firmware/acquire.h"
+#include "firmware/capture.h"
+#include "firmware/health.h"
+#include "firmware/parameter.h"
+#include "firmware/port.h"
+#include "firmware/sequence.h"
+#include "firmware/stream.h"
+
+struct app {
+	struct parameters parameters;
+	volatile uint32_t counters[WIRE_COUNTERS]; /* each is written in one context only */
+	volatile uint32_t tick_ms;                 /* now; written by the interrupt */
+	struct acquire acquire;
+	struct sequence sequence;
+	struct health health;
+	struct capture capture;
+	struct stream stream;
+	/* main only */
+	uint32_t seen_ms;        /* last tick that main has seen */
+	uint32_t capture_end_ms; /* when the capture end was last sent */
+	uint8_t fault_reported;
+	uint8_t next_counter, sync_counter;
+	bool started, bus_was_off;
+};
+
+/* Interrupts off. */
+void app_init(enum port_reset cause);
+
+/* Interrupt. ready false = the converter did not deliver. gate 0 upper, 1 lower. */
+void app_on_tick(void);
+void app_on_x(int16_t s1x, int16_t s2x, bool ready);
+void app_on_yz(int16_t s1y, int16_t s1z, int16_t s2y, int16_t s2z, bool ready);
+void app_on_gate(unsigned gate, uint32_t time_us);
+
+/* Main. */
+void app_poll(void);
+
+/* For command.c, main: what is seen now, between port_lock and port_unlock; the capture end, sent. */
+struct sequence_view app_view(const struct app *app);
+void app_send_capture_end(struct app *app);
+
+#endif

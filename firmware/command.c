@@ -1,0 +1,204 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "firmware/command.h"
+
+enum { /* CiA 301 network management */
+       NMT_START = 1,
+       NMT_STOP = 2,
+       NMT_PRE_OPERATIONAL = 128,
+       NMT_RESET_NODE = 129,
+       NMT_RESET_COMMUNICATION = 130,
+       NODE = 1,
+};
+
+enum { /* CiA 301 expedited SDO, four bytes */
+       SDO_READ = 0x40,
+       SDO_WRITE = 0x23,
+       SDO_VALUE = 0x43,
+       SDO_WRITTEN = 0x60,
+       SDO_ABORT = 0x80,
+};
+
+static void count(struct app *app, enum wire_counter_number counter)
+{
+	app->counters[counter]++;
+}
+
+static void operate(struct app *app, const struct wire_command *command)
+{
+	struct sequence *sequence = &app->sequence;
+	struct sequence_view view;
+	struct wire_reply reply;
+	struct frame frame;
+	int result;
+
+	port_lock();
+	view = app_view(app);
+	result = sequence_command(sequence, &view, command, app->capture.crc32);
+	reply = (struct wire_reply){
+	        .op = command->op,
+	        .sequence = command->sequence,
+	        .result = (int8_t)result,
+	        .state = sequence->state,
+	        .checks = view.checks,
+	        .drop_id = sequence->drop_id,
+	};
+	port_unlock();
+	if (result != 0)
+		count(app, WIRE_COUNTER_commands_refused);
+	else if (reply.state == WIRE_STATE_UPLOADED && command->op != WIRE_OP_ABORT)
+		capture_release(&app->capture);
+	wire_pack_reply(&frame, WIRE_ID_REPLY, &reply);
+	stream_send(&app->stream, &frame);
+}
+
+static void reset(struct app *app)
+{
+	bool moving;
+
+	port_lock();
+	moving = sequence_moving(app->sequence.state);
+	port_unlock();
+	if (moving)
+		count(app, WIRE_COUNTER_commands_refused);
+	else
+		port_reset();
+}
+
+static int handle_nmt(struct app *app, const struct frame *frame)
+{
+	struct wire_nmt nmt;
+	int result = wire_unpack_nmt(frame, &nmt);
+
+	if (result != 0 || (nmt.node != NODE && nmt.node != 0))
+		return result;
+	switch (nmt.command) {
+	case NMT_STOP:
+		operate(app, &(struct wire_command){.op = WIRE_OP_ABORT});
+		return 0;
+	case NMT_RESET_NODE:
+	case NMT_RESET_COMMUNICATION:
+		reset(app);
+		return 0;
+	case NMT_START:
+	case NMT_PRE_OPERATIONAL:
+		return 0; /* the tower always talks */
+	default:
+		return DT_E_UNKNOWN;
+	}
+}
+
+static int handle_command(struct app *app, const struct frame *frame)
+{
+	struct wire_command command;
+	int result = wire_unpack_command(frame, &command);
+
+	if (result == 0)
+		operate(app, &command);
+	return result;
+}
+
+static int handle_resend(struct app *app, const struct frame *frame)
+{
+	struct wire_resend request;
+	int result = wire_unpack_resend(frame, &request);
+
+	if (result != 0)
+		return result;
+	if (request.sensor < 1 || request.sensor > WIRE_SENSORS)
+		return DT_E_RANGE;
+	if (request.count > 0)
+		stream_request(&app->stream, &app->capture, &request);
+	else if (app->capture.phase == CAPTURE_COMPLETE)
+		app_send_capture_end(app);
+	else
+		count(app, WIRE_COUNTER_resends_out_of_range);
+	return 0;
+}
+
+static uint32_t write_parameter(struct app *app, uint16_t index, uint32_t value)
+{
+	struct sequence *sequence = &app->sequence;
+	uint32_t abort_code = PARAMETER_WRONG_STATE;
+
+	port_lock();
+	if (sequence->state == WIRE_STATE_SAFE || sequence->state == WIRE_STATE_READY ||
+	    sequence->state == WIRE_STATE_FAULT_HELD) {
+		abort_code = parameters_set(&app->parameters, index, value);
+		if (abort_code == 0)
+			sequence_plan(sequence);
+	}
+	port_unlock();
+	return abort_code;
+}
+
+static int handle_sdo(struct app *app, const struct frame *frame)
+{
+	struct wire_sdo sdo;
+	struct frame answer;
+	uint32_t abort_code;
+	int result = wire_unpack_sdo(frame, &sdo);
+
+	if (result != 0 || sdo.specifier == SDO_ABORT) /* the host's abort needs no answer */
+		return result;
+	if (sdo.specifier != SDO_READ && sdo.specifier != SDO_WRITE)
+		abort_code = PARAMETER_BAD_SPECIFIER;
+	else if (sdo.subindex != 0)
+		abort_code = PARAMETER_NO_SUBINDEX;
+	else if (sdo.specifier == SDO_READ)
+		abort_code = parameters_get(&app->parameters, sdo.index, &sdo.value);
+	else
+		abort_code = write_parameter(app, sdo.index, sdo.value);
+	if (abort_code != 0) {
+		sdo.specifier = SDO_ABORT;
+		sdo.value = abort_code;
+	} else if (sdo.specifier == SDO_WRITE) {
+		sdo.specifier = SDO_WRITTEN;
+		sdo.value = 0;
+	} else {
+		sdo.specifier = SDO_VALUE;
+	}
+	wire_pack_sdo(&answer, WIRE_ID_SDO_REPLY, &sdo);
+	stream_send(&app->stream, &answer);
+	return 0;
+}
+
+static int handle_heartbeat(struct app *app, const struct frame *frame)
+{
+	struct wire_heartbeat heartbeat;
+	int result = wire_unpack_heartbeat(frame, &heartbeat);
+
+	if (result != 0)
+		return result;
+	port_lock();
+	health_host(&app->health, app->tick_ms, heartbeat.wire_hash);
+	port_unlock();
+	return 0;
+}
+
+static int dispatch(struct app *app, const struct frame *frame)
+{
+	switch (frame->id) {
+	case WIRE_ID_NMT:
+		return handle_nmt(app, frame);
+	case WIRE_ID_COMMAND:
+		return handle_command(app, frame);
+	case WIRE_ID_RESEND:
+		return handle_resend(app, frame);
+	case WIRE_ID_SDO_REQUEST:
+		return handle_sdo(app, frame);
+	case WIRE_ID_HEARTBEAT_HOST:
+		return handle_heartbeat(app, frame);
+	default:
+		count(app, WIRE_COUNTER_frames_unknown);
+		return 0;
+	}
+}
+
+void command_handle(struct app *app, const struct frame *frame)
+{
+	count(app, WIRE_COUNTER_frames_received);
+	if (frame->flags & FRAME_EXTENDED)
+		count(app, WIRE_COUNTER_frames_unknown);
+	else if (dispatch(app, frame) != 0)
+		count(app, WIRE_COUNTER_frames_malformed);
+}

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_FIRMWARE_HEALTH_H
+#define DT_FIRMWARE_HEALTH_H
+/*
+ * Is everything fit for a drop? The check bits of wire.def from the inputs, the sensors and the host.
+ *
+ * A sensor is fit when its supply's bias is in its window and, over the last HEALTH_WINDOW_TICKS, offset and
+ * standard deviation of every axis stay within noise_counts (1/32 g) and at least half the samples were
+ * taken. A channel in motion that gives one value for HEALTH_STUCK_TICKS is counted, once for each such
+ * spell.
+ *
+ * Context: health_samples main; the rest interrupt, or main between port_lock and port_unlock.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "firmware/acquire.h"
+#include "firmware/parameter.h"
+
+enum {
+	HEALTH_CHANNELS = 6, /* S1 X Y Z, S2 X Y Z */
+	HEALTH_WINDOW_TICKS = 100,
+	HEALTH_STUCK_TICKS = 20,
+};
+
+struct health_channel {
+	int32_t sum;
+	uint64_t squares;
+	uint16_t count;
+	int16_t last;
+	uint8_t same_ticks;
+};
+
+struct health {
+	const struct parameters *parameters;
+	volatile uint32_t *counters;
+	struct health_channel channel[HEALTH_CHANNELS];
+	uint8_t window_ticks;
+	volatile uint16_t sensor_checks; /* written by main */
+	bool host_here, host_hash_good;
+	uint32_t host_ms; /* last heartbeat */
+};
+
+void health_init(struct health *health, const struct parameters *parameters, volatile uint32_t *counters);
+
+void health_samples(struct health *health, const struct acquire_tick *tick);
+
+/* A heartbeat of the host has come. */
+void health_host(struct health *health, uint32_t tick_ms, uint32_t hash);
+
+/* Every tick: notices that the host is gone. */
+void health_tick(struct health *health, uint32_t tick_ms);
+
+/* WIRE_CHECK_* bits that are not green. */
+uint16_t health_checks(const struct health *health, uint16_t io);
+
+#endif

@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_FIRMWARE_PORT_H
+#define DT_FIRMWARE_PORT_H
+/*
+ * The whole hardware boundary, resolved by the linker: a port is one folder that defines these functions
+ * and calls the entry points of app.h.
+ *
+ * Contexts. "Interrupt" is everything that app_on_* runs in; those calls have one priority and never
+ * interrupt each other. "Main" is app_poll. Functions marked both may be called from either.
+ *
+ * Times are us since reset, 32 bits, wrapping; compare them by signed difference. Outputs and inputs are
+ * bits of wire.def's io word. Inputs arrive debounced. While the controller is in reset the drivers hold
+ * their fail-safe levels by themselves: latch and dampers de-energised, magnet energised.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "common/frame.h"
+
+enum port_reset {
+	PORT_RESET_POWER_ON,
+	PORT_RESET_COMMAND, /* port_reset */
+	PORT_RESET_WATCHDOG,
+	PORT_RESET_BROWN_OUT,
+	PORT_RESETS
+};
+
+/* Both: the clock that also stamps the gates and times the edges. */
+uint32_t port_time_us(void);
+
+/* Both: the inputs, and the outputs as they are at the pins, edges already made included. */
+uint16_t port_io(void);
+
+/* Both: energises the outputs in `on`, de-energises those in `off`, leaves the others alone. */
+void port_outputs(uint16_t on, uint16_t off);
+
+/* Both: de-energises one output at time_us exactly, by hardware compare. There is one such edge for
+ * MAGNET_HOLD and one for DAMPERS_RELIEVE. 0, or 1 if the time had passed and it was done at once. */
+int port_off_at(uint16_t output, uint32_t time_us);
+
+/* Both: takes back a port_off_at that has not happened yet; else nothing. */
+void port_off_cancel(uint16_t output);
+
+/* Main: 0 = the controller has taken the frame, DT_E_FULL = ask again later, also while bus-off. */
+DT_MUST_USE int port_can_send(const struct frame *frame);
+
+/* Main: 1 with a frame, 0 without. */
+DT_MUST_USE int port_can_receive(struct frame *frame);
+
+/* Main: bus errors since reset. *bus_off tells the present state; the port restarts the controller. */
+uint32_t port_can_errors(bool *bus_off);
+
+/* Main: must come at least every 50 ms or the controller is reset with PORT_RESET_WATCHDOG. */
+void port_watchdog_kick(void);
+
+/* Main: restarts with PORT_RESET_COMMAND. May return; the restart then follows when app_poll returns. */
+void port_reset(void);
+
+/* Main: between these no app_on_* runs. Short, not nested. */
+void port_lock(void);
+void port_unlock(void);
+
+#endif

@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <getopt.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "firmware/port.h"
+#include "firmware/port/posix/posix.h"
+
+static const char usage[] =
+        "Usage: droptower-firmware --bus PREFIX [OPTION]...\n"
+        "\n"
+        "The drop tower's controller as a Linux process. It has no sensors, gates and outputs of its own: "
+        "they are\n"
+        "at the other end of two FIFOs, normally droptower-bench, which creates them and starts this "
+        "program.\n"
+        "\n"
+        "  --bus PREFIX       write requests to PREFIX.request, read answers from PREFIX.answer\n"
+        "  --can URL          CAN on a link of its own, unix:PATH, can:IF or slcan:DEV; without it CAN "
+        "frames ride\n"
+        "                     in the requests and answers\n"
+        "  --realtime         keep to the clock, a millisecond for a millisecond; without it time stands "
+        "still\n"
+        "                     until the other end has answered\n"
+        "  --reset-cause N    boot as after 0 power-on (the default), 1 command, 2 watchdog, 3 brown-out\n"
+        "  --help             this text\n"
+        "\n"
+        "Ends with 0 when the other end closes its pipe or says stop, 2 wrong arguments, 4 link or bus "
+        "fault.\n";
+
+enum { OPTION_BUS = 1, OPTION_CAN, OPTION_REALTIME, OPTION_RESET_CAUSE, OPTION_HELP };
+
+static const struct option options[] = {
+        {"bus", required_argument, NULL, OPTION_BUS},
+        {"can", required_argument, NULL, OPTION_CAN},
+        {"realtime", no_argument, NULL, OPTION_REALTIME},
+        {"reset-cause", required_argument, NULL, OPTION_RESET_CAUSE},
+        {"help", no_argument, NULL, OPTION_HELP},
+        {NULL, 0, NULL, 0},
+};
+
+static int refuse(const char *what, const char *value)
+{
+	fprintf(stderr, "droptower-firmware: %s%s; see --help\n", what, value);
+	return POSIX_EXIT_USAGE;
+}
+
+static int parse_cause(const char *text, enum port_reset *cause)
+{
+	char *end;
+	unsigned long value = strtoul(text, &end, 10);
+
+	if (*text < '0' || *text > '9' || *end != '\0' || value >= PORT_RESETS)
+		return DT_E_ARGUMENT;
+	*cause = (enum port_reset)value;
+	return 0;
+}
+
+int main(int argc, char **argv)
+{
+	struct posix_options wanted = {.cause = PORT_RESET_POWER_ON};
+	int option;
+
+	while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {
+		switch (option) {
+		case OPTION_BUS:
+			wanted.bus = optarg;
+			break;
+		case OPTION_CAN:
+			wanted.can = optarg;
+			break;
+		case OPTION_REALTIME:
+			wanted.realtime = true;
+			break;
+		case OPTION_RESET_CAUSE:
+			if (parse_cause(optarg, &wanted.cause) != 0)
+				return refuse("--reset-cause takes 0 to 3, not ", optarg);
+			break;
+		case OPTION_HELP:
+			fputs(usage, stdout);
+			return 0;
+		default:
+			return POSIX_EXIT_USAGE; /* getopt has said why */
+		}
+	}
+	if (optind < argc)
+		return refuse("no arguments expected beside options, got ", argv[optind]);
+	if (wanted.bus == NULL)
+		return refuse("--bus PREFIX is needed", "");
+	signal(SIGPIPE, SIG_IGN);
+	return posix_run(&wanted);
+}

@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "firmware/stream.h"
+
+#include "common/memory.h"
+#include "firmware/port.h"
+
+void stream_init(struct stream *stream, volatile uint32_t *counters)
+{
+	memset(stream, 0, sizeof(*stream));
+	stream->counters = counters;
+	stream->queue = (struct ring)RING_OVER(stream->queue_storage);
+	stream->requests = (struct ring)RING_OVER(stream->requests_storage);
+}
+
+static bool idle(const struct stream *stream)
+{
+	return !stream->waiting && ring_fill(&stream->queue) == 0;
+}
+
+void stream_send(struct stream *stream, const struct frame *frame)
+{
+	bool is_block = frame->length == WIRE_LENGTH_block;
+
+	if (idle(stream) && port_can_send(frame) == 0) {
+		stream->counters[WIRE_COUNTER_frames_sent]++;
+		return;
+	}
+	if ((is_block && ring_fill(&stream->queue) >= STREAM_QUEUE - STREAM_RESERVED) ||
+	    ring_put(&stream->queue, frame) != 0)
+		stream->counters[WIRE_COUNTER_frames_dropped]++;
+	else
+		stream->counters[WIRE_COUNTER_frames_deferred]++;
+}
+
+void stream_flush(struct stream *stream)
+{
+	for (unsigned i = 0; i <= STREAM_QUEUE; i++) {
+		if (!stream->waiting && ring_get(&stream->queue, &stream->next) != 0)
+			return;
+		stream->waiting = port_can_send(&stream->next) != 0;
+		if (stream->waiting)
+			return;
+		stream->counters[WIRE_COUNTER_frames_sent]++;
+	}
+}
+
+void stream_tick(struct stream *stream, const struct acquire_tick *tick)
+{
+	struct frame frame;
+
+	acquire_pack(tick, 0, WIRE_ID_BLOCK_S1, &frame);
+	stream_send(stream, &frame);
+	acquire_pack(tick, 1, WIRE_ID_BLOCK_S2, &frame);
+	stream_send(stream, &frame);
+}
+
+/* Cuts the request to what the ring holds; the rest is counted. */
+static void cut(struct stream *stream, const struct capture *capture, struct wire_resend *request)
+{
+	uint32_t oldest_ms = capture->newest_ms - (capture->count - 1);
+	uint32_t asked = request->count, early = 0, held = 0;
+
+	if (capture->count > 0 && (int32_t)(oldest_ms - request->first_tick_ms) > 0)
+		early = oldest_ms - request->first_tick_ms;
+	if (early > asked)
+		early = asked;
+	if (capture->count > 0 && (int32_t)(capture->newest_ms - request->first_tick_ms) >= 0)
+		held = capture->newest_ms - request->first_tick_ms + 1;
+	held = held < asked ? held : asked;
+	held = held > early ? held - early : 0;
+	request->first_tick_ms += early;
+	request->count = (uint16_t)held;
+	stream->counters[WIRE_COUNTER_resends_out_of_range] += asked - held;
+}
+
+void stream_request(struct stream *stream, const struct capture *capture, const struct wire_resend *request)
+{
+	struct wire_resend held = *request;
+
+	cut(stream, capture, &held);
+	if (held.count > 0 && ring_put(&stream->requests, &held) != 0)
+		stream->counters[WIRE_COUNTER_resends_overflowed]++;
+}
+
+static void resend_one(struct stream *stream, const struct capture *capture)
+{
+	struct wire_resend *request = &stream->request;
+	const struct acquire_tick *tick = capture_find(capture, request->first_tick_ms);
+	unsigned sensor = request->sensor - 1u;
+	struct frame frame;
+
+	if (tick == NULL) { /* the ring has rolled on */
+		stream->counters[WIRE_COUNTER_resends_out_of_range]++;
+	} else {
+		acquire_pack(tick, sensor, sensor == 0 ? WIRE_ID_RESENT_S1 : WIRE_ID_RESENT_S2, &frame);
+		stream_send(stream, &frame);
+		stream->counters[WIRE_COUNTER_blocks_resent]++;
+	}
+	request->first_tick_ms++;
+	stream->serving = --request->count > 0;
+}
+
+void stream_resend(struct stream *stream, const struct capture *capture)
+{
+	for (unsigned i = 0; i < STREAM_RESENT_PER_TICK; i++) {
+		if (!idle(stream))
+			return;
+		if (!stream->serving && ring_get(&stream->requests, &stream->request) != 0)
+			return;
+		stream->serving = true;
+		resend_one(stream, capture);
+	}
+}

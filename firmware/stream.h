@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_FIRMWARE_STREAM_H
+#define DT_FIRMWARE_STREAM_H
+/*
+ * Frames out. What the controller does not take at once waits in a queue, in order, and is counted; what the
+ * queue has no room for is dropped and counted. Blocks leave STREAM_RESERVED places to the other messages,
+ * for a block can be asked for again. Resend requests wait in a short list and are served from the capture
+ * ring, STREAM_RESENT_PER_TICK blocks a millisecond, only when nothing else waits.
+ *
+ * Context: main.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/frame.h"
+#include "common/ring.h"
+#include "common/wire.h"
+#include "firmware/capture.h"
+
+enum {
+	STREAM_QUEUE = 64, /* frames, a power of two */
+	STREAM_RESERVED = 16,
+	STREAM_REQUESTS = 8, /* a power of two */
+	STREAM_RESENT_PER_TICK = 2,
+};
+
+struct stream {
+	volatile uint32_t *counters;
+	bool waiting; /* next was taken out of the queue and not sent yet */
+	struct frame next;
+	struct ring queue;
+	struct frame queue_storage[STREAM_QUEUE];
+	bool serving; /* request is not finished */
+	struct wire_resend request;
+	struct ring requests;
+	struct wire_resend requests_storage[STREAM_REQUESTS];
+};
+
+void stream_init(struct stream *stream, volatile uint32_t *counters);
+
+void stream_send(struct stream *stream, const struct frame *frame);
+
+/* Both blocks of a tick, live. */
+void stream_tick(struct stream *stream, const struct acquire_tick *tick);
+
+/* Offers the controller what waits. */
+void stream_flush(struct stream *stream);
+
+/* Notes a request for blocks (count > 0, sensor 1 or 2). Ticks the ring does not hold are counted. */
+void stream_request(struct stream *stream, const struct capture *capture, const struct wire_resend *request);
+
+/* Once a tick: serves the requests. */
+void stream_resend(struct stream *stream, const struct capture *capture);
+
+#endif

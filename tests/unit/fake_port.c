@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "tests/unit/fake_port.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware/port.h"
+
+struct fake_port fake;
+
+void fake_init(void)
+{
+	memset(&fake, 0, sizeof(fake));
+	fake.inputs = FAKE_ALL_GOOD;
+	fake.outputs = WIRE_IO_MAGNET_HOLD;
+}
+
+void fake_time(uint32_t now_us)
+{
+	for (unsigned i = 0; i < 16; i++)
+		if ((fake.planned & 1u << i) && (int32_t)(now_us - fake.off_us[i]) >= 0) {
+			fake.outputs &= (uint16_t) ~(1u << i);
+			fake.planned &= (uint16_t) ~(1u << i);
+		}
+	fake.now_us = now_us;
+}
+
+void fake_receive(const struct frame *frame)
+{
+	if (fake.received_next == fake.received_count)
+		fake.received_next = fake.received_count = 0;
+	if (fake.received_count == FAKE_RECEIVED_MAX)
+		abort();
+	fake.received[fake.received_count++] = *frame;
+}
+
+unsigned fake_count(uint32_t id)
+{
+	unsigned count = 0;
+
+	for (unsigned i = 0; i < fake.sent_count; i++)
+		count += fake.sent[i].id == id;
+	return count;
+}
+
+const struct frame *fake_last(uint32_t id)
+{
+	for (unsigned i = fake.sent_count; i-- > 0;)
+		if (fake.sent[i].id == id)
+			return &fake.sent[i];
+	return NULL;
+}
+
+uint32_t fake_random(uint32_t *seed)
+{
+	*seed ^= *seed << 13;
+	*seed ^= *seed >> 17;
+	*seed ^= *seed << 5;
+	return *seed;
+}
+
+uint32_t port_time_us(void)
+{
+	return fake.now_us;
+}
+
+uint16_t port_io(void)
+{
+	return fake.inputs | fake.outputs;
+}
+
+void port_outputs(uint16_t on, uint16_t off)
+{
+	fake.outputs = (uint16_t)((fake.outputs & ~off) | on);
+}
+
+int port_off_at(uint16_t output, uint32_t time_us)
+{
+	for (unsigned i = 0; i < 16; i++)
+		if (output & 1u << i)
+			fake.off_us[i] = time_us;
+	if ((int32_t)(time_us - fake.now_us) < 0) {
+		port_outputs(0, output);
+		return 1;
+	}
+	fake.planned |= output;
+	return 0;
+}
+
+void port_off_cancel(uint16_t output)
+{
+	fake.planned &= (uint16_t)~output;
+}
+
+int port_can_send(const struct frame *frame)
+{
+	if (fake.can_full || fake.bus_off)
+		return DT_E_FULL;
+	if (fake.sent_count == FAKE_SENT_MAX)
+		abort();
+	fake.sent[fake.sent_count++] = *frame;
+	return 0;
+}
+
+int port_can_receive(struct frame *frame)
+{
+	if (fake.received_next == fake.received_count)
+		return 0;
+	*frame = fake.received[fake.received_next++];
+	return 1;
+}
+
+uint32_t port_can_errors(bool *bus_off)
+{
+	*bus_off = fake.bus_off;
+	return fake.bus_errors;
+}
+
+void port_watchdog_kick(void)
+{
+	fake.kicks++;
+}
+
+void port_reset(void)
+{
+	fake.resets++;
+}
+
+void port_lock(void)
+{
+	if (fake.locks++ != 0)
+		abort(); /* not nested */
+}
+
+void port_unlock(void)
+{
+	if (--fake.locks != 0)
+		abort();
+}

@@ -1,0 +1,176 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * The checks: each input, the host, offset and noise of each axis on both sides of the limit, stuck channels.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <string.h>
+
+#include "firmware/health.h"
+#include "tests/unit/fake_port.h"
+
+static struct health health;
+static struct parameters parameters;
+static uint32_t counters[WIRE_COUNTERS];
+
+static int begin(void **state)
+{
+	(void)state;
+	memset(counters, 0, sizeof(counters));
+	parameters_init(&parameters);
+	health_init(&health, &parameters, counters);
+	return 0;
+}
+
+static int16_t *at(struct acquire_tick *tick, unsigned channel, unsigned k)
+{
+	struct acquire_samples *samples = &tick->sensor[channel / 3];
+
+	return channel % 3 == 0 ? &samples->x[k] : channel % 3 == 1 ? &samples->y[k] : &samples->z[k];
+}
+
+/* 100 ms in which all is 0 but one channel, which alternates offset +- swing. */
+static uint16_t after_window(unsigned channel, int offset, int swing)
+{
+	unsigned per_tick = channel % 3 == 0 ? 7 : 10;
+	unsigned n = 0;
+
+	for (unsigned t = 0; t < 100; t++) {
+		struct acquire_tick tick = {.status = {WIRE_STATE_SAFE, WIRE_STATE_SAFE}};
+
+		for (unsigned k = 0; k < per_tick; k++)
+			*at(&tick, channel, k) = (int16_t)(offset + (n++ % 2 ? swing : -swing));
+		health_samples(&health, &tick);
+	}
+	return health_checks(&health, FAKE_ALL_GOOD) & (WIRE_CHECK_SENSOR_S1 | WIRE_CHECK_SENSOR_S2);
+}
+
+static void sensors_are_red_until_seen(void **state)
+{
+	struct acquire_tick tick = {0};
+
+	(void)state;
+	for (unsigned t = 0; t < 99; t++)
+		health_samples(&health, &tick);
+	assert_true(health_checks(&health, FAKE_ALL_GOOD) & WIRE_CHECK_SENSOR_S1);
+	assert_true(health_checks(&health, FAKE_ALL_GOOD) & WIRE_CHECK_SENSOR_S2);
+	health_samples(&health, &tick);
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), WIRE_CHECK_HOST);
+}
+
+static void offset_and_noise_of_each_axis(void **state)
+{
+	(void)state;
+	for (unsigned channel = 0; channel < 6; channel++) {
+		uint16_t red = channel < 3 ? WIRE_CHECK_SENSOR_S1 : WIRE_CHECK_SENSOR_S2;
+
+		assert_int_equal(after_window(channel, 320, 0), 0);
+		assert_int_equal(after_window(channel, 321, 0), red);
+		assert_int_equal(after_window(channel, -320, 0), 0);
+		assert_int_equal(after_window(channel, -321, 0), red);
+		assert_int_equal(after_window(channel, 0, 320), 0);
+		assert_int_equal(after_window(channel, 0, 321), red);
+		assert_int_equal(after_window(channel, 200, 300), 0);
+		assert_int_equal(after_window(channel, 0, 32767), red);
+	}
+	assert_int_equal(after_window(0, 0, 0), 0);
+}
+
+static void absent_samples_make_a_sensor_red(void **state)
+{
+	(void)state;
+	for (unsigned missing = 0; missing <= 10; missing++) {
+		for (unsigned t = 0; t < 100; t++) {
+			struct acquire_tick tick = {0};
+
+			for (unsigned k = 0; k < missing; k++)
+				*at(&tick, 5, k) = WIRE_SAMPLE_NOT_TAKEN;
+			health_samples(&health, &tick);
+		}
+		assert_int_equal((health_checks(&health, FAKE_ALL_GOOD) & WIRE_CHECK_SENSOR_S2) != 0,
+		                 missing > 5);
+	}
+}
+
+static void each_input_has_its_check(void **state)
+{
+	static const struct {
+		uint16_t input, check;
+	} pairs[] = {
+	        {WIRE_IO_LATCH_CLOSED, WIRE_CHECK_LATCH},      {WIRE_IO_PRODUCT_HELD, WIRE_CHECK_PRODUCT},
+	        {WIRE_IO_DAMPERS_ENGAGED, WIRE_CHECK_DAMPERS}, {WIRE_IO_DOOR_CLOSED, WIRE_CHECK_DOOR},
+	        {WIRE_IO_ESTOP_CLEAR, WIRE_CHECK_ESTOP},       {WIRE_IO_SUPPLY_GOOD, WIRE_CHECK_SUPPLY},
+	        {WIRE_IO_IEPE_S1, WIRE_CHECK_SENSOR_S1},       {WIRE_IO_IEPE_S2, WIRE_CHECK_SENSOR_S2},
+	        {WIRE_IO_GATE_UPPER, WIRE_CHECK_GATES},        {WIRE_IO_GATE_LOWER, WIRE_CHECK_GATES},
+	        {WIRE_IO_FRAME_DOWN, WIRE_CHECK_LATCH},
+	};
+
+	(void)state;
+	assert_int_equal(after_window(0, 0, 0), 0);
+	health_host(&health, 0, wire_hash());
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), 0);
+	for (size_t i = 0; i < sizeof(pairs) / sizeof(pairs[0]); i++)
+		assert_int_equal(health_checks(&health, FAKE_ALL_GOOD ^ pairs[i].input), pairs[i].check);
+}
+
+static void host_must_beat_and_have_our_hash(void **state)
+{
+	(void)state;
+	assert_int_equal(after_window(0, 0, 0), 0);
+	health_tick(&health, 5000);
+	assert_int_equal(counters[WIRE_COUNTER_host_heartbeats_lost], 0); /* never was there */
+	health_host(&health, 5000, wire_hash());
+	health_tick(&health, 5500);
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), 0);
+	health_tick(&health, 5501);
+	health_tick(&health, 5502);
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), WIRE_CHECK_HOST);
+	assert_int_equal(counters[WIRE_COUNTER_host_heartbeats_lost], 1);
+	health_host(&health, 5600, wire_hash() ^ 1);
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), WIRE_CHECK_HOST);
+	health_host(&health, 5601, wire_hash());
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), 0);
+}
+
+static void run_stuck(unsigned ticks, unsigned state, int16_t other)
+{
+	for (unsigned t = 0; t < ticks; t++) {
+		struct acquire_tick tick = {.status = {(uint8_t)state, (uint8_t)state}};
+
+		for (unsigned channel = 0; channel < 6; channel++)
+			for (unsigned k = 0; k < (channel % 3 ? 10u : 7u); k++)
+				*at(&tick, channel, k) = channel == 4 ? 123 : (int16_t)((int)k + other);
+		health_samples(&health, &tick);
+	}
+}
+
+static void stuck_channel_in_motion_is_counted_once(void **state)
+{
+	(void)state;
+	run_stuck(200, WIRE_STATE_SAFE, 0);
+	assert_int_equal(counters[WIRE_COUNTER_samples_stuck], 0);
+	run_stuck(19, WIRE_STATE_FALLING, 0);
+	assert_int_equal(counters[WIRE_COUNTER_samples_stuck], 0);
+	run_stuck(100, WIRE_STATE_SEPARATED, 0);
+	assert_int_equal(counters[WIRE_COUNTER_samples_stuck], 1);
+	run_stuck(1, WIRE_STATE_CAPTURED, 0);
+	run_stuck(30, WIRE_STATE_FALLING, 0); /* the next drop */
+	assert_int_equal(counters[WIRE_COUNTER_samples_stuck], 2);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test_setup(sensors_are_red_until_seen, begin),
+	        cmocka_unit_test_setup(offset_and_noise_of_each_axis, begin),
+	        cmocka_unit_test_setup(absent_samples_make_a_sensor_red, begin),
+	        cmocka_unit_test_setup(each_input_has_its_check, begin),
+	        cmocka_unit_test_setup(host_must_beat_and_have_our_hash, begin),
+	        cmocka_unit_test_setup(stuck_channel_in_motion_is_counted_once, begin),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
