@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HIL_BENCH_H
+#define DT_HIL_BENCH_H
+/*
+ * The bench: runs a firmware against the simulated tower. It answers every request of the sensor bus with
+ * the tower at exactly that instant, carries the firmware's CAN frames through the fault injector to a
+ * host and the host's back, and lifts the frame again after each drop. The host is whatever is on the
+ * link, or the script of hil/script.h.
+ *
+ * Virtual time is the firmware's sample grid, so a run with the script and the same seed repeats bit for
+ * bit: codes, frames, log.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "hil/busfault.h"
+#include "hil/tower.h"
+
+enum {
+	BENCH_FAULTS_MAX = 16,
+	/* The program's exit statuses. */
+	BENCH_DONE = 0,
+	BENCH_NOT_SAFE = 1, /* a drop of the script did not end as it should */
+	BENCH_USAGE = 2,
+	BENCH_INPUT = 3,
+	BENCH_LINK = 4, /* link, firmware, file system */
+};
+
+/* Virtual time 0 in log files, us since 1970. */
+#define BENCH_EPOCH_US INT64_C(1000000000000000)
+
+struct bench_options {
+	const char *scene_file;
+	double angle_deg;     /* NAN: the scene's */
+	const char *link;     /* NULL: the script is the host */
+	const char *firmware; /* NULL: droptower-firmware beside this program */
+	uint64_t seed;
+	bool realtime;  /* paced by the clock, else as fast as it goes */
+	unsigned drops; /* the script's */
+	bool ideal;
+	struct busfault_options bus; /* cut_resend counts for the way to the host */
+	unsigned burst;              /* live blocks lost in a row after each impact */
+	double burst_after_s;        /* so long after it */
+	unsigned fault_count;
+	struct bench_fault {
+		enum tower_fault fault;
+		double time_s;
+	} faults[BENCH_FAULTS_MAX];
+	const char *log;   /* candump text of the host's side of the bus, NULL: none */
+	const char *truth; /* codes as given to the firmware (hil/codes.h), NULL: none */
+	int ready_fd;      /* gets one byte when the firmware runs; -1: none */
+};
+
+/* Runs until the script has ended or SIGINT, SIGTERM, SIGHUP; says what goes on and what is wrong on stderr;
+ * returns the exit status. */
+int bench_run(const struct bench_options *options);
+
+/* "droptower-bench: ..." and a newline on stderr. */
+void bench_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+#endif

@@ -1,0 +1,232 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "hil/product.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "common/units.h"
+
+/* Beyond this the imprint is no wedge any more and 1/sin would run away. */
+#define WEDGE_ANGLE_MIN_RAD UNITS_RAD(10.0)
+
+struct load { /* on the box, about its centre of gravity, counter-clockwise */
+	double x_n, y_n, torque_n_m;
+};
+
+struct corner {
+	double arm_x_m, arm_y_m; /* world axes, from the centre of gravity */
+	double depth_m, closing_m_s, sliding_m_s;
+};
+
+static const double corner_side[PRODUCT_CORNERS][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+
+/* The root D > 0 of ln(1 + D) - ln(1 - e D) = (1 + e) D; the difference is negative below it. */
+static double hysteresis(double restitution)
+{
+	double low = 0, high = 1 / restitution;
+
+	for (int i = 0; i < 100; i++) {
+		const double mid = 0.5 * (low + high);
+
+		if (log1p(mid) - log1p(-restitution * mid) < (1 + restitution) * mid)
+			low = mid;
+		else
+			high = mid;
+	}
+	return low;
+}
+
+static double wedge(double angle_rad)
+{
+	return sin(UNITS_RAD(50.0)) / fmax(fabs(sin(2 * angle_rad)), sin(2 * WEDGE_ANGLE_MIN_RAD));
+}
+
+static struct corner corner_at(const struct product *p, const double s[], int i, double sn, double cs)
+{
+	const double along_x = corner_side[i][0] * p->lever_x_m, along_y = corner_side[i][1] * p->lever_y_m;
+	struct corner c;
+
+	c.arm_x_m = along_x * sn - along_y * cs;
+	c.arm_y_m = along_x * cs + along_y * sn;
+	c.depth_m = -(s[PRODUCT_Y] + c.arm_y_m);
+	/* turning by +angle is clockwise */
+	c.closing_m_s = -(s[PRODUCT_VY] - s[PRODUCT_SPIN] * c.arm_x_m);
+	c.sliding_m_s = s[PRODUCT_VX] + s[PRODUCT_SPIN] * c.arm_y_m;
+	return c;
+}
+
+/* Adds the mat's force on one corner; returns how fast its tangential deflection grows. */
+static double contact_force(const struct product *p, int i, const struct corner *c, double grip_m,
+                            struct load *load)
+{
+	const double root = sqrt(c->depth_m), k = p->stiffness_n_m15[i];
+	const double normal =
+	        k * c->depth_m * root * (1 + p->hysteresis * c->closing_m_s / p->approach_m_s[i]);
+	const double limit = p->friction * normal;
+	double along = -p->tangential_ratio * 1.5 * k * root * grip_m;
+	bool slips = false;
+
+	if (normal <= 0)
+		return 0;
+	if (fabs(along) > limit) {
+		along = copysign(limit, along);
+		slips = c->sliding_m_s * grip_m > 0;
+	}
+	load->x_n += along;
+	load->y_n += normal;
+	load->torque_n_m += c->arm_x_m * normal - c->arm_y_m * along;
+	return slips ? 0 : c->sliding_m_s;
+}
+
+/* The mounts' force on the box; the plate feels its opposite. */
+static struct load mount_force(const struct product *p, const double s[])
+{
+	const double x = s[PRODUCT_PLATE_X] - s[PRODUCT_X], y = s[PRODUCT_PLATE_Y] - s[PRODUCT_Y];
+	/* how the offset changes as seen from the turning box */
+	const double vx = s[PRODUCT_PLATE_VX] - s[PRODUCT_VX] - s[PRODUCT_SPIN] * y;
+	const double vy = s[PRODUCT_PLATE_VY] - s[PRODUCT_VY] + s[PRODUCT_SPIN] * x;
+	const double k = p->mount_n_m * (1 + p->softening / (1 + (x * x + y * y) * p->softening_per_m2));
+
+	return (struct load){k * x + p->mount_damping_n_s_m * vx, k * y + p->mount_damping_n_s_m * vy, 0};
+}
+
+static void rates(const struct product *p, const double s[], double rate[])
+{
+	const double sn = sin(s[PRODUCT_ANGLE]), cs = cos(s[PRODUCT_ANGLE]);
+	struct load load = {0, 0, 0}, mount = {0, 0, 0};
+
+	for (int i = 0; i < PRODUCT_CORNERS; i++) {
+		const struct corner c = corner_at(p, s, i, sn, cs);
+
+		rate[PRODUCT_GRIP + i] =
+		        c.depth_m > 0 ? contact_force(p, i, &c, s[PRODUCT_GRIP + i], &load) : 0;
+	}
+	if (p->plate_mass_kg > 0)
+		mount = mount_force(p, s);
+	rate[PRODUCT_X] = s[PRODUCT_VX];
+	rate[PRODUCT_Y] = s[PRODUCT_VY];
+	rate[PRODUCT_ANGLE] = s[PRODUCT_SPIN];
+	rate[PRODUCT_VX] = (load.x_n + mount.x_n) / p->case_mass_kg;
+	rate[PRODUCT_VY] = (load.y_n + mount.y_n) / p->case_mass_kg - UNITS_G_M_S2;
+	rate[PRODUCT_SPIN] = -load.torque_n_m / p->inertia_kg_m2;
+	rate[PRODUCT_PLATE_X] = s[PRODUCT_PLATE_VX];
+	rate[PRODUCT_PLATE_Y] = s[PRODUCT_PLATE_VY];
+	/* without a plate its place holders ride with the box */
+	rate[PRODUCT_PLATE_VX] = p->plate_mass_kg > 0 ? -mount.x_n / p->plate_mass_kg : rate[PRODUCT_VX];
+	rate[PRODUCT_PLATE_VY] =
+	        p->plate_mass_kg > 0 ? -mount.y_n / p->plate_mass_kg - UNITS_G_M_S2 : rate[PRODUCT_VY];
+}
+
+/* A corner clear of the mat forgets its last contact and is ready for the next. */
+static void corners_renew(struct product *p)
+{
+	const double sn = sin(p->state[PRODUCT_ANGLE]), cs = cos(p->state[PRODUCT_ANGLE]);
+
+	for (int i = 0; i < PRODUCT_CORNERS; i++) {
+		const struct corner c = corner_at(p, p->state, i, sn, cs);
+
+		if (c.depth_m > 0)
+			continue;
+		p->state[PRODUCT_GRIP + i] = 0;
+		p->stiffness_n_m15[i] = p->stiffness25_n_m15 * wedge(p->state[PRODUCT_ANGLE]);
+		p->approach_m_s[i] = fmax(c.closing_m_s, PRODUCT_APPROACH_MIN_M_S);
+	}
+}
+
+void product_init(struct product *p, const struct scene *scene, double angle_rad)
+{
+	const double yaw = UNITS_RAD(scene->sensor_s1_yaw_deg);
+	const double strain_m = scene->mount_softening_strain * scene->mount_cube_m;
+
+	memset(p, 0, sizeof(*p));
+	p->case_mass_kg = scene->product_case_mass_kg;
+	p->plate_mass_kg = scene->mount_plate_mass_kg;
+	p->inertia_kg_m2 = scene->product_inertia_ratio * scene->product_case_mass_kg *
+	                   (scene->product_length_m * scene->product_length_m +
+	                    scene->product_width_m * scene->product_width_m) /
+	                   12;
+	p->lever_y_m = scene->product_width_m / 2;
+	p->lever_x_m = p->lever_y_m / tan(UNITS_RAD(scene->product_balance_angle_deg));
+	p->stiffness25_n_m15 = scene->contact_stiffness_n_m15;
+	p->hysteresis = hysteresis(scene->contact_restitution);
+	p->tangential_ratio = scene->contact_tangential_ratio;
+	p->friction = scene->contact_friction;
+	p->mount_n_m = scene->mount_stiffness_n_m;
+	p->mount_damping_n_s_m = scene->mount_damping_n_s_m;
+	p->softening = scene->mount_softening;
+	p->softening_per_m2 = strain_m > 0 ? 1 / (strain_m * strain_m) : 0;
+	p->s2_offset_m = scene->sensor_s2_offset_m;
+	p->yaw_cos = cos(yaw);
+	p->yaw_sin = sin(yaw);
+	p->state[PRODUCT_ANGLE] = angle_rad;
+}
+
+void product_carry(struct product *p, double down_m_s2)
+{
+	memset(p->rate, 0, sizeof(p->rate));
+	p->rate[PRODUCT_VY] = p->rate[PRODUCT_PLATE_VY] = -down_m_s2;
+}
+
+void product_strike(struct product *p, double speed_m_s)
+{
+	const double angle = p->state[PRODUCT_ANGLE];
+	struct corner lowest;
+
+	memset(p->state, 0, sizeof(p->state));
+	p->state[PRODUCT_ANGLE] = angle;
+	lowest = corner_at(p, p->state, 0, sin(angle), cos(angle));
+	p->state[PRODUCT_Y] = p->state[PRODUCT_PLATE_Y] = -lowest.arm_y_m;
+	p->state[PRODUCT_VY] = p->state[PRODUCT_PLATE_VY] = -speed_m_s;
+	corners_renew(p);
+	rates(p, p->state, p->rate);
+}
+
+void product_step(struct product *p, double step_s)
+{
+	static const double reach[3] = {0.5, 0.5, 1.0};
+	double at[PRODUCT_STATES], slope[PRODUCT_STATES], sum[PRODUCT_STATES];
+
+	memcpy(slope, p->rate, sizeof(slope));
+	memcpy(sum, p->rate, sizeof(sum));
+	for (int stage = 0; stage < 3; stage++) {
+		const double weight = stage < 2 ? 2 : 1;
+
+		for (int i = 0; i < PRODUCT_STATES; i++)
+			at[i] = p->state[i] + reach[stage] * step_s * slope[i];
+		rates(p, at, slope);
+		for (int i = 0; i < PRODUCT_STATES; i++)
+			sum[i] += weight * slope[i];
+	}
+	for (int i = 0; i < PRODUCT_STATES; i++)
+		p->state[i] += step_s / 6 * sum[i];
+	corners_renew(p);
+	rates(p, p->state, p->rate);
+}
+
+void product_read(const struct product *p, struct product_reading *reading)
+{
+	const double sn = sin(p->state[PRODUCT_ANGLE]), cs = cos(p->state[PRODUCT_ANGLE]);
+	const double x = p->rate[PRODUCT_PLATE_VX], y = p->rate[PRODUCT_PLATE_VY] + UNITS_G_M_S2;
+	const double box_x = p->rate[PRODUCT_VX], box_y = p->rate[PRODUCT_VY] + UNITS_G_M_S2;
+	const double spin = p->state[PRODUCT_SPIN];
+	const double body_x = x * sn + y * cs, body_y = -x * cs + y * sn;
+
+	reading->s1_x = body_x * p->yaw_cos - body_y * p->yaw_sin;
+	reading->s1_y = body_x * p->yaw_sin + body_y * p->yaw_cos;
+	reading->s2_x = box_x * sn + box_y * cs - spin * spin * p->s2_offset_m;
+	reading->s2_y = -box_x * cs + box_y * sn - p->rate[PRODUCT_SPIN] * p->s2_offset_m;
+}
+
+void product_simulate(const struct scene *scene, double angle_rad, double speed_m_s, double step_s,
+                      struct product_reading *reading, size_t count)
+{
+	struct product p;
+
+	product_init(&p, scene, angle_rad);
+	product_strike(&p, speed_m_s);
+	for (size_t i = 0; i < count; i++) {
+		product_read(&p, &reading[i]);
+		product_step(&p, step_s);
+	}
+}

@@ -1,0 +1,311 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "hil/script.h"
+
+#include <stdio.h>
+
+#include "common/wire_table.h"
+
+enum {
+	HEARTBEAT_MS = 100,
+	RELEASE_MS = 500,  /* a person's pause between ARM and RELEASE */
+	REPEAT_MS = 200,   /* a command without effect is sent again */
+	SETTLE_MS = 20,    /* frames still on their way when the capture end comes */
+	RESEND_MS = 100,   /* one round of requests */
+	RESEND_RUNS = 8,   /* requests in a round */
+	RESEND_TICKS = 64, /* ticks in a request */
+	GIVE_UP_MS = 3000, /* so long without a missing block coming */
+	NMT_OPERATIONAL = 5,
+	TOKEN = 0x5A5A,
+};
+
+static void enter(struct script *script, enum script_phase phase, uint32_t send_ms)
+{
+	script->phase = phase;
+	script->send_ms = send_ms;
+}
+
+void script_init(struct script *script, unsigned drops)
+{
+	*script = (struct script){.drops = drops};
+}
+
+static bool due(uint32_t time_ms, uint32_t now_ms)
+{
+	return (int32_t)(now_ms - time_ms) >= 0;
+}
+
+/* ---- what the tower says ---- */
+
+static bool in_capture(const struct script *script, uint32_t tick_ms)
+{
+	return tick_ms - script->capture.first_tick_ms <=
+	       script->capture.last_tick_ms - script->capture.first_tick_ms;
+}
+
+static void feed_block(struct script *script, unsigned sensor, const struct frame *frame, uint32_t now_ms)
+{
+	struct wire_block block;
+	uint32_t *slot;
+
+	if (wire_check_block(frame) != 0 || wire_unpack_block(frame, &block) != 0)
+		return;
+	/* Once the window is known, later live blocks must not push its blocks out. */
+	if (script->captured && !in_capture(script, block.tick_ms))
+		return;
+	slot = &script->held[sensor][block.tick_ms % SCRIPT_TICKS];
+	if (*slot != block.tick_ms + 1)
+		script->progress_ms = now_ms;
+	*slot = block.tick_ms + 1;
+}
+
+static void feed_capture(struct script *script, const struct frame *frame, uint32_t now_ms)
+{
+	struct wire_capture_end end;
+
+	if (wire_unpack_capture_end(frame, &end) != 0 || script->phase != SCRIPT_FETCH || script->captured ||
+	    end.drop_id == script->capture.drop_id)
+		return;
+	script->capture = end;
+	script->captured = true;
+	script->progress_ms = now_ms;
+	script->send_ms = now_ms + SETTLE_MS;
+	script->resend_at = 0;
+}
+
+static void feed_reply(struct script *script, const struct frame *frame)
+{
+	struct wire_reply reply;
+
+	if (wire_unpack_reply(frame, &reply) != 0)
+		return;
+	script->status.state = reply.state;
+	script->status.checks = reply.checks;
+}
+
+void script_feed(struct script *script, const struct frame *frame, uint32_t now_ms)
+{
+	switch (frame->id) {
+	case WIRE_ID_BLOCK_S1:
+	case WIRE_ID_RESENT_S1:
+		feed_block(script, 0, frame, now_ms);
+		break;
+	case WIRE_ID_BLOCK_S2:
+	case WIRE_ID_RESENT_S2:
+		feed_block(script, 1, frame, now_ms);
+		break;
+	case WIRE_ID_CAPTURE_END:
+		feed_capture(script, frame, now_ms);
+		break;
+	case WIRE_ID_STATUS:
+		if (wire_unpack_status(frame, &script->status) != 0)
+			return; /* of another wire: the hash in the heartbeat tells */
+		break;
+	case WIRE_ID_REPLY:
+		feed_reply(script, frame);
+		break;
+	default:
+		break;
+	}
+}
+
+/* ---- what the operator does ---- */
+
+static void fail(struct script *script, const char *what)
+{
+	char checks[80] = "";
+
+	for (unsigned i = 0, used = 0; i < WIRE_CHECKS && used < sizeof(checks) - 16; i++)
+		if (script->status.checks & 1u << i)
+			used += (unsigned)snprintf(checks + used, sizeof(checks) - used, " %s",
+			                           wire_check_name(i));
+	snprintf(script->why, sizeof(script->why), "drop %u: %s in state %s, fault %s, checks not green:%s",
+	         script->drops_done + 1, what, wire_state_name(script->status.state),
+	         wire_fault_name(script->status.fault), checks[0] ? checks : " none");
+	script->phase = SCRIPT_FAILED;
+}
+
+static unsigned command(struct script *script, uint8_t op, uint32_t now_ms, struct frame *out)
+{
+	struct wire_command message = {.op = op, .sequence = script->sequence++, .token = TOKEN};
+
+	if (op == WIRE_OP_ACCEPT)
+		message.argument = script->capture.crc32;
+	wire_pack_command(out, WIRE_ID_COMMAND, &message);
+	script->send_ms = now_ms + REPEAT_MS;
+	return 1;
+}
+
+/* The capture's blocks are numbered: those of S1 by tick, then those of S2. */
+static uint32_t capture_ticks(const struct script *script)
+{
+	return script->capture.last_tick_ms - script->capture.first_tick_ms + 1;
+}
+
+static bool missing(const struct script *script, uint32_t block)
+{
+	uint32_t ticks = capture_ticks(script);
+	uint32_t tick_ms = script->capture.first_tick_ms + block % ticks;
+
+	return script->held[block / ticks][tick_ms % SCRIPT_TICKS] != tick_ms + 1;
+}
+
+static unsigned count_missing(const struct script *script)
+{
+	unsigned count = 0;
+
+	for (uint32_t block = 0; block < WIRE_SENSORS * capture_ticks(script); block++)
+		count += missing(script, block);
+	return count;
+}
+
+/* One round goes on where the one before ended, so that all runs get their turn. */
+static unsigned request_missing(struct script *script, struct frame *out)
+{
+	uint32_t ticks = capture_ticks(script), block = script->resend_at;
+	unsigned count = 0;
+
+	while (block < WIRE_SENSORS * ticks && count < RESEND_RUNS) {
+		uint32_t sensor = block / ticks, first = block;
+
+		while (block < (sensor + 1) * ticks && block - first < RESEND_TICKS && missing(script, block))
+			block++;
+		if (block == first) {
+			block++;
+			continue;
+		}
+		wire_pack_resend(&out[count++], WIRE_ID_RESEND,
+		                 &(struct wire_resend){.sensor = (uint8_t)(sensor + 1),
+		                                       .count = (uint16_t)(block - first),
+		                                       .first_tick_ms = script->capture.first_tick_ms +
+		                                                        first % ticks});
+	}
+	script->resend_at = block < WIRE_SENSORS * ticks ? block : 0;
+	return count;
+}
+
+static unsigned do_arm(struct script *script, uint32_t now_ms, struct frame *out)
+{
+	if (script->status.state == WIRE_STATE_ARMED) {
+		enter(script, SCRIPT_RELEASE, now_ms + RELEASE_MS);
+		return 0;
+	}
+	if (script->status.state != WIRE_STATE_READY || !due(script->send_ms, now_ms))
+		return 0;
+	return command(script, WIRE_OP_ARM, now_ms, out);
+}
+
+static unsigned do_release(struct script *script, uint32_t now_ms, struct frame *out)
+{
+	unsigned state = script->status.state;
+
+	if (state == WIRE_STATE_SAFE || state == WIRE_STATE_READY) { /* disarmed */
+		enter(script, SCRIPT_ARM, now_ms);
+		return 0;
+	}
+	if (state != WIRE_STATE_ARMED) {
+		enter(script, SCRIPT_FETCH, now_ms);
+		return 0;
+	}
+	return due(script->send_ms, now_ms) ? command(script, WIRE_OP_RELEASE, now_ms, out) : 0;
+}
+
+static unsigned do_fetch(struct script *script, uint32_t now_ms, struct frame *out)
+{
+	unsigned lacking;
+
+	if (!due(script->send_ms, now_ms))
+		return 0;
+	if (!script->captured) {
+		script->send_ms = now_ms + REPEAT_MS;
+		if (script->status.state != WIRE_STATE_CAPTURED)
+			return 0;
+		/* The capture end was lost. */
+		wire_pack_resend(out, WIRE_ID_RESEND, &(struct wire_resend){.sensor = 1});
+		return 1;
+	}
+	if (capture_ticks(script) > SCRIPT_TICKS) {
+		fail(script, "capture longer than the script remembers");
+		return 0;
+	}
+	lacking = count_missing(script);
+	if (lacking > 0 && !due(script->progress_ms + GIVE_UP_MS, now_ms)) {
+		script->send_ms = now_ms + RESEND_MS;
+		return request_missing(script, out);
+	}
+	if (lacking > 0) {
+		snprintf(script->why, sizeof(script->why), "drop %u: discarded with %u blocks missing",
+		         script->drops_done + 1, lacking);
+		script->incomplete++;
+	}
+	script->accept_op = lacking > 0 ? WIRE_OP_DISCARD : WIRE_OP_ACCEPT;
+	enter(script, SCRIPT_ACCEPT, now_ms);
+	return 0;
+}
+
+static unsigned do_accept(struct script *script, uint32_t now_ms, struct frame *out)
+{
+	unsigned state = script->status.state;
+
+	if (state == WIRE_STATE_UPLOADED || state == WIRE_STATE_SAFE || state == WIRE_STATE_READY ||
+	    state == WIRE_STATE_FAULT_HELD) {
+		enter(script, SCRIPT_RETURN, now_ms);
+		return 0;
+	}
+	if (state != WIRE_STATE_CAPTURED || !due(script->send_ms, now_ms))
+		return 0;
+	return command(script, script->accept_op, now_ms, out);
+}
+
+static unsigned do_return(struct script *script, uint32_t now_ms, struct frame *out)
+{
+	unsigned state = script->status.state;
+
+	if (state == WIRE_STATE_FAULT_HELD) /* the fault was in motion, the drop is uploaded */
+		return due(script->send_ms, now_ms) ? command(script, WIRE_OP_CLEAR, now_ms, out) : 0;
+	if (state != WIRE_STATE_SAFE && state != WIRE_STATE_READY)
+		return 0;
+	script->drops_done++;
+	script->captured = false;
+	script->drop_ms = now_ms;
+	enter(script, script->drops_done < script->drops ? SCRIPT_ARM : SCRIPT_DONE, now_ms);
+	return 0;
+}
+
+static unsigned do_phase(struct script *script, uint32_t now_ms, struct frame *out)
+{
+	switch (script->phase) {
+	case SCRIPT_ARM:
+		return do_arm(script, now_ms, out);
+	case SCRIPT_RELEASE:
+		return do_release(script, now_ms, out);
+	case SCRIPT_FETCH:
+		return do_fetch(script, now_ms, out);
+	case SCRIPT_ACCEPT:
+		return do_accept(script, now_ms, out);
+	case SCRIPT_RETURN:
+		return do_return(script, now_ms, out);
+	case SCRIPT_DONE:
+	case SCRIPT_FAILED:
+		return 0;
+	}
+	return 0;
+}
+
+unsigned script_poll(struct script *script, uint32_t now_ms, struct frame out[SCRIPT_SEND_MAX])
+{
+	unsigned count = 0;
+
+	if (due(script->heartbeat_ms, now_ms)) {
+		script->heartbeat_ms = now_ms + HEARTBEAT_MS;
+		wire_pack_heartbeat(&out[count++], WIRE_ID_HEARTBEAT_HOST,
+		                    &(struct wire_heartbeat){NMT_OPERATIONAL, wire_hash()});
+	}
+	if (script->phase == SCRIPT_DONE || script->phase == SCRIPT_FAILED)
+		return count;
+	if (script->status.state == WIRE_STATE_FAULT_HELD && script->phase != SCRIPT_ACCEPT &&
+	    script->phase != SCRIPT_RETURN)
+		fail(script, "stopped");
+	else if (due(script->drop_ms + SCRIPT_LIMIT_MS, now_ms))
+		fail(script, "not done in time");
+	return count + do_phase(script, now_ms, out + count);
+}

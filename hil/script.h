@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HIL_SCRIPT_H
+#define DT_HIL_SCRIPT_H
+/*
+ * The scripted operator inside the bench: heartbeats, arms, releases, asks for missing blocks, accepts
+ * and waits for SAFE, as often as told. It lives in virtual time and has no randomness, so that a run
+ * repeats bit for bit. It holds no samples, only which blocks came: the host proper is another program.
+ *
+ * One thread, no heap. Times are virtual, in ms.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/frame.h"
+#include "common/wire.h"
+
+enum {
+	SCRIPT_TICKS = 2048,     /* blocks remembered of a sensor, more than the longest capture has */
+	SCRIPT_SEND_MAX = 12,    /* frames in one call */
+	SCRIPT_LIMIT_MS = 30000, /* for one drop, from SAFE to SAFE */
+	SCRIPT_WHY_MAX = 200,
+};
+
+enum script_phase {
+	SCRIPT_ARM,     /* wait for READY, arm */
+	SCRIPT_RELEASE, /* armed: release */
+	SCRIPT_FETCH,   /* falling; then until no block is missing */
+	SCRIPT_ACCEPT,  /* say that all is there, or that it is given up */
+	SCRIPT_RETURN,  /* wait for SAFE */
+	SCRIPT_DONE,
+	SCRIPT_FAILED,
+};
+
+struct script {
+	enum script_phase phase;
+	unsigned drops, drops_done;
+	unsigned incomplete;   /* drops that came back to SAFE with blocks missing */
+	uint32_t drop_ms;      /* when this drop began */
+	uint32_t heartbeat_ms; /* when the next one is due */
+	uint32_t send_ms;      /* when the phase's next command or request is due */
+	uint32_t progress_ms;  /* when a block of the capture came last */
+	uint32_t resend_at;    /* where the next round begins: S1's blocks are counted first, then S2's */
+	uint8_t sequence;
+	uint8_t accept_op;
+	bool captured; /* capture is this drop's */
+	struct wire_capture_end capture;
+	struct wire_status status;                 /* the tower's last */
+	uint32_t held[WIRE_SENSORS][SCRIPT_TICKS]; /* tick + 1 of the block that came, at tick modulo size */
+	char why[SCRIPT_WHY_MAX];                  /* one line: why FAILED, or which drop is incomplete */
+};
+
+void script_init(struct script *script, unsigned drops);
+
+/* A frame from the tower. */
+void script_feed(struct script *script, const struct frame *frame, uint32_t now_ms);
+
+/* To be called every ms; returns how many frames go to the tower. */
+unsigned script_poll(struct script *script, uint32_t now_ms, struct frame out[SCRIPT_SEND_MAX]);
+
+#endif

@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HIL_SENSOR_H
+#define DT_HIL_SENSOR_H
+/*
+ * One axis of a sensor, from what it feels to the code its converter gives: the high-pass of the IEPE
+ * supply, white noise, the converter's limits, rounding to 1/32 g.
+ *
+ * The high-pass is of first order and continuous in time: a step fades as exp(-t / time constant). It is
+ * exact for an input that goes in straight lines between the calls of sensor_advance; a call with no time
+ * in between is a jump. The noise is drawn for each conversion. The sensor itself stays linear beyond its
+ * nominal range, which is for the firmware to mark.
+ *
+ * Plain functions on a struct the caller owns: no heap, no errors, any context. Units: g.
+ */
+#include <stdint.h>
+
+#include <gsl/gsl_rng.h>
+
+struct sensor {
+	double time_constant_s; /* 0: no high-pass */
+	double noise_g;         /* standard deviation; 0: none is drawn */
+	double input_g;         /* at the last call */
+	double output_g;        /* behind the high-pass */
+};
+
+/* The supply has been on for long, with this input. */
+void sensor_settle(struct sensor *sensor, double input_g);
+
+/* Time went on by step_s while the input went straight to input_g. */
+void sensor_advance(struct sensor *sensor, double step_s, double input_g);
+
+/* -32767 to 32767; never -32768, which on the wire means "not taken". */
+int16_t sensor_convert(const struct sensor *sensor, gsl_rng *noise);
+
+#endif
