@@ -34,7 +34,7 @@ struct model_prediction {
 	double impact_speed_m_s;
 	double velocity_change_m_s; /* of the centre of gravity */
 	double contact_time_s;
-	double plate_frequency_hz;  /* damped, free-free; 0 without a plate */
+	double plate_frequency_hz; /* damped, free-free; 0 without a plate */
 	double plate_damping_ratio;
 	struct model_peak peak[MODEL_AXES];
 	struct model_peak resultant[2]; /* S1, S2 */
@@ -43,10 +43,10 @@ struct model_prediction {
 
 /* Predicts the drop of a checked scene. 0, or DT_E_NUMERIC. */
 DT_MUST_USE int model_predict(const struct scene *scene, enum model_fidelity fidelity,
-			      struct model_prediction *prediction);
+                              struct model_prediction *prediction);
 
 /* Fills value_g[count] with one axis at times start_s + k step_s after first touch (negative times: 0). */
 DT_MUST_USE int model_history(const struct scene *scene, enum model_fidelity fidelity, enum model_axis axis,
-			      double start_s, double step_s, double *value_g, size_t count);
+                              double start_s, double step_s, double *value_g, size_t count);
 
 #endif

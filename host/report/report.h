@@ -17,16 +17,19 @@ struct report {
 	const struct analysis *analysis;
 	const struct scene *scene;                 /* NULL: none was given */
 	const struct model_prediction *prediction; /* NULL: no scene */
+	const char *version;                       /* of the program, for the page's foot; NULL: not said */
 };
 
 /* The result table. 0 or DT_E_SYSTEM. */
 DT_MUST_USE int report_text(const struct report *report, FILE *out);
 
-/* One JSON object and a newline; keys in snake_case with units, numbers in full precision, NAN as null. */
+/* One JSON object on one line; keys in snake_case with units, numbers with as many digits as give the same
+ * double again, NAN as null, texts as valid UTF-8. Times count from the record's first instant. What does
+ * not apply (drop, lag, plate, scene, model) is null. 0, DT_E_SYSTEM or DT_E_MEMORY. */
 DT_MUST_USE int report_json(const struct report *report, FILE *out);
 
-/* One HTML file without outside references; pictures are SVG made by gnuplot, which is run for it. 0, or
- * DT_E_SYSTEM with a line in message. */
+/* One HTML file without outside references; pictures are SVG made by gnuplot, which is run for it. The file
+ * is whole or not there: it is written beside and then renamed. 0, or DT_E_* with a line in message. */
 DT_MUST_USE int report_html(const struct report *report, const char *file, char *message, size_t size);
 
 #endif

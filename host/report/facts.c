@@ -1,0 +1,235 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/report/facts.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+const struct estimate_channel *report_estimate(const struct report *report, const char *name)
+{
+	const struct channel *channel = record_channel(report->record, name);
+
+	return channel ? &report->analysis->channels[channel - report->record->channels] : NULL;
+}
+
+static bool has_pulse(const struct estimate_channel *estimate)
+{
+	return estimate && isfinite(estimate->pulse.start_s) && estimate->pulse.duration_s > 0.0 &&
+	       (estimate->pulse.status == ESTIMATE_OK || estimate->pulse.status == ESTIMATE_CLIPPED ||
+	        estimate->pulse.status == ESTIMATE_AMBIGUOUS);
+}
+
+/* Times count from S2's X, other recordings from the earliest pulse. */
+static bool better_zero(const struct report *report, size_t i, size_t best)
+{
+	const struct estimate_channel *channels = report->analysis->channels;
+
+	if (!strcmp(report->record->channels[best].name, "S2X"))
+		return false;
+	return !strcmp(report->record->channels[i].name, "S2X") ||
+	       channels[i].pulse.start_s < channels[best].pulse.start_s;
+}
+
+struct report_zero report_zero(const struct report *report)
+{
+	const struct analysis *a = report->analysis;
+	struct report_zero zero = {.width_s = (double)NAN};
+	size_t best = a->channel_count;
+
+	for (size_t i = 0; i < a->channel_count; i++) {
+		if (!has_pulse(&a->channels[i]))
+			continue;
+		zero.width_s = fmax(zero.width_s, a->channels[i].pulse.duration_s);
+		if (best == a->channel_count || better_zero(report, i, best))
+			best = i;
+	}
+	if (best < a->channel_count) {
+		zero.time_s = a->channels[best].pulse.start_s;
+		if (!strcmp(report->record->channels[best].name, "S2X"))
+			zero.width_s = a->channels[best].pulse.duration_s;
+		snprintf(zero.name, sizeof(zero.name), "%s leaves 10 %% of its peak",
+		         report->record->channels[best].name);
+	} else if (report->record->is_drop && isfinite(report->record->trigger_s)) {
+		zero.time_s = report->record->trigger_s;
+		snprintf(zero.name, sizeof(zero.name), "the trigger");
+	} else {
+		snprintf(zero.name, sizeof(zero.name), "the first sample");
+	}
+	return zero;
+}
+
+/* Each is a millisecond of one sensor. */
+static uint64_t missing_ticks(const struct record *record)
+{
+	uint64_t ticks = 0;
+
+	for (size_t i = 0; i < record->gap_count; i++)
+		ticks += (uint64_t)record->gaps[i].last_tick_ms - record->gaps[i].first_tick_ms + 1;
+	return ticks;
+}
+
+bool report_verdict(const struct report *report, char *line, size_t size)
+{
+	const struct record *r = report->record;
+
+	if (r->lost_samples && !r->gap_count)
+		snprintf(line, size, "INCOMPLETE: %" PRIu64 " samples lost", r->lost_samples);
+	else if (r->lost_samples)
+		snprintf(line, size, "INCOMPLETE: %" PRIu64 " samples lost in %zu gap%s, %" PRIu64 " blocks",
+		         r->lost_samples, r->gap_count, r->gap_count == 1 ? "" : "s", missing_ticks(r));
+	else if (!r->is_drop)
+		snprintf(line, size, "no sample lost");
+	else if (!r->crc_known)
+		snprintf(line, size, "UNPROVEN: no capture end, so nothing says what the tower sent");
+	else if (!r->crc_agrees)
+		snprintf(line, size, "CORRUPT: no sample is missing, yet the CRC-32 does not agree");
+	else
+		snprintf(line, size, "complete: every sample arrived, and the CRC-32 agrees");
+	return !r->lost_samples && (!r->is_drop || (r->crc_known && r->crc_agrees));
+}
+
+unsigned report_flags(const struct report *report)
+{
+	unsigned flags = report->record->flags;
+
+	for (size_t i = 0; i < report->analysis->channel_count; i++)
+		flags |= report->analysis->channels[i].flags;
+	return flags;
+}
+
+const char *report_flag_words(unsigned flag)
+{
+	switch (flag) {
+	case RECORD_FLAG_LOST:
+		return "samples never arrived; they are left out, nothing is drawn or fitted across them";
+	case RECORD_FLAG_BAD:
+		return "samples were not taken, or the file holds no number there";
+	case RECORD_FLAG_CLIPPED:
+		return "samples are beyond the sensor's range: the true peak may be higher";
+	case RECORD_FLAG_INCOMPLETE:
+		return "the capture could not be completed";
+	case RECORD_FLAG_NO_CRC:
+		return "the capture end is missing, so completeness cannot be proven";
+	case RECORD_FLAG_SLOW_FRAME:
+		return "the frame fell slower than free fall beyond the limit: check rails and bearings";
+	case RECORD_FLAG_NO_IMPACT:
+		return "no impact was seen: the capture was ended by time";
+	case RECORD_FLAG_FAULT:
+		return "a fault was latched during the drop";
+	case RECORD_FLAG_UNEVEN:
+		return "the time column is not evenly spaced; its mean step was used";
+	case RECORD_FLAG_FULL_SCALE:
+		return "samples are at the converter's limit: the true value is unknown";
+	case RECORD_FLAG_OVERRUN:
+		return "the controller missed samples; they are marked and left out";
+	default:
+		return record_flag_name(flag);
+	}
+}
+
+const char *report_channel_status(const struct estimate_channel *estimate, char *text, size_t size)
+{
+	if (estimate->peak.status != ESTIMATE_OK)
+		snprintf(text, size, "%s", estimate_status_name(estimate->peak.status));
+	else if (estimate->pulse.status != ESTIMATE_OK)
+		snprintf(text, size, "width %s", estimate_status_name(estimate->pulse.status));
+	else
+		snprintf(text, size, "ok");
+	return text;
+}
+
+static void add_row(struct report_row *rows, size_t *count, struct report_row row,
+                    enum estimate_status status)
+{
+	if (status != ESTIMATE_OK)
+		row.measured = (double)NAN;
+	row.difference_percent = 100.0 * (row.predicted - row.measured) / row.measured;
+	if (!isfinite(row.difference_percent))
+		row.difference_percent = (double)NAN;
+	rows[(*count)++] = row;
+}
+
+static void compare_peaks(const struct report *report, struct report_row *rows, size_t *count)
+{
+	static const char *const names[MODEL_AXES] = {"S1X", "S1Y", "S2X", "S2Y"};
+	static const char *const keys[MODEL_AXES] = {"s1x_peak_g", "s1y_peak_g", "s2x_peak_g", "s2y_peak_g"};
+	static const char *const labels[MODEL_AXES] = {"S1 X peak", "S1 Y peak", "S2 X peak", "S2 Y peak"};
+
+	for (enum model_axis axis = 0; axis < MODEL_AXES; axis++) {
+		const struct estimate_channel *e = report_estimate(report, names[axis]);
+
+		add_row(rows, count,
+		        (struct report_row){.key = keys[axis],
+		                            .label = labels[axis],
+		                            .unit = "g",
+		                            .scale = 1.0,
+		                            .decimals = 1,
+		                            .predicted = report->prediction->peak[axis].value_g,
+		                            .measured = e ? e->peak.value_g : (double)NAN},
+		        e ? e->peak.status : ESTIMATE_SHORT);
+	}
+}
+
+static void compare_resultants(const struct report *report, struct report_row *rows, size_t *count)
+{
+	static const char *const names[] = {"S1", "S2"};
+	static const char *const keys[] = {"s1_resultant_g", "s2_resultant_g"};
+	static const char *const labels[] = {"S1 resultant", "S2 resultant"};
+
+	for (size_t sensor = 0; sensor < 2; sensor++) {
+		struct report_row row = {.key = keys[sensor],
+		                         .label = labels[sensor],
+		                         .unit = "g",
+		                         .scale = 1.0,
+		                         .decimals = 1,
+		                         .predicted = report->prediction->resultant[sensor].value_g,
+		                         .measured = (double)NAN};
+		enum estimate_status status = ESTIMATE_SHORT;
+
+		for (size_t i = 0; i < report->analysis->resultant_count; i++) {
+			const struct estimate_resultant *r = &report->analysis->resultants[i];
+
+			if (strcmp(r->sensor, names[sensor]))
+				continue;
+			row.measured = r->peak_g;
+			status = r->status;
+		}
+		add_row(rows, count, row, status);
+	}
+}
+
+size_t report_compare(const struct report *report, struct report_row rows[REPORT_ROWS_MAX])
+{
+	const struct analysis *a = report->analysis;
+	const struct model_prediction *p = report->prediction;
+	struct report_row lag = {
+	        .key = "lag_s", .label = "S1 after S2", .unit = "ms", .scale = 1e3, .decimals = 3};
+	struct report_row frequency = {.key = "plate_frequency_hz",
+	                               .label = "plate frequency",
+	                               .unit = "Hz",
+	                               .scale = 1.0,
+	                               .decimals = 2};
+	struct report_row damping = {.key = "plate_damping_ratio",
+	                             .label = "plate damping",
+	                             .unit = "",
+	                             .scale = 1.0,
+	                             .decimals = 4};
+	size_t count = 0;
+
+	if (!p)
+		return 0;
+	compare_peaks(report, rows, &count);
+	compare_resultants(report, rows, &count);
+	lag.predicted = p->lag_s;
+	lag.measured = a->lag.largest_peak_s;
+	add_row(rows, &count, lag, a->has_lag ? a->lag.status : ESTIMATE_SHORT);
+	if (p->has_plate) {
+		frequency.predicted = p->plate_frequency_hz;
+		frequency.measured = a->plate.frequency_hz;
+		damping.predicted = p->plate_damping_ratio;
+		damping.measured = a->plate.damping_ratio;
+		add_row(rows, &count, frequency, a->has_plate ? a->plate.status : ESTIMATE_SHORT);
+		add_row(rows, &count, damping, a->has_plate ? a->plate.status : ESTIMATE_SHORT);
+	}
+	return count;
+}

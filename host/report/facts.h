@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_REPORT_FACTS_H
+#define DT_HOST_REPORT_FACTS_H
+/*
+ * What the text, the JSON and the page say alike: the verdict, where their time 0 lies, flags in plain
+ * words, and the model beside the measurement. Functions of the report alone, no memory kept.
+ */
+#include "host/report/report.h"
+
+/* The instant that text and page count times from. JSON counts from the record's first instant. */
+struct report_zero {
+	double time_s;  /* after the record's first instant */
+	double width_s; /* of S2's pulse, or the longest of the record; NAN when there is none */
+	char name[80];  /* "S2X leaves 10 % of its peak" */
+};
+
+struct report_zero report_zero(const struct report *report);
+
+/* One line: is all of it there? Returns whether nothing is missing. */
+bool report_verdict(const struct report *report, char *line, size_t size);
+
+/* RECORD_FLAG_* of the record and of every channel as analysed. */
+unsigned report_flags(const struct report *report);
+
+/* A sentence for one RECORD_FLAG_*. */
+const char *report_flag_words(unsigned flag);
+
+/* The estimate of the channel of that name; NULL if there is none. */
+const struct estimate_channel *report_estimate(const struct report *report, const char *name);
+
+/* What of a channel's result is not ok, in a word or two: "ok", "clipped", "width short". */
+const char *report_channel_status(const struct estimate_channel *estimate, char *text, size_t size);
+
+enum { REPORT_ROWS_MAX = 10 };
+
+/* One line of the comparison. Measured is NAN where it is not known well enough to compare: its status is
+ * not ok. */
+struct report_row {
+	const char *key;   /* "s1x_peak_g" */
+	const char *label; /* "S1 X peak" */
+	const char *unit;  /* "g" */
+	double scale;      /* value times scale is in unit */
+	int decimals;      /* in unit */
+	double predicted, measured;
+	double difference_percent; /* (predicted - measured)/measured */
+};
+
+/* Fills rows, returns how many; 0 without a prediction. */
+size_t report_compare(const struct report *report, struct report_row rows[REPORT_ROWS_MAX]);
+
+#endif

@@ -1,0 +1,337 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "host/report/facts.h"
+
+/* Objects under construction. Out of memory anywhere, and failed is set: checked once, at the end. */
+struct builder {
+	bool failed;
+};
+
+static void attach(struct builder *b, cJSON *object, const char *key, cJSON *item)
+{
+	if (!item || !cJSON_AddItemToObject(object, key, item)) {
+		cJSON_Delete(item);
+		b->failed = true;
+	}
+}
+
+/* cJSON's own numbers may lose the last digit. */
+static void put_number(struct builder *b, cJSON *object, const char *key, double value)
+{
+	char text[32];
+
+	if (!isfinite(value)) {
+		attach(b, object, key, cJSON_CreateNull());
+		return;
+	}
+	for (int digits = 15; digits <= 17; digits++) {
+		snprintf(text, sizeof(text), "%.*g", digits, value);
+		if (strtod(text, NULL) == value)
+			break;
+	}
+	attach(b, object, key, cJSON_CreateRaw(text));
+}
+
+static void put_bool(struct builder *b, cJSON *object, const char *key, bool value)
+{
+	attach(b, object, key, cJSON_CreateBool(value));
+}
+
+/* Length of the UTF-8 character at s, 0 where there is none. */
+static size_t utf8_length(const unsigned char *s)
+{
+	size_t length = s[0] < 0x80                   ? 1
+	                : s[0] >= 0xC2 && s[0] < 0xE0 ? 2
+	                : s[0] >= 0xE0 && s[0] < 0xF0 ? 3
+	                                              : 0;
+
+	if (s[0] >= 0xF0 && s[0] < 0xF5)
+		length = 4;
+	for (size_t i = 1; i < length; i++)
+		if ((s[i] & 0xC0) != 0x80)
+			return 0;
+	return length;
+}
+
+/* File names are bytes, JSON is UTF-8: what is no UTF-8 becomes a question mark. */
+static void put_text(struct builder *b, cJSON *object, const char *key, const char *value)
+{
+	char *copy = strdup(value);
+
+	for (char *s = copy; s && *s;) {
+		size_t length = utf8_length((const unsigned char *)s);
+
+		if (!length)
+			*s = '?';
+		s += length ? length : 1;
+	}
+	attach(b, object, key, copy ? cJSON_CreateString(copy) : NULL);
+	free(copy);
+}
+
+static cJSON *put_object(struct builder *b, cJSON *object, const char *key)
+{
+	cJSON *item = cJSON_AddObjectToObject(object, key);
+
+	b->failed |= !item;
+	return item;
+}
+
+static cJSON *put_array(struct builder *b, cJSON *object, const char *key)
+{
+	cJSON *item = cJSON_AddArrayToObject(object, key);
+
+	b->failed |= !item;
+	return item;
+}
+
+static cJSON *append_object(struct builder *b, cJSON *array)
+{
+	cJSON *item = cJSON_CreateObject();
+
+	if (!item || !cJSON_AddItemToArray(array, item)) {
+		cJSON_Delete(item);
+		b->failed = true;
+		return NULL;
+	}
+	return item;
+}
+
+static void put_flags(struct builder *b, cJSON *object, unsigned flags)
+{
+	cJSON *array = put_array(b, object, "flags");
+
+	for (; flags; flags &= flags - 1) {
+		cJSON *name = cJSON_CreateString(record_flag_name(flags));
+
+		if (!name || !cJSON_AddItemToArray(array, name)) {
+			cJSON_Delete(name);
+			b->failed = true;
+		}
+	}
+}
+
+static void put_status(struct builder *b, cJSON *object, enum estimate_status status)
+{
+	put_text(b, object, "status", estimate_status_name(status));
+}
+
+static void put_method(struct builder *b, cJSON *object, const char *method)
+{
+	put_text(b, object, "method", method ? method : "");
+}
+
+static void put_ringdown(struct builder *b, cJSON *object, const char *key, const struct estimate_ringdown *r)
+{
+	cJSON *item = put_object(b, object, key);
+
+	put_number(b, item, "frequency_hz", r->frequency_hz);
+	put_number(b, item, "sigma_hz", r->sigma_hz);
+	put_number(b, item, "natural_frequency_hz", r->natural_frequency_hz);
+	put_number(b, item, "three_cycle_frequency_hz", r->three_cycle_frequency_hz);
+	put_number(b, item, "damping_ratio", r->damping_ratio);
+	put_number(b, item, "sigma_damping", r->sigma_damping);
+	put_method(b, item, r->method);
+	put_status(b, item, r->status);
+}
+
+static void put_peak(struct builder *b, cJSON *object, const struct estimate_peak *peak)
+{
+	cJSON *item = put_object(b, object, "peak");
+
+	put_number(b, item, "value_g", peak->value_g);
+	put_number(b, item, "sigma_g", peak->sigma_g);
+	put_number(b, item, "time_s", peak->time_s);
+	put_number(b, item, "sigma_time_s", peak->sigma_time_s);
+	put_method(b, item, peak->method);
+	put_status(b, item, peak->status);
+}
+
+static void put_pulse(struct builder *b, cJSON *object, const struct estimate_pulse *pulse)
+{
+	cJSON *item = put_object(b, object, "pulse");
+
+	put_number(b, item, "duration_s", pulse->duration_s);
+	put_number(b, item, "sigma_duration_s", pulse->sigma_duration_s);
+	put_number(b, item, "velocity_change_m_s", pulse->velocity_change_m_s);
+	put_number(b, item, "sigma_velocity_m_s", pulse->sigma_velocity_m_s);
+	put_number(b, item, "start_s", pulse->start_s);
+	put_number(b, item, "end_s", pulse->end_s);
+	put_status(b, item, pulse->status);
+}
+
+static void put_channel(struct builder *b, cJSON *array, const struct channel *channel,
+                        const struct estimate_channel *e)
+{
+	cJSON *item = append_object(b, array), *baseline;
+
+	put_text(b, item, "name", channel->name);
+	put_number(b, item, "rate_hz", channel->rate_hz);
+	put_number(b, item, "start_s", channel->start_s);
+	put_number(b, item, "count", (double)channel->count);
+	put_number(b, item, "range_g", channel->range_g > 0.0 ? channel->range_g : (double)NAN);
+	put_flags(b, item, e->flags);
+	baseline = put_object(b, item, "baseline");
+	put_number(b, baseline, "offset_g", e->baseline.offset_g);
+	put_number(b, baseline, "noise_g", e->baseline.noise_g);
+	put_number(b, baseline, "samples", (double)e->baseline.samples);
+	put_peak(b, item, &e->peak);
+	put_pulse(b, item, &e->pulse);
+	put_ringdown(b, item, "ringdown", &e->ringdown);
+}
+
+static void put_drop(struct builder *b, cJSON *root, const struct record *r)
+{
+	cJSON *drop, *counters, *gaps;
+
+	if (!r->is_drop) {
+		attach(b, root, "drop", cJSON_CreateNull());
+		return;
+	}
+	drop = put_object(b, root, "drop");
+	put_number(b, drop, "drop_id", r->drop_id);
+	put_number(b, drop, "first_tick_ms", r->first_tick_ms);
+	put_number(b, drop, "last_tick_ms", r->last_tick_ms);
+	put_number(b, drop, "trigger_s", r->trigger_s);
+	put_number(b, drop, "frame_speed_m_s", r->frame_speed_m_s);
+	put_number(b, drop, "crc32", r->crc_known ? (double)r->crc32 : (double)NAN);
+	put_bool(b, drop, "crc_agrees", r->crc_known && r->crc_agrees);
+	counters = put_object(b, drop, "counters");
+	put_number(b, counters, "blocks", (double)r->counters.blocks);
+	put_number(b, counters, "repeated", (double)r->counters.repeated);
+	put_number(b, counters, "reordered", (double)r->counters.reordered);
+	put_number(b, counters, "corrupt", (double)r->counters.corrupt);
+	put_number(b, counters, "gaps", (double)r->counters.gaps);
+	put_number(b, counters, "resent", (double)r->counters.resent);
+	put_number(b, counters, "conflicting", (double)r->counters.conflicting);
+	gaps = put_array(b, drop, "gaps");
+	for (size_t i = 0; i < r->gap_count; i++) {
+		cJSON *gap = append_object(b, gaps);
+
+		put_number(b, gap, "sensor", r->gaps[i].sensor);
+		put_number(b, gap, "first_tick_ms", r->gaps[i].first_tick_ms);
+		put_number(b, gap, "last_tick_ms", r->gaps[i].last_tick_ms);
+	}
+}
+
+static void put_resultants(struct builder *b, cJSON *root, const struct analysis *a)
+{
+	cJSON *array = put_array(b, root, "resultants");
+
+	for (size_t i = 0; i < a->resultant_count; i++) {
+		cJSON *item = append_object(b, array);
+
+		put_text(b, item, "sensor", a->resultants[i].sensor);
+		put_number(b, item, "peak_g", a->resultants[i].peak_g);
+		put_number(b, item, "sigma_g", a->resultants[i].sigma_g);
+		put_number(b, item, "time_s", a->resultants[i].time_s);
+		put_bool(b, item, "axes_coincide", a->resultants[i].axes_coincide);
+		put_number(b, item, "axes_apart_s", a->resultants[i].axes_apart_s);
+		put_status(b, item, a->resultants[i].status);
+	}
+}
+
+static void put_lag(struct builder *b, cJSON *root, const struct analysis *a)
+{
+	cJSON *item;
+
+	if (!a->has_lag) {
+		attach(b, root, "lag", cJSON_CreateNull());
+		return;
+	}
+	item = put_object(b, root, "lag");
+	put_number(b, item, "first_peak_s", a->lag.first_peak_s);
+	put_number(b, item, "largest_peak_s", a->lag.largest_peak_s);
+	put_number(b, item, "cross_correlation_s", a->lag.cross_correlation_s);
+	put_number(b, item, "spread_s", a->lag.spread_s);
+	put_number(b, item, "sigma_s", a->lag.sigma_s);
+	put_status(b, item, a->lag.status);
+}
+
+static void put_scene(struct builder *b, cJSON *root, const struct scene *scene)
+{
+	cJSON *item;
+
+	if (!scene) {
+		attach(b, root, "scene", cJSON_CreateNull());
+		return;
+	}
+	item = put_object(b, root, "scene");
+	put_text(b, item, "name", scene->name);
+	put_text(b, item, "title", scene->title);
+	put_number(b, item, "angle_deg", scene->drop_angle_deg);
+	put_number(b, item, "height_m", scene->drop_height_m);
+}
+
+static void put_model(struct builder *b, cJSON *root, const struct report *report)
+{
+	static const char *const times[MODEL_AXES] = {"s1x_time_s", "s1y_time_s", "s2x_time_s", "s2y_time_s"};
+	const struct model_prediction *p = report->prediction;
+	struct report_row rows[REPORT_ROWS_MAX];
+	size_t count = report_compare(report, rows);
+	cJSON *model, *predicted, *difference;
+
+	if (!p) {
+		attach(b, root, "model", cJSON_CreateNull());
+		return;
+	}
+	model = put_object(b, root, "model");
+	put_text(b, model, "fidelity", p->fidelity);
+	put_text(b, model, "reason", p->reason);
+	predicted = put_object(b, model, "predicted");
+	put_number(b, predicted, "impact_speed_m_s", p->impact_speed_m_s);
+	put_number(b, predicted, "velocity_change_m_s", p->velocity_change_m_s);
+	put_number(b, predicted, "contact_time_s", p->contact_time_s);
+	for (size_t i = 0; i < count; i++)
+		put_number(b, predicted, rows[i].key, rows[i].predicted);
+	for (enum model_axis axis = 0; axis < MODEL_AXES; axis++)
+		put_number(b, predicted, times[axis], p->peak[axis].time_s);
+	difference = put_object(b, model, "difference_percent");
+	for (size_t i = 0; i < count; i++)
+		put_number(b, difference, rows[i].key, rows[i].difference_percent);
+}
+
+static cJSON *build(struct builder *b, const struct report *report)
+{
+	const struct record *r = report->record;
+	const struct analysis *a = report->analysis;
+	cJSON *root = cJSON_CreateObject(), *channels;
+
+	b->failed = !root;
+	put_text(b, root, "file", r->file);
+	put_text(b, root, "format", r->format);
+	put_flags(b, root, report_flags(report));
+	put_number(b, root, "lost_samples", (double)r->lost_samples);
+	put_drop(b, root, r);
+	put_scene(b, root, report->scene);
+	channels = put_array(b, root, "channels");
+	for (size_t i = 0; i < a->channel_count; i++)
+		put_channel(b, channels, &r->channels[i], &a->channels[i]);
+	put_resultants(b, root, a);
+	put_lag(b, root, a);
+	if (a->has_plate)
+		put_ringdown(b, root, "plate", &a->plate);
+	else
+		attach(b, root, "plate", cJSON_CreateNull());
+	put_model(b, root, report);
+	return root;
+}
+
+int report_json(const struct report *report, FILE *out)
+{
+	struct builder b;
+	cJSON *root = build(&b, report);
+	char *text = b.failed ? NULL : cJSON_PrintUnformatted(root);
+
+	cJSON_Delete(root);
+	if (!text)
+		return DT_E_MEMORY;
+	fprintf(out, "%s\n", text);
+	cJSON_free(text);
+	return fflush(out) != 0 || ferror(out) ? DT_E_SYSTEM : 0;
+}

@@ -1,0 +1,185 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+#include "host/report/facts.h"
+
+enum { TEXT_GAPS_MAX = 8, TEXT_WIDTH = 90 };
+
+static void cell(FILE *out, int width, int decimals, double value)
+{
+	if (isfinite(value))
+		fprintf(out, " %*.*f", width, decimals, value);
+	else
+		fprintf(out, " %*s", width, "-");
+}
+
+static void write_head(const struct report *report, FILE *out)
+{
+	const struct record *r = report->record;
+	char verdict[160];
+
+	fprintf(out, "%s (%s)", r->file, r->format);
+	if (r->is_drop)
+		fprintf(out, ", drop %u", (unsigned)r->drop_id);
+	if (r->is_drop && isfinite(r->frame_speed_m_s))
+		fprintf(out, ", frame %.3f m/s between the gates", r->frame_speed_m_s);
+	fputc('\n', out);
+	if (report->scene)
+		fprintf(out, "%s, %g deg, from %g m\n",
+		        report->scene->title[0] ? report->scene->title : report->scene->name,
+		        report->scene->drop_angle_deg, report->scene->drop_height_m);
+	(void)report_verdict(report, verdict, sizeof(verdict));
+	fprintf(out, "%s\n", verdict);
+	for (unsigned flags = report_flags(report); flags; flags &= flags - 1)
+		fprintf(out, "  %s: %s\n", record_flag_name(flags), report_flag_words(flags & ~(flags - 1)));
+}
+
+static int name_width(const struct record *record)
+{
+	size_t width = 7;
+
+	for (size_t i = 0; i < record->channel_count; i++)
+		if (strlen(record->channels[i].name) > width)
+			width = strlen(record->channels[i].name);
+	return (int)width;
+}
+
+static void write_channels(const struct report *report, const struct report_zero *zero, FILE *out)
+{
+	int width = name_width(report->record);
+
+	fprintf(out, "\n%-*s %8s %9s %7s %9s %7s %9s %9s %8s  %s\n", width, "channel", "rate Hz", "peak g",
+	        "+-", "at ms", "+- us", "width ms", "dv m/s", "noise g", "status");
+	for (size_t i = 0; i < report->analysis->channel_count; i++) {
+		const struct estimate_channel *e = &report->analysis->channels[i];
+		char status[48];
+
+		fprintf(out, "%-*s", width, report->record->channels[i].name);
+		cell(out, 8, 1, report->record->channels[i].rate_hz);
+		cell(out, 9, 2, e->peak.value_g);
+		cell(out, 7, 2, e->peak.sigma_g);
+		cell(out, 9, 3, (e->peak.time_s - zero->time_s) * 1e3);
+		cell(out, 7, 1, e->peak.sigma_time_s * 1e6);
+		cell(out, 9, 3, e->pulse.duration_s * 1e3);
+		cell(out, 9, 3, e->pulse.velocity_change_m_s);
+		cell(out, 8, 2, e->baseline.noise_g);
+		fprintf(out, "  %s\n", report_channel_status(e, status, sizeof(status)));
+	}
+	for (size_t i = 0; i < report->analysis->resultant_count; i++) {
+		const struct estimate_resultant *r = &report->analysis->resultants[i];
+		char name[16];
+
+		snprintf(name, sizeof(name), "%s XY", r->sensor);
+		fprintf(out, "%-*s %8s", width, name, "");
+		cell(out, 9, 2, r->peak_g);
+		cell(out, 7, 2, r->sigma_g);
+		cell(out, 9, 3, (r->time_s - zero->time_s) * 1e3);
+		fprintf(out, " %7s  %s", "", estimate_status_name(r->status));
+		fprintf(out, r->axes_coincide ? ", X and Y peak together\n" : ", Y peaks %+.3f ms after X\n",
+		        r->axes_apart_s * 1e3);
+	}
+	fprintf(out, "Time 0: %s. Width at 10 %% of the peak; dv over that width.\n", zero->name);
+}
+
+static void write_joint(const struct analysis *a, FILE *out)
+{
+	if (a->has_lag || a->has_plate)
+		fputc('\n', out);
+	if (a->has_lag) {
+		fprintf(out, "S1 after S2: first peak");
+		cell(out, 1, 3, a->lag.first_peak_s * 1e3);
+		fprintf(out, ", largest");
+		cell(out, 1, 3, a->lag.largest_peak_s * 1e3);
+		fprintf(out, " +-");
+		cell(out, 1, 4, a->lag.sigma_s * 1e3);
+		fprintf(out, ", correlation");
+		cell(out, 1, 3, a->lag.cross_correlation_s * 1e3);
+		fprintf(out, " ms; spread");
+		cell(out, 1, 3, a->lag.spread_s * 1e3);
+		fprintf(out, " ms  %s\n", estimate_status_name(a->lag.status));
+	}
+	if (a->has_plate) {
+		fprintf(out, "plate:");
+		cell(out, 1, 2, a->plate.frequency_hz);
+		fprintf(out, " +-");
+		cell(out, 1, 2, a->plate.sigma_hz);
+		fprintf(out, " Hz damped (");
+		fprintf(out, isfinite(a->plate.three_cycle_frequency_hz) ? "%.2f" : "-",
+		        a->plate.three_cycle_frequency_hz);
+		fprintf(out, " over three cycles), damping");
+		cell(out, 1, 4, a->plate.damping_ratio);
+		fprintf(out, " +-");
+		cell(out, 1, 4, a->plate.sigma_damping);
+		fprintf(out, "  %s\n", estimate_status_name(a->plate.status));
+	}
+}
+
+/* "Model sdof, ..." with no line longer than the table. */
+static void write_wrapped(FILE *out, const char *fidelity, const char *reason)
+{
+	int column = fprintf(out, "Model %s,", fidelity);
+
+	while (*reason) {
+		int length = (int)strcspn(reason, " ");
+
+		if (column + 1 + length > TEXT_WIDTH)
+			column = fprintf(out, "\n ");
+		column += fprintf(out, " %.*s", length, reason);
+		reason += length;
+		reason += strspn(reason, " ");
+	}
+	fprintf(out, ".\n");
+}
+
+static void write_model(const struct report *report, FILE *out)
+{
+	struct report_row rows[REPORT_ROWS_MAX];
+	size_t count = report_compare(report, rows);
+
+	if (!count)
+		return;
+	fprintf(out, "\n%-20s %10s %10s %12s\n", "model against drop", "model", "measured", "difference");
+	for (size_t i = 0; i < count; i++) {
+		fprintf(out, "%-17s %2s", rows[i].label, rows[i].unit);
+		cell(out, 10, rows[i].decimals, rows[i].predicted * rows[i].scale);
+		cell(out, 10, rows[i].decimals, rows[i].measured * rows[i].scale);
+		if (isfinite(rows[i].difference_percent))
+			fprintf(out, " %+10.1f %%\n", rows[i].difference_percent);
+		else
+			fprintf(out, " %10s\n", "-");
+	}
+	write_wrapped(out, report->prediction->fidelity, report->prediction->reason);
+}
+
+static void write_frames(const struct record *r, FILE *out)
+{
+	const struct record_counters *c = &r->counters;
+
+	if (!(c->repeated | c->reordered | c->corrupt | c->gaps | c->resent | c->conflicting) &&
+	    !r->gap_count)
+		return;
+	fprintf(out,
+	        "\nframes: %" PRIu64 " blocks held, %" PRIu64 " gaps, %" PRIu64 " resent, %" PRIu64
+	        " repeated, "
+	        "%" PRIu64 " reordered, %" PRIu64 " corrupt, %" PRIu64 " conflicting\n",
+	        c->blocks, c->gaps, c->resent, c->repeated, c->reordered, c->corrupt, c->conflicting);
+	for (size_t i = 0; i < r->gap_count && i < TEXT_GAPS_MAX; i++)
+		fprintf(out, "  missing: S%u tick %" PRIu32 " to %" PRIu32 "\n", r->gaps[i].sensor,
+		        r->gaps[i].first_tick_ms, r->gaps[i].last_tick_ms);
+	if (r->gap_count > TEXT_GAPS_MAX)
+		fprintf(out, "  and %zu more, all listed by --json\n", r->gap_count - TEXT_GAPS_MAX);
+}
+
+int report_text(const struct report *report, FILE *out)
+{
+	struct report_zero zero = report_zero(report);
+
+	write_head(report, out);
+	write_channels(report, &zero, out);
+	write_joint(report->analysis, out);
+	write_model(report, out);
+	write_frames(report->record, out);
+	return fflush(out) != 0 || ferror(out) ? DT_E_SYSTEM : 0;
+}
