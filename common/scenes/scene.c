@@ -217,20 +217,20 @@ static const char *contradiction(const struct scene *scene)
 
 int scene_check(const struct scene *scene, const char *where, char message[SCENE_MESSAGE_MAX])
 {
-	const char *wrong;
+	const char *wrong = contradiction(scene); /* first: it says more than a derived value out of range */
 
+	if (wrong != NULL) {
+		snprintf(message, SCENE_MESSAGE_MAX, "%.300s: %s", where, wrong);
+		return DT_E_RANGE;
+	}
 	for (size_t i = 0; i < KEYS; i++) {
 		double value = value_in(scene, &keys[i]);
 
 		if (value >= keys[i].min && value <= keys[i].max)
 			continue;
 		snprintf(message, SCENE_MESSAGE_MAX, "%.300s: %s is %g, expected %g to %g", where,
-		         keys[i].name, value, keys[i].min, keys[i].max);
+			 keys[i].name, value, keys[i].min, keys[i].max);
 		return DT_E_RANGE;
 	}
-	wrong = contradiction(scene);
-	if (wrong == NULL)
-		return 0;
-	snprintf(message, SCENE_MESSAGE_MAX, "%.300s: %s", where, wrong);
-	return DT_E_RANGE;
+	return 0;
 }
