@@ -23,13 +23,14 @@ enum estimate_status {
 const char *estimate_status_name(enum estimate_status status);
 
 struct estimate_baseline {
-	double offset_g;  /* mean before the pulse */
-	double noise_g;   /* standard deviation per sample, from the median absolute deviation */
-	size_t samples;   /* used */
+	double offset_g; /* mean before the pulse; 0 when the record starts inside it (samples 0) */
+	double noise_g;  /* standard deviation per sample as read, from the median absolute deviation */
+	size_t samples;  /* used for the offset */
 };
 
 struct estimate_peak {
-	double value_g; /* signed; the extreme of largest magnitude, baseline removed */
+	double value_g; /* signed; the extreme of largest magnitude (of a drop: within 100 ms of its trigger)
+	                 */
 	double sigma_g;
 	double time_s;
 	double sigma_time_s;
@@ -70,7 +71,7 @@ struct estimate_resultant {
 	double peak_g;  /* maximum of hypot(X(t), Y(t)) on one continuous time */
 	double sigma_g;
 	double time_s;
-	bool axes_coincide; /* X and Y have their own maxima within the coincidence limit of each other */
+	bool axes_coincide;  /* X and Y have their own maxima within the coincidence limit of each other */
 	double axes_apart_s; /* Y's time minus X's */
 	enum estimate_status status;
 };
@@ -95,18 +96,19 @@ struct analysis {
 	size_t resultant_count; /* sensors that have both X and Y */
 	bool has_lag;           /* S1 and S2 are both there */
 	struct estimate_lag lag;
-	bool has_plate;         /* S1 rings on its own: it and S2 differ */
+	bool has_plate;                 /* S1 rings on its own: it and S2 differ */
 	struct estimate_ringdown plate; /* X and Y of S1 combined by their weights */
 };
 
 struct estimate_options {
-	double lowpass_hz; /* zero-phase low-pass before everything else; 0 = raw */
+	double lowpass_hz; /* zero-phase low-pass with this corner before everything else; 0 = raw */
 };
 
-/* Analyses a record. 0; DT_E_EMPTY if no channel has a single good sample; DT_E_MEMORY. Uncertain results
- * are not errors: they carry a status. On success free with estimate_free. */
+/* Analyses a record; the record is only read. 0; DT_E_EMPTY if no channel has a single good sample;
+ * DT_E_ARGUMENT for a low-pass that is negative or not finite; DT_E_MEMORY. Uncertain results are not errors:
+ * they carry a status. On success free with estimate_free. */
 DT_MUST_USE int estimate_record(const struct record *record, const struct estimate_options *options,
-				struct analysis *analysis);
+                                struct analysis *analysis);
 void estimate_free(struct analysis *analysis);
 
 #endif

@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/estimate/cholesky.h"
+
+#include <math.h>
+
+/* A pivot this much smaller than its diagonal is rounding. */
+#define PIVOT_MIN 1e-13
+
+bool cholesky_factor(struct cholesky *factor, unsigned size, double a[CHOLESKY_MAX][CHOLESKY_MAX])
+{
+	factor->size = size;
+	for (unsigned i = 0; i < size; i++) {
+		for (unsigned j = 0; j <= i; j++) {
+			double sum = a[i][j];
+
+			for (unsigned k = 0; k < j; k++)
+				sum -= factor->lower[i][k] * factor->lower[j][k];
+			if (j < i) {
+				factor->lower[i][j] = sum / factor->lower[j][j];
+				continue;
+			}
+			if (!(sum > PIVOT_MIN * a[i][i]) || !isfinite(sum))
+				return false;
+			factor->lower[i][i] = sqrt(sum);
+		}
+	}
+	return true;
+}
+
+/* L z = b */
+static void forward(const struct cholesky *factor, const double *b, double *z)
+{
+	for (unsigned i = 0; i < factor->size; i++) {
+		double sum = b[i];
+
+		for (unsigned k = 0; k < i; k++)
+			sum -= factor->lower[i][k] * z[k];
+		z[i] = sum / factor->lower[i][i];
+	}
+}
+
+void cholesky_solve(const struct cholesky *factor, const double *b, double *x)
+{
+	forward(factor, b, x);
+	for (unsigned i = factor->size; i-- > 0;) {
+		for (unsigned k = i + 1; k < factor->size; k++)
+			x[i] -= factor->lower[k][i] * x[k];
+		x[i] /= factor->lower[i][i];
+	}
+}
+
+double cholesky_variance(const struct cholesky *factor, const double *v)
+{
+	double z[CHOLESKY_MAX], sum = 0;
+
+	forward(factor, v, z);
+	for (unsigned i = 0; i < factor->size; i++)
+		sum += z[i] * z[i];
+	return sum;
+}

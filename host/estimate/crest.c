@@ -1,0 +1,169 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/estimate/crest.h"
+
+#include <math.h>
+
+enum {
+	CREST_PASSES = 6,
+	CREST_STEPS = 24, /* coarse steps across the reach */
+	CREST_NEWTON = 8,
+};
+
+/* Windows shrink by this much where the polynomial does not fit, so many times. */
+#define SHRINK 0.75
+
+enum { SHRINKS = 12 };
+
+/* Narrowest start in samples: enough for both orders even where the foot of the pulse cuts one side. */
+#define NARROWEST 15.0
+
+/* A residual this small against the magnitude does no harm. */
+#define RESIDUAL_MIN 3e-4
+
+/* How far from its centre a fit is believed, in half widths of its window. */
+#define REACH 0.6
+
+struct surface {
+	unsigned count;
+	struct local axis[CREST_AXES_MAX];
+};
+
+/* Half of the square's value, slope and curvature. */
+static void square_at(const struct surface *surface, double time_s, double half[3])
+{
+	half[0] = half[1] = half[2] = 0;
+	for (unsigned i = 0; i < surface->count; i++) {
+		double d[3];
+
+		local_at(&surface->axis[i], time_s, d);
+		half[0] += d[0] * d[0] / 2;
+		half[1] += d[0] * d[1];
+		half[2] += d[1] * d[1] + d[0] * d[2];
+	}
+}
+
+/* The highest instant within reach of the centre: 0 inside, -1 or +1 at that end of the reach. */
+static int summit(const struct surface *surface, double *time_s)
+{
+	double centre = surface->axis[0].centre_s, reach = REACH * surface->axis[0].half_s;
+	double step = 2 * reach / CREST_STEPS, best = -1, time, half[3];
+	int at = 0;
+
+	for (int i = 0; i <= CREST_STEPS; i++) {
+		square_at(surface, centre - reach + i * step, half);
+		if (half[0] > best) {
+			best = half[0];
+			at = i;
+		}
+	}
+	time = centre - reach + at * step;
+	*time_s = time;
+	if (at == 0 || at == CREST_STEPS)
+		return at == 0 ? -1 : 1;
+	for (int i = 0; i < CREST_NEWTON; i++) {
+		square_at(surface, time, half);
+		if (!(half[2] < 0))
+			break;
+		time -= half[1] / half[2];
+		if (!(fabs(time - *time_s) <= step))
+			return 0;
+	}
+	*time_s = time;
+	return 0;
+}
+
+/* Fits all axes around near_s and again around the summit until it stays, so that it ends in the middle
+ * of its window. */
+static bool climb(struct surface *surface, const struct trace *const axes[], unsigned count, double *near_s,
+                  double half_s, const struct local_span *span, unsigned order)
+{
+	int side = 1;
+
+	surface->count = count;
+	for (int pass = 0; pass < CREST_PASSES; pass++) {
+		double top;
+
+		for (unsigned i = 0; i < count; i++)
+			if (!local_fit(&surface->axis[i], axes[i], *near_s, half_s, span, order))
+				return false;
+		side = summit(surface, &top);
+		if (side == 0 && fabs(top - *near_s) * axes[0]->rate_hz < 0.5) {
+			*near_s = top;
+			return true;
+		}
+		if (top < span->from_s || top > span->until_s)
+			return false;
+		*near_s = top;
+	}
+	return side == 0;
+}
+
+/* Noise through the fit: dR = sum X dX / R, dt = sum X dX' / (sum X'^2 + X X''). */
+static void propagate(const struct surface *surface, const struct trace *const axes[], struct crest *crest)
+{
+	double half[3], variance = 0, slope_variance = 0;
+
+	square_at(surface, crest->time_s, half);
+	for (unsigned i = 0; i < surface->count; i++) {
+		double d[3], noise = fmax(axes[i]->noise_g, surface->axis[i].residual_g);
+
+		local_at(&surface->axis[i], crest->time_s, d);
+		variance += pow(d[0] * noise * local_spread(&surface->axis[i], crest->time_s, 0), 2);
+		slope_variance += pow(d[0] * noise * local_spread(&surface->axis[i], crest->time_s, 1), 2);
+	}
+	crest->value_g = sqrt(2 * half[0]);
+	crest->sigma_g = sqrt(variance) / crest->value_g;
+	crest->sigma_time_s = sqrt(slope_variance) / fabs(half[2]);
+}
+
+/* Whether the residual is what noise leaves: chi square within 3.3 of its standard deviations. */
+static bool follows(const struct surface *surface, const struct trace *const axes[], double value_g)
+{
+	for (unsigned i = 0; i < surface->count; i++) {
+		double chi2 = 1 + 3.3 * sqrt(2.0 / surface->axis[i].freedom);
+		double limit = axes[i]->noise_g * sqrt(chi2);
+
+		if (surface->axis[i].residual_g > fmax(limit, RESIDUAL_MIN * value_g))
+			return false;
+	}
+	return true;
+}
+
+/* Both orders at one width; *good says whether they follow the samples. */
+static bool fit_pair(struct crest *crest, const struct trace *const axes[], unsigned count, double near_s,
+                     double width_s, const struct local_span *span, bool *good)
+{
+	struct surface fine, coarse;
+	struct crest six, four;
+
+	six.time_s = near_s;
+	if (!climb(&fine, axes, count, &six.time_s, 0.45 * width_s, span, 6))
+		return false;
+	four.time_s = six.time_s;
+	if (!climb(&coarse, axes, count, &four.time_s, 0.35 * width_s, span, 4))
+		return false;
+	propagate(&fine, axes, &six);
+	propagate(&coarse, axes, &four);
+	if (!isfinite(six.value_g) || !isfinite(six.time_s))
+		return false;
+	six.sigma_g = hypot(six.sigma_g, (six.value_g - four.value_g) / 2);
+	six.sigma_time_s = hypot(six.sigma_time_s, (six.time_s - four.time_s) / 2);
+	*crest = six;
+	*good = follows(&fine, axes, six.value_g);
+	return true;
+}
+
+bool crest_fit(struct crest *crest, const struct trace *const axes[], unsigned count, double near_s,
+               double width_s, const struct local_span *span)
+{
+	bool fitted = false, good = false;
+
+	for (unsigned i = 0; i < count; i++)
+		width_s = fmax(width_s, NARROWEST / axes[i]->rate_hz);
+	for (int i = 0; i < SHRINKS && !good; i++, width_s *= SHRINK) {
+		if (!fit_pair(crest, axes, count, near_s, width_s, span, &good))
+			break;
+		fitted = true;
+	}
+	return fitted;
+}

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ESTIMATE_RESULTANT_H
+#define DT_HOST_ESTIMATE_RESULTANT_H
+/*
+ * The resultant of a sensor's X and Y: the maximum over continuous time of hypot(X(t), Y(t)), each axis a
+ * local model at its own rate (crest.h). Never the hypot of two maxima, which lie at different instants, nor
+ * of nearest samples.
+ *
+ * The axes coincide when their own maxima lie no further apart than RESULTANT_COINCIDE_S, about two samples.
+ * Status: the stronger axis' when that is short or no_peak; short when the weaker axis has too few samples
+ * under the pulse to say what it did; clipped and ambiguous as for a peak.
+ */
+#include "host/estimate/peak.h"
+
+#define RESULTANT_COINCIDE_S 0.25e-3
+
+/* Two axes of a sensor and what is known of each. */
+struct resultant_axes {
+	const struct trace *trace[2]; /* X, Y */
+	const struct peak *peak[2];
+};
+
+struct resultant {
+	struct estimate_resultant result; /* sensor is left to the caller */
+	double sigma_time_s;
+	double width_s;         /* of the stronger axis */
+	struct local_span span; /* of the stronger axis */
+	double first_peak_s;    /* the first local maximum above half of the largest; NAN unless found */
+};
+
+void resultant_find(const struct resultant_axes *axes, struct resultant *resultant);
+
+#endif
