@@ -36,7 +36,7 @@ say = @$(if $(V),true,printf '  %-8s %s\n' $(1) '$(2)')
 # ---- sources: a new file needs no line here ---------------------------------------------------------
 
 LCM_TYPES = $(basename $(notdir $(wildcard common/lcm/*.lcm)))
-LCM_C = $(LCM_TYPES:%=$(BUILD)/generated/droptower_%_t.c)
+LCM_C = $(LCM_TYPES:%=$(BUILD)/generated/droptower_%.c)
 LCM_H = $(LCM_C:.c=.h)
 
 FREESTANDING_C = $(wildcard common/*.c firmware/*.c)
@@ -68,28 +68,35 @@ all: $(PROGRAMS) ## build the three programs into build/
 $(call obj,$(FREESTANDING_C)): CFLAGS += -ffreestanding
 $(call obj,$(POSIX_C) $(LINK_C) $(HOST_C) host/main.c $(HIL_C) hil/main.c $(UNIT_C) $(UNIT_HELPER_C) $(TOOL_C)): \
 	CPPFLAGS += $(LINUX)
-$(call obj,host/main.c): CPPFLAGS += -DDT_VERSION='"$(VERSION)"'
 
 $(BUILD)/obj/%.o: %.c Makefile
 	$(call say,CC,$<)
 	$(Q)mkdir -p $(@D)
 	$(Q)$(CC) $(CFLAGS) $(CPPFLAGS) -MMD -MP -c $< -o $@
 
-$(call obj,$(HOST_C) $(UNIT_C) $(TOOL_C)): | $(LCM_H)
+$(call obj,$(HOST_C) host/main.c $(UNIT_C) $(TOOL_C)): | $(LCM_H) $(BUILD)/generated/droptower_version.h
 
-$(BUILD)/generated/droptower_%_t.c $(BUILD)/generated/droptower_%_t.h: common/lcm/%.lcm
+# Touched only when the version changes, so that nothing is compiled in vain.
+$(BUILD)/generated/droptower_version.h: always
+	$(Q)mkdir -p $(@D)
+	$(Q)echo '#define DT_VERSION "$(VERSION)"' | cmp -s - $@ || echo '#define DT_VERSION "$(VERSION)"' >$@
+.PHONY: always
+
+$(BUILD)/generated/droptower_%.c $(BUILD)/generated/droptower_%.h: common/lcm/%.lcm
 	$(call say,LCM,$<)
 	$(Q)mkdir -p $(@D)
 	$(Q)lcm-gen -c --c-cpath $(@D) --c-hpath $(@D) $<
 
-# Generated code is lcm-gen's business: our warnings do not apply to it.
+# Generated code is lcm-gen's business: our warnings do not apply to it, nor does its memcpy of nothing to
+# nowhere stop the sanitizer.
 $(LCM_O): %.o: %.c | $(LCM_H)
-	$(Q)$(CC) $(filter-out $(WARNINGS),$(CFLAGS)) $(CPPFLAGS) -c $< -o $@
+	$(Q)$(CC) $(filter-out $(WARNINGS),$(CFLAGS)) $(if $(SANITIZE),-fno-sanitize=nonnull-attribute) \
+		$(CPPFLAGS) -c $< -o $@
 
 $(BUILD)/lib/%.a:
 	$(call say,AR,$@)
 	$(Q)mkdir -p $(@D)
-	$(Q)rm -f $@ && ar rcs $@ $^
+	$(Q)rm -f $@ && ar qcs $@ $^
 
 $(call lib,common): $(call obj,$(COMMON_C))
 $(call lib,firmware): $(call obj,$(FIRMWARE_C))
@@ -121,6 +128,9 @@ $(UNITS): $(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(call obj,$(UNIT_HELPER
 $(TOOLS): $(BUILD)/tests/%: $(BUILD)/obj/tests/system/%.o $(foreach l,host link common,$(call lib,$l))
 	$(call say,LINK,$@)
 	$(link)
+
+# What a port, the bench's helpers and the tests add: their own programs, targets and packages.
+include $(sort $(wildcard firmware/port/*/*.mk hil/*/*.mk tests/*/*.mk))
 
 # ---- set-up -----------------------------------------------------------------------------------------
 
@@ -165,7 +175,7 @@ tests: $(UNITS) $(TOOLS)
 
 # ---- more ---------------------------------------------------------------------------------------------
 
-.PHONY: check edges dbc format clean help
+.PHONY: check edges dbc readme format clean help
 check: edges ## test, both compilers with warnings as errors, sanitizers, include edges, formatting
 	@$(MAKE) --no-print-directory test
 	@clang-format --dry-run --Werror $$(git ls-files '*.c' '*.h')
@@ -178,6 +188,9 @@ $(BUILD)/droptower.dbc: $(BUILD)/droptower
 	$(Q)$(BUILD)/droptower convert --dbc $@
 	@echo $@
 
+readme: all ## drop once and renew what README.md shows of it
+	@tests/readme $(BUILD)
+
 format: ## run clang-format over all sources
 	@clang-format -i $$(git ls-files '*.c' '*.h')
 
@@ -185,6 +198,6 @@ clean: ## remove build/
 	rm -rf $(BUILD)
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  %-12s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  %-12s %s\n", $$1, $$2}' $(filter %Makefile %.mk,$(MAKEFILE_LIST))
 
 -include $(ALL_O:.o=.d)

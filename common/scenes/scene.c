@@ -229,7 +229,7 @@ int scene_check(const struct scene *scene, const char *where, char message[SCENE
 		if (value >= keys[i].min && value <= keys[i].max)
 			continue;
 		snprintf(message, SCENE_MESSAGE_MAX, "%.300s: %s is %g, expected %g to %g", where,
-			 keys[i].name, value, keys[i].min, keys[i].max);
+		         keys[i].name, value, keys[i].min, keys[i].max);
 		return DT_E_RANGE;
 	}
 	return 0;

@@ -14,7 +14,10 @@
 
 struct join;
 
-/* NULL without memory. The join keeps the last 2 048 ticks until a capture end says which count. */
+/* NULL without memory. The join keeps the last 2 048 ticks until a capture end says which count; repeats,
+ * reorders and resends are counted for these, corrupt blocks since the last take. A capture end that comes
+ * again is the same capture. A boot-up heartbeat, or a live block more than 100 ticks behind, is a tower that
+ * started again: what came before belongs to no capture to come. */
 struct join *join_create(void);
 void join_destroy(struct join *join);
 
@@ -28,10 +31,10 @@ bool join_has_capture(const struct join *join);
 bool join_complete(const struct join *join);
 
 /* The first missing run with last - first + 1 <= limit, starting at or after (sensor, tick) in the order S1
- * then S2; false when there is none. When nothing is missing and yet the CRC-32 disagrees, see
- * join_forget. */
+ * then S2, sensor 0 = from the beginning; false when there is none. When nothing is missing and yet the
+ * CRC-32 disagrees, see join_forget. */
 bool join_next_gap(const struct join *join, unsigned sensor, uint32_t tick_ms, uint32_t limit,
-		   struct record_gap *gap);
+                   struct record_gap *gap);
 
 /* Drops every block of the capture, so that all of it is asked for again: a corrupt block slipped through
  * its CRC-8. */
@@ -41,8 +44,8 @@ void join_forget(struct join *join);
 uint32_t join_crc32(const struct join *join);
 
 /* Moves the capture, complete or not, into *record (initialised by the call) and makes room for the next
- * one. Without a capture end the longest run of ticks held is taken and flagged crc_unknown. DT_E_EMPTY
- * when no block was ever held. */
+ * one. Without a capture end the longest run of ticks held, over holes of less than 100, is taken and
+ * flagged crc_unknown. DT_E_EMPTY when no block of it is held. */
 DT_MUST_USE int join_take(struct join *join, struct record *record);
 
 #endif

@@ -18,6 +18,6 @@
 enum { READ_MESSAGE_MAX = 512 };
 
 DT_MUST_USE int read_record(struct record *record, const char *file, const char *columns,
-			    char message[READ_MESSAGE_MAX]);
+                            char message[READ_MESSAGE_MAX]);
 
 #endif

@@ -15,8 +15,9 @@
 
 /* What is known of one sample; 0 is a good one. A sample keeps its place whatever it is. */
 enum {
-	SAMPLE_LOST = 1u << 0,    /* its frame never came; value is NAN */
-	SAMPLE_BAD = 1u << 1,     /* the firmware marked it not taken, or the file holds no number; value is NAN */
+	SAMPLE_LOST = 1u << 0, /* its frame never came; value is NAN */
+	SAMPLE_BAD =
+	        1u << 1, /* the firmware marked it not taken, or the file holds no number; value is NAN */
 	SAMPLE_CLIPPED = 1u << 2, /* beyond the sensor's range or at full scale; value as read */
 	SAMPLE_SPIKE = 1u << 3,   /* set by the analysis */
 };
@@ -37,14 +38,15 @@ enum {
 };
 
 struct channel {
-	char name[32];      /* "S1X", or the name given in --columns */
-	double rate_hz;     /* native rate */
-	double start_s;     /* time of sample 0, s after the record's first instant; sample k is at start_s + k/rate_hz */
-	size_t count;       /* samples */
-	double *value_g;    /* [count]; NAN where SAMPLE_LOST or SAMPLE_BAD */
-	uint8_t *sample;    /* [count], SAMPLE_* bits */
-	double range_g;     /* sensor range when known, else 0 */
-	unsigned flags;     /* RECORD_FLAG_* */
+	char name[32];   /* "S1X", or the name given in --columns */
+	double rate_hz;  /* native rate */
+	double start_s;  /* time of sample 0, s after the record's first instant; sample k is at start_s +
+	                    k/rate_hz */
+	size_t count;    /* samples */
+	double *value_g; /* [count]; NAN where SAMPLE_LOST or SAMPLE_BAD */
+	uint8_t *sample; /* [count], SAMPLE_* bits */
+	double range_g;  /* sensor range when known, else 0 */
+	unsigned flags;  /* RECORD_FLAG_* */
 };
 
 struct record_gap {
@@ -55,36 +57,36 @@ struct record_gap {
 
 /* What happened to the frames of the capture on their way. */
 struct record_counters {
-	uint64_t blocks;     /* distinct blocks held */
-	uint64_t repeated;   /* a block that was already there */
-	uint64_t reordered;  /* a live block older than the one before it */
-	uint64_t corrupt;    /* CRC-8 does not agree; not used */
-	uint64_t gaps;       /* runs of ticks that were missing when the capture end came */
-	uint64_t resent;     /* blocks that came on request */
-	uint64_t conflicting;/* repeated with other samples: the first is kept */
+	uint64_t blocks;      /* distinct blocks held */
+	uint64_t repeated;    /* a block that was already there */
+	uint64_t reordered;   /* a live block that came after a newer one of its sensor */
+	uint64_t corrupt;     /* CRC-8 or length does not agree, or what a log holds is no frame; not used */
+	uint64_t gaps;        /* runs of ticks that were missing when the capture end came */
+	uint64_t resent;      /* blocks that came on request, needed or not */
+	uint64_t conflicting; /* repeated with other samples: the first is kept */
 };
 
 struct record {
-	char file[4096];   /* as given on the command line, or the link's URL */
-	char format[16];   /* "live" "candump" "lcm" "csv" "delimited" "lvm" */
+	char file[4096]; /* as given on the command line, or the link's URL */
+	char format[16]; /* "live" "candump" "lcm" "csv" "delimited" "lvm" */
 	struct channel *channels;
 	size_t channel_count;
 
 	/* Of a drop by our tower; zero for foreign recordings. */
 	bool is_drop;
 	uint16_t drop_id;
-	uint16_t marks;            /* WIRE_MARK_* */
+	uint16_t marks; /* WIRE_MARK_* */
 	uint32_t first_tick_ms, last_tick_ms;
-	double trigger_s;          /* after the first instant; NAN if unknown */
-	double frame_speed_m_s;    /* between the gates; NAN if unknown */
-	uint32_t crc32;            /* as sent in the capture end */
+	double trigger_s;       /* after the first instant; NAN if unknown */
+	double frame_speed_m_s; /* between the gates; NAN if unknown */
+	uint32_t crc32;         /* as sent in the capture end */
 	bool crc_known, crc_agrees;
 	struct record_counters counters;
-	struct record_gap *gaps;   /* what stayed missing */
+	struct record_gap *gaps; /* what stayed missing */
 	size_t gap_count;
 
-	uint64_t lost_samples;     /* over all channels */
-	unsigned flags;            /* RECORD_FLAG_*, union over channels and the drop's own */
+	uint64_t lost_samples; /* over all channels */
+	unsigned flags;        /* RECORD_FLAG_*, union over channels and the drop's own */
 };
 
 void record_init(struct record *record);

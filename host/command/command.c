@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/command/command.h"
+
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/error.h"
+
+static volatile sig_atomic_t interrupted;
+
+void command_error(const char *format, ...)
+{
+	va_list arguments;
+
+	va_start(arguments, format);
+	fputs("droptower: ", stderr);
+	vfprintf(stderr, format, arguments);
+	fputc('\n', stderr);
+	va_end(arguments);
+}
+
+int command_usage(const char *name, const char *format, ...)
+{
+	va_list arguments;
+
+	va_start(arguments, format);
+	fprintf(stderr, "droptower: %s: ", name);
+	vfprintf(stderr, format, arguments);
+	fprintf(stderr, "; try 'droptower %s --help'\n", name);
+	va_end(arguments);
+	return COMMAND_USAGE;
+}
+
+int command_link_failed(const char *doing, int result)
+{
+	command_error("%s: %s", doing, error_text(result));
+	return COMMAND_LINK;
+}
+
+static void on_signal(int number)
+{
+	interrupted = number;
+}
+
+void command_catch_signals(void)
+{
+	struct sigaction action;
+
+	memset(&action, 0, sizeof(action));
+	action.sa_handler = on_signal;
+	sigemptyset(&action.sa_mask);
+	sigaction(SIGINT, &action, NULL);
+	sigaction(SIGTERM, &action, NULL);
+	signal(SIGPIPE, SIG_IGN);
+}
+
+int command_interrupted(void)
+{
+	return interrupted != 0;
+}
+
+int command_number(const char *name, const char *option, const char *text, double min, double max,
+                   double *value)
+{
+	char *end;
+	double number = strtod(text, &end);
+
+	if (end == text || *end != '\0' || !(number >= min && number <= max))
+		return command_usage(name, "--%s is '%s', expected a number from %g to %g", option, text, min,
+		                     max);
+	*value = number;
+	return 0;
+}

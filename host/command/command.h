@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_COMMAND_COMMAND_H
+#define DT_HOST_COMMAND_COMMAND_H
+/*
+ * The subcommands of `droptower`, one file each. A command gets its own argv (argv[0] is its name) and
+ * returns the program's exit code. Results go to stdout, progress and errors to stderr.
+ */
+
+enum command_exit {
+	COMMAND_DONE = 0,
+	COMMAND_USAGE = 2,
+	COMMAND_INPUT = 3,   /* input unusable, or --strict and a flag is set */
+	COMMAND_LINK = 4,    /* link or hardware */
+	COMMAND_REFUSED = 5, /* by an interlock */
+};
+
+int command_run(int argc, char **argv);
+int command_analyze(int argc, char **argv);
+int command_replay(int argc, char **argv);
+int command_convert(int argc, char **argv);
+int command_ctl(int argc, char **argv);
+int command_bridge(int argc, char **argv);
+
+/* One line to stderr: "droptower: ..." */
+void command_error(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+/* Wrong usage: the line, then "try 'droptower NAME --help'"; returns COMMAND_USAGE. */
+int command_usage(const char *name, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* A call on a session or link failed with result: says so and returns COMMAND_LINK. */
+int command_link_failed(const char *doing, int result);
+
+/* Set by SIGINT and SIGTERM once command_catch_signals was called. */
+void command_catch_signals(void);
+int command_interrupted(void);
+
+/* A whole text as a finite number in [min, max]; 0 on success, else says why for option and returns
+ * COMMAND_USAGE. */
+int command_number(const char *name, const char *option, const char *text, double min, double max,
+                   double *value);
+
+#endif

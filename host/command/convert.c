@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <errno.h>
+#include <getopt.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "host/command/command.h"
+#include "host/record/dbc.h"
+#include "host/record/read.h"
+#include "host/record/write.h"
+
+static const char help[] = "usage: droptower convert IN OUT [--columns SPEC]\n"
+                           "       droptower convert --dbc OUT\n"
+                           "\n"
+                           "Writes a logged drop in another format, chosen by OUT's ending: .log candump "
+                           "text, .lcm LCM event log,\n"
+                           ".csv. IN is recognised by its content; foreign text needs --columns (see "
+                           "'droptower analyze --help')\n"
+                           "and becomes CSV.\n"
+                           "\n"
+                           "  --dbc OUT   the wire as a DBC file for other CAN tools\n";
+
+static int write_dbc(const char *file)
+{
+	FILE *out = fopen(file, "w");
+	int result = out == NULL ? DT_E_SYSTEM : dbc_write(out);
+
+	if (out != NULL && fclose(out) != 0)
+		result = DT_E_SYSTEM;
+	if (result == 0)
+		return COMMAND_DONE;
+	command_error("%s: %s", file, strerror(errno));
+	return COMMAND_INPUT;
+}
+
+static int convert(const char *in, const char *out, const char *columns)
+{
+	char message[READ_MESSAGE_MAX];
+	struct record record;
+	int result = read_record(&record, in, columns, message);
+
+	if (result == 0) {
+		result = write_record(&record, out, message);
+		record_free(&record);
+	}
+	if (result == 0)
+		return COMMAND_DONE;
+	command_error("%s", message);
+	return COMMAND_INPUT;
+}
+
+int command_convert(int argc, char **argv)
+{
+	static const struct option options[] = {{"columns", required_argument, NULL, 'c'},
+	                                        {"dbc", required_argument, NULL, 'd'},
+	                                        {"help", no_argument, NULL, 'h'},
+	                                        {0}};
+	const char *columns = NULL, *dbc = NULL;
+	int option;
+
+	opterr = 0;
+	while ((option = getopt_long(argc, argv, "h", options, NULL)) != -1) {
+		if (option == 'c')
+			columns = optarg;
+		else if (option == 'd')
+			dbc = optarg;
+		else if (option == 'h') {
+			fputs(help, stdout);
+			return COMMAND_DONE;
+		} else
+			return command_usage("convert", "option '%s' is not known or lacks its value",
+			                     argv[optind - 1]);
+	}
+	if (dbc != NULL)
+		return optind == argc ? write_dbc(dbc) : command_usage("convert", "--dbc takes no IN");
+	if (optind + 2 != argc)
+		return command_usage("convert", "expected IN OUT, %d given", argc - optind);
+	return convert(argv[optind], argv[optind + 1], columns);
+}

@@ -1,0 +1,191 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+
+#include "common/wire_table.h"
+#include "host/command/command.h"
+#include "host/command/session.h"
+
+static const char help[] =
+        "usage: droptower ctl [--link URL] status|arm|release TOKEN|abort|clear\n"
+        "\n"
+        "  status         state, checks, faults and every counter\n"
+        "  arm            prints the token that release needs within 10 s\n"
+        "  release TOKEN  opens the latch: the product falls\n"
+        "  abort          never asks, never refused\n"
+        "  clear          out of a fault whose cause is gone\n"
+        "\n"
+        "The tower arms only while a host keeps its heartbeat going: run 'droptower bridge' beside.\n"
+        "--link is unix:PATH, can:IF, slcan:DEV or udpm://...; default $DROPTOWER_LINK, else can:can0.\n";
+
+enum { STATUS_WAIT_MS = 1500, COUNTERS_WAIT_MS = 2500 };
+
+static void print_status(const struct session_view *view)
+{
+	printf("state    %s\nfault    %s%s%s\ndrop     %u\n", wire_state_name(view->state),
+	       wire_fault_name(view->fault), view->fault != 0 ? ": " : "",
+	       view->fault != 0 ? wire_fault_text(view->fault) : "", view->drop_id);
+	if (view->checks == 0)
+		printf("checks   all green\n");
+	for (unsigned i = 0; i < WIRE_CHECKS; i++)
+		if ((view->checks >> i & 1u) != 0)
+			printf("check    %-9s %s\n", wire_check_name(i), wire_check_text(i));
+	for (unsigned i = 0; i < WIRE_COUNTERS; i++)
+		if (view->counter_known[i])
+			printf("counter  %-22s %u\n", wire_counter_name(i), view->counters[i]);
+}
+
+static bool all_counters(const struct session_view *view)
+{
+	for (unsigned i = 0; i < WIRE_COUNTERS; i++)
+		if (!view->counter_known[i])
+			return false;
+	return true;
+}
+
+static int wait_for_status(struct session *session, bool counters)
+{
+	const struct session_view *view = session_view(session);
+	int64_t start_ms = session_now_ms();
+
+	while (!command_interrupted() && (!view->seen || (counters && !all_counters(view)))) {
+		int64_t waited_ms = session_now_ms() - start_ms;
+		int result;
+
+		if (waited_ms > (view->seen ? COUNTERS_WAIT_MS : STATUS_WAIT_MS))
+			break;
+		result = session_poll(session, 50);
+		if (result != 0)
+			return result;
+	}
+	return view->seen ? 0 : DT_E_TIMEOUT;
+}
+
+static int refused(const char *verb, int result, const struct session_view *view)
+{
+	command_error("%s: %s (state %s)", verb, error_text(result), wire_state_name(view->state));
+	for (unsigned i = 0; i < WIRE_CHECKS; i++)
+		if ((view->checks >> i & 1u) != 0)
+			command_error("  %s: %s", wire_check_name(i), wire_check_text(i));
+	return result == DT_E_TIMEOUT || result == DT_E_LINK || result == DT_E_CLOSED ? COMMAND_LINK
+	                                                                              : COMMAND_REFUSED;
+}
+
+/* A token from the kernel's generator, never 0. */
+static uint16_t random_token(void)
+{
+	uint16_t token = 0;
+
+	while (token == 0)
+		if (getrandom(&token, sizeof(token), 0) != sizeof(token))
+			token = (uint16_t)(session_utime() | 1);
+	return token;
+}
+
+static int act(struct session *session, const char *verb, uint16_t token)
+{
+	static const struct {
+		const char *verb;
+		enum wire_op op;
+	} verbs[] = {{"arm", WIRE_OP_ARM},
+	             {"release", WIRE_OP_RELEASE},
+	             {"abort", WIRE_OP_ABORT},
+	             {"clear", WIRE_OP_CLEAR}};
+	const struct session_view *view = session_view(session);
+
+	if (strcmp(verb, "arm") == 0)
+		token = random_token();
+	for (size_t i = 0; i < sizeof(verbs) / sizeof(verbs[0]); i++) {
+		int result;
+
+		if (strcmp(verb, verbs[i].verb) != 0)
+			continue;
+		result = session_command(session, verbs[i].op, token);
+		if (result != 0) {
+			if (result != DT_E_TIMEOUT)
+				(void)wait_for_status(session, false);
+			return refused(verb, result, view);
+		}
+		if (strcmp(verb, "arm") == 0)
+			printf("%u\n", token);
+		return COMMAND_DONE;
+	}
+	return COMMAND_USAGE;
+}
+
+static int parse_token(const char *text, uint16_t *token)
+{
+	double value;
+	int code = command_number("ctl", "token", text, 1, 65535, &value);
+
+	if (code == 0)
+		*token = (uint16_t)value;
+	return code;
+}
+
+static int with_session(const char *url, const char *verb, uint16_t token)
+{
+	struct session_options options = {.passive = true};
+	char message[SESSION_MESSAGE_MAX];
+	struct session *session = session_open(url, &options, message);
+	int code, result;
+
+	if (session == NULL) {
+		command_error("%s", message);
+		return COMMAND_LINK;
+	}
+	if (strcmp(verb, "status") == 0) {
+		result = wait_for_status(session, true);
+		code = result == 0 ? COMMAND_DONE : COMMAND_LINK;
+		if (result == 0)
+			print_status(session_view(session));
+		else
+			command_error("%s: no tower heard: %s", url, error_text(result));
+	} else {
+		code = act(session, verb, token);
+	}
+	session_close(session);
+	return code;
+}
+
+int command_ctl(int argc, char **argv)
+{
+	static const struct option options[] = {
+	        {"link", required_argument, NULL, 'l'}, {"help", no_argument, NULL, 'h'}, {0}};
+	const char *url = getenv("DROPTOWER_LINK"), *verb;
+	uint16_t token = 0;
+	int option, code;
+
+	opterr = 0;
+	while ((option = getopt_long(argc, argv, "h", options, NULL)) != -1) {
+		if (option == 'h') {
+			fputs(help, stdout);
+			return COMMAND_DONE;
+		}
+		if (option != 'l')
+			return command_usage("ctl", "option '%s' is not known or lacks its value",
+			                     argv[optind - 1]);
+		url = optarg;
+	}
+	if (optind == argc)
+		return command_usage("ctl", "no verb given");
+	verb = argv[optind++];
+	if (strcmp(verb, "release") == 0) {
+		if (optind == argc)
+			return command_usage("ctl", "release needs the token that arm printed");
+		code = parse_token(argv[optind++], &token);
+		if (code != 0)
+			return code;
+	} else if (strcmp(verb, "status") != 0 && strcmp(verb, "arm") != 0 && strcmp(verb, "abort") != 0 &&
+	           strcmp(verb, "clear") != 0) {
+		return command_usage("ctl", "no verb '%s', expected status, arm, release, abort or clear",
+		                     verb);
+	}
+	if (optind != argc)
+		return command_usage("ctl", "'%s' is too much", argv[optind]);
+	command_catch_signals();
+	return with_session(url != NULL ? url : "can:can0", verb, token);
+}

@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/command/evaluate.h"
+
+#include <droptower_version.h>
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/command/command.h"
+#include "host/report/report.h"
+
+static int write_json_file(const struct report *report, const char *file)
+{
+	FILE *out = fopen(file, "w");
+	int result = out == NULL ? DT_E_SYSTEM : report_json(report, out);
+
+	if (out != NULL && fclose(out) != 0)
+		result = DT_E_SYSTEM;
+	if (result == 0)
+		return COMMAND_DONE;
+	command_error("%s: %s", file, strerror(errno));
+	return COMMAND_INPUT;
+}
+
+static int write_out(const struct report *report, const struct evaluate_options *options)
+{
+	char message[512];
+	int code = COMMAND_DONE;
+
+	if ((options->json ? report_json(report, stdout) : report_text(report, stdout)) != 0) {
+		command_error("standard output: %s", strerror(errno));
+		code = COMMAND_INPUT;
+	}
+	if (code == COMMAND_DONE && options->json_file != NULL)
+		code = write_json_file(report, options->json_file);
+	if (code == COMMAND_DONE && options->html != NULL &&
+	    report_html(report, options->html, message, sizeof(message)) != 0) {
+		command_error("%s", message);
+		code = COMMAND_INPUT;
+	}
+	return code;
+}
+
+static bool any_flag(const struct record *record, const struct analysis *analysis)
+{
+	bool flagged = record->flags != 0;
+
+	for (size_t i = 0; i < analysis->channel_count; i++)
+		flagged |= analysis->channels[i].flags != 0;
+	return flagged;
+}
+
+/* Estimates and predicts; the report points into the other two. 0 or DT_E_*. */
+static int make_report(struct report *report, struct analysis *analysis, struct model_prediction *prediction,
+                       const struct record *record, const struct scene *scene, double lowpass_hz)
+{
+	struct estimate_options options = {.lowpass_hz = lowpass_hz};
+	int result = estimate_record(record, &options, analysis);
+
+	if (result != 0)
+		return result;
+	*report = (struct report){
+	        .record = record, .analysis = analysis, .scene = scene, .version = DT_VERSION};
+	if (scene == NULL)
+		return 0;
+	result = model_predict(scene, MODEL_AUTO, prediction);
+	if (result == 0)
+		report->prediction = prediction;
+	else
+		command_error("%s: no prediction: %s", scene->name, error_text(result));
+	return 0;
+}
+
+int evaluate(const struct record *record, const struct evaluate_options *options)
+{
+	struct model_prediction prediction;
+	struct analysis analysis;
+	struct report report;
+	int code, result = make_report(&report, &analysis, &prediction, record, options->scene,
+	                               options->lowpass_hz);
+
+	if (result != 0) {
+		command_error("%s: %s", record->file,
+		              result == DT_E_EMPTY ? "no good sample in any channel" : error_text(result));
+		return COMMAND_INPUT;
+	}
+	code = write_out(&report, options);
+	if (code == COMMAND_DONE && options->strict && any_flag(record, &analysis)) {
+		command_error("%s: flagged, and --strict was asked for", record->file);
+		code = COMMAND_INPUT;
+	}
+	estimate_free(&analysis);
+	return code;
+}
+
+char *evaluate_json(const struct record *record, const struct scene *scene)
+{
+	struct model_prediction prediction;
+	struct analysis analysis;
+	struct report report;
+	char *json = NULL;
+	size_t size = 0;
+	FILE *out;
+
+	if (make_report(&report, &analysis, &prediction, record, scene, 0.0) != 0)
+		return NULL;
+	out = open_memstream(&json, &size);
+	if (out != NULL) {
+		int result = report_json(&report, out);
+
+		if (fclose(out) != 0 || result != 0) {
+			free(json);
+			json = NULL;
+		}
+	}
+	estimate_free(&analysis);
+	return json;
+}
+
+int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg)
+{
+	char message[SCENE_MESSAGE_MAX];
+	int result = scene_read(scene, file, message);
+
+	if (result == 0 && !isnan(angle_deg)) {
+		scene->drop_angle_deg = angle_deg;
+		result = scene_check(scene, "--angle", message);
+	}
+	if (result == 0)
+		return COMMAND_DONE;
+	command_error("%s", message);
+	return COMMAND_INPUT;
+}

@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_COMMAND_PUBLISH_H
+#define DT_HOST_COMMAND_PUBLISH_H
+/*
+ * What the host publishes on LCM: DT_BLOCK, DT_STATE, DT_DROP, DT_RESULT; and DT_COMMAND, which it takes.
+ * One thread. The bridge, the replay and a session over LCM use it.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+
+#include <lcm/lcm.h>
+
+#include "common/frame.h"
+#include "host/record/record.h"
+
+#define PUBLISH_STATE "DT_STATE"
+#define PUBLISH_COMMAND "DT_COMMAND"
+#define PUBLISH_RESULT "DT_RESULT"
+
+enum { PUBLISH_MESSAGE_MAX = 256 };
+
+/* What one bus needs besides the default: no time to live beyond this machine, room for a burst. */
+#define PUBLISH_URL "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
+
+struct publisher {
+	lcm_t *lcm;
+	int64_t command_utime; /* of the last command answered; goes with every state */
+	int16_t command_result;
+	struct frame status; /* the last one, to be published again with a command's result */
+	uint64_t blocks, states, drops, refused; /* refused: frames that are none of the wire's */
+};
+
+/* url is an LCM provider's, so neither a link nor a log. */
+bool publisher_wants(const char *url);
+
+/* NULL with one line in message. */
+struct publisher *publisher_open(const char *url, char message[PUBLISH_MESSAGE_MAX]);
+void publisher_close(struct publisher *publisher);
+
+/* A frame of the tower: blocks and status are published, the others are none of LCM's business. 0 or
+ * DT_E_LINK. */
+DT_MUST_USE int publisher_frame(struct publisher *publisher, const struct frame *frame);
+
+/* A collected drop, and the result of its analysis as JSON. 0, DT_E_LINK, DT_E_MEMORY, DT_E_ARGUMENT. */
+DT_MUST_USE int publisher_drop(struct publisher *publisher, const struct record *record);
+DT_MUST_USE int publisher_result(struct publisher *publisher, unsigned drop_id, const char *json);
+
+/* Publishes the last state again with what became of a command. */
+DT_MUST_USE int publisher_answer(struct publisher *publisher, int64_t command_utime, int result);
+
+/* Bytes as they are. */
+DT_MUST_USE int publisher_raw(struct publisher *publisher, const char *channel, const void *bytes,
+                              size_t size);
+
+#endif

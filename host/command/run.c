@@ -1,0 +1,382 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <errno.h>
+#include <getopt.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+
+#include "common/wire_table.h"
+#include "host/command/command.h"
+#include "host/command/evaluate.h"
+#include "host/command/session.h"
+#include "host/command/simulated.h"
+#include "host/command/tower_setup.h"
+#include "host/record/write.h"
+
+static const char help[] =
+        "usage: droptower run [OPTIONS]\n"
+        "\n"
+        "One drop: waits until every check is green, arms, releases, follows the fall, fetches every "
+        "sample,\n"
+        "analyses and reports. Writes drop-NNNN.log (candump text), .csv, .json and .html into --out.\n"
+        "\n"
+        "  --link URL     unix:PATH, can:IF, slcan:DEV, or udpm://... for a running 'droptower bridge';\n"
+        "                 without it a simulated tower is started\n"
+        "  --scene FILE   what is dropped (default common/scenes/geometry-2A.ini)\n"
+        "  --angle DEG    contact angle, instead of the scene's\n"
+        "  --out DIR      where the files go (default .)\n"
+        "  --json         one JSON object on standard output instead of the table\n"
+        "  --strict       a flagged result is a failure (exit 3)\n"
+        "  --bench WORD   simulated tower only: a word for droptower-bench, e.g. --bench=--loss\n"
+        "                 --bench=0.05; may be repeated\n";
+
+enum {
+	OPTION_LINK = 256,
+	OPTION_SCENE,
+	OPTION_ANGLE,
+	OPTION_OUT,
+	OPTION_JSON,
+	OPTION_STRICT,
+	OPTION_BENCH,
+	BENCH_WORDS_MAX = 24,
+	READY_MS = 60000, /* a person may have to close a door */
+	DROP_MS = 20000,  /* fall, capture and upload take about one second */
+};
+
+static const struct option long_options[] = {
+        {"link", required_argument, NULL, OPTION_LINK},
+        {"scene", required_argument, NULL, OPTION_SCENE},
+        {"angle", required_argument, NULL, OPTION_ANGLE},
+        {"out", required_argument, NULL, OPTION_OUT},
+        {"json", no_argument, NULL, OPTION_JSON},
+        {"strict", no_argument, NULL, OPTION_STRICT},
+        {"bench", required_argument, NULL, OPTION_BENCH},
+        {"help", no_argument, NULL, 'h'},
+        {0},
+};
+
+struct run {
+	const char *link, *scene_file, *out;
+	double angle_deg;
+	bool json, strict, help;
+	const char *bench_words[BENCH_WORDS_MAX + 8];
+	int bench_word_count;
+	/* while it runs */
+	struct scene scene;
+	struct session *session;
+	int64_t start_ms;
+	char stem[4096]; /* OUT/drop-NNNN */
+};
+
+static int parse(struct run *run, int argc, char **argv)
+{
+	int option, code = COMMAND_DONE;
+
+	opterr = 0;
+	while (code == COMMAND_DONE && (option = getopt_long(argc, argv, "h", long_options, NULL)) != -1) {
+		switch (option) {
+		case OPTION_LINK:
+			run->link = optarg;
+			break;
+		case OPTION_SCENE:
+			run->scene_file = optarg;
+			break;
+		case OPTION_ANGLE:
+			code = command_number("run", "angle", optarg, 10, 80, &run->angle_deg);
+			break;
+		case OPTION_OUT:
+			run->out = optarg;
+			break;
+		case OPTION_JSON:
+			run->json = true;
+			break;
+		case OPTION_STRICT:
+			run->strict = true;
+			break;
+		case OPTION_BENCH:
+			if (run->bench_word_count == BENCH_WORDS_MAX)
+				return command_usage("run", "more than %d --bench words", BENCH_WORDS_MAX);
+			run->bench_words[run->bench_word_count++] = optarg;
+			break;
+		case 'h':
+			run->help = true;
+			return COMMAND_DONE;
+		default:
+			return command_usage("run", "option '%s' is not known or lacks its value",
+			                     argv[optind - 1]);
+		}
+	}
+	if (code == COMMAND_DONE && optind != argc)
+		code = command_usage("run", "'%s' is too much", argv[optind]);
+	if (code == COMMAND_DONE && run->link != NULL && run->bench_word_count > 0)
+		code = command_usage("run", "--bench is for the simulated tower, --link for another one");
+	return code;
+}
+
+static void __attribute__((format(printf, 2, 3))) progress(const struct run *run, const char *format, ...)
+{
+	va_list arguments;
+
+	fprintf(stderr, "%7.3f s  ", (double)(session_now_ms() - run->start_ms) / 1000.0);
+	va_start(arguments, format);
+	vfprintf(stderr, format, arguments);
+	va_end(arguments);
+	fputc('\n', stderr);
+}
+
+/* Makes OUT and finds the first number for which no log is there. */
+static int choose_stem(struct run *run)
+{
+	struct stat there;
+	char log[4200];
+
+	if (mkdir(run->out, 0777) != 0 && errno != EEXIST) {
+		command_error("%s: %s", run->out, strerror(errno));
+		return COMMAND_INPUT;
+	}
+	for (int number = 1; number < 10000; number++) {
+		snprintf(run->stem, sizeof(run->stem), "%.4000s/drop-%04d", run->out, number);
+		snprintf(log, sizeof(log), "%s.log", run->stem);
+		if (stat(log, &there) != 0)
+			return COMMAND_DONE;
+	}
+	command_error("%s: 9999 drops are there already", run->out);
+	return COMMAND_INPUT;
+}
+
+static void tell_checks(const struct run *run, uint16_t checks)
+{
+	for (unsigned i = 0; i < WIRE_CHECKS; i++)
+		if ((checks >> i & 1u) != 0)
+			progress(run, "check     %-10s %s", wire_check_name(i), wire_check_text(i));
+}
+
+static int wait_until_ready(struct run *run)
+{
+	const struct session_view *view = session_view(run->session);
+	int64_t start_ms = session_now_ms();
+	uint16_t told = 0;
+
+	while (view->state != WIRE_STATE_READY) {
+		int result = session_poll(run->session, 50);
+
+		if (result != 0)
+			return command_link_failed("waiting for the checks", result);
+		if (command_interrupted())
+			return COMMAND_REFUSED;
+		if (view->state == WIRE_STATE_FAULT_HELD) {
+			command_error(
+			        "the tower holds a fault: %s; 'droptower ctl clear' when its cause is gone",
+			        wire_fault_text(view->fault));
+			return COMMAND_REFUSED;
+		}
+		if (view->checks != told && session_now_ms() - start_ms > 1000) {
+			told = view->checks;
+			tell_checks(run, told);
+		}
+		if (session_now_ms() - start_ms > READY_MS) {
+			command_error("checks not green within %d s", READY_MS / 1000);
+			return COMMAND_REFUSED;
+		}
+	}
+	progress(run, "ready     all checks green");
+	return COMMAND_DONE;
+}
+
+static int arm_and_release(struct run *run)
+{
+	uint16_t token = 0;
+	int result;
+
+	while (token == 0)
+		if (getrandom(&token, sizeof(token), 0) != sizeof(token))
+			token = (uint16_t)(session_utime() | 1);
+	result = session_command(run->session, WIRE_OP_ARM, token);
+	if (result == 0) {
+		progress(run, "armed");
+		result = session_command(run->session, WIRE_OP_RELEASE, token);
+	}
+	if (result == 0) {
+		progress(run, "released");
+		return COMMAND_DONE;
+	}
+	command_error("the tower refuses: %s", error_text(result));
+	tell_checks(run, session_view(run->session)->checks);
+	return result == DT_E_TIMEOUT || result == DT_E_CLOSED || result == DT_E_LINK ? COMMAND_LINK
+	                                                                              : COMMAND_REFUSED;
+}
+
+/* Follows the drop until it is collected. */
+static int follow(struct run *run, struct record *record)
+{
+	const struct session_view *view = session_view(run->session);
+	int64_t start_ms = session_now_ms();
+	unsigned told = WIRE_STATE_ARMED;
+	bool aborted = false;
+
+	for (;;) {
+		int result = session_poll(run->session, 50);
+		int taken = result == 0 ? session_take_drop(run->session, record) : result;
+
+		if (taken == 1)
+			return COMMAND_DONE;
+		if (taken < 0)
+			return command_link_failed("following the drop", taken);
+		if (view->state != told) {
+			told = view->state;
+			progress(run, "%-9s %s", wire_state_name(told), wire_state_text(told));
+		}
+		if (command_interrupted() && !aborted) {
+			aborted = true;
+			progress(run, "abort");
+			result = session_command(run->session, WIRE_OP_ABORT, 0);
+			if (result != 0)
+				return command_link_failed("abort", result);
+		}
+		if (session_now_ms() - start_ms > DROP_MS) {
+			command_error("no capture within %d s of the release; state %s, fault %s",
+			              DROP_MS / 1000, wire_state_name(view->state),
+			              wire_fault_name(view->fault));
+			return COMMAND_LINK;
+		}
+	}
+}
+
+/* What the link lost on its way; a tower's own losses are in its counters. */
+static void tell_losses(const struct run *run)
+{
+	const struct link_counters *link = session_view(run->session)->link;
+
+	if (link == NULL)
+		return;
+	if (link->receive_lost + link->send_lost + link->malformed + link->errors + link->restarts == 0)
+		return;
+	progress(run,
+	         "link      %" PRIu64 " frames lost before us, %" PRIu64 " of ours lost, %" PRIu64
+	         " malformed, %" PRIu64 " bus errors, %" PRIu64 " restarts",
+	         link->receive_lost, link->send_lost, link->malformed, link->errors, link->restarts);
+}
+
+static int drop(struct run *run, struct record *record)
+{
+	int code = tower_setup_hear(run->session);
+
+	if (code == COMMAND_DONE)
+		code = tower_setup_write(run->session, &run->scene);
+	if (code == COMMAND_DONE)
+		code = wait_until_ready(run);
+	if (code == COMMAND_DONE)
+		code = arm_and_release(run);
+	if (code == COMMAND_DONE)
+		code = follow(run, record);
+	if (code == COMMAND_DONE)
+		progress(run, "collected %" PRIu64 " blocks, %" PRIu64 " asked for again",
+		         record->counters.blocks, session_view(run->session)->asked);
+	tell_losses(run);
+	return code;
+}
+
+static int report(struct run *run, struct record *record)
+{
+	char csv[4200], json[4200], html[4200], message[READ_MESSAGE_MAX];
+	struct evaluate_options options = {.scene = &run->scene,
+	                                   .json = run->json,
+	                                   .html = html,
+	                                   .json_file = json,
+	                                   .strict = run->strict};
+	int code;
+
+	snprintf(csv, sizeof(csv), "%s.csv", run->stem);
+	snprintf(json, sizeof(json), "%s.json", run->stem);
+	snprintf(html, sizeof(html), "%s.html", run->stem);
+	snprintf(record->file, sizeof(record->file), "%.4000s.log", run->stem);
+	if (write_record(record, csv, message) != 0) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	code = evaluate(record, &options);
+	if (code == COMMAND_DONE)
+		fprintf(run->json ? stderr : stdout,
+		        "\nraw log  %s.log\ntable    %s\nJSON     %s\nreport   %s\n", run->stem, csv, json,
+		        html);
+	return code;
+}
+
+/* Drops with the log open; the log is on disk before the analysis begins. */
+static int drop_logged(struct run *run, const char *url, struct record *record)
+{
+	struct session_options options = {0};
+	char log[4200], message[SESSION_MESSAGE_MAX];
+	int code = COMMAND_LINK;
+
+	snprintf(log, sizeof(log), "log:%s.log", run->stem);
+	options.log = link_open(log, LINK_WRITE, message, sizeof(message));
+	if (options.log == NULL) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	run->session = session_open(url, &options, message);
+	if (run->session != NULL)
+		code = drop(run, record);
+	else
+		command_error("%s", message);
+	session_close(run->session);
+	if (link_close(options.log) != 0) {
+		command_error("%s.log: could not be written", run->stem);
+		code = COMMAND_INPUT;
+	}
+	return code;
+}
+
+static int run_drop(struct run *run)
+{
+	struct simulated tower = {0};
+	struct record record;
+	char angle[32], message[256];
+	int code;
+
+	if (run->link == NULL) {
+		const char *words[] = {"--scene", run->scene_file, "--angle", angle};
+
+		snprintf(angle, sizeof(angle), "%.17g", run->scene.drop_angle_deg);
+		for (size_t i = 0; i < sizeof(words) / sizeof(words[0]); i++)
+			run->bench_words[run->bench_word_count++] = words[i];
+		if (simulated_start(&tower, run->bench_words, message, sizeof(message)) != 0) {
+			command_error("%s", message);
+			return COMMAND_LINK;
+		}
+	}
+	record_init(&record);
+	code = drop_logged(run, run->link != NULL ? run->link : tower.url, &record);
+	if (run->link == NULL)
+		simulated_stop(&tower);
+	if (code == COMMAND_DONE)
+		code = report(run, &record);
+	record_free(&record);
+	return code;
+}
+
+int command_run(int argc, char **argv)
+{
+	struct run run = {.scene_file = "common/scenes/geometry-2A.ini", .out = ".", .angle_deg = NAN};
+	int code = parse(&run, argc, argv);
+
+	if (code != COMMAND_DONE)
+		return code;
+	if (run.help) {
+		fputs(help, stdout);
+		return COMMAND_DONE;
+	}
+	code = evaluate_read_scene(&run.scene, run.scene_file, run.angle_deg);
+	if (code == COMMAND_DONE)
+		code = choose_stem(&run);
+	if (code != COMMAND_DONE)
+		return code;
+	command_catch_signals();
+	run.start_ms = session_now_ms();
+	return run_drop(&run);
+}

@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_COMMAND_SIMULATED_H
+#define DT_HOST_COMMAND_SIMULATED_H
+/*
+ * A simulated tower for a command that was given no link: droptower-bench, found beside this program, on a
+ * bus of its own in a temporary directory.
+ */
+#include <stdint.h>
+#include <sys/types.h>
+
+struct simulated {
+	pid_t pid;
+	char directory[64];
+	char url[96]; /* of its bus */
+};
+
+/* arguments: what to hand to the bench besides --link and --ready-fd, NULL-terminated, at most 32. 0, or -1
+ * with one line in message. Waits until the bus is open. */
+int simulated_start(struct simulated *tower, const char *const *arguments, char *message, unsigned size);
+
+/* Ends it and removes its directory. */
+void simulated_stop(struct simulated *tower);
+
+#endif

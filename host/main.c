@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * droptower: one program with subcommands.
+ */
+#include <stdio.h>
+#include <string.h>
+
+#include <droptower_version.h>
+#include <gsl/gsl_errno.h>
+
+#include "host/command/command.h"
+
+static const struct {
+	const char *name;
+	int (*run)(int argc, char **argv);
+	const char *what;
+} commands[] = {
+        {"run", command_run, "arm, drop, capture, analyse and report; without --link on a simulated tower"},
+        {"analyze", command_analyze, "logged drops and foreign recordings to results"},
+        {"replay", command_replay, "a logged drop onto CAN or LCM, in its own time"},
+        {"convert", command_convert, "candump, LCM and CSV into each other; the wire as a DBC file"},
+        {"ctl", command_ctl, "the operator's verbs: status, arm, release, abort, clear"},
+        {"bridge", command_bridge, "CAN to LCM and commands back"},
+};
+enum { COMMANDS = sizeof(commands) / sizeof(commands[0]) };
+
+static void help(FILE *out)
+{
+	fputs("usage: droptower COMMAND [OPTIONS]\n\n", out);
+	for (int i = 0; i < COMMANDS; i++)
+		fprintf(out, "  %-8s %s\n", commands[i].name, commands[i].what);
+	fputs("\n'droptower COMMAND --help' tells the options. Exit codes: 0 done, 2 usage, 3 input "
+	      "unusable,\n"
+	      "4 link or hardware, 5 refused by an interlock.\n",
+	      out);
+}
+
+int main(int argc, char **argv)
+{
+	gsl_set_error_handler_off();
+	if (argc < 2) {
+		help(stderr);
+		return COMMAND_USAGE;
+	}
+	if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 || strcmp(argv[1], "help") == 0) {
+		help(stdout);
+		return COMMAND_DONE;
+	}
+	if (strcmp(argv[1], "--version") == 0) {
+		puts("droptower " DT_VERSION);
+		return COMMAND_DONE;
+	}
+	for (int i = 0; i < COMMANDS; i++)
+		if (strcmp(argv[1], commands[i].name) == 0)
+			return commands[i].run(argc - 1, argv + 1);
+	command_error("no command '%s'; 'droptower --help' lists them", argv[1]);
+	return COMMAND_USAGE;
+}

@@ -1,0 +1,142 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/columns.h"
+
+#include <string.h>
+
+#include "common/units.h"
+#include "host/record/number.h"
+#include "host/record/source.h"
+
+/* A stretch of the text. */
+struct piece {
+	const char *text;
+	size_t length;
+};
+
+static int refuse(char *message, struct piece entry, const char *expected)
+{
+	return source_refuse(message, DT_E_ARGUMENT, "--columns", 0, "\"%.*s\", expected %s",
+	                     (int)(entry.length < 80 ? entry.length : 80), entry.text, expected);
+}
+
+/* Cuts *rest at the first separator: what is before it is returned, *rest is what is behind, or NULL. */
+static struct piece cut(struct piece *rest, char separator)
+{
+	struct piece piece = *rest;
+	const char *end = memchr(rest->text, separator, rest->length);
+
+	if (!end) {
+		*rest = (struct piece){0};
+		return piece;
+	}
+	piece.length = (size_t)(end - piece.text);
+	rest->text = end + 1;
+	rest->length -= piece.length + 1;
+	return piece;
+}
+
+/* Number in the file / divisor = s or g; 0 for an unknown unit. */
+static double unit_divisor(enum column_kind kind, struct piece unit)
+{
+	static const struct {
+		enum column_kind kind;
+		const char *unit;
+		double divisor;
+	} table[] = {
+	        {COLUMN_TIME, "s", 1},
+	        {COLUMN_TIME, "ms", 1e3},
+	        {COLUMN_TIME, "us", 1e6},
+	        {COLUMN_CHANNEL, "g", 1},
+	        {COLUMN_CHANNEL, "m/s2", UNITS_G_M_S2},
+	};
+
+	for (size_t i = 0; i < sizeof(table) / sizeof(table[0]); i++)
+		if (table[i].kind == kind && strlen(table[i].unit) == unit.length &&
+		    memcmp(table[i].unit, unit.text, unit.length) == 0)
+			return table[i].divisor;
+	return 0;
+}
+
+static bool can_name(struct piece name)
+{
+	for (size_t i = 0; i < name.length; i++)
+		if ((unsigned char)name.text[i] < ' ')
+			return false;
+	return name.length > 0 && name.length < sizeof(((struct column *)NULL)->name);
+}
+
+static bool has_name(const struct columns *columns, const char *name)
+{
+	for (size_t i = 0; i < columns->count; i++)
+		if (columns->column[i].kind == COLUMN_CHANNEL && strcmp(columns->column[i].name, name) == 0)
+			return true;
+	return false;
+}
+
+static int parse_rate(struct columns *columns, struct piece entry, struct piece rate, char *message)
+{
+	double rate_hz;
+
+	if (!number_parse(rate.text, rate.length, '.', &rate_hz) || rate_hz <= 0)
+		return refuse(message, entry, "a rate in Hz behind @");
+	if (columns->rate_hz != 0 && columns->rate_hz != rate_hz)
+		return refuse(message, entry, "one rate for all columns, they share their rows");
+	columns->rate_hz = rate_hz;
+	return 0;
+}
+
+static int parse_entry(struct columns *columns, struct piece entry, char *message)
+{
+	struct column *column = &columns->column[columns->count];
+	struct piece rate = entry, unit = cut(&rate, '@'), name = cut(&unit, ':');
+	double sign = 1;
+
+	*column = (struct column){.kind = COLUMN_SKIP};
+	if (entry.length == 1 && entry.text[0] == '-')
+		return 0;
+	if (!can_name(name) || !unit.text)
+		return refuse(message, entry,
+		              "name:unit with a name of 1 to 31 characters, or - to skip a column");
+	memcpy(column->name, name.text, name.length);
+	column->kind = COLUMN_CHANNEL;
+	if (strcmp(column->name, "time") == 0 && !columns->has_time)
+		column->kind = COLUMN_TIME;
+	if (column->kind == COLUMN_CHANNEL && unit.length > 0 && unit.text[0] == '-') {
+		sign = -1;
+		unit.text++;
+		unit.length--;
+	}
+	column->divisor = sign * unit_divisor(column->kind, unit);
+	if (column->divisor == 0)
+		return refuse(message, entry,
+		              column->kind == COLUMN_TIME ? "unit s, ms or us" : "unit g, m/s2, -g or -m/s2");
+	if (has_name(columns, column->name))
+		return refuse(message, entry, "every name once");
+	columns->has_time |= column->kind == COLUMN_TIME;
+	columns->channels += column->kind == COLUMN_CHANNEL;
+	return rate.text ? parse_rate(columns, entry, rate, message) : 0;
+}
+
+int columns_parse(struct columns *columns, const char *text, char message[READ_MESSAGE_MAX])
+{
+	struct piece all = {text, strlen(text)}, rest = all;
+	struct columns parsed = {.count = 0};
+
+	while (rest.text) {
+		struct piece entry = cut(&rest, ',');
+		int error;
+
+		if (parsed.count == COLUMNS_MAX)
+			return refuse(message, entry, "no more than 256 columns");
+		error = parse_entry(&parsed, entry, message);
+		if (error)
+			return error;
+		parsed.count++;
+	}
+	if (parsed.channels == 0)
+		return refuse(message, all, "at least one channel, name:g or name:m/s2");
+	if (parsed.has_time && parsed.rate_hz != 0)
+		return refuse(message, all, "a time column or a rate, not both");
+	*columns = parsed;
+	return 0;
+}

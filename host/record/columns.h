@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_COLUMNS_H
+#define DT_HOST_RECORD_COLUMNS_H
+/*
+ * What --columns says: one entry per column of a text file, "time:ms,fixture:g,board:-g,-". The syntax is
+ * told in read.h.
+ */
+#include "host/record/read.h"
+
+enum { COLUMNS_MAX = 256 };
+
+enum column_kind {
+	COLUMN_SKIP,
+	COLUMN_TIME,
+	COLUMN_CHANNEL,
+};
+
+struct column {
+	enum column_kind kind;
+	char name[32];
+	double divisor; /* number in the file / divisor = s or g */
+};
+
+struct columns {
+	struct column column[COLUMNS_MAX];
+	size_t count;
+	size_t channels;
+	bool has_time;
+	double rate_hz; /* 0 = not said */
+};
+
+/* 0 or DT_E_ARGUMENT with a line in message. */
+DT_MUST_USE int columns_parse(struct columns *columns, const char *text, char message[READ_MESSAGE_MAX]);
+
+#endif

@@ -1,0 +1,143 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/drop.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/crc.h"
+#include "common/wire.h"
+#include "common/wire_table.h"
+
+int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_ms)
+{
+	static const char *const names[DROP_CHANNELS] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
+	uint32_t ticks = last_tick_ms - first_tick_ms + 1;
+	struct record drop;
+
+	if (ticks == 0 || ticks > DROP_TICKS_MAX)
+		return DT_E_RANGE;
+	record_init(&drop);
+	drop.is_drop = true;
+	drop.first_tick_ms = first_tick_ms;
+	drop.last_tick_ms = last_tick_ms;
+	for (unsigned i = 0; i < DROP_CHANNELS; i++) {
+		uint32_t per_tick = i % 3 == 0 ? WIRE_X_PER_TICK : WIRE_YZ_PER_TICK;
+		struct channel *channel =
+		        record_add_channel(&drop, names[i], 1000.0 * per_tick, (size_t)ticks * per_tick);
+		if (!channel) {
+			record_free(&drop);
+			return DT_E_MEMORY;
+		}
+		channel->range_g =
+		        (double)wire_parameters[WIRE_PARAMETER_range_counts].initial / WIRE_COUNTS_PER_G;
+	}
+	*record = drop;
+	return 0;
+}
+
+uint32_t drop_ticks(const struct record *record)
+{
+	return record->last_tick_ms - record->first_tick_ms + 1;
+}
+
+static void put_axis(struct channel *channel, size_t at, const int16_t *counts, size_t count)
+{
+	for (size_t i = 0; i < count; i++) {
+		double value_g = (double)counts[i] / WIRE_COUNTS_PER_G;
+
+		if (counts[i] == WIRE_SAMPLE_NOT_TAKEN) {
+			channel->value_g[at + i] = NAN;
+			channel->sample[at + i] = SAMPLE_BAD;
+		} else {
+			channel->value_g[at + i] = value_g;
+			channel->sample[at + i] = fabs(value_g) > channel->range_g ? SAMPLE_CLIPPED : 0;
+		}
+	}
+}
+
+void drop_put(struct record *record, unsigned sensor, uint32_t tick, const int16_t *x, const int16_t *y,
+              const int16_t *z)
+{
+	struct channel *axes = record->channels + 3 * (size_t)(sensor - 1);
+
+	put_axis(&axes[0], (size_t)tick * WIRE_X_PER_TICK, x, WIRE_X_PER_TICK);
+	put_axis(&axes[1], (size_t)tick * WIRE_YZ_PER_TICK, y, WIRE_YZ_PER_TICK);
+	put_axis(&axes[2], (size_t)tick * WIRE_YZ_PER_TICK, z, WIRE_YZ_PER_TICK);
+}
+
+static void get_axis(const struct channel *channel, size_t at, int16_t *counts, size_t count)
+{
+	for (size_t i = 0; i < count; i++) {
+		double value = round(channel->value_g[at + i] * WIRE_COUNTS_PER_G);
+
+		counts[i] = fabs(value) <= WIRE_SAMPLE_FULL_SCALE ? (int16_t)value : WIRE_SAMPLE_NOT_TAKEN;
+	}
+}
+
+static bool is_lost(const struct record *record, unsigned sensor, uint32_t tick)
+{
+	const struct channel *x = record->channels + 3 * (size_t)(sensor - 1);
+
+	return x->sample[(size_t)tick * WIRE_X_PER_TICK] & SAMPLE_LOST;
+}
+
+bool drop_get(const struct record *record, unsigned sensor, uint32_t tick, int16_t *x, int16_t *y, int16_t *z)
+{
+	const struct channel *axes = record->channels + 3 * (size_t)(sensor - 1);
+
+	if (is_lost(record, sensor, tick))
+		return false;
+	get_axis(&axes[0], (size_t)tick * WIRE_X_PER_TICK, x, WIRE_X_PER_TICK);
+	get_axis(&axes[1], (size_t)tick * WIRE_YZ_PER_TICK, y, WIRE_YZ_PER_TICK);
+	get_axis(&axes[2], (size_t)tick * WIRE_YZ_PER_TICK, z, WIRE_YZ_PER_TICK);
+	return true;
+}
+
+/* As the tower computes it: tick by tick, S1 then S2, the sample bytes of the packed block. */
+static uint32_t samples_crc32(const struct record *record)
+{
+	uint32_t crc = CRC32_INIT;
+
+	for (uint32_t tick = 0; tick < drop_ticks(record); tick++) {
+		for (unsigned sensor = 1; sensor <= WIRE_SENSORS; sensor++) {
+			struct wire_block block = {0};
+			struct frame frame;
+
+			drop_get(record, sensor, tick, block.x, block.y, block.z);
+			wire_pack_block(&frame, WIRE_ID_BLOCK_S1, &block);
+			crc = crc32(crc, frame.data + WIRE_SAMPLE_OFFSET, WIRE_SAMPLE_BYTES);
+		}
+	}
+	return crc;
+}
+
+int drop_close(struct record *record)
+{
+	uint32_t ticks = drop_ticks(record);
+	bool before = false;
+
+	/* at worst every second tick of both sensors */
+	record->gaps = calloc((size_t)ticks + WIRE_SENSORS, sizeof(*record->gaps));
+	if (!record->gaps) {
+		record_free(record);
+		return DT_E_MEMORY;
+	}
+	for (unsigned sensor = 1; sensor <= WIRE_SENSORS; sensor++, before = false) {
+		for (uint32_t tick = 0; tick < ticks; tick++) {
+			bool lost = is_lost(record, sensor, tick);
+
+			if (lost && !before)
+				record->gaps[record->gap_count++] = (struct record_gap){
+				        .sensor = sensor, .first_tick_ms = record->first_tick_ms + tick};
+			if (lost)
+				record->gaps[record->gap_count - 1].last_tick_ms =
+				        record->first_tick_ms + tick;
+			before = lost;
+		}
+	}
+	record->crc_agrees =
+	        record->crc_known && record->gap_count == 0 && samples_crc32(record) == record->crc32;
+	record_finish(record);
+	return 0;
+}

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_DROP_H
+#define DT_HOST_RECORD_DROP_H
+/*
+ * The channels of a drop from the samples of its blocks, the same for everything that holds counts: the
+ * join, an LCM message. Six channels S1X S1Y S1Z S2X S2Y S2Z, 7 and 10 samples a tick, counts / 32 g.
+ *
+ * drop_open, drop_put for every block held, fill the record's other fields, drop_close.
+ */
+#include <stdint.h>
+
+#include "host/record/record.h"
+
+enum {
+	DROP_CHANNELS = 6,
+	DROP_TICKS_MAX = 2048, /* more than the longest capture the tower can be set to */
+};
+
+/* Makes *record the drop of ticks first..last, all samples lost. DT_E_RANGE, DT_E_MEMORY. */
+DT_MUST_USE int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_ms);
+
+/* The samples of one block, tick being its place from 0: 7 of x, 10 of y and z. */
+void drop_put(struct record *record, unsigned sensor, uint32_t tick, const int16_t *x, const int16_t *y,
+              const int16_t *z);
+
+/* The opposite: false if the block is lost. A sample that was not taken is WIRE_SAMPLE_NOT_TAKEN. */
+bool drop_get(const struct record *record, unsigned sensor, uint32_t tick, int16_t *x, int16_t *y,
+              int16_t *z);
+
+/* Lists the gaps, compares the samples with record->crc32 if crc_known, and finishes the record. On
+ * DT_E_MEMORY the record is freed. */
+DT_MUST_USE int drop_close(struct record *record);
+
+/* Ticks of the window; the record must be a drop. */
+uint32_t drop_ticks(const struct record *record);
+
+#endif

@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_NUMBER_H
+#define DT_HOST_RECORD_NUMBER_H
+/*
+ * Numbers in text files. Any context, no state; the C locale is taken for granted.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+
+/* Reads text of length characters, all of it, as one finite decimal number; decimal is '.' or ','. No
+ * blanks, no hexadecimal, no words: false, and *value unchanged. */
+bool number_parse(const char *text, size_t length, char decimal, double *value);
+
+#endif

@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/record.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/wire.h"
+
+void record_init(struct record *record)
+{
+	*record = (struct record){.trigger_s = NAN, .frame_speed_m_s = NAN};
+}
+
+void record_free(struct record *record)
+{
+	for (size_t i = 0; i < record->channel_count; i++) {
+		free(record->channels[i].value_g);
+		free(record->channels[i].sample);
+	}
+	free(record->channels);
+	free(record->gaps);
+	record_init(record);
+}
+
+struct channel *record_add_channel(struct record *record, const char *name, double rate_hz, size_t count)
+{
+	struct channel *channels =
+	        realloc(record->channels, (record->channel_count + 1) * sizeof(*record->channels));
+	if (!channels)
+		return NULL;
+	record->channels = channels;
+
+	struct channel *channel = &channels[record->channel_count];
+	*channel = (struct channel){.rate_hz = rate_hz, .count = count};
+	strncpy(channel->name, name, sizeof(channel->name) - 1);
+	channel->value_g = calloc(count ? count : 1, sizeof(*channel->value_g));
+	channel->sample = malloc(count ? count : 1);
+	if (!channel->value_g || !channel->sample) {
+		free(channel->value_g);
+		free(channel->sample);
+		return NULL;
+	}
+	for (size_t k = 0; k < count; k++)
+		channel->value_g[k] = NAN;
+	memset(channel->sample, SAMPLE_LOST, count);
+	record->channel_count++;
+	return channel;
+}
+
+const struct channel *record_channel(const struct record *record, const char *name)
+{
+	for (size_t i = 0; i < record->channel_count; i++)
+		if (strcmp(record->channels[i].name, name) == 0)
+			return &record->channels[i];
+	return NULL;
+}
+
+static void finish_channel(struct record *record, struct channel *channel)
+{
+	const double full_scale_g = (double)WIRE_SAMPLE_FULL_SCALE / WIRE_COUNTS_PER_G;
+	unsigned flags = channel->flags & RECORD_FLAG_UNEVEN; /* only the reader knows */
+	uint64_t lost = 0;
+
+	for (size_t k = 0; k < channel->count; k++) {
+		if (channel->sample[k] & SAMPLE_LOST)
+			lost++;
+		if (channel->sample[k] & SAMPLE_BAD)
+			flags |= RECORD_FLAG_BAD;
+		if (channel->sample[k] & SAMPLE_CLIPPED)
+			flags |= RECORD_FLAG_CLIPPED;
+		if (record->is_drop && fabs(channel->value_g[k]) >= full_scale_g)
+			flags |= RECORD_FLAG_FULL_SCALE;
+	}
+	if (lost)
+		flags |= RECORD_FLAG_LOST;
+	channel->flags = flags;
+	record->lost_samples += lost;
+	record->flags |= flags;
+}
+
+static unsigned flags_of_marks(unsigned marks)
+{
+	static const struct {
+		unsigned mark, flag;
+	} table[] = {
+	        {WIRE_MARK_SLOW_FRAME, RECORD_FLAG_SLOW_FRAME},
+	        {WIRE_MARK_NO_IMPACT, RECORD_FLAG_NO_IMPACT},
+	        {WIRE_MARK_FAULT, RECORD_FLAG_FAULT},
+	        {WIRE_MARK_CLIPPED, RECORD_FLAG_CLIPPED},
+	        {WIRE_MARK_OVERRUN, RECORD_FLAG_OVERRUN},
+	        {WIRE_MARK_FULL_SCALE, RECORD_FLAG_FULL_SCALE},
+	};
+	unsigned flags = 0;
+
+	for (size_t i = 0; i < sizeof(table) / sizeof(table[0]); i++)
+		if (marks & table[i].mark)
+			flags |= table[i].flag;
+	return flags;
+}
+
+void record_finish(struct record *record)
+{
+	record->lost_samples = 0;
+	record->flags = 0;
+	for (size_t i = 0; i < record->channel_count; i++)
+		finish_channel(record, &record->channels[i]);
+	if (!record->is_drop)
+		return;
+	record->flags |= flags_of_marks(record->marks);
+	if (!record->crc_known)
+		record->flags |= RECORD_FLAG_NO_CRC;
+	else if (!record->crc_agrees)
+		record->flags |= RECORD_FLAG_INCOMPLETE;
+}
+
+const char *record_flag_name(unsigned flags)
+{
+	static const char *const names[] = {
+	        "lost_samples", "bad_samples", "clipped",         "incomplete", "crc_unknown", "slow_frame",
+	        "no_impact",    "fault",       "uneven_sampling", "full_scale", "overrun",
+	};
+
+	for (size_t bit = 0; bit < sizeof(names) / sizeof(names[0]); bit++)
+		if (flags & 1u << bit)
+			return names[bit];
+	return "";
+}

@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/source.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* Nobody records this much of a drop; a device that never ends would fill the memory. */
+static const size_t SIZE_MAX_BYTES = (size_t)2 << 30;
+
+int source_refuse(char message[READ_MESSAGE_MAX], int code, const char *file, uint64_t line,
+                  const char *format, ...)
+{
+	enum { NAME_MAX_CHARS = 256 }; /* the explanation must fit behind it */
+	size_t length = strlen(file);
+	char place[32] = "";
+	va_list list;
+	int used;
+
+	if (length > NAME_MAX_CHARS)
+		file += length - NAME_MAX_CHARS;
+	if (line)
+		snprintf(place, sizeof(place), ":%llu", (unsigned long long)line);
+	used = snprintf(message, READ_MESSAGE_MAX, "%s%s: ", file, place);
+	va_start(list, format);
+	vsnprintf(message + used, READ_MESSAGE_MAX - (size_t)used, format, list);
+	va_end(list);
+	return code;
+}
+
+static int refuse_system(char *message, const char *file)
+{
+	return source_refuse(message, DT_E_SYSTEM, file, 0, "%s, expected a recording", strerror(errno));
+}
+
+/* Makes room for at least one more byte, or says why not. */
+static int grow(struct source *source, size_t *room, char *message)
+{
+	char *bytes;
+
+	if (source->size < *room)
+		return 0;
+	if (*room >= SIZE_MAX_BYTES)
+		return source_refuse(message, DT_E_RANGE, source->file, 0,
+		                     "larger than 2 GiB, expected a recording");
+	bytes = realloc(source->bytes, 2 * *room);
+	if (!bytes)
+		return source_refuse(message, DT_E_MEMORY, source->file, 0, "no memory for %zu bytes",
+		                     2 * *room);
+	source->bytes = bytes;
+	*room *= 2;
+	return 0;
+}
+
+static int read_all(struct source *source, int descriptor, size_t room, char *message)
+{
+	for (;;) {
+		int error = grow(source, &room, message);
+		ssize_t count;
+
+		if (error)
+			return error;
+		count = read(descriptor, source->bytes + source->size, room - source->size);
+		if (count < 0 && errno != EINTR)
+			return refuse_system(message, source->file);
+		if (count == 0)
+			break;
+		if (count > 0)
+			source->size += (size_t)count;
+	}
+	if (source->size == 0)
+		return source_refuse(message, DT_E_EMPTY, source->file, 0,
+		                     "empty file, expected a recording");
+	return 0;
+}
+
+/* Spreadsheets put a byte order mark in front of UTF-8. */
+static void skip_mark(struct source *source)
+{
+	static const char mark[] = {(char)0xEF, (char)0xBB, (char)0xBF};
+
+	if (source->size <= sizeof(mark) || memcmp(source->bytes, mark, sizeof(mark)) != 0)
+		return;
+	source->size -= sizeof(mark);
+	memmove(source->bytes, source->bytes + sizeof(mark), source->size);
+}
+
+int source_load(struct source *source, const char *file, char message[READ_MESSAGE_MAX])
+{
+	int descriptor = open(file, O_RDONLY | O_CLOEXEC);
+	struct source loaded = {.file = file};
+	size_t room = 1 << 16;
+	struct stat stat;
+	int error;
+
+	if (descriptor < 0)
+		return refuse_system(message, file);
+	if (fstat(descriptor, &stat) == 0 && S_ISREG(stat.st_mode) && stat.st_size > 0)
+		room = (size_t)stat.st_size + 1; /* the byte that finds the end */
+	loaded.bytes = malloc(room);
+	if (loaded.bytes)
+		error = read_all(&loaded, descriptor, room, message);
+	else
+		error = source_refuse(message, DT_E_MEMORY, file, 0, "no memory for %zu bytes", room);
+	close(descriptor);
+	if (!error)
+		skip_mark(&loaded);
+	if (error) {
+		source_free(&loaded);
+		return error;
+	}
+	*source = loaded;
+	return 0;
+}
+
+void source_free(struct source *source)
+{
+	free(source->bytes);
+	source->bytes = NULL;
+	source->size = 0;
+}
+
+bool source_next_line(const struct source *source, struct source_line *line)
+{
+	const char *end;
+
+	if (line->next >= source->size)
+		return false;
+	line->text = source->bytes + line->next;
+	line->length = source->size - line->next;
+	end = memchr(line->text, '\n', line->length);
+	if (end)
+		line->length = (size_t)(end - line->text);
+	line->next += line->length + (end != NULL);
+	line->number++;
+	while (line->length > 0 && line->text[line->length - 1] == '\r')
+		line->length--;
+	return true;
+}

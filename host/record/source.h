@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_SOURCE_H
+#define DT_HOST_RECORD_SOURCE_H
+/*
+ * A file as the readers see it: its bytes in memory, walked line by line, and the one form in which all
+ * of them refuse it: "FILE:LINE: what is wrong, what was expected".
+ *
+ * The bytes are a copy (a pipe cannot be mapped, and a mapped file that shrinks kills its reader); they
+ * belong to the source until source_free.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "host/record/read.h"
+
+struct source {
+	const char *file; /* as given */
+	char *bytes;      /* not terminated */
+	size_t size;
+};
+
+struct source_line {
+	const char *text; /* not terminated */
+	size_t length;    /* without line end: \n, \r\n or \r\r\n */
+	uint64_t number;  /* from 1 */
+	size_t next;      /* where the next line begins */
+};
+
+/* 0, or an error told in message, with nothing to free. An empty file is refused. */
+DT_MUST_USE int source_load(struct source *source, const char *file, char message[READ_MESSAGE_MAX]);
+void source_free(struct source *source);
+
+/* Steps from line to line; start with a zeroed *line. */
+bool source_next_line(const struct source *source, struct source_line *line);
+
+/* Writes "FILE:LINE: text" (no line when 0) and returns code. */
+__attribute__((format(printf, 5, 6))) int source_refuse(char message[READ_MESSAGE_MAX], int code,
+                                                        const char *file, uint64_t line, const char *format,
+                                                        ...);
+
+/* The formats. Each fills *record, initialised by the call, except for its file name. */
+DT_MUST_USE int read_candump(struct record *record, const struct source *source,
+                             char message[READ_MESSAGE_MAX]);
+DT_MUST_USE int read_lcm(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX]);
+DT_MUST_USE int read_csv(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX]);
+DT_MUST_USE int read_delimited(struct record *record, const struct source *source, const char *columns,
+                               char message[READ_MESSAGE_MAX]);
+
+#endif

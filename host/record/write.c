@@ -1,0 +1,334 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/write.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <lcm/lcm.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/link/candump.h"
+#include "common/wire.h"
+#include "host/record/drop.h"
+#include "host/record/lcm_codec.h"
+#include "host/record/source.h"
+
+/* ---- frames ---- */
+
+static bool clips(const struct record *record, unsigned channel, uint32_t tick, unsigned per_tick)
+{
+	const uint8_t *sample = record->channels[channel].sample + (size_t)tick * per_tick;
+
+	for (unsigned i = 0; i < per_tick; i++)
+		if (sample[i] & SAMPLE_CLIPPED)
+			return true;
+	return false;
+}
+
+static bool overruns(const struct wire_block *block)
+{
+	bool any = false;
+
+	for (unsigned i = 0; i < WIRE_X_PER_TICK; i++)
+		any |= block->x[i] == WIRE_SAMPLE_NOT_TAKEN;
+	for (unsigned i = 0; i < WIRE_YZ_PER_TICK; i++)
+		any |= block->y[i] == WIRE_SAMPLE_NOT_TAKEN || block->z[i] == WIRE_SAMPLE_NOT_TAKEN;
+	return any;
+}
+
+/* false if the block is lost */
+static bool make_block(const struct record *record, unsigned sensor, uint32_t tick, struct frame *frame)
+{
+	static const uint32_t ids[WIRE_SENSORS] = {WIRE_ID_BLOCK_S1, WIRE_ID_BLOCK_S2};
+	struct wire_block block = {.drop_id = record->drop_id, .tick_ms = record->first_tick_ms + tick};
+	unsigned first = 3 * (sensor - 1), status = WIRE_STATE_CAPTURED;
+
+	if (!drop_get(record, sensor, tick, block.x, block.y, block.z))
+		return false;
+	if ((tick + 1) / 1e3 > record->trigger_s)
+		status |= WIRE_STATUS_TRIGGERED;
+	if (clips(record, first, tick, WIRE_X_PER_TICK))
+		status |= WIRE_STATUS_CLIP_X;
+	if (clips(record, first + 1, tick, WIRE_YZ_PER_TICK))
+		status |= WIRE_STATUS_CLIP_Y;
+	if (clips(record, first + 2, tick, WIRE_YZ_PER_TICK))
+		status |= WIRE_STATUS_CLIP_Z;
+	block.status = (uint8_t)status;
+	block.io = overruns(&block) ? WIRE_IO_OVERRUN : 0;
+	wire_pack_block(frame, ids[sensor - 1], &block);
+	wire_seal_block(frame);
+	return true;
+}
+
+static void make_capture_end(const struct record *record, struct frame *frame)
+{
+	struct wire_capture_end end = {
+	        .drop_id = record->drop_id,
+	        .marks = record->marks,
+	        .first_tick_ms = record->first_tick_ms,
+	        .last_tick_ms = record->last_tick_ms,
+	        .crc32 = record->crc32,
+	};
+
+	if (!isnan(record->trigger_s))
+		end.trigger_us = (uint32_t)llround(record->trigger_s * 1e6);
+	if (!isnan(record->frame_speed_m_s))
+		end.frame_speed_mm_s = (uint16_t)lround(record->frame_speed_m_s * 1e3);
+	wire_pack_capture_end(frame, WIRE_ID_CAPTURE_END, &end);
+}
+
+int write_frames(const struct record *record, int (*send)(void *context, const struct frame *frame),
+                 void *context)
+{
+	struct frame frame = {0};
+	int result = 0;
+
+	if (!record->is_drop)
+		return DT_E_ARGUMENT;
+	for (uint32_t tick = 0; tick < drop_ticks(record) && result == 0; tick++) {
+		/* a block can leave when its last sample is taken */
+		frame.time_us = ((int64_t)record->first_tick_ms + tick + 1) * 1000;
+		for (unsigned sensor = 1; sensor <= WIRE_SENSORS && result == 0; sensor++)
+			if (make_block(record, sensor, tick, &frame))
+				result = send(context, &frame);
+	}
+	if (result == 0 && record->crc_known) {
+		make_capture_end(record, &frame);
+		result = send(context, &frame);
+	}
+	return result;
+}
+
+/* ---- CSV ---- */
+
+/* The fewest digits that read back equal. */
+static void put_number(FILE *out, double value)
+{
+	char text[32];
+
+	for (int digits = 15; digits <= 17; digits++) {
+		snprintf(text, sizeof(text), "%.*g", digits, value);
+		if (strtod(text, NULL) == value)
+			break;
+	}
+	fputs(text, out);
+}
+
+static void put_drop(const struct record *record, FILE *out)
+{
+	const struct record_counters *counters = &record->counters;
+
+	fprintf(out, "# drop_id %u\n# marks %u\n", record->drop_id, record->marks);
+	fprintf(out, "# first_tick_ms %" PRIu32 "\n# last_tick_ms %" PRIu32 "\n", record->first_tick_ms,
+	        record->last_tick_ms);
+	if (!isnan(record->trigger_s)) {
+		fputs("# trigger_s ", out);
+		put_number(out, record->trigger_s);
+		fputc('\n', out);
+	}
+	if (!isnan(record->frame_speed_m_s)) {
+		fputs("# frame_speed_m_s ", out);
+		put_number(out, record->frame_speed_m_s);
+		fputc('\n', out);
+	}
+	if (record->crc_known)
+		fprintf(out, "# crc32 %" PRIu32 "\n", record->crc32);
+	fprintf(out,
+	        "# blocks %" PRIu64 "\n# repeated %" PRIu64 "\n# reordered %" PRIu64 "\n# corrupt %" PRIu64
+	        "\n",
+	        counters->blocks, counters->repeated, counters->reordered, counters->corrupt);
+	fprintf(out, "# gaps %" PRIu64 "\n# resent %" PRIu64 "\n# conflicting %" PRIu64 "\n", counters->gaps,
+	        counters->resent, counters->conflicting);
+}
+
+static void put_channel(const struct channel *channel, FILE *out)
+{
+	fputs("# channel rate_hz=", out);
+	put_number(out, channel->rate_hz);
+	fputs(" start_s=", out);
+	put_number(out, channel->start_s);
+	fputs(" range_g=", out);
+	put_number(out, channel->range_g);
+	fprintf(out, " count=%zu uneven=%d name=%s\n", channel->count,
+	        (channel->flags & RECORD_FLAG_UNEVEN) != 0, channel->name);
+}
+
+static void put_cell(const struct channel *channel, size_t k, FILE *out)
+{
+	if (channel->sample[k] & SAMPLE_LOST)
+		fputs("lost", out);
+	else if (channel->sample[k] & SAMPLE_BAD || !isfinite(channel->value_g[k]))
+		fputs("bad", out);
+	else
+		put_number(out, channel->value_g[k]);
+	if (channel->sample[k] & SAMPLE_CLIPPED)
+		fputc('*', out);
+}
+
+static double sample_time(const struct channel *channel, size_t k)
+{
+	return channel->start_s + (double)k / channel->rate_hz;
+}
+
+/* One row per instant at which any channel has a sample. */
+static void put_rows(const struct record *record, size_t *next, FILE *out)
+{
+	for (;;) {
+		double now = INFINITY;
+
+		for (size_t i = 0; i < record->channel_count; i++)
+			if (next[i] < record->channels[i].count)
+				now = fmin(now, sample_time(&record->channels[i], next[i]));
+		if (isinf(now))
+			return;
+		put_number(out, now);
+		for (size_t i = 0; i < record->channel_count; i++) {
+			const struct channel *channel = &record->channels[i];
+
+			fputc(',', out);
+			if (next[i] < channel->count && sample_time(channel, next[i]) <= now)
+				put_cell(channel, next[i]++, out);
+		}
+		fputc('\n', out);
+	}
+}
+
+static bool can_name(const char *name)
+{
+	for (const char *p = name; *p; p++)
+		if ((unsigned char)*p < ' ' || *p == ',')
+			return false;
+	return name[0] != '\0';
+}
+
+int write_csv(const struct record *record, FILE *out)
+{
+	size_t *next;
+
+	for (size_t i = 0; i < record->channel_count; i++)
+		if (!can_name(record->channels[i].name))
+			return DT_E_ARGUMENT;
+	next = calloc(record->channel_count + 1, sizeof(*next));
+	if (!next)
+		return DT_E_MEMORY;
+	fputs("# droptower csv 1\n", out);
+	if (record->is_drop)
+		put_drop(record, out);
+	for (size_t i = 0; i < record->channel_count; i++)
+		put_channel(&record->channels[i], out);
+	fputs("time_s", out);
+	for (size_t i = 0; i < record->channel_count; i++)
+		fprintf(out, ",%s_g", record->channels[i].name);
+	fputc('\n', out);
+	put_rows(record, next, out);
+	free(next);
+	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
+}
+
+/* ---- the formats, by name ---- */
+
+static int put_frame(void *context, const struct frame *frame)
+{
+	char line[CANDUMP_LINE_MAX];
+
+	candump_format(line, frame, "can0");
+	return fputs(line, context) < 0 ? DT_E_SYSTEM : 0;
+}
+
+static int write_candump(const struct record *record, FILE *out)
+{
+	int error = write_frames(record, put_frame, out);
+
+	if (error)
+		return error;
+	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
+}
+
+static int put_event(FILE *out, int64_t time_us, uint8_t *bytes, int size)
+{
+	char channel[] = LCM_CODEC_DROP;
+	lcm_eventlog_t log = {.f = out};
+	lcm_eventlog_event_t event = {
+	        .timestamp = time_us,
+	        .channellen = (int32_t)strlen(channel),
+	        .datalen = size,
+	        .channel = channel,
+	        .data = bytes,
+	};
+
+	if (lcm_eventlog_write_event(&log, &event))
+		return DT_E_SYSTEM;
+	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
+}
+
+static int write_lcm(const struct record *record, FILE *out)
+{
+	int64_t time_us =
+	        ((int64_t)record->first_tick_ms + record->last_tick_ms - record->first_tick_ms + 1) * 1000;
+	droptower_drop drop;
+	int error = lcm_codec_drop(record, time_us, &drop), size;
+	uint8_t *bytes;
+
+	if (error)
+		return error;
+	size = droptower_drop_encoded_size(&drop);
+	bytes = malloc((size_t)size);
+	if (!bytes)
+		error = DT_E_MEMORY;
+	else if (droptower_drop_encode(bytes, 0, size, &drop) != size)
+		error = DT_E_FORMAT;
+	else
+		error = put_event(out, time_us, bytes, size);
+	free(bytes);
+	lcm_codec_free_drop(&drop);
+	return error;
+}
+
+static int (*writer_of(const char *file))(const struct record *, FILE *)
+{
+	static const struct {
+		const char *ending;
+		int (*write)(const struct record *, FILE *);
+	} table[] = {
+	        {".csv", write_csv},
+	        {".lcm", write_lcm},
+	        {".log", write_candump},
+	        {".candump", write_candump},
+	};
+	const char *ending = strrchr(file, '.');
+
+	for (size_t i = 0; ending && i < sizeof(table) / sizeof(table[0]); i++)
+		if (strcmp(ending, table[i].ending) == 0)
+			return table[i].write;
+	return NULL;
+}
+
+int write_record(const struct record *record, const char *file, char message[READ_MESSAGE_MAX])
+{
+	int (*write)(const struct record *, FILE *) = writer_of(file);
+	int error, kept;
+	FILE *out;
+
+	if (!write)
+		return source_refuse(message, DT_E_ARGUMENT, file, 0,
+		                     "unknown ending, expected .csv, .lcm, .log or .candump");
+	if (write != write_csv && !record->is_drop)
+		return source_refuse(message, DT_E_ARGUMENT, file, 0,
+		                     "not a drop of a tower, which only .csv can hold");
+	out = fopen(file, "wb");
+	if (!out)
+		return source_refuse(message, DT_E_SYSTEM, file, 0, "%s, expected to write it",
+		                     strerror(errno));
+	errno = 0;
+	error = write(record, out);
+	kept = errno;
+	if (fclose(out) && !error) {
+		error = DT_E_SYSTEM;
+		kept = errno;
+	}
+	if (error)
+		return source_refuse(message, error, file, 0, "%s",
+		                     error == DT_E_SYSTEM && kept ? strerror(kept) : error_text(error));
+	return 0;
+}

@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_WRITE_H
+#define DT_HOST_RECORD_WRITE_H
+/*
+ * A record to a file that read_record reads back equal: our CSV takes any record, candump text and LCM
+ * event logs take drops. README.md describes the CSV.
+ *
+ * Times in candump text and LCM logs are the tower's clock: a record does not know the time of day. What a
+ * record does not keep of its blocks is written as state CAPTURED, inputs and outputs 0.
+ */
+#include <stdio.h>
+
+#include "common/frame.h"
+#include "host/record/read.h"
+
+/* Writes file in the format its name ends in: .csv, .lcm, or .log and .candump. 0 or DT_E_* with one line in
+ * message. */
+DT_MUST_USE int write_record(const struct record *record, const char *file, char message[READ_MESSAGE_MAX]);
+
+/* 0; DT_E_ARGUMENT if a channel's name cannot be written; DT_E_SYSTEM if out did not take it all. */
+DT_MUST_USE int write_csv(const struct record *record, FILE *out);
+
+/* The frames of a drop, each given to send at its turn with time_us in the tower's clock: every block held,
+ * then the capture end if one is known. Ends early with what send returns if that is not 0.
+ * DT_E_ARGUMENT: not a drop. */
+DT_MUST_USE int write_frames(const struct record *record,
+                             int (*send)(void *context, const struct frame *frame), void *context);
+
+#endif

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the system tests share: TAP output, running our programs, temporary folders.
+
+A test is a function named test_*; it passes unless it raises. `skip(why)` marks it skipped.
+"""
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import traceback
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+BUILD = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else "build")
+SANITIZED = os.path.abspath(sys.argv[2] if len(sys.argv) > 2 else "build/sanitize")
+SHARED_DATA = os.path.join(ROOT, "..", "shared", "data")
+SCENE = "common/scenes/geometry-2A.ini"
+
+
+class Skip(Exception):
+    pass
+
+
+def skip(why):
+    raise Skip(why)
+
+
+def run(*words, build=None, expect=0, timeout=120, **more):
+    """Runs build/<words[0]> with the other words; fails unless it exits with expect (None: any)."""
+    command = [os.path.join(build or BUILD, words[0])] + [str(w) for w in words[1:]]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, timeout=timeout, stdin=subprocess.DEVNULL, **more)
+    done.out, done.err = done.stdout.decode(errors="replace"), done.stderr.decode(errors="replace")
+    if expect is not None and done.returncode != expect:
+        raise AssertionError(f"{' '.join(command)}: exit {done.returncode}, expected {expect}\n{done.err[-2000:]}")
+    return done
+
+
+def analyze(*words, **more):
+    """droptower analyze --json: the objects it prints."""
+    done = run("droptower", "analyze", "--json", *words, **more)
+    return [json.loads(line) for line in done.out.splitlines() if line.strip()]
+
+
+def equal(got, wanted, what=""):
+    if got != wanted:
+        raise AssertionError(f"{what}: got {str(got)[:300]}, expected {str(wanted)[:300]}")
+
+
+def within(value, low, high, what=""):
+    if value is None or not low <= value <= high:
+        raise AssertionError(f"{what}: {value} is not within {low} to {high}")
+
+
+def main(namespace):
+    tests = [(name, f) for name, f in namespace.items() if name.startswith("test_") and callable(f)]
+    print(f"1..{len(tests)}", flush=True)
+    failed = False
+    for number, (name, test) in enumerate(tests, 1):
+        folder = tempfile.mkdtemp(prefix="droptower-test-")
+        try:
+            test(folder)
+            print(f"ok {number} - {name}", flush=True)
+        except Skip as why:
+            print(f"ok {number} - {name} # SKIP {why}", flush=True)
+        except Exception:
+            failed = True
+            print(f"not ok {number} - {name}")
+            print("\n".join("# " + line for line in traceback.format_exc().splitlines()), flush=True)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+    sys.exit(failed)

@@ -1,0 +1,746 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/record/join.h"
+#include "tests/unit/drop_by_hand.h"
+
+static struct hand_drop drop; /* too large for the stack */
+static struct join *join;
+
+static int setup(void **state)
+{
+	(void)state;
+	join = join_create();
+	return join ? 0 : -1;
+}
+
+static int teardown(void **state)
+{
+	(void)state;
+	join_destroy(join);
+	return 0;
+}
+
+static void feed(unsigned sensor, uint32_t tick, bool resent)
+{
+	struct frame frame;
+
+	hand_block(&drop, sensor, tick, resent, &frame);
+	assert_int_equal(join_feed(join, &frame), 0);
+}
+
+static void feed_both(uint32_t first, uint32_t last)
+{
+	for (uint32_t tick = first; tick <= last; tick++) {
+		feed(1, tick, false);
+		feed(2, tick, false);
+	}
+}
+
+static int feed_end(void)
+{
+	struct frame frame;
+
+	hand_capture_end(&drop, &frame);
+	return join_feed(join, &frame);
+}
+
+static struct record take(void)
+{
+	struct record record;
+
+	assert_int_equal(join_take(join, &record), 0);
+	assert_true(record.is_drop);
+	assert_string_equal(record.format, "live");
+	assert_int_equal(record.first_tick_ms, drop.first_tick_ms);
+	assert_int_equal(record.last_tick_ms, drop.first_tick_ms + drop.ticks - 1);
+	assert_int_equal(record.drop_id, drop.drop_id);
+	return record;
+}
+
+static void check_counters(const struct record *record, struct record_counters expected)
+{
+	assert_int_equal(record->counters.blocks, expected.blocks);
+	assert_int_equal(record->counters.repeated, expected.repeated);
+	assert_int_equal(record->counters.reordered, expected.reordered);
+	assert_int_equal(record->counters.corrupt, expected.corrupt);
+	assert_int_equal(record->counters.gaps, expected.gaps);
+	assert_int_equal(record->counters.resent, expected.resent);
+	assert_int_equal(record->counters.conflicting, expected.conflicting);
+}
+
+static void test_a_lossless_drop(void **state)
+{
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 5000, 500, 1);
+	assert_int_equal(join_take(join, &record), DT_E_EMPTY);
+	feed_both(0, 499);
+	assert_false(join_has_capture(join));
+	assert_int_equal(feed_end(), 1);
+	assert_true(join_has_capture(join) && join_complete(join));
+	assert_int_equal(join_crc32(join), hand_drop_crc32(&drop));
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	check_counters(&record, (struct record_counters){.blocks = 1000});
+	assert_true(record.crc_known && record.crc_agrees);
+	assert_int_equal(record.crc32, hand_drop_crc32(&drop));
+	assert_true(record.trigger_s == 0.100123);
+	assert_true(record.frame_speed_m_s == 3.912);
+	assert_true(record.channels[0].range_g == 500);
+	assert_int_equal(record.lost_samples, 0);
+	assert_int_equal(record.flags, 0);
+	assert_int_equal(record.gap_count, 0);
+	record_free(&record);
+	assert_false(join_has_capture(join));
+}
+
+static void test_marks_and_marked_samples(void **state)
+{
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 100, 20, 2);
+	drop.marks = 1u << 1 | 1u << 3; /* NO_IMPACT, CLIPPED */
+	drop.frame_speed_mm_s = 0;
+	drop.sample[0][3][0] = -32768; /* S1X not taken */
+	drop.sample[0][4][7] = 16001;  /* S1Y beyond the range, but not 16000 */
+	drop.sample[0][4][8] = 16000;
+	drop.sample[1][19][26] = -32767; /* the last of S2Z, full scale */
+	feed_both(0, 19);
+	feed_end();
+	assert_true(join_complete(join));
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	assert_true(isnan(record.trigger_s) && isnan(record.frame_speed_m_s));
+	assert_int_equal(record.channels[0].flags, RECORD_FLAG_BAD);
+	assert_int_equal(record.channels[1].flags, RECORD_FLAG_CLIPPED);
+	assert_int_equal(record.channels[2].flags, 0);
+	assert_int_equal(record.channels[5].flags, RECORD_FLAG_CLIPPED | RECORD_FLAG_FULL_SCALE);
+	assert_int_equal(record.flags, RECORD_FLAG_BAD | RECORD_FLAG_CLIPPED | RECORD_FLAG_FULL_SCALE |
+	                                       RECORD_FLAG_NO_IMPACT);
+	record_free(&record);
+}
+
+/* ---- random losses ---- */
+
+/* What a bus did to the frames of a drop, and what the join must count. */
+struct plan {
+	struct frame *frames;
+	size_t count;
+	bool movable[4 * HAND_TICKS_MAX];
+	bool held[2][HAND_TICKS_MAX];
+	struct record_counters expected;
+};
+
+static void plan_one(struct plan *plan, unsigned s, uint32_t tick, uint64_t *random)
+{
+	unsigned luck = hand_random(random) % 100;
+	struct frame *frame = &plan->frames[plan->count];
+
+	hand_block(&drop, s + 1, tick, false, frame);
+	if (luck < 5) /* lost */
+		return;
+	plan->count++;
+	if (luck < 7) { /* corrupt */
+		frame->data[hand_random(random) % 64] ^= (uint8_t)(1u << hand_random(random) % 8);
+		plan->expected.corrupt++;
+		return;
+	}
+	plan->held[s][tick] = true;
+	plan->expected.blocks++;
+	if (luck >= 12) {
+		plan->movable[plan->count - 1] = true;
+		return;
+	}
+	plan->frames[plan->count] = *frame; /* repeated, */
+	plan->expected.repeated++;
+	if (luck >= 10) { /* and not the same */
+		struct frame *other = &plan->frames[plan->count];
+
+		other->data[20] ^= 1;
+		other->data[9] = hand_crc8(other->data, 64, 9);
+		plan->expected.conflicting++;
+	}
+	plan->count++;
+}
+
+static int sensor_of(const struct frame *frame)
+{
+	return frame->id == 0x281;
+}
+
+static uint32_t tick_of(const struct frame *frame)
+{
+	return frame->data[2] | (uint32_t)frame->data[3] << 8 | (uint32_t)frame->data[4] << 16 |
+	       (uint32_t)frame->data[5] << 24;
+}
+
+/* Blocks change places with others up to 20 frames away: only those that came once and whole, so that what
+ * is the first of two stays as planned. */
+static void shuffle(struct plan *plan, uint64_t *random)
+{
+	for (size_t i = 0; i + 20 < plan->count; i++) {
+		size_t j = i + 1 + hand_random(random) % 19;
+		struct frame swap = plan->frames[i];
+
+		if (hand_random(random) % 20 || !plan->movable[i] || !plan->movable[j])
+			continue;
+		plan->frames[i] = plan->frames[j];
+		plan->frames[j] = swap;
+	}
+}
+
+static void count_reordered(struct plan *plan)
+{
+	uint32_t newest[2] = {0, 0};
+
+	for (size_t i = 0; i < plan->count; i++) {
+		const struct frame *frame = &plan->frames[i];
+
+		if (hand_crc8(frame->data, 64, 9) != frame->data[9])
+			continue;
+		if (tick_of(frame) < newest[sensor_of(frame)])
+			plan->expected.reordered++;
+		else
+			newest[sensor_of(frame)] = tick_of(frame);
+	}
+}
+
+static void count_gaps(struct plan *plan)
+{
+	for (unsigned s = 0; s < 2; s++)
+		for (uint32_t tick = 0; tick < drop.ticks; tick++)
+			if (!plan->held[s][tick] && (tick == 0 || plan->held[s][tick - 1]))
+				plan->expected.gaps++;
+}
+
+static void check_gap_list(const struct record *record, bool held[2][HAND_TICKS_MAX])
+{
+	size_t at = 0;
+
+	for (unsigned s = 0; s < 2; s++) {
+		for (uint32_t tick = 0; tick < drop.ticks; tick++) {
+			if (held[s][tick] || (tick > 0 && !held[s][tick - 1]))
+				continue;
+			assert_true(at < record->gap_count);
+			assert_int_equal(record->gaps[at].sensor, s + 1);
+			assert_int_equal(record->gaps[at].first_tick_ms, drop.first_tick_ms + tick);
+			while (tick + 1 < drop.ticks && !held[s][tick + 1])
+				tick++;
+			assert_int_equal(record->gaps[at++].last_tick_ms, drop.first_tick_ms + tick);
+		}
+	}
+	assert_int_equal(record->gap_count, at);
+}
+
+static struct plan make_plan(uint64_t seed)
+{
+	struct plan plan = {.frames = calloc(4u * HAND_TICKS_MAX, sizeof(struct frame))};
+	uint64_t random = seed;
+
+	print_message("# seed %llu\n", (unsigned long long)seed);
+	assert_non_null(plan.frames);
+	hand_fill(&drop, 100000, 500, seed);
+	for (uint32_t tick = 0; tick < drop.ticks; tick++)
+		for (unsigned s = 0; s < 2; s++)
+			plan_one(&plan, s, tick, &random);
+	shuffle(&plan, &random);
+	count_reordered(&plan);
+	count_gaps(&plan);
+	assert_true(plan.expected.reordered > 10 && plan.expected.corrupt > 3 && plan.expected.gaps > 20);
+	return plan;
+}
+
+/* Serves every gap the join tells, as the tower would; returns the blocks sent. */
+static uint64_t serve_gaps(uint32_t limit)
+{
+	struct record_gap gap = {0};
+	uint64_t sent = 0;
+
+	while (join_next_gap(join, 0, 0, limit, &gap)) {
+		assert_true(gap.last_tick_ms - gap.first_tick_ms < limit);
+		for (uint32_t tick = gap.first_tick_ms; tick != gap.last_tick_ms + 1; tick++) {
+			feed(gap.sensor, tick - drop.first_tick_ms, true);
+			sent++;
+		}
+	}
+	return sent;
+}
+
+static void test_random_losses_are_counted_and_recovered(void **state)
+{
+	(void)state;
+	for (uint64_t seed = 11; seed < 21; seed++) {
+		struct plan plan = make_plan(seed);
+		struct record record;
+
+		for (size_t i = 0; i < plan.count; i++)
+			assert_int_equal(join_feed(join, &plan.frames[i]), 0);
+		assert_int_equal(feed_end(), 1);
+		assert_false(join_complete(join));
+		plan.expected.resent = serve_gaps(1 + (uint32_t)seed % 7);
+		assert_int_equal(plan.expected.resent, 1000 - plan.expected.blocks);
+		/* the first of two that differ may be the wrong one: then the CRC-32 says so */
+		if (!join_complete(join)) {
+			join_forget(join);
+			plan.expected.resent += serve_gaps(100);
+		}
+		assert_true(join_complete(join));
+		record = take();
+		hand_check_samples(&record, &drop, NULL);
+		plan.expected.blocks = 1000;
+		check_counters(&record, plan.expected);
+		assert_int_equal(record.gap_count, 0);
+		assert_int_equal(record.flags, 0);
+		record_free(&record);
+		free(plan.frames);
+		join_destroy(join);
+		join = join_create();
+		assert_non_null(join);
+	}
+}
+
+static void test_what_stays_missing_is_listed(void **state)
+{
+	struct plan plan = make_plan(31);
+	struct record record;
+
+	(void)state;
+	for (size_t i = 0; i < plan.count; i++)
+		assert_int_equal(join_feed(join, &plan.frames[i]), 0);
+	feed_end();
+	record = take();
+	hand_check_samples(&record, &drop, plan.held);
+	check_counters(&record, plan.expected);
+	check_gap_list(&record, plan.held);
+	assert_int_equal(record.lost_samples, (1000 - plan.expected.blocks) * 27);
+	assert_int_equal(record.flags, RECORD_FLAG_LOST | RECORD_FLAG_INCOMPLETE);
+	assert_true(record.crc_known && !record.crc_agrees);
+	record_free(&record);
+	free(plan.frames);
+}
+
+/* ---- asking again ---- */
+
+static void check_next(unsigned sensor, uint32_t tick_ms, uint32_t limit, struct record_gap expected)
+{
+	struct record_gap gap = {0};
+
+	assert_true(join_next_gap(join, sensor, tick_ms, limit, &gap));
+	assert_int_equal(gap.sensor, expected.sensor);
+	assert_int_equal(gap.first_tick_ms, expected.first_tick_ms);
+	assert_int_equal(gap.last_tick_ms, expected.last_tick_ms);
+}
+
+static void test_gaps_in_order_and_in_pieces(void **state)
+{
+	struct record_gap gap;
+
+	(void)state;
+	hand_fill(&drop, 1000, 100, 3);
+	assert_false(join_next_gap(join, 0, 0, 10, &gap));
+	for (uint32_t tick = 0; tick < 100; tick++) {
+		if (tick < 20 || tick > 44) /* S1 lacks 1020 to 1044 */
+			feed(1, tick, false);
+		if (tick != 0 && tick != 99) /* S2 its first and last */
+			feed(2, tick, false);
+	}
+	feed_end();
+	check_next(0, 0, 100, (struct record_gap){1, 1020, 1044});
+	check_next(1, 500, 10, (struct record_gap){1, 1020, 1029});
+	check_next(1, 1030, 10, (struct record_gap){1, 1030, 1039});
+	check_next(1, 1040, 10, (struct record_gap){1, 1040, 1044});
+	check_next(1, 1045, 10, (struct record_gap){2, 1000, 1000});
+	check_next(2, 1001, 10, (struct record_gap){2, 1099, 1099});
+	assert_false(join_next_gap(join, 2, 1100, 10, &gap));
+	assert_false(join_next_gap(join, 3, 1000, 10, &gap));
+	assert_false(join_next_gap(join, 0, 0, 0, &gap));
+}
+
+static void test_forget_asks_for_everything(void **state)
+{
+	struct record record;
+	struct frame frame;
+
+	(void)state;
+	hand_fill(&drop, 1000, 50, 4);
+	for (uint32_t tick = 0; tick < 50; tick++) {
+		feed(1, tick, false);
+		hand_block(&drop, 2, tick, false, &frame);
+		if (tick == 30) { /* slips through its CRC-8 */
+			frame.data[40] ^= 0x10;
+			frame.data[9] = hand_crc8(frame.data, 64, 9);
+		}
+		if (tick != 31)
+			join_feed(join, &frame);
+	}
+	feed_end();
+	assert_false(join_complete(join));
+	assert_int_equal(serve_gaps(10), 1);
+	assert_false(join_complete(join));
+	assert_int_not_equal(join_crc32(join), hand_drop_crc32(&drop));
+	join_forget(join);
+	assert_int_equal(serve_gaps(10), 100);
+	assert_true(join_complete(join));
+	join_forget(join);
+	assert_false(join_complete(join));
+	assert_int_equal(serve_gaps(64), 100);
+	assert_true(join_complete(join));
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	check_counters(&record, (struct record_counters){.blocks = 100, .gaps = 1, .resent = 201});
+	record_free(&record);
+}
+
+/* A missing block is no block of zeros, though the CRC-32 would not tell. */
+static void test_zeros_are_not_missing(void **state)
+{
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 1000, 50, 20);
+	memset(drop.sample[1][7], 0, sizeof(drop.sample[1][7]));
+	for (uint32_t tick = 0; tick < 50; tick++) {
+		feed(1, tick, false);
+		if (tick != 7)
+			feed(2, tick, false);
+	}
+	feed_end();
+	assert_int_equal(join_crc32(join), hand_drop_crc32(&drop));
+	assert_false(join_complete(join));
+	record = take();
+	assert_int_equal(record.flags, RECORD_FLAG_LOST | RECORD_FLAG_INCOMPLETE);
+	assert_false(record.crc_agrees);
+	record_free(&record);
+}
+
+/* A resent block that was not needed, and a late live one. */
+static void test_late_blocks(void **state)
+{
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 1000, 50, 5);
+	feed_both(0, 48);
+	feed(2, 49, false);
+	feed_end();
+	feed(2, 10, true);
+	assert_false(join_complete(join));
+	feed(1, 49, false);
+	assert_true(join_complete(join));
+	record = take();
+	check_counters(&record,
+	               (struct record_counters){.blocks = 100, .gaps = 1, .repeated = 1, .resent = 1});
+	record_free(&record);
+}
+
+/* ---- more than one drop ---- */
+
+static void test_a_capture_end_repeated_is_no_news(void **state)
+{
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 1000, 50, 6);
+	feed_both(0, 49);
+	assert_int_equal(feed_end(), 1);
+	assert_int_equal(feed_end(), 0);
+	record = take();
+	record_free(&record);
+	assert_int_equal(feed_end(), 0); /* also after it was taken */
+	assert_false(join_has_capture(join));
+}
+
+static void test_the_next_drop(void **state)
+{
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 1000, 50, 7);
+	feed_both(0, 40);
+	assert_int_equal(feed_end(), 1); /* incomplete, and not taken */
+	hand_fill(&drop, 1100, 50, 8);
+	drop.drop_id = 4;
+	feed_both(0, 49);
+	assert_int_equal(feed_end(), 1);
+	assert_true(join_complete(join));
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	check_counters(&record, (struct record_counters){.blocks = 100});
+	record_free(&record);
+}
+
+/* The window is kept whatever comes after it, and what comes after it does not get into it. */
+static void test_a_capture_outlives_the_ring(void **state)
+{
+	static struct hand_drop first;
+	struct record record;
+
+	(void)state;
+	hand_fill(&first, 1000, 50, 9);
+	drop = first;
+	feed_both(0, 49);
+	feed_end();
+	for (uint32_t k = 0; k < 5; k++) {
+		hand_fill(&drop, 1050 + 1000 * k, 1000, 10);
+		feed_both(0, 999);
+	}
+	drop = first;
+	assert_true(join_complete(join));
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	check_counters(&record, (struct record_counters){.blocks = 100});
+	record_free(&record);
+}
+
+/* The tower starts again and its ticks cross those of the drop before. */
+static void check_restart(bool boot_message)
+{
+	static const uint8_t boot[5] = {0};
+	struct frame heartbeat = {.id = 0x701, .length = 5};
+	uint32_t first_ms = boot_message ? 30 : 3000;
+	struct record record;
+
+	memcpy(heartbeat.data, boot, sizeof(boot));
+	hand_fill(&drop, first_ms, 60, 12);
+	feed_both(0, 59);
+	if (boot_message)
+		join_feed(join, &heartbeat);
+	hand_fill(&drop, 0, 40, 13);
+	feed_both(0, 39);
+	feed_end();
+	assert_true(join_complete(join));
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	check_counters(&record, (struct record_counters){.blocks = 80});
+	record_free(&record);
+}
+
+static void test_a_restart_seen_by_its_ticks(void **state)
+{
+	(void)state;
+	check_restart(false);
+}
+
+static void test_a_restart_seen_by_its_boot_message(void **state)
+{
+	(void)state;
+	check_restart(true);
+}
+
+/* The capture of before the restart is still to be had, but not from what the tower sends now. */
+static void test_a_restart_leaves_the_capture_alone(void **state)
+{
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 3000, 60, 21);
+	feed_both(0, 50);
+	feed_end();
+	hand_fill(&drop, 2000, 1024, 22);
+	feed_both(0, 1023); /* goes back, and then over ticks 3000 to 3023 */
+	hand_fill(&drop, 3024, 60, 23);
+	feed_both(0, 59);
+	hand_fill(&drop, 3000, 60, 21);
+	record = take();
+	assert_int_equal(record.gap_count, 2);
+	check_counters(&record, (struct record_counters){.blocks = 102, .gaps = 2});
+	record_free(&record);
+}
+
+/* A slot of the ring is used again after 2 048 ticks. */
+static void test_the_ring_does_not_confuse_ticks(void **state)
+{
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 1000, 50, 24);
+	feed_both(0, 49);
+	hand_fill(&drop, 1000 + 2048, 50, 25);
+	feed_both(0, 9);
+	feed_both(20, 49);
+	hand_fill(&drop, 1000, 50, 24);
+	feed(1, 30, true); /* too old for the ring: must not take the place of tick 3078 */
+	hand_fill(&drop, 1000 + 2048, 50, 25);
+	feed_end();
+	assert_int_equal(serve_gaps(64), 20);
+	assert_true(join_complete(join));
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	check_counters(&record, (struct record_counters){.blocks = 100, .gaps = 2, .resent = 20});
+	record_free(&record);
+}
+
+static void test_the_same_drop_after_a_restart_is_another(void **state)
+{
+	struct record record;
+
+	(void)state;
+	for (uint64_t seed = 1; seed < 3; seed++) {
+		hand_fill(&drop, 400, 60, seed); /* same id, same ticks, other samples */
+		feed_both(0, 59);
+		assert_int_equal(feed_end(), 1);
+		record = take();
+		hand_check_samples(&record, &drop, NULL);
+		record_free(&record);
+		hand_fill(&drop, 1000, 2, seed);
+		feed_both(0, 1);
+	}
+}
+
+static void test_ticks_wrap(void **state)
+{
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, UINT32_MAX - 20, 100, 14);
+	for (uint32_t tick = 0; tick < 100; tick++)
+		if (tick < 15 || tick > 30)
+			feed(1, tick, false), feed(2, tick, false);
+	assert_int_equal(feed_end(), 1);
+	check_next(0, 0, 100, (struct record_gap){1, UINT32_MAX - 5, 9});
+	assert_int_equal(serve_gaps(10), 32);
+	assert_true(join_complete(join));
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	assert_int_equal(record.counters.reordered, 0);
+	assert_int_equal(record.counters.gaps, 2);
+	record_free(&record);
+}
+
+/* ---- no capture end ---- */
+
+static void test_without_a_capture_end(void **state)
+{
+	static bool held[2][HAND_TICKS_MAX];
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 500, 10, 15); /* a shorter run, a hole, and the longer one */
+	feed_both(0, 9);
+	hand_fill(&drop, 700, 300, 16);
+	for (uint32_t tick = 0; tick < 300; tick++) {
+		held[0][tick] = tick < 100 || tick >= 150;
+		held[1][tick] = tick < 100 || tick >= 160;
+		for (unsigned s = 0; s < 2; s++)
+			if (held[s][tick])
+				feed(s + 1, tick, false);
+	}
+	record = take();
+	hand_check_samples(&record, &drop, held);
+	check_gap_list(&record, held);
+	check_counters(&record, (struct record_counters){.blocks = 490, .gaps = 2});
+	assert_false(record.crc_known || record.crc_agrees);
+	assert_true(isnan(record.trigger_s) && isnan(record.frame_speed_m_s));
+	assert_int_equal(record.flags, RECORD_FLAG_LOST | RECORD_FLAG_NO_CRC);
+	record_free(&record);
+	assert_int_equal(join_take(join, &record), DT_E_EMPTY);
+}
+
+/* ---- what is no block ---- */
+
+static void test_other_frames(void **state)
+{
+	struct frame frame;
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 1000, 50, 17);
+	feed_both(0, 49);
+	for (unsigned flag = FRAME_EXTENDED; flag <= FRAME_ERROR; flag <<= 1) {
+		hand_block(&drop, 1, 0, false, &frame);
+		frame.flags |= (uint8_t)flag;
+		frame.data[50] ^= 1; /* would be corrupt */
+		assert_int_equal(join_feed(join, &frame), 0);
+		hand_capture_end(&drop, &frame);
+		frame.flags |= (uint8_t)flag;
+		assert_int_equal(join_feed(join, &frame), 0);
+	}
+	frame = (struct frame){.id = 0x123, .length = 8};
+	assert_int_equal(join_feed(join, &frame), 0);
+	hand_block(&drop, 1, 0, false, &frame);
+	frame.length = 48; /* corrupt */
+	assert_int_equal(join_feed(join, &frame), 0);
+	feed_end();
+	record = take();
+	check_counters(&record, (struct record_counters){.blocks = 100, .corrupt = 1});
+	record_free(&record);
+}
+
+static void test_impossible_windows(void **state)
+{
+	struct frame frame;
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 1000, 50, 18);
+	feed_both(0, 49);
+	hand_capture_end(&drop, &frame);
+	frame.data[9] = 0x40; /* last tick: 16 s away */
+	assert_int_equal(join_feed(join, &frame), 0);
+	memset(frame.data + 8, 0, 4); /* last before first */
+	assert_int_equal(join_feed(join, &frame), 0);
+	hand_capture_end(&drop, &frame);
+	frame.length = 20;
+	assert_int_equal(join_feed(join, &frame), 0);
+	assert_false(join_has_capture(join));
+	assert_int_equal(feed_end(), 1);
+	record = take();
+	assert_int_equal(record.counters.corrupt, 3);
+	record_free(&record);
+}
+
+static void test_a_capture_without_a_block(void **state)
+{
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 1000, 50, 19);
+	assert_int_equal(feed_end(), 1);
+	assert_int_equal(join_take(join, &record), DT_E_EMPTY);
+	assert_int_equal(serve_gaps(64), 100); /* the host came late: all of it can still be had */
+	assert_true(join_complete(join));
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	record_free(&record);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, setup, teardown)
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        TEST(test_a_lossless_drop),
+	        TEST(test_marks_and_marked_samples),
+	        TEST(test_random_losses_are_counted_and_recovered),
+	        TEST(test_what_stays_missing_is_listed),
+	        TEST(test_gaps_in_order_and_in_pieces),
+	        TEST(test_forget_asks_for_everything),
+	        TEST(test_zeros_are_not_missing),
+	        TEST(test_late_blocks),
+	        TEST(test_a_capture_end_repeated_is_no_news),
+	        TEST(test_the_next_drop),
+	        TEST(test_a_capture_outlives_the_ring),
+	        TEST(test_a_restart_seen_by_its_ticks),
+	        TEST(test_a_restart_seen_by_its_boot_message),
+	        TEST(test_a_restart_leaves_the_capture_alone),
+	        TEST(test_the_ring_does_not_confuse_ticks),
+	        TEST(test_the_same_drop_after_a_restart_is_another),
+	        TEST(test_ticks_wrap),
+	        TEST(test_without_a_capture_end),
+	        TEST(test_other_frames),
+	        TEST(test_impossible_windows),
+	        TEST(test_a_capture_without_a_block),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

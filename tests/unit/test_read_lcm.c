@@ -1,0 +1,469 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <lcm/lcm.h>
+
+#include "common/wire.h"
+#include "host/record/join.h"
+#include "host/record/lcm_codec.h"
+#include "host/record/lcm_log.h"
+#include "host/record/read.h"
+#include "host/record/write.h"
+#include "tests/unit/drop_by_hand.h"
+
+static struct hand_drop drop;
+
+/* The record of drop, but for the blocks of tick 10 to 12 of S2 if losses are asked for. */
+static struct record make_record(bool losses)
+{
+	struct join *join = join_create();
+	struct record record;
+	struct frame frame;
+
+	assert_non_null(join);
+	for (uint32_t tick = 0; tick < drop.ticks; tick++) {
+		for (unsigned sensor = 1; sensor <= 2; sensor++) {
+			if (losses && sensor == 2 && tick >= 10 && tick <= 12)
+				continue;
+			hand_block(&drop, sensor, tick, false, &frame);
+			join_feed(join, &frame);
+			if (losses && tick == 20)
+				join_feed(join, &frame); /* a counter that is not 0 */
+		}
+	}
+	hand_capture_end(&drop, &frame);
+	assert_int_equal(join_feed(join, &frame), 1);
+	assert_int_equal(join_take(join, &record), 0);
+	join_destroy(join);
+	return record;
+}
+
+static void read_back(const char *file, struct record *record)
+{
+	char message[READ_MESSAGE_MAX] = "";
+
+	if (read_record(record, file, NULL, message))
+		fail_msg("%s", message);
+	assert_string_equal(record->format, "lcm");
+}
+
+static int read_bytes(const void *bytes, size_t size, struct record *record, char *message)
+{
+	char *file = hand_file("", bytes, size);
+	int error = read_record(record, file, NULL, message);
+
+	hand_unlink(file);
+	return error;
+}
+
+/* ---- messages ---- */
+
+static void test_a_block_there_and_back(void **state)
+{
+	droptower_block block;
+	struct frame frame, again = {0};
+
+	(void)state;
+	hand_fill(&drop, UINT32_MAX - 5, 10, 1);
+	for (unsigned i = 0; i < 40; i++) {
+		hand_block(&drop, 1 + i % 2, i / 4, i / 2 % 2, &frame);
+		frame.time_us = 1000 + i;
+		frame.data[6] = 0xF7; /* every status and io bit arrives */
+		frame.data[8] = 0x80;
+		frame.data[9] = hand_crc8(frame.data, 64, 9);
+		assert_int_equal(lcm_codec_block(&frame, &block), 0);
+		assert_int_equal(block.utime, 1000 + i);
+		assert_int_equal(block.drop_id, 3);
+		assert_int_equal(block.tick_ms, (uint32_t)(UINT32_MAX - 5 + i / 4));
+		assert_int_equal(block.sensor, 1 + i % 2);
+		assert_int_equal(block.resent, i / 2 % 2);
+		assert_int_equal(block.status, 0xF7);
+		assert_int_equal(block.io, 0x8000);
+		assert_memory_equal(block.x, drop.sample[i % 2][i / 4], 14);
+		assert_memory_equal(block.y, drop.sample[i % 2][i / 4] + 7, 20);
+		assert_memory_equal(block.z, drop.sample[i % 2][i / 4] + 17, 20);
+		assert_int_equal(lcm_codec_frame(&block, &again), 0);
+		assert_memory_equal(&again, &frame, sizeof(frame));
+	}
+	frame.data[30] ^= 1;
+	assert_int_equal(lcm_codec_block(&frame, &block), DT_E_CORRUPT);
+	frame.length = 48;
+	assert_int_equal(lcm_codec_block(&frame, &block), DT_E_LENGTH);
+	frame.id = 0x681;
+	assert_int_equal(lcm_codec_block(&frame, &block), DT_E_UNKNOWN);
+}
+
+static void test_blocks_that_do_not_fit_the_wire(void **state)
+{
+	const droptower_block good = {.sensor = 1};
+	droptower_block bad[] = {good, good, good, good, good, good, good, good};
+	struct frame frame = {.id = 77};
+
+	(void)state;
+	bad[0].sensor = 0;
+	bad[1].sensor = 3;
+	bad[2].drop_id = 65536;
+	bad[3].drop_id = -1;
+	bad[4].tick_ms = (int64_t)1 << 32;
+	bad[5].tick_ms = -1;
+	bad[6].status = 256;
+	bad[7].io = -1;
+	for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++)
+		assert_int_equal(lcm_codec_frame(&bad[i], &frame), DT_E_RANGE);
+	assert_int_equal(frame.id, 77);
+	assert_int_equal(lcm_codec_frame(&good, &frame), 0);
+}
+
+static void test_a_status(void **state)
+{
+	struct frame frame = {
+	        .id = 0x682, .length = 8, .time_us = 99, .data = {3, 2, 0x34, 0x12, 0x78, 0x56, 0xBC, 0x9A}};
+	droptower_state message = {.command_utime = 5, .command_result = -7};
+
+	(void)state;
+	assert_int_equal(lcm_codec_state(&frame, &message), 0);
+	assert_int_equal(message.utime, 99);
+	assert_int_equal(message.state, 3);
+	assert_int_equal(message.fault, 2);
+	assert_int_equal(message.checks, 0x1234);
+	assert_int_equal(message.drop_id, 0x5678);
+	assert_int_equal(message.io, 0x9ABC);
+	assert_int_equal(message.command_utime, 5);
+	assert_int_equal(message.command_result, -7);
+	frame.id = 0x683;
+	assert_int_equal(lcm_codec_state(&frame, &message), DT_E_UNKNOWN);
+}
+
+static void test_a_drop_there_and_back(void **state)
+{
+	droptower_drop message, decoded, refused;
+	struct record record, again;
+
+	(void)state;
+	for (int losses = 0; losses < 2; losses++) {
+		uint8_t *bytes;
+		int size;
+
+		hand_fill(&drop, UINT32_MAX - 30, 50, 2);
+		drop.sample[0][5][0] = -32768;
+		drop.sample[1][6][26] = 16001;
+		drop.marks = losses ? 1u << 1 : 0; /* no impact: the time of the trigger is unknown */
+		record = make_record(losses);
+		assert_int_equal(lcm_codec_drop(&record, 1234, &message), 0);
+		assert_int_equal(message.utime, 1234);
+		assert_int_equal(message.drop_id, 3);
+		assert_int_equal(message.trigger_us, losses ? -1 : 10123);
+		assert_int_equal(message.x_count, 350);
+		assert_int_equal(message.s2_z[6 * 10 + 9], 16001);
+		assert_int_equal(message.gap_count, losses);
+		assert_int_equal(message.crc_agrees, !losses);
+		size = droptower_drop_encoded_size(&message);
+		bytes = malloc((size_t)size);
+		assert_non_null(bytes);
+		assert_int_equal(droptower_drop_encode(bytes, 0, size, &message), size);
+		assert_int_equal(lcm_codec_decode_drop(bytes, (size_t)size, &decoded), 0);
+		assert_int_equal(lcm_codec_record(&decoded, &again), 0);
+		hand_check_equal(&again, &record);
+		for (int cut = 0; cut < size; cut++) /* every truncation is refused */
+			assert_int_equal(lcm_codec_decode_drop(bytes, (size_t)cut, &refused), DT_E_FORMAT);
+		droptower_drop_decode_cleanup(&decoded);
+		lcm_codec_free_drop(&message);
+		free(bytes);
+		record_free(&record);
+		record_free(&again);
+	}
+}
+
+static void test_drops_that_do_not_fit(void **state)
+{
+	struct record record, foreign;
+	droptower_drop message, bad;
+
+	(void)state;
+	hand_fill(&drop, 1000, 20, 3);
+	record = make_record(false);
+	assert_int_equal(lcm_codec_drop(&record, 0, &message), 0);
+	record_free(&record);
+#define REFUSE(field, value) \
+	bad = message;       \
+	bad.field = value;   \
+	assert_int_equal(lcm_codec_record(&bad, &record), DT_E_RANGE)
+	REFUSE(drop_id, 70000);
+	REFUSE(marks, -1);
+	REFUSE(first_tick_ms, -1);
+	REFUSE(first_tick_ms, 1001);
+	REFUSE(last_tick_ms, (int64_t)1 << 40);
+	REFUSE(crc32, -1);
+	REFUSE(frame_speed_mm_s, 70000);
+	REFUSE(x_count, 139);
+	REFUSE(yz_count, 201);
+	REFUSE(gap_count, 1000);
+#undef REFUSE
+	message.crc_agrees = 0; /* not believed, computed */
+	assert_int_equal(lcm_codec_record(&message, &record), 0);
+	assert_true(record.crc_agrees);
+	record_free(&record);
+	message.s2_y[17] ^= 1;
+	message.crc_agrees = 1;
+	assert_int_equal(lcm_codec_record(&message, &record), 0);
+	assert_int_equal(record.flags, RECORD_FLAG_INCOMPLETE);
+	record_free(&record);
+	lcm_codec_free_drop(&message);
+	record_init(&foreign);
+	assert_int_equal(lcm_codec_drop(&foreign, 0, &message), DT_E_ARGUMENT);
+}
+
+/* ---- logs ---- */
+
+static void test_a_written_log(void **state)
+{
+	char message[READ_MESSAGE_MAX] = "", *file = hand_file(".lcm", "", 0);
+	struct record record, again;
+	lcm_eventlog_event_t *event;
+	lcm_eventlog_t *log;
+
+	(void)state;
+	hand_fill(&drop, 1000, 500, 4);
+	record = make_record(true);
+	assert_int_equal(write_record(&record, file, message), 0);
+	read_back(file, &again);
+	hand_check_equal(&again, &record);
+	/* the library reads it as well */
+	log = lcm_eventlog_create(file, "r");
+	assert_non_null(log);
+	event = lcm_eventlog_read_next_event(log);
+	assert_non_null(event);
+	assert_string_equal(event->channel, "DT_DROP");
+	assert_int_equal(event->timestamp, 1500000);
+	assert_in_range(event->datalen, 54000, 60000);
+	lcm_eventlog_free_event(event);
+	assert_null(lcm_eventlog_read_next_event(log));
+	lcm_eventlog_destroy(log);
+	record_free(&record);
+	record_free(&again);
+	hand_unlink(file);
+}
+
+/* A log as lcm-logger makes it, written by the library: blocks, things of others, and drops if asked. */
+static char *make_log(bool drops, size_t *size)
+{
+	char *file = hand_file(".lcm", "", 0), *bytes, block_channel[] = "DT_BLOCK", other[] = "OTHER";
+	lcm_eventlog_t *log = lcm_eventlog_create(file, "w");
+	uint8_t data[512];
+
+	assert_non_null(log);
+	for (unsigned i = 0; i < 2 * drop.ticks; i++) {
+		lcm_eventlog_event_t event = {
+		        .timestamp = 1000 * i, .channel = block_channel, .channellen = 8, .data = data};
+		droptower_block block;
+		struct frame frame;
+
+		hand_block(&drop, 1 + i % 2, i / 2, false, &frame);
+		assert_int_equal(lcm_codec_block(&frame, &block), 0);
+		event.datalen = droptower_block_encode(data, 0, sizeof(data), &block);
+		assert_true(event.datalen > 0);
+		assert_int_equal(lcm_eventlog_write_event(log, &event), 0);
+		if (i % 10 == 3) {
+			event.channel = other;
+			event.channellen = 5;
+			assert_int_equal(lcm_eventlog_write_event(log, &event), 0);
+		}
+	}
+	lcm_eventlog_destroy(log);
+	bytes = hand_read(file, size);
+	if (drops) {
+		struct record record = make_record(true);
+		char message[READ_MESSAGE_MAX], *more;
+		size_t more_size;
+
+		assert_int_equal(write_record(&record, file, message), 0);
+		more = hand_read(file, &more_size);
+		bytes = realloc(bytes, *size + more_size);
+		assert_non_null(bytes);
+		memcpy(bytes + *size, more, more_size);
+		*size += more_size;
+		free(more);
+		record_free(&record);
+	}
+	hand_unlink(file);
+	return bytes;
+}
+
+static void test_blocks_without_a_drop(void **state)
+{
+	char message[READ_MESSAGE_MAX] = "", *bytes;
+	struct record record;
+	size_t size;
+
+	(void)state;
+	hand_fill(&drop, 1000, 100, 5);
+	bytes = make_log(false, &size);
+	assert_int_equal(read_bytes(bytes, size, &record, message), 0);
+	hand_check_samples(&record, &drop, NULL);
+	assert_int_equal(record.flags, RECORD_FLAG_NO_CRC);
+	assert_int_equal(record.counters.blocks, 200);
+	assert_int_equal(record.counters.corrupt, 0);
+	record_free(&record);
+	free(bytes);
+}
+
+static void test_a_drop_goes_before_blocks(void **state)
+{
+	char message[READ_MESSAGE_MAX] = "", *bytes;
+	struct record record, expected;
+	size_t size;
+
+	(void)state;
+	hand_fill(&drop, 1000, 100, 6);
+	expected = make_record(true);
+	bytes = make_log(true, &size);
+	assert_int_equal(read_bytes(bytes, size, &record, message), 0);
+	hand_check_equal(&record, &expected);
+	record_free(&record);
+	record_free(&expected);
+	free(bytes);
+}
+
+/* One bad byte ends the library's reader. Ours loses that event and no other. */
+static void test_bad_bytes_cost_one_event_each(void **state)
+{
+	char message[READ_MESSAGE_MAX] = "", *bytes;
+	struct record record;
+	size_t size, event;
+
+	(void)state;
+	hand_fill(&drop, 1000, 100, 7);
+	bytes = make_log(false, &size);
+	event = 28 + 8 + 8 + 8 + 4 + 8 + 1 + 1 + 2 + 4 + 54; /* header, name, fingerprint, the fields */
+	assert_memory_equal(bytes + event, "\xED\xA1\xDA\x01", 4);
+	bytes[0] ^= 1;              /* tick 0 of S1: the sync word */
+	bytes[event + 26] = 1;      /* tick 0 of S2: a length over the next events, */
+	bytes[2 * event + 24] = 64; /* tick 1 of S1: and one beyond the end */
+	assert_int_equal(read_bytes(bytes, size - 5, &record, message), 0);
+	assert_int_equal(record.first_tick_ms, 1001);
+	assert_int_equal(record.last_tick_ms, 1099);
+	assert_int_equal(record.counters.blocks, 200 - 4);
+	assert_int_equal(record.counters.corrupt, 2); /* three at the beginning in one stretch, the cut end */
+	assert_int_equal(record.gap_count, 2);
+	record_free(&record);
+	free(bytes);
+}
+
+static void test_events_in_turn(void **state)
+{
+	struct source source = {.file = "log"}, text = {.file = "text", .bytes = NULL, .size = 0};
+	struct lcm_log_walk walk = {0};
+	struct lcm_log_event event;
+
+	(void)state;
+	hand_fill(&drop, 1000, 5, 8);
+	source.bytes = make_log(false, &source.size);
+	assert_true(lcm_log_is(&source));
+	for (unsigned i = 0; i < 10; i++) {
+		assert_true(lcm_log_next(&source, &walk, &event));
+		assert_string_equal(event.channel, "DT_BLOCK");
+		assert_int_equal(event.time_us, 1000 * i);
+		assert_int_equal(event.size, 90);
+		if (i == 3) {
+			assert_true(lcm_log_next(&source, &walk, &event));
+			assert_string_equal(event.channel, "OTHER");
+		}
+	}
+	assert_false(lcm_log_next(&source, &walk, &event));
+	assert_int_equal(walk.events, 11);
+	assert_int_equal(walk.skipped, 0);
+	text.bytes = source.bytes + 4;
+	text.size = 40;
+	assert_false(lcm_log_is(&text));
+	free(source.bytes);
+}
+
+static void test_refusals(void **state)
+{
+	char message[READ_MESSAGE_MAX] = "", *bytes;
+	struct record record;
+	size_t size;
+
+	(void)state;
+	hand_fill(&drop, 1000, 5, 9);
+	bytes = make_log(false, &size);
+	for (size_t i = 0; i + 8 < size; i++)
+		if (memcmp(bytes + i, "DT_BLOCK", 8) == 0)
+			bytes[i + 8] ^= 1; /* the fingerprint: another version's message */
+	assert_int_equal(read_bytes(bytes, size, &record, message), DT_E_EMPTY);
+	assert_non_null(
+	        strstr(message, ": no message of a drop tower in 11 events, 10 refused, expected DT_DROP"));
+	free(bytes);
+}
+
+static void test_damage(void **state)
+{
+	size_t size;
+	char *bytes;
+
+	(void)state;
+	hand_fill(&drop, 1000, 20, 10);
+	bytes = make_log(true, &size);
+	hand_fuzz(bytes, size, NULL, 43, 300);
+	/* the drop message alone, so that most of the damage is to its counts */
+	hand_fuzz(bytes + size - 1400, 1400, NULL, 44, 100);
+	free(bytes);
+	bytes = make_log(false, &size);
+	hand_fuzz(bytes, size, NULL, 45, 300);
+	free(bytes);
+}
+
+/* Every byte of the counts that the generated decoder would believe. */
+static void test_damaged_counts(void **state)
+{
+	struct record record;
+	droptower_drop message, decoded;
+	uint8_t bytes[8192];
+	int size;
+
+	(void)state;
+	hand_fill(&drop, 1000, 20, 11);
+	record = make_record(true);
+	assert_int_equal(lcm_codec_drop(&record, 0, &message), 0);
+	size = droptower_drop_encode(bytes, 0, sizeof(bytes), &message);
+	assert_true(size > 0);
+	for (int at = 100; at < 160; at++) {
+		for (int value = 1; value < 256; value++) {
+			bytes[at] = (uint8_t)(bytes[at] ^ value);
+			if (lcm_codec_decode_drop(bytes, (size_t)size, &decoded) == 0)
+				droptower_drop_decode_cleanup(&decoded);
+			bytes[at] = (uint8_t)(bytes[at] ^ value);
+		}
+	}
+	lcm_codec_free_drop(&message);
+	record_free(&record);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(test_a_block_there_and_back),
+	        cmocka_unit_test(test_blocks_that_do_not_fit_the_wire),
+	        cmocka_unit_test(test_a_status),
+	        cmocka_unit_test(test_a_drop_there_and_back),
+	        cmocka_unit_test(test_drops_that_do_not_fit),
+	        cmocka_unit_test(test_a_written_log),
+	        cmocka_unit_test(test_blocks_without_a_drop),
+	        cmocka_unit_test(test_a_drop_goes_before_blocks),
+	        cmocka_unit_test(test_bad_bytes_cost_one_event_each),
+	        cmocka_unit_test(test_events_in_turn),
+	        cmocka_unit_test(test_refusals),
+	        cmocka_unit_test(test_damage),
+	        cmocka_unit_test(test_damaged_counts),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
