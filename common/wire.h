@@ -11,8 +11,8 @@
  *     ...
  *     if (wire_unpack_status(&frame, &status) == 0) ...
  *
- * A frame longer than 8 bytes is CAN FD with bit-rate switching; others are sent as CAN FD too when
- * the bus carries it, which is the port's choice and not seen here.
+ * A frame longer than 8 bytes is CAN FD with bit-rate switching, the others are classic frames on either
+ * bus. On classic CAN the longer ones travel in segments (segment.h).
  */
 #include <stdbool.h>
 #include <stddef.h>

@@ -107,6 +107,8 @@ void acquire_open(struct acquire *acquire, const struct acquire_head *head)
 	tick->drop_id = head->drop_id;
 	tick->io = head->io;
 	tick->marks = head->marks;
+	if ((~head->io & (WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2)) != 0)
+		tick->marks |= WIRE_MARK_CABLE;
 	tick->status[0] = tick->status[1] = head->state;
 	acquire->open = true;
 	acquire->x_count = 0;
@@ -116,6 +118,14 @@ void acquire_open(struct acquire *acquire, const struct acquire_head *head)
 int acquire_take(struct acquire *acquire, struct acquire_tick *tick)
 {
 	return ring_get(&acquire->queue, tick);
+}
+
+const int16_t *acquire_channel(const struct acquire_tick *tick, unsigned channel, unsigned *count)
+{
+	const struct acquire_samples *samples = &tick->sensor[channel / 3];
+
+	*count = channel % 3 == 0 ? WIRE_X_PER_TICK : WIRE_YZ_PER_TICK;
+	return channel % 3 == 0 ? samples->x : channel % 3 == 1 ? samples->y : samples->z;
 }
 
 void acquire_pack(const struct acquire_tick *tick, unsigned sensor, uint32_t id, struct frame *frame)

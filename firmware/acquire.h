@@ -17,6 +17,7 @@
 #include "firmware/parameter.h"
 
 enum {
+	ACQUIRE_CHANNELS = 6,      /* S1 X Y Z, S2 X Y Z */
 	ACQUIRE_QUEUE = 16,        /* ticks that main may be behind before one is lost */
 	ACQUIRE_CLOCK_TICKS = 100, /* the sample clocks are judged over this many */
 	ACQUIRE_SAMPLES_PER_TICK = 2 * (WIRE_X_PER_TICK + 2 * WIRE_YZ_PER_TICK),
@@ -61,7 +62,7 @@ void acquire_init(struct acquire *acquire, const struct parameters *parameters, 
 /* Ends the tick that is open, if any, and queues it. */
 void acquire_close(struct acquire *acquire);
 
-/* Opens the next. */
+/* Opens the next; a sensor without its bias marks it. */
 void acquire_open(struct acquire *acquire, const struct acquire_head *head);
 
 /* The next sample instant has come; ready false = the converter did not deliver, the codes are nothing. */
@@ -71,6 +72,9 @@ void acquire_yz(struct acquire *acquire, const int16_t y[WIRE_SENSORS], const in
 
 /* Main: the oldest finished tick, or DT_E_EMPTY. */
 DT_MUST_USE int acquire_take(struct acquire *acquire, struct acquire_tick *tick);
+
+/* Main: the samples of one channel, *count of them. */
+const int16_t *acquire_channel(const struct acquire_tick *tick, unsigned channel, unsigned *count);
 
 /* Main: the sealed block of sensor 0 (S1) or 1 (S2). */
 void acquire_pack(const struct acquire_tick *tick, unsigned sensor, uint32_t id, struct frame *frame);

@@ -14,13 +14,32 @@ enum {
 	TICKS_PER_POLL = 4,
 	NMT_BOOT_UP = 0,
 	NMT_OPERATIONAL = 5,
-	NMT_PRE_OPERATIONAL = 127,
 	ERROR_GENERIC = 1 << 0, /* CiA 301 error register */
 	ERROR_COMMUNICATION = 1 << 4,
 	ERROR_OURS = 1 << 7,
 };
 
 static struct app app;
+
+int app_set_up_bus(struct app *a)
+{
+	bool classic = a->parameters.value[WIRE_PARAMETER_bus_mode] != 0;
+	int result = port_can_setup(classic, a->parameters.value[WIRE_PARAMETER_data_kbit_s]);
+
+	if (result == 0)
+		stream_set_classic(&a->stream, classic);
+	return result;
+}
+
+/* A bus without FD is told from one with it by the port's refusal. */
+static void start_bus(void)
+{
+	app.bus_ready = app_set_up_bus(&app) == 0;
+	if (app.bus_ready)
+		return;
+	app.parameters.value[WIRE_PARAMETER_bus_mode] = 1;
+	app.bus_ready = app_set_up_bus(&app) == 0;
+}
 
 void app_init(enum port_reset cause)
 {
@@ -33,6 +52,7 @@ void app_init(enum port_reset cause)
 	stream_init(&app.stream, app.counters);
 	app.tick_ms = UINT32_MAX; /* the first tick is 0 */
 	app.seen_ms = UINT32_MAX;
+	start_bus();
 }
 
 struct sequence_view app_view(const struct app *a)
@@ -95,15 +115,13 @@ static struct sequence snapshot(void)
 	return now;
 }
 
-static void send_heartbeat(uint8_t state)
+static void send_heartbeat(void)
 {
-	struct wire_heartbeat heartbeat = {.nmt_state = NMT_OPERATIONAL, .wire_hash = wire_hash()};
+	struct wire_heartbeat heartbeat = {.nmt_state = NMT_OPERATIONAL, .wire_hash = app.health.wire_hash};
 	struct frame frame;
 
 	if (!app.started)
 		heartbeat.nmt_state = NMT_BOOT_UP;
-	else if (state == WIRE_STATE_BOOT)
-		heartbeat.nmt_state = NMT_PRE_OPERATIONAL;
 	app.started = true;
 	wire_pack_heartbeat(&frame, WIRE_ID_HEARTBEAT_TOWER, &heartbeat);
 	stream_send(&app.stream, &frame);
@@ -118,7 +136,7 @@ static void send_status(const struct sequence *now)
 	        .drop_id = now->drop_id,
 	        .io = io,
 	};
-	struct wire_counter counter = {.index = app.next_counter, .value = app.counters[app.next_counter]};
+	struct wire_counter counter = {.index = app.next_counter};
 	struct frame frame;
 
 	port_lock();
@@ -126,6 +144,7 @@ static void send_status(const struct sequence *now)
 	port_unlock();
 	wire_pack_status(&frame, WIRE_ID_STATUS, &status);
 	stream_send(&app.stream, &frame);
+	counter.value = app.counters[app.next_counter]; /* now: frames_sent counts all before this one */
 	wire_pack_counter(&frame, WIRE_ID_COUNTER, &counter);
 	stream_send(&app.stream, &frame);
 	app.next_counter = (uint8_t)((app.next_counter + 1u) % WIRE_COUNTERS);
@@ -173,12 +192,32 @@ void app_send_capture_end(struct app *a)
 	        .trigger_us = a->capture.trigger_us,
 	        .crc32 = a->capture.crc32,
 	        .frame_speed_mm_s = now.frame_speed_mm_s,
+	        .camera_frame = (int16_t)(a->capture.first_ms - now.released_ms), /* seconds, at most */
 	};
 	struct frame frame;
 
 	wire_pack_capture_end(&frame, WIRE_ID_CAPTURE_END, &end);
 	stream_send(&a->stream, &frame);
 	a->capture_end_ms = a->tick_ms;
+}
+
+static void finish_capture(void)
+{
+	uint32_t limit = app.parameters.value[WIRE_PARAMETER_zero_shift_counts];
+	bool captured;
+
+	port_lock();
+	sequence_full(&app.sequence);
+	captured = app.sequence.state == WIRE_STATE_CAPTURED;
+	port_unlock();
+	if (!captured) { /* triggered just when the release turned out to be none */
+		capture_release(&app.capture);
+		return;
+	}
+	if (capture_zero_shift(&app.capture, app.health.zero, limit))
+		app.capture.marks |= WIRE_MARK_ZERO_SHIFT;
+	app_send_capture_end(&app);
+	stream_upload(&app.stream, &app.capture);
 }
 
 /* The ticks that the interrupt has finished: into the ring, and out. */
@@ -197,12 +236,8 @@ static void take_ticks(void)
 		sequence_triggered(&app.sequence);
 		port_unlock();
 	}
-	if (capture_work(&app.capture)) {
-		port_lock();
-		sequence_full(&app.sequence);
-		port_unlock();
-		app_send_capture_end(&app);
-	}
+	if (capture_work(&app.capture))
+		finish_capture();
 }
 
 static void receive(void)
@@ -258,10 +293,12 @@ static void beat(const struct sequence *now, uint32_t tick_ms)
 	if (due(tick_ms, 0, SYNC_MS))
 		send_time(tick_ms);
 	if (due(tick_ms, 0, BEAT_MS))
-		send_heartbeat(now->state);
+		send_heartbeat();
 	if (due(tick_ms, STATUS_PHASE_MS, BEAT_MS))
 		send_status(now);
 	app.seen_ms = tick_ms;
+	if (!app.bus_ready && !sequence_moving(now->state))
+		start_bus();
 	if (now->state == WIRE_STATE_CAPTURED && tick_ms - app.capture_end_ms >= BEAT_MS)
 		app_send_capture_end(&app);
 	stream_resend(&app.stream, &app.capture);

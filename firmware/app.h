@@ -34,7 +34,7 @@ struct app {
 	uint32_t capture_end_ms; /* when the capture end was last sent */
 	uint8_t fault_reported;
 	uint8_t next_counter, sync_counter;
-	bool started, bus_was_off;
+	bool started, bus_ready, bus_was_off;
 };
 
 /* Interrupts off. */
@@ -49,8 +49,10 @@ void app_on_gate(unsigned gate, uint32_t time_us);
 /* Main. */
 void app_poll(void);
 
-/* For command.c, main: what is seen now, between port_lock and port_unlock; the capture end, sent. */
+/* For command.c, main: what is seen now, between port_lock and port_unlock; the capture end, sent; the bus as
+ * the parameters want it, at rest, 0 or DT_E_ARGUMENT with everything as it was. */
 struct sequence_view app_view(const struct app *app);
 void app_send_capture_end(struct app *app);
+DT_MUST_USE int app_set_up_bus(struct app *app);
 
 #endif

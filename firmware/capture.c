@@ -29,8 +29,7 @@ static bool beyond(int16_t code, uint32_t level)
 	return code != WIRE_SAMPLE_NOT_TAKEN && (uint32_t)(code < 0 ? -code : code) > level;
 }
 
-/* Time of the first sample beyond the level, us after the tick; 1000 if there is none. */
-static uint32_t impact_us(const struct acquire_samples *s2, uint32_t level)
+uint32_t capture_impact_us(const struct acquire_samples *s2, uint32_t level)
 {
 	uint32_t first_us = 1000;
 
@@ -57,6 +56,7 @@ static void open_window(struct capture *capture, uint32_t tick_ms, uint32_t offs
 	capture->crc_ms = capture->first_ms;
 	capture->crc32 = CRC32_INIT;
 	capture->marks = 0;
+	memset(capture->zero, 0, sizeof(capture->zero));
 }
 
 static void look_for_trigger(struct capture *capture, const struct acquire_tick *tick)
@@ -66,7 +66,7 @@ static void look_for_trigger(struct capture *capture, const struct acquire_tick 
 
 	if (!sequence_separated(tick->status[0] & WIRE_STATUS_STATE))
 		return;
-	offset_us = impact_us(&tick->sensor[1], level);
+	offset_us = capture_impact_us(&tick->sensor[1], level);
 	if (offset_us < 1000)
 		open_window(capture, tick->tick_ms, offset_us);
 	else if (tick->marks & WIRE_MARK_NO_IMPACT)
@@ -130,6 +130,35 @@ void capture_put(struct capture *capture, struct acquire_tick *tick)
 		store(capture, tick);
 }
 
+static void add_zero(struct capture *capture, const struct acquire_tick *tick)
+{
+	for (unsigned i = 0; i < ACQUIRE_CHANNELS; i++) {
+		unsigned count;
+		const int16_t *code = acquire_channel(tick, i, &count);
+
+		for (unsigned k = 0; k < count; k++) {
+			if (code[k] == WIRE_SAMPLE_NOT_TAKEN)
+				continue;
+			capture->zero[i].sum += code[k];
+			capture->zero[i].count++;
+		}
+	}
+}
+
+bool capture_zero_shift(const struct capture *capture, const int16_t before[ACQUIRE_CHANNELS], uint32_t limit)
+{
+	if (capture->parameters->value[WIRE_PARAMETER_post_trigger_ms] < CAPTURE_ZERO_AFTER_TICKS)
+		return false;
+	for (unsigned i = 0; i < ACQUIRE_CHANNELS; i++) {
+		int32_t count = capture->zero[i].count;
+		int32_t shift = count > 0 ? capture->zero[i].sum / count - before[i] : 0;
+
+		if (shift > (int32_t)limit || -shift > (int32_t)limit)
+			return true;
+	}
+	return false;
+}
+
 bool capture_work(struct capture *capture)
 {
 	const struct acquire_tick *tick = capture_find(capture, capture->crc_ms);
@@ -142,6 +171,8 @@ bool capture_work(struct capture *capture)
 		capture->crc32 = crc32(capture->crc32, frame.data + WIRE_SAMPLE_OFFSET, WIRE_SAMPLE_BYTES);
 	}
 	capture->marks |= tick->marks;
+	if (capture->last_ms - capture->crc_ms < CAPTURE_ZERO_TICKS)
+		add_zero(capture, tick);
 	if (capture->crc_ms++ != capture->last_ms)
 		return false;
 	capture->phase = CAPTURE_COMPLETE;

@@ -17,7 +17,11 @@
 #include "firmware/acquire.h"
 #include "firmware/parameter.h"
 
-enum { CAPTURE_TICKS = 512 }; /* a power of two */
+enum {
+	CAPTURE_TICKS = 512,            /* a power of two */
+	CAPTURE_ZERO_TICKS = 50,        /* at the end of the window, for the offset after the drop */
+	CAPTURE_ZERO_AFTER_TICKS = 200, /* post_trigger_ms that leaves time for the ring-down */
+};
 
 enum capture_phase {
 	CAPTURE_ROLLING,
@@ -35,6 +39,10 @@ struct capture {
 	uint32_t crc_ms;            /* next tick for the CRC */
 	uint32_t crc32;
 	uint16_t marks; /* WIRE_MARK_* of the window's ticks */
+	struct {
+		int32_t sum;
+		uint16_t count;
+	} zero[ACQUIRE_CHANNELS]; /* over the last CAPTURE_ZERO_TICKS */
 	struct acquire_tick ring[CAPTURE_TICKS];
 };
 
@@ -46,6 +54,14 @@ void capture_put(struct capture *capture, struct acquire_tick *tick);
 
 /* One step of the CRC; true on the step that completes the window. */
 bool capture_work(struct capture *capture);
+
+/* Time of the first sample of S2 X or Y beyond the level, us after the tick; 1000 if there is none. */
+uint32_t capture_impact_us(const struct acquire_samples *s2, uint32_t level);
+
+/* Once complete: the offset of a channel at the end of the window differs by more than limit from the one
+ * before. False when the window is too short to tell. */
+bool capture_zero_shift(const struct capture *capture, const int16_t before[ACQUIRE_CHANNELS],
+                        uint32_t limit);
 
 /* The tick, or NULL if the ring does not hold it; good until the next capture_put. */
 const struct acquire_tick *capture_find(const struct capture *capture, uint32_t tick_ms);

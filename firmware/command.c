@@ -115,9 +115,16 @@ static int handle_resend(struct app *app, const struct frame *frame)
 	return 0;
 }
 
+static bool bus_differs(const struct parameters *a, const struct parameters *b)
+{
+	return a->value[WIRE_PARAMETER_bus_mode] != b->value[WIRE_PARAMETER_bus_mode] ||
+	       a->value[WIRE_PARAMETER_data_kbit_s] != b->value[WIRE_PARAMETER_data_kbit_s];
+}
+
 static uint32_t write_parameter(struct app *app, uint16_t index, uint32_t value)
 {
 	struct sequence *sequence = &app->sequence;
+	struct parameters before = app->parameters;
 	uint32_t abort_code = PARAMETER_WRONG_STATE;
 
 	port_lock();
@@ -128,7 +135,12 @@ static uint32_t write_parameter(struct app *app, uint16_t index, uint32_t value)
 			sequence_plan(sequence);
 	}
 	port_unlock();
-	return abort_code;
+	if (!bus_differs(&before, &app->parameters) || app_set_up_bus(app) == 0)
+		return abort_code;
+	port_lock();
+	app->parameters = before;
+	port_unlock();
+	return PARAMETER_HARDWARE;
 }
 
 static int handle_sdo(struct app *app, const struct frame *frame)

@@ -2,6 +2,7 @@
 #include "firmware/health.h"
 
 #include "common/memory.h"
+#include "firmware/capture.h"
 #include "firmware/sequence.h"
 
 void health_init(struct health *health, const struct parameters *parameters, volatile uint32_t *counters)
@@ -9,6 +10,7 @@ void health_init(struct health *health, const struct parameters *parameters, vol
 	memset(health, 0, sizeof(*health));
 	health->parameters = parameters;
 	health->counters = counters;
+	health->wire_hash = wire_hash();
 	health->sensor_checks = WIRE_CHECK_SENSOR_S1 | WIRE_CHECK_SENSOR_S2; /* until seen */
 }
 
@@ -29,12 +31,14 @@ static bool add(struct health_channel *channel, const int16_t *code, unsigned co
 	return same;
 }
 
-static void watch_stuck(struct health *health, struct health_channel *channel, bool same)
+/* True while it is stuck. */
+static bool watch_stuck(struct health *health, struct health_channel *channel, bool same)
 {
 	if (!same)
 		channel->same_ticks = 0;
 	else if (channel->same_ticks < HEALTH_STUCK_TICKS && ++channel->same_ticks == HEALTH_STUCK_TICKS)
 		health->counters[WIRE_COUNTER_samples_stuck]++;
+	return channel->same_ticks == HEALTH_STUCK_TICKS;
 }
 
 /* |mean| <= limit and variance <= limit^2, in whole numbers: with n samples both sides times n^2. */
@@ -48,38 +52,54 @@ static bool quiet(const struct health_channel *channel, unsigned expected, int64
 	       n * (int64_t)channel->squares - sum * sum <= limit * limit * n * n;
 }
 
+static void keep_zero(struct health *health, unsigned channel)
+{
+	const struct health_channel *seen = &health->channel[channel];
+
+	if (!health->window_moved && seen->count > 0)
+		health->zero[channel] = (int16_t)(seen->sum / seen->count);
+}
+
 static void judge_window(struct health *health)
 {
 	static const uint16_t sensor_check[WIRE_SENSORS] = {WIRE_CHECK_SENSOR_S1, WIRE_CHECK_SENSOR_S2};
 	int64_t limit = health->parameters->value[WIRE_PARAMETER_noise_counts];
-	uint16_t checks = 0;
+	uint16_t checks = health->window_triggered ? WIRE_CHECK_TRIGGER : 0;
 
-	for (unsigned i = 0; i < HEALTH_CHANNELS; i++) {
+	for (unsigned i = 0; i < ACQUIRE_CHANNELS; i++) {
 		struct health_channel *channel = &health->channel[i];
 		unsigned per_tick = i % 3 == 0 ? WIRE_X_PER_TICK : WIRE_YZ_PER_TICK;
 
 		if (!quiet(channel, per_tick * HEALTH_WINDOW_TICKS, limit))
 			checks |= sensor_check[i / 3];
+		keep_zero(health, i);
 		channel->sum = 0;
 		channel->squares = 0;
 		channel->count = 0;
 	}
 	health->sensor_checks = checks;
 	health->window_ticks = 0;
+	health->window_moved = false;
+	health->window_triggered = false;
 }
 
-void health_samples(struct health *health, const struct acquire_tick *tick)
+void health_samples(struct health *health, struct acquire_tick *tick)
 {
+	uint32_t level = health->parameters->value[WIRE_PARAMETER_trigger_counts];
 	bool moving = sequence_moving(tick->status[0] & WIRE_STATUS_STATE);
 
-	for (unsigned s = 0; s < WIRE_SENSORS; s++) {
-		const struct acquire_samples *samples = &tick->sensor[s];
-		struct health_channel *channel = &health->channel[3 * s];
+	for (unsigned i = 0; i < ACQUIRE_CHANNELS; i++) {
+		struct health_channel *channel = &health->channel[i];
+		unsigned count;
+		const int16_t *code = acquire_channel(tick, i, &count);
 
-		watch_stuck(health, &channel[0], add(&channel[0], samples->x, WIRE_X_PER_TICK) && moving);
-		watch_stuck(health, &channel[1], add(&channel[1], samples->y, WIRE_YZ_PER_TICK) && moving);
-		watch_stuck(health, &channel[2], add(&channel[2], samples->z, WIRE_YZ_PER_TICK) && moving);
+		if (watch_stuck(health, channel, add(channel, code, count) && moving))
+			tick->marks |= WIRE_MARK_STUCK;
 	}
+	if (moving)
+		health->window_moved = true;
+	else if (capture_impact_us(&tick->sensor[1], level) < 1000)
+		health->window_triggered = true;
 	if (++health->window_ticks == HEALTH_WINDOW_TICKS)
 		judge_window(health);
 }
@@ -88,7 +108,7 @@ void health_host(struct health *health, uint32_t tick_ms, uint32_t hash)
 {
 	health->host_here = true;
 	health->host_ms = tick_ms;
-	health->host_hash_good = hash == wire_hash();
+	health->host_hash_good = hash == health->wire_hash;
 }
 
 void health_tick(struct health *health, uint32_t tick_ms)

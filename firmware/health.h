@@ -6,8 +6,9 @@
  *
  * A sensor is fit when its supply's bias is in its window and, over the last HEALTH_WINDOW_TICKS, offset and
  * standard deviation of every axis stay within noise_counts (1/32 g) and at least half the samples were
- * taken. A channel in motion that gives one value for HEALTH_STUCK_TICKS is counted, once for each such
- * spell.
+ * taken. The trigger is fit when S2 did not reach trigger_counts in that time, or a drop would be triggered
+ * by what is there before it. A channel in motion that gives one value for HEALTH_STUCK_TICKS is counted,
+ * once for each such spell, and marks the ticks until it ends.
  *
  * Context: health_samples main; the rest interrupt, or main between port_lock and port_unlock.
  */
@@ -18,7 +19,6 @@
 #include "firmware/parameter.h"
 
 enum {
-	HEALTH_CHANNELS = 6, /* S1 X Y Z, S2 X Y Z */
 	HEALTH_WINDOW_TICKS = 100,
 	HEALTH_STUCK_TICKS = 20,
 };
@@ -34,16 +34,20 @@ struct health_channel {
 struct health {
 	const struct parameters *parameters;
 	volatile uint32_t *counters;
-	struct health_channel channel[HEALTH_CHANNELS];
+	struct health_channel channel[ACQUIRE_CHANNELS];
+	int16_t zero[ACQUIRE_CHANNELS]; /* offsets over the last window at rest */
 	uint8_t window_ticks;
+	bool window_moved, window_triggered;
 	volatile uint16_t sensor_checks; /* written by main */
+	uint32_t wire_hash;              /* our own: takes too long to be worked out each time */
 	bool host_here, host_hash_good;
 	uint32_t host_ms; /* last heartbeat */
 };
 
 void health_init(struct health *health, const struct parameters *parameters, volatile uint32_t *counters);
 
-void health_samples(struct health *health, const struct acquire_tick *tick);
+/* Sets WIRE_MARK_STUCK in the tick where it applies. */
+void health_samples(struct health *health, struct acquire_tick *tick);
 
 /* A heartbeat of the host has come. */
 void health_host(struct health *health, uint32_t tick_ms, uint32_t hash);

@@ -26,6 +26,11 @@ static unsigned find(uint16_t index)
 	return i;
 }
 
+static bool exists(unsigned i, uint32_t value)
+{
+	return i != WIRE_PARAMETER_data_kbit_s || value == 2000 || value == 5000 || value == 8000;
+}
+
 static bool agree(const uint32_t *value)
 {
 	return value[WIRE_PARAMETER_gate_upper_um] + PARAMETER_GATE_DISTANCE_UM <=
@@ -56,6 +61,8 @@ uint32_t parameters_set(struct parameters *parameters, uint16_t index, uint32_t 
 		return PARAMETER_TOO_LOW;
 	if (value > table[i].max)
 		return PARAMETER_TOO_HIGH;
+	if (!exists(i, value))
+		return PARAMETER_NO_VALUE;
 	wanted.value[i] = value;
 	if (!agree(wanted.value))
 		return PARAMETER_INCOMPATIBLE;

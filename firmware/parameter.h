@@ -23,9 +23,11 @@ enum {
 	PARAMETER_NO_SUBINDEX = 0x06090011,
 	PARAMETER_TOO_HIGH = 0x06090031,
 	PARAMETER_TOO_LOW = 0x06090032,
+	PARAMETER_NO_VALUE = 0x06090030,     /* between the limits, but not one of those there are */
 	PARAMETER_INCOMPATIBLE = 0x06040043, /* does not agree with the other parameters */
 	PARAMETER_BAD_SPECIFIER = 0x05040001,
 	PARAMETER_WRONG_STATE = 0x08000022,
+	PARAMETER_HARDWARE = 0x06060000, /* the port refuses it */
 };
 
 void parameters_init(struct parameters *parameters);

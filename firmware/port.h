@@ -42,6 +42,12 @@ int port_off_at(uint16_t output, uint32_t time_us);
 /* Both: takes back a port_off_at that has not happened yet; else nothing. */
 void port_off_cancel(uint16_t output);
 
+/* Main, at rest, and once before anything is sent or received: sets the CAN controller up, classic at
+ * 1 Mbit/s or FD with a data phase of data_kbit_s (2000, 5000, 8000). What the controller had taken and not
+ * sent may be lost. 0, or DT_E_ARGUMENT for another rate, or for FD where controller or bus have none, with
+ * the controller left as it was. At reset the core asks for FD first and for classic if that is refused. */
+DT_MUST_USE int port_can_setup(bool classic, uint32_t data_kbit_s);
+
 /* Main: 0 = the controller has taken the frame, DT_E_FULL = ask again later, also while bus-off. */
 DT_MUST_USE int port_can_send(const struct frame *frame);
 

@@ -18,22 +18,23 @@ enum {
 	MAGNET = WIRE_IO_MAGNET_HOLD,
 	RELIEVE = WIRE_IO_DAMPERS_RELIEVE,
 	CAMERA = WIRE_IO_CAMERA,
+	FRAME_SEEN = WIRE_IO_GATE_UPPER | WIRE_IO_GATE_LOWER | WIRE_IO_FRAME_DOWN,
 };
 
 /* clang-format off */
 static const uint8_t table[WIRE_STATES][SEQUENCE_EVENTS] = {
-/*                TESTED GREEN  RED   ARM    RELEASE  ABORT   CLEAR ACCEPT    DISCARD   EXPIRED FREE       BRAKE   FULL      DONE  FAULT */
-[BOOT]         = {SAFE,  NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,   HELD},
-[SAFE]         = {NO,    READY, STAY, NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,   HELD},
-[READY]        = {NO,    STAY,  SAFE, ARMED, NO,      SAFE,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,   HELD},
-[ARMED]        = {NO,    STAY,  SAFE, NO,    FALLING, SAFE,   NO,   NO,       NO,       READY,  NO,        NO,     NO,       NO,   HELD},
-[FALLING]      = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     SEPARATED, NO,     NO,       NO,   MOVING},
-[SEPARATED]    = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     NO,        BRAKED, CAPTURED, NO,   MOVING},
-[BRAKED]       = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     NO,        NO,     CAPTURED, NO,   MOVING},
-[CAPTURED]     = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   UPLOADED, UPLOADED, NO,     NO,        NO,     NO,       NO,   STAY},
-[UPLOADED]     = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       SAFE, HELD},
-[FAULT_HELD]   = {NO,    NO,    NO,   NO,    NO,      STAY,   SAFE, NO,       NO,       NO,     NO,        NO,     NO,       NO,   STAY},
-[FAULT_MOVING] = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     CAPTURED, NO,   STAY},
+/*                TESTED GREEN  RED   ARM    RELEASE  ABORT   CLEAR ACCEPT    DISCARD   EXPIRED FREE       BRAKE   FULL      DONE  STILL FAULT */
+[BOOT]         = {SAFE,  NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,   NO,   HELD},
+[SAFE]         = {NO,    READY, STAY, NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,   NO,   HELD},
+[READY]        = {NO,    STAY,  SAFE, ARMED, NO,      SAFE,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,   NO,   HELD},
+[ARMED]        = {NO,    STAY,  SAFE, NO,    FALLING, SAFE,   NO,   NO,       NO,       READY,  NO,        NO,     NO,       NO,   NO,   HELD},
+[FALLING]      = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     SEPARATED, NO,     NO,       NO,   NO,   MOVING},
+[SEPARATED]    = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     NO,        BRAKED, CAPTURED, NO,   NO,   MOVING},
+[BRAKED]       = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     NO,        NO,     CAPTURED, NO,   NO,   MOVING},
+[CAPTURED]     = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   UPLOADED, UPLOADED, NO,     NO,        NO,     NO,       NO,   NO,   STAY},
+[UPLOADED]     = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       SAFE, NO,   HELD},
+[FAULT_HELD]   = {NO,    NO,    NO,   NO,    NO,      STAY,   SAFE, NO,       NO,       NO,     NO,        NO,     NO,       NO,   NO,   STAY},
+[FAULT_MOVING] = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     CAPTURED, NO,   HELD, STAY},
 };
 
 /* What entering a state energises and de-energises. */
@@ -63,7 +64,7 @@ static const struct {
 	{WIRE_CHECK_ESTOP,   WIRE_FAULT_ESTOP,     true},
 	{WIRE_CHECK_DOOR,    WIRE_FAULT_DOOR,      true},
 	{WIRE_CHECK_SUPPLY,  WIRE_FAULT_BROWN_OUT, true},
-	{WIRE_CHECK_DAMPERS, WIRE_FAULT_DAMPERS,   false},
+	{WIRE_CHECK_DAMPERS, WIRE_FAULT_DAMPERS,   true},
 	{WIRE_CHECK_LATCH,   WIRE_FAULT_LATCH,     false},
 	{WIRE_CHECK_PRODUCT, WIRE_FAULT_MAGNET,    false},
 	{WIRE_CHECK_GATES,   WIRE_FAULT_GATES,     false},
@@ -258,6 +259,7 @@ static int release(struct sequence *sequence, const struct sequence_view *view, 
 	sequence->frame_speed_mm_s = 0;
 	sequence->gates_seen = 0;
 	sequence->triggered = false;
+	sequence->moved = false;
 	sequence->released_ms = sequence->tick_ms;
 	sequence->released_us = view->now_us;
 	return step(sequence, SEQUENCE_RELEASE);
@@ -338,6 +340,7 @@ static void plan_edges(struct sequence *sequence, uint32_t lower_us)
 
 void sequence_gate(struct sequence *sequence, unsigned gate, uint32_t time_us)
 {
+	sequence->moved = true;
 	if (sequence->state != FALLING || gate < sequence->gates_seen)
 		return; /* not a fall, or the beam again */
 	if (gate > sequence->gates_seen) {
@@ -370,7 +373,7 @@ static void tick_falling(struct sequence *sequence, const struct sequence_view *
 
 static bool impact_overdue(const struct sequence *sequence)
 {
-	return sequence_separated(sequence->state) && !sequence->triggered &&
+	return sequence_separated(sequence->state) && sequence->moved && !sequence->triggered &&
 	       (int32_t)(sequence->tick_ms - sequence->no_impact_ms) >= 0;
 }
 
@@ -390,8 +393,20 @@ static void tick_interlocks(struct sequence *sequence, uint16_t checks)
 		}
 }
 
+/* The latch's switch, both gates and the dampers' switch must all be silent for twice the fall to the lower
+ * gate before a release that went wrong counts as none. Then there is nothing to record. */
+static void tick_still(struct sequence *sequence, const struct sequence_view *view)
+{
+	if ((view->io & WIRE_IO_LATCH_CLOSED) == 0 || (view->io & FRAME_SEEN) != 0)
+		sequence->moved = true;
+	if (!sequence->moved && !sequence->triggered &&
+	    view->now_us - sequence->released_us > sequence->plan.gate_limit_us[1])
+		happen(sequence, SEQUENCE_STILL);
+}
+
 static void tick_moving(struct sequence *sequence, const struct sequence_view *view)
 {
+	tick_still(sequence, view);
 	if (sequence->tick_ms - sequence->released_ms >= SEQUENCE_CAMERA_MS)
 		port_outputs(0, CAMERA);
 	if (sequence->state == FALLING)

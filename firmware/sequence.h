@@ -7,6 +7,7 @@
  *
  *   BOOT -> SAFE <-> READY -> ARMED -> FALLING -> SEPARATED -> BRAKED -> CAPTURED -> UPLOADED -> SAFE
  *   at rest -> FAULT_HELD, in motion -> FAULT_MOVING -> CAPTURED -> UPLOADED -> FAULT_HELD -> SAFE
+ *   FAULT_MOVING -> FAULT_HELD when the frame never left the latch
  *
  * Outputs fail safe when de-energised, but for the magnet, whose release is the drop: it is energised by
  * sequence_init and by SAFE, and de-energised by nothing but the edge computed from the two light gates.
@@ -36,6 +37,7 @@ enum sequence_event {
 	SEQUENCE_BRAKE,   /* the dampers are not relieved any more, or the frame is in them */
 	SEQUENCE_FULL,    /* the capture window is complete */
 	SEQUENCE_DONE,    /* UPLOADED has been shown long enough */
+	SEQUENCE_STILL,   /* the frame never left the latch */
 	SEQUENCE_FAULT,
 	SEQUENCE_EVENTS
 };
@@ -71,6 +73,7 @@ struct sequence {
 	uint8_t fault; /* WIRE_FAULT_*, latched until CLEAR */
 	uint8_t gates_seen;
 	bool triggered;
+	bool moved;     /* since the release something has seen the frame move */
 	uint16_t token; /* 0 unless armed */
 	uint16_t drop_id;
 	uint16_t marks; /* WIRE_MARK_* of this drop */

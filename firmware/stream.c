@@ -2,6 +2,7 @@
 #include "firmware/stream.h"
 
 #include "common/memory.h"
+#include "common/segment.h"
 #include "firmware/port.h"
 
 void stream_init(struct stream *stream, volatile uint32_t *counters)
@@ -17,7 +18,12 @@ static bool idle(const struct stream *stream)
 	return !stream->waiting && ring_fill(&stream->queue) == 0;
 }
 
-void stream_send(struct stream *stream, const struct frame *frame)
+static bool fits(const struct stream *stream, const struct frame *frame)
+{
+	return !stream->classic || frame->length <= WIRE_LENGTH_segment;
+}
+
+static void put(struct stream *stream, const struct frame *frame)
 {
 	bool is_block = frame->length == WIRE_LENGTH_block;
 
@@ -30,6 +36,36 @@ void stream_send(struct stream *stream, const struct frame *frame)
 		stream->counters[WIRE_COUNTER_frames_dropped]++;
 	else
 		stream->counters[WIRE_COUNTER_frames_deferred]++;
+}
+
+void stream_send(struct stream *stream, const struct frame *frame)
+{
+	struct frame segment;
+
+	if (fits(stream, frame)) {
+		put(stream, frame);
+		return;
+	}
+	for (unsigned i = 0; i < segment_count(frame->length); i++) {
+		segment_cut(frame, i, &segment);
+		put(stream, &segment);
+	}
+}
+
+/* Goes once round the queue. */
+void stream_set_classic(struct stream *stream, bool classic)
+{
+	uint32_t waiting = ring_fill(&stream->queue);
+	struct frame frame;
+
+	stream->classic = classic;
+	if (stream->waiting && !fits(stream, &stream->next)) {
+		stream->waiting = false;
+		stream->counters[WIRE_COUNTER_frames_dropped]++;
+	}
+	for (; waiting > 0 && ring_get(&stream->queue, &frame) == 0; waiting--)
+		if (!fits(stream, &frame) || ring_put(&stream->queue, &frame) != 0)
+			stream->counters[WIRE_COUNTER_frames_dropped]++;
 }
 
 void stream_flush(struct stream *stream)
@@ -48,6 +84,8 @@ void stream_tick(struct stream *stream, const struct acquire_tick *tick)
 {
 	struct frame frame;
 
+	if (stream->classic)
+		return;
 	acquire_pack(tick, 0, WIRE_ID_BLOCK_S1, &frame);
 	stream_send(stream, &frame);
 	acquire_pack(tick, 1, WIRE_ID_BLOCK_S2, &frame);
@@ -82,6 +120,19 @@ void stream_request(struct stream *stream, const struct capture *capture, const 
 		stream->counters[WIRE_COUNTER_resends_overflowed]++;
 }
 
+void stream_upload(struct stream *stream, const struct capture *capture)
+{
+	struct wire_resend request = {
+	        .first_tick_ms = capture->first_ms,
+	        .count = (uint16_t)(capture->last_ms - capture->first_ms + 1),
+	};
+
+	if (!stream->classic)
+		return;
+	for (request.sensor = 1; request.sensor <= WIRE_SENSORS; request.sensor++)
+		stream_request(stream, capture, &request);
+}
+
 static void resend_one(struct stream *stream, const struct capture *capture)
 {
 	struct wire_resend *request = &stream->request;
@@ -100,10 +151,15 @@ static void resend_one(struct stream *stream, const struct capture *capture)
 	stream->serving = --request->count > 0;
 }
 
+static bool ready_for_block(const struct stream *stream)
+{
+	return stream->classic ? ring_fill(&stream->queue) < STREAM_UPLOAD_WAITING : idle(stream);
+}
+
 void stream_resend(struct stream *stream, const struct capture *capture)
 {
 	for (unsigned i = 0; i < STREAM_RESENT_PER_TICK; i++) {
-		if (!idle(stream))
+		if (!ready_for_block(stream))
 			return;
 		if (!stream->serving && ring_get(&stream->requests, &stream->request) != 0)
 			return;

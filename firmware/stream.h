@@ -7,6 +7,10 @@
  * for a block can be asked for again. Resend requests wait in a short list and are served from the capture
  * ring, STREAM_RESENT_PER_TICK blocks a millisecond, only when nothing else waits.
  *
+ * On classic CAN nothing is sent live. Messages longer than 8 bytes are cut into segments (common/segment.h),
+ * and the window is uploaded as if it had been asked for. The bus takes less than one block a millisecond
+ * there, so that a few segments always wait and keep it busy.
+ *
  * Context: main.
  */
 #include <stdbool.h>
@@ -22,10 +26,12 @@ enum {
 	STREAM_RESERVED = 16,
 	STREAM_REQUESTS = 8, /* a power of two */
 	STREAM_RESENT_PER_TICK = 2,
+	STREAM_UPLOAD_WAITING = 20, /* classic: segments that may wait before the next block */
 };
 
 struct stream {
 	volatile uint32_t *counters;
+	bool classic;
 	bool waiting; /* next was taken out of the queue and not sent yet */
 	struct frame next;
 	struct ring queue;
@@ -38,9 +44,12 @@ struct stream {
 
 void stream_init(struct stream *stream, volatile uint32_t *counters);
 
+/* Takes effect at once: what waits and does not fit the new bus is dropped and counted. */
+void stream_set_classic(struct stream *stream, bool classic);
+
 void stream_send(struct stream *stream, const struct frame *frame);
 
-/* Both blocks of a tick, live. */
+/* Both blocks of a tick, live; nothing on classic CAN. */
 void stream_tick(struct stream *stream, const struct acquire_tick *tick);
 
 /* Offers the controller what waits. */
@@ -48,6 +57,9 @@ void stream_flush(struct stream *stream);
 
 /* Notes a request for blocks (count > 0, sensor 1 or 2). Ticks the ring does not hold are counted. */
 void stream_request(struct stream *stream, const struct capture *capture, const struct wire_resend *request);
+
+/* Classic CAN: asks for the whole window of a complete capture. */
+void stream_upload(struct stream *stream, const struct capture *capture);
 
 /* Once a tick: serves the requests. */
 void stream_resend(struct stream *stream, const struct capture *capture);

@@ -428,12 +428,11 @@ uint16_t tower_inputs(const struct tower *t)
 {
 	const bool *fault = t->fault;
 	const bool held = t->place == PLACE_MAGNET && output_on(t, WIRE_IO_MAGNET_HOLD);
-	const bool dampers = !fault[TOWER_DAMPERS_OUT] && !output_on(t, WIRE_IO_DAMPERS_RELIEVE);
 	unsigned inputs = 0;
 
 	inputs |= t->frame_state == FRAME_LATCHED ? WIRE_IO_LATCH_CLOSED : 0;
 	inputs |= held ? WIRE_IO_PRODUCT_HELD : 0;
-	inputs |= dampers ? WIRE_IO_DAMPERS_ENGAGED : 0;
+	inputs |= fault[TOWER_DAMPERS_OUT] ? 0 : WIRE_IO_DAMPERS_ENGAGED;
 	inputs |= fault[TOWER_DOOR_OPEN] ? 0 : WIRE_IO_DOOR_CLOSED;
 	inputs |= fault[TOWER_ESTOP] ? 0 : WIRE_IO_ESTOP_CLEAR;
 	inputs |= fault[TOWER_SUPPLY_LOW] ? 0 : WIRE_IO_SUPPLY_GOOD;

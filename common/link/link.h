@@ -32,7 +32,7 @@ enum link_mode {
 struct link_counters {
 	uint64_t sent, received;
 	uint64_t send_retried; /* the queue was full, the frame went later */
-	uint64_t send_lost;    /* the queue stayed full, the frame was dropped and DT_E_FULL returned */
+	uint64_t send_lost;    /* no room, or the interface is down: dropped, DT_E_FULL returned */
 	uint64_t receive_lost; /* the kernel or a peer's queue dropped it before us */
 	uint64_t errors;       /* error frames received */
 	uint64_t malformed;    /* text or bytes that are no frame, skipped */
@@ -43,9 +43,10 @@ struct link_counters {
  * has room for size bytes: "unix:/tmp/bus: no such directory, ..." */
 struct link *link_open(const char *url, enum link_mode mode, char *message, unsigned size);
 
-/* 0, DT_E_FULL (queue stayed full for 10 ms), DT_E_CLOSED, DT_E_LINK, DT_E_SYSTEM (a log that cannot be
- * written), DT_E_STATE (opened for reading), or DT_E_ARGUMENT (a frame this transport cannot carry, or none
- * at all). frame->time_us is written to log: links; 0 there means now. */
+/* 0, DT_E_FULL (the queue stayed full for 10 ms, or a SocketCAN interface is down; a later frame may go),
+ * DT_E_CLOSED, DT_E_LINK, DT_E_SYSTEM (a log that cannot be written), DT_E_STATE (opened for reading), or
+ * DT_E_ARGUMENT (a frame this transport cannot carry, or none at all). frame->time_us is written to log:
+ * links; 0 there means now. */
 DT_MUST_USE int link_send(struct link *link, const struct frame *frame);
 
 /* 1 with a frame in *frame, 0 when timeout_ms passed without one (0 = do not wait, negative = for ever),

@@ -252,7 +252,7 @@ static int why_not_sent(struct socketcan *can, int error, int64_t deadline_us)
 		note_down(can, error);
 		look_again(can);
 		if (can->down)
-			return DT_E_LINK;
+			return DT_E_FULL;
 	} else if (error != ENOBUFS && error != EAGAIN && error != EINTR) {
 		return DT_E_LINK;
 	}

@@ -86,6 +86,11 @@ static void on_frame(void *user, const struct frame *frame)
 		bridge->publish_error = result;
 }
 
+static bool abort_waits(const struct bridge *bridge)
+{
+	return bridge->commanded && bridge->command.op == WIRE_OP_ABORT;
+}
+
 static void on_command(const lcm_recv_buf_t *buffer, const char *channel, const droptower_command *command,
                        void *user)
 {
@@ -93,6 +98,8 @@ static void on_command(const lcm_recv_buf_t *buffer, const char *channel, const 
 
 	(void)buffer;
 	(void)channel;
+	if (abort_waits(bridge))
+		return; /* nothing that comes behind an ABORT is carried out before it */
 	bridge->commanded = true;
 	bridge->command = *command;
 }
@@ -114,6 +121,16 @@ static int obey(struct bridge *bridge)
 	return publisher_answer(bridge->publisher, bridge->command.utime, result);
 }
 
+/* While a command waits for its reply an ABORT must not wait for it. */
+static bool cancelled(void *user)
+{
+	struct bridge *bridge = user;
+
+	while (lcm_handle_timeout(bridge->publisher->lcm, 0) > 0)
+		continue;
+	return abort_waits(bridge);
+}
+
 static int hand_on_drop(struct bridge *bridge)
 {
 	struct record record;
@@ -125,7 +142,9 @@ static int hand_on_drop(struct bridge *bridge)
 		return taken;
 	result = publisher_drop(bridge->publisher, &record);
 	json = evaluate_json(&record, bridge->scene_file != NULL ? &bridge->scene : NULL);
-	if (result == 0 && json != NULL)
+	if (json == NULL)
+		command_error("drop %u: no result, it cannot be analysed", record.drop_id);
+	else if (result == 0)
 		result = publisher_result(bridge->publisher, record.drop_id, json);
 	fprintf(stderr,
 	        "droptower: drop %u: %" PRIu64 " samples lost; %" PRIu64 " blocks, %" PRIu64
@@ -156,7 +175,7 @@ static int serve(struct bridge *bridge)
 
 static int bridge_session(struct bridge *bridge)
 {
-	struct session_options options = {.on_frame = on_frame, .user = bridge};
+	struct session_options options = {.on_frame = on_frame, .cancelled = cancelled, .user = bridge};
 	char message[SESSION_MESSAGE_MAX];
 	int code = COMMAND_DONE;
 

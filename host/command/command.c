@@ -62,6 +62,12 @@ int command_interrupted(void)
 	return interrupted != 0;
 }
 
+int command_stopped(void)
+{
+	command_error("interrupted, nothing was released");
+	return COMMAND_REFUSED;
+}
+
 int command_number(const char *name, const char *option, const char *text, double min, double max,
                    double *value)
 {

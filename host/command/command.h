@@ -11,7 +11,7 @@ enum command_exit {
 	COMMAND_USAGE = 2,
 	COMMAND_INPUT = 3,   /* input unusable, or --strict and a flag is set */
 	COMMAND_LINK = 4,    /* link or hardware */
-	COMMAND_REFUSED = 5, /* by an interlock */
+	COMMAND_REFUSED = 5, /* by an interlock, or stopped by the operator */
 };
 
 int command_run(int argc, char **argv);
@@ -33,6 +33,9 @@ int command_link_failed(const char *doing, int result);
 /* Set by SIGINT and SIGTERM once command_catch_signals was called. */
 void command_catch_signals(void);
 int command_interrupted(void);
+
+/* Interrupted before anything was released: says so and returns COMMAND_REFUSED. */
+int command_stopped(void);
 
 /* A whole text as a finite number in [min, max]; 0 on success, else says why for option and returns
  * COMMAND_USAGE. */

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "host/command/command.h"
 #include "host/record/dbc.h"
 #include "host/record/read.h"
+#include "host/record/whole.h"
 #include "host/record/write.h"
 
 static const char help[] = "usage: droptower convert IN OUT [--columns SPEC]\n"
@@ -22,14 +21,15 @@ static const char help[] = "usage: droptower convert IN OUT [--columns SPEC]\n"
 
 static int write_dbc(const char *file)
 {
-	FILE *out = fopen(file, "w");
-	int result = out == NULL ? DT_E_SYSTEM : dbc_write(out);
+	char message[READ_MESSAGE_MAX];
+	struct whole whole;
+	int result = whole_open(&whole, file, message, sizeof(message));
 
-	if (out != NULL && fclose(out) != 0)
-		result = DT_E_SYSTEM;
+	if (result == 0)
+		result = whole_close(&whole, dbc_write(whole.out), message, sizeof(message));
 	if (result == 0)
 		return COMMAND_DONE;
-	command_error("%s: %s", file, strerror(errno));
+	command_error("%s", message);
 	return COMMAND_INPUT;
 }
 

@@ -21,7 +21,7 @@ static const char help[] =
         "The tower arms only while a host keeps its heartbeat going: run 'droptower bridge' beside.\n"
         "--link is unix:PATH, can:IF, slcan:DEV or udpm://...; default $DROPTOWER_LINK, else can:can0.\n";
 
-enum { STATUS_WAIT_MS = 1500, COUNTERS_WAIT_MS = 2500 };
+enum { STATUS_WAIT_MS = 1500, COUNTERS_WAIT_MS = 5000 };
 
 static void print_status(const struct session_view *view)
 {
@@ -118,12 +118,13 @@ static int act(struct session *session, const char *verb, uint16_t token)
 
 static int parse_token(const char *text, uint16_t *token)
 {
-	double value;
-	int code = command_number("ctl", "token", text, 1, 65535, &value);
+	char *end;
+	unsigned long value = strtoul(text, &end, 10);
 
-	if (code == 0)
-		*token = (uint16_t)value;
-	return code;
+	if (text[0] < '0' || text[0] > '9' || *end != '\0' || value < 1 || value > UINT16_MAX)
+		return command_usage("ctl", "token '%s', expected the number that arm printed", text);
+	*token = (uint16_t)value;
+	return COMMAND_DONE;
 }
 
 static int with_session(const char *url, const char *verb, uint16_t token)

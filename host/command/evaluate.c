@@ -9,38 +9,32 @@
 #include <string.h>
 
 #include "host/command/command.h"
+#include "host/record/whole.h"
 #include "host/report/report.h"
 
-static int write_json_file(const struct report *report, const char *file)
+static int write_json_file(const struct report *report, const char *file, char *message, size_t size)
 {
-	FILE *out = fopen(file, "w");
-	int result = out == NULL ? DT_E_SYSTEM : report_json(report, out);
+	struct whole whole;
+	int result = whole_open(&whole, file, message, size);
 
-	if (out != NULL && fclose(out) != 0)
-		result = DT_E_SYSTEM;
-	if (result == 0)
-		return COMMAND_DONE;
-	command_error("%s: %s", file, strerror(errno));
-	return COMMAND_INPUT;
+	return result != 0 ? result : whole_close(&whole, report_json(report, whole.out), message, size);
 }
 
 static int write_out(const struct report *report, const struct evaluate_options *options)
 {
 	char message[512];
-	int code = COMMAND_DONE;
 
 	if ((options->json ? report_json(report, stdout) : report_text(report, stdout)) != 0) {
 		command_error("standard output: %s", strerror(errno));
-		code = COMMAND_INPUT;
+		return COMMAND_INPUT;
 	}
-	if (code == COMMAND_DONE && options->json_file != NULL)
-		code = write_json_file(report, options->json_file);
-	if (code == COMMAND_DONE && options->html != NULL &&
-	    report_html(report, options->html, message, sizeof(message)) != 0) {
+	if ((options->json_file != NULL &&
+	     write_json_file(report, options->json_file, message, sizeof(message)) != 0) ||
+	    (options->html != NULL && report_html(report, options->html, message, sizeof(message)) != 0)) {
 		command_error("%s", message);
-		code = COMMAND_INPUT;
+		return COMMAND_INPUT;
 	}
-	return code;
+	return COMMAND_DONE;
 }
 
 static bool any_flag(const struct record *record, const struct analysis *analysis)

@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <getopt.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -22,6 +23,8 @@ static const char help[] =
         "\n"
         "Into a log: at a given speed the frames carry the time they were sent, at max their own.\n";
 
+static const double CENTURY_S = 3.15e9;
+
 /* The plan: log time `origin_us` is now; speed 0 is as fast as possible. */
 struct pace {
 	double speed;
@@ -40,7 +43,7 @@ struct replay {
 static void keep_pace(struct pace *pace, int64_t time_us)
 {
 	struct timespec due;
-	int64_t after_ns;
+	double after_s, whole_s;
 
 	if (pace->speed <= 0.0)
 		return;
@@ -49,12 +52,14 @@ static void keep_pace(struct pace *pace, int64_t time_us)
 		pace->origin_us = time_us;
 		clock_gettime(CLOCK_MONOTONIC, &pace->start);
 	}
-	after_ns =
-	        (int64_t)((double)(time_us - pace->origin_us) * 1000.0 / pace->speed) + pace->start.tv_nsec;
-	if (after_ns <= pace->start.tv_nsec)
+	/* a damaged log may name any time: as doubles no difference overflows, and a century is for ever */
+	after_s = ((double)time_us - (double)pace->origin_us) / 1e6 / pace->speed;
+	if (!(after_s > 0.0))
 		return;
-	due.tv_sec = pace->start.tv_sec + (time_t)(after_ns / 1000000000);
-	due.tv_nsec = (long)(after_ns % 1000000000);
+	after_s = fmin(after_s, CENTURY_S) + (double)pace->start.tv_nsec / 1e9;
+	whole_s = floor(after_s);
+	due.tv_sec = pace->start.tv_sec + (time_t)whole_s;
+	due.tv_nsec = (long)((after_s - whole_s) * 1e9);
 	while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, NULL) == EINTR && !command_interrupted())
 		continue;
 }
@@ -86,10 +91,6 @@ static int replay_frames(struct replay *replay, struct link *from, struct link *
 	replay->skipped += link_counters(from)->malformed;
 	if (result != DT_E_CLOSED && result != 1)
 		return command_link_failed(replay->file, result);
-	if (replay->sent == 0) {
-		command_error("%s: no frame, expected candump text or an LCM event log", replay->file);
-		return COMMAND_INPUT;
-	}
 	return COMMAND_DONE;
 }
 
@@ -174,6 +175,10 @@ static int replay_file(struct replay *replay)
 	}
 	code = lcm_log_is(&source) ? replay_lcm(replay, &source) : replay_candump(replay);
 	source_free(&source);
+	if (code == COMMAND_DONE && replay->sent == 0 && !command_interrupted()) {
+		command_error("%s: no frame, expected candump text or an LCM event log", replay->file);
+		code = COMMAND_INPUT;
+	}
 	return code;
 }
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <errno.h>
+#include <fcntl.h>
 #include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
@@ -8,6 +9,7 @@
 #include <string.h>
 #include <sys/random.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "common/wire_table.h"
 #include "host/command/command.h"
@@ -23,6 +25,7 @@ static const char help[] =
         "One drop: waits until every check is green, arms, releases, follows the fall, fetches every "
         "sample,\n"
         "analyses and reports. Writes drop-NNNN.log (candump text), .csv, .json and .html into --out.\n"
+        "Ctrl-C aborts: at rest nothing is released, in motion the frame is braked and the record kept.\n"
         "\n"
         "  --link URL     unix:PATH, can:IF, slcan:DEV, or udpm://... for a running 'droptower bridge';\n"
         "                 without it a simulated tower is started\n"
@@ -69,6 +72,8 @@ struct run {
 	struct scene scene;
 	struct session *session;
 	int64_t start_ms;
+	bool aborted;    /* by the operator, after the release */
+	bool earlier;    /* the drop is one that the tower still held */
 	char stem[4096]; /* OUT/drop-NNNN */
 };
 
@@ -128,10 +133,9 @@ static void __attribute__((format(printf, 2, 3))) progress(const struct run *run
 	fputc('\n', stderr);
 }
 
-/* Makes OUT and finds the first number for which no log is there. */
+/* Makes OUT and takes the first number for which no log is there, by making it. */
 static int choose_stem(struct run *run)
 {
-	struct stat there;
 	char log[4200];
 
 	if (mkdir(run->out, 0777) != 0 && errno != EEXIST) {
@@ -139,13 +143,33 @@ static int choose_stem(struct run *run)
 		return COMMAND_INPUT;
 	}
 	for (int number = 1; number < 10000; number++) {
+		int fd;
+
 		snprintf(run->stem, sizeof(run->stem), "%.4000s/drop-%04d", run->out, number);
 		snprintf(log, sizeof(log), "%s.log", run->stem);
-		if (stat(log, &there) != 0)
+		fd = open(log, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+		if (fd >= 0) {
+			close(fd);
 			return COMMAND_DONE;
+		}
+		if (errno != EEXIST) {
+			command_error("%s: %s", log, strerror(errno));
+			return COMMAND_INPUT;
+		}
 	}
 	command_error("%s: 9999 drops are there already", run->out);
 	return COMMAND_INPUT;
+}
+
+/* A run that never heard a tower leaves no file. */
+static void forget_empty_log(const struct run *run)
+{
+	struct stat there;
+	char log[4200];
+
+	snprintf(log, sizeof(log), "%s.log", run->stem);
+	if (stat(log, &there) == 0 && there.st_size == 0)
+		unlink(log);
 }
 
 static void tell_checks(const struct run *run, uint16_t checks)
@@ -167,7 +191,7 @@ static int wait_until_ready(struct run *run)
 		if (result != 0)
 			return command_link_failed("waiting for the checks", result);
 		if (command_interrupted())
-			return COMMAND_REFUSED;
+			return command_stopped();
 		if (view->state == WIRE_STATE_FAULT_HELD) {
 			command_error(
 			        "the tower holds a fault: %s; 'droptower ctl clear' when its cause is gone",
@@ -196,11 +220,16 @@ static int arm_and_release(struct run *run)
 		if (getrandom(&token, sizeof(token), 0) != sizeof(token))
 			token = (uint16_t)(session_utime() | 1);
 	result = session_command(run->session, WIRE_OP_ARM, token);
+	if (command_interrupted()) {
+		result = session_command(run->session, WIRE_OP_ABORT, 0);
+		return result == 0 ? command_stopped() : command_link_failed("abort", result);
+	}
 	if (result == 0) {
 		progress(run, "armed");
 		result = session_command(run->session, WIRE_OP_RELEASE, token);
 	}
-	if (result == 0) {
+	/* an interrupted release may have worked: what follows aborts it and looks */
+	if (result == 0 || command_interrupted()) {
 		progress(run, "released");
 		return COMMAND_DONE;
 	}
@@ -210,13 +239,29 @@ static int arm_and_release(struct run *run)
 	                                                                              : COMMAND_REFUSED;
 }
 
+static void tell_state(const struct run *run, unsigned state, uint32_t *told)
+{
+	uint32_t bit = 1u << (state & 31u);
+
+	/* once each: the last blocks on their way may still carry the state before */
+	if ((*told & bit) == 0)
+		progress(run, "%-9s %s", wire_state_name(state), wire_state_text(state));
+	*told |= bit;
+}
+
+/* No drop can come of this state. */
+static bool at_rest(unsigned state)
+{
+	return !wire_state_moving(state) && state != WIRE_STATE_ARMED && state != WIRE_STATE_CAPTURED &&
+	       state != WIRE_STATE_UPLOADED;
+}
+
 /* Follows the drop until it is collected. */
 static int follow(struct run *run, struct record *record)
 {
 	const struct session_view *view = session_view(run->session);
 	int64_t start_ms = session_now_ms();
-	unsigned told = WIRE_STATE_ARMED;
-	bool aborted = false;
+	uint32_t told = 1u << WIRE_STATE_ARMED;
 
 	for (;;) {
 		int result = session_poll(run->session, 50);
@@ -226,12 +271,11 @@ static int follow(struct run *run, struct record *record)
 			return COMMAND_DONE;
 		if (taken < 0)
 			return command_link_failed("following the drop", taken);
-		if (view->state != told) {
-			told = view->state;
-			progress(run, "%-9s %s", wire_state_name(told), wire_state_text(told));
-		}
-		if (command_interrupted() && !aborted) {
-			aborted = true;
+		tell_state(run, view->state, &told);
+		if (run->aborted && at_rest(view->state))
+			return command_stopped();
+		if (command_interrupted() && !run->aborted) {
+			run->aborted = true;
 			progress(run, "abort");
 			result = session_command(run->session, WIRE_OP_ABORT, 0);
 			if (result != 0)
@@ -261,18 +305,33 @@ static void tell_losses(const struct run *run)
 	         link->receive_lost, link->send_lost, link->malformed, link->errors, link->restarts);
 }
 
-static int drop(struct run *run, struct record *record)
+static int release_and_follow(struct run *run, struct record *record)
 {
-	int code = tower_setup_hear(run->session);
+	int code = tower_setup_write(run->session, &run->scene);
 
-	if (code == COMMAND_DONE)
-		code = tower_setup_write(run->session, &run->scene);
 	if (code == COMMAND_DONE)
 		code = wait_until_ready(run);
 	if (code == COMMAND_DONE)
 		code = arm_and_release(run);
-	if (code == COMMAND_DONE)
-		code = follow(run, record);
+	return code == COMMAND_DONE ? follow(run, record) : code;
+}
+
+/* A host that died leaves its drop in the tower, which neither arms before it is fetched nor may have it
+ * taken for the next one. */
+static int drop(struct run *run, struct record *record)
+{
+	const struct session_view *view = session_view(run->session);
+	int code = tower_setup_hear(run->session);
+	int taken = code == COMMAND_DONE ? session_take_drop(run->session, record) : 0;
+
+	run->earlier = code == COMMAND_DONE &&
+	               (taken == 1 || wire_state_moving(view->state) || view->state == WIRE_STATE_CAPTURED);
+	if (run->earlier)
+		progress(run, "held      drop of an earlier run, to be fetched first");
+	if (taken < 0)
+		code = command_link_failed("an earlier drop", taken);
+	else if (code == COMMAND_DONE && taken == 0)
+		code = run->earlier ? follow(run, record) : release_and_follow(run, record);
 	if (code == COMMAND_DONE)
 		progress(run, "collected %" PRIu64 " blocks, %" PRIu64 " asked for again",
 		         record->counters.blocks, session_view(run->session)->asked);
@@ -303,6 +362,13 @@ static int report(struct run *run, struct record *record)
 		fprintf(run->json ? stderr : stdout,
 		        "\nraw log  %s.log\ntable    %s\nJSON     %s\nreport   %s\n", run->stem, csv, json,
 		        html);
+	if (run->aborted)
+		command_error("aborted; what was recorded is kept");
+	if (run->earlier)
+		command_error("drop %u was still in the tower from an earlier run; nothing was released now",
+		              record->drop_id);
+	if (code == COMMAND_DONE && (run->aborted || run->earlier))
+		code = COMMAND_REFUSED;
 	return code;
 }
 
@@ -346,6 +412,8 @@ static int run_drop(struct run *run)
 		for (size_t i = 0; i < sizeof(words) / sizeof(words[0]); i++)
 			run->bench_words[run->bench_word_count++] = words[i];
 		if (simulated_start(&tower, run->bench_words, message, sizeof(message)) != 0) {
+			if (command_interrupted())
+				return command_stopped();
 			command_error("%s", message);
 			return COMMAND_LINK;
 		}
@@ -378,5 +446,7 @@ int command_run(int argc, char **argv)
 		return code;
 	command_catch_signals();
 	run.start_ms = session_now_ms();
-	return run_drop(&run);
+	code = run_drop(&run);
+	forget_empty_log(&run);
+	return code;
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "host/command/command.h"
 #include "host/command/session_private.h"
 
 struct session *session_open(const char *url, const struct session_options *options,
@@ -47,6 +48,14 @@ const struct session_view *session_view(const struct session *session)
 int session_command(struct session *session, enum wire_op op, uint16_t token)
 {
 	return session->how->command(session, op, token);
+}
+
+bool session_cancelled(struct session *session, enum wire_op op)
+{
+	const struct session_options *options = &session->options;
+
+	return op != WIRE_OP_ABORT &&
+	       (command_interrupted() || (options->cancelled != NULL && options->cancelled(options->user)));
 }
 
 int session_set_parameter(struct session *session, enum wire_parameter_number number, uint32_t value)

@@ -41,6 +41,8 @@ struct session_options {
 	bool passive;     /* no heartbeat, no collecting: look and command only */
 	struct link *log; /* every frame sent or received is appended; NULL: none; stays the caller's */
 	void (*on_frame)(void *user, const struct frame *frame); /* every frame received; NULL: none */
+	bool (*cancelled)(void *user); /* a command other than ABORT is not sent again once this says so;
+	                                * NULL: only Ctrl-C cancels */
 	void *user;
 };
 

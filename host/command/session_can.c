@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/segment.h"
 #include "common/wire_table.h"
 #include "host/command/session_private.h"
 #include "host/record/join.h"
@@ -22,6 +23,8 @@ enum {
 struct can_way {
 	struct link *link;
 	struct join *join;
+	struct segment_join segments;
+	bool classic; /* they come in segments: the tower uploads by itself */
 	int64_t heartbeat_due_ms;
 	int64_t heard_ms;
 	uint8_t sequence;
@@ -48,6 +51,8 @@ static int send(struct session *session, struct frame *frame)
 
 	frame->time_us = session_utime();
 	result = link_send(way->link, frame);
+	if (result == DT_E_FULL)
+		return 0; /* as one lost on the bus: the link counts it, what matters is sent again */
 	if (result == 0 && session->options.log != NULL)
 		result = link_send(session->options.log, frame);
 	return result;
@@ -156,7 +161,7 @@ static void begin_collecting(struct can_way *way, const struct wire_capture_end 
 	way->end = *end;
 	way->rounds = 0;
 	way->forgotten = 0;
-	way->ask_due_ms = 0;
+	way->ask_due_ms = way->classic ? session_now_ms() + RESEND_PATIENCE_MS : 0;
 }
 
 static int collect(struct session *session, const struct frame *frame)
@@ -232,9 +237,23 @@ static int drive_collection(struct session *session)
 	return ask_again(session);
 }
 
+/* The message that the frame is or completes; NULL while more of it must come. */
+static const struct frame *put_together(struct can_way *way, const struct frame *frame)
+{
+	const struct frame *whole = segment_feed(&way->segments, frame);
+
+	if (whole == frame)
+		return frame;
+	way->classic = true;
+	if (frame->id != WIRE_ID_CAPTURE_END) /* as long as blocks come none is asked for */
+		way->ask_due_ms = session_now_ms() + RESEND_PATIENCE_MS;
+	return whole;
+}
+
 static int can_poll(struct session *session, int timeout_ms)
 {
 	struct can_way *way = session->way;
+	const struct frame *whole;
 	struct frame frame;
 	int result = send_heartbeat(session);
 
@@ -246,18 +265,19 @@ static int can_poll(struct session *session, int timeout_ms)
 	if (result == 0 && session->view.seen && session_now_ms() - way->heard_ms > SILENCE_MS)
 		return DT_E_CLOSED;
 	if (result <= 0)
-		return result == DT_E_FULL
-		               ? 0
-		               : result; /* the link counts a full queue; the next round tries again */
+		return result;
 	way->heard_ms = session_now_ms();
 	if (session->options.log != NULL)
 		result = link_send(session->options.log, &frame);
-	follow_tower(session, &frame);
-	hear_answers(way, &frame);
+	whole = put_together(way, &frame);
+	if (whole == NULL)
+		return result < 0 ? result : 0;
+	follow_tower(session, whole);
+	hear_answers(way, whole);
 	if (result >= 0)
-		result = collect(session, &frame);
+		result = collect(session, whole);
 	if (session->options.on_frame != NULL)
-		session->options.on_frame(session->options.user, &frame);
+		session->options.on_frame(session->options.user, whole);
 	return result < 0 ? result : 0;
 }
 
@@ -299,7 +319,8 @@ static int can_command(struct session *session, enum wire_op op, uint16_t token)
 	int result = DT_E_TIMEOUT;
 
 	way->sequence++;
-	for (int attempt = 0; attempt < TRIES && result == DT_E_TIMEOUT; attempt++) {
+	for (int attempt = 0; attempt < TRIES && result == DT_E_TIMEOUT && !session_cancelled(session, op);
+	     attempt++) {
 		if (op == WIRE_OP_ABORT) { /* both ways to stop: any tool's, and ours with a reply */
 			struct wire_nmt stop = {.command = 2, .node = 1};
 			struct frame frame;

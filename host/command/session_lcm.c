@@ -80,9 +80,7 @@ static int lcm_way_poll(struct session *session, int timeout_ms)
 	struct lcm_way *way = session->way;
 	int result = lcm_handle_timeout(way->publisher->lcm, timeout_ms);
 
-	if (result < 0)
-		return DT_E_LINK;
-	return way->drop_error;
+	return result < 0 ? DT_E_LINK : 0;
 }
 
 static int lcm_way_command(struct session *session, enum wire_op op, uint16_t token)
@@ -98,7 +96,7 @@ static int lcm_way_command(struct session *session, enum wire_op op, uint16_t to
 
 		if (result != 0)
 			return result;
-		if (session_now_ms() > deadline_ms)
+		if (session_now_ms() > deadline_ms || session_cancelled(session, op))
 			return DT_E_TIMEOUT;
 	}
 	return way->command_result;
@@ -123,7 +121,7 @@ static int lcm_way_take_drop(struct session *session, struct record *record)
 	struct lcm_way *way = session->way;
 
 	if (!way->has_drop)
-		return 0;
+		return way->drop_error;
 	*record = way->drop;
 	way->has_drop = false;
 	if (session->options.log != NULL && write_frames(record, log_frame, session->options.log) != 0) {

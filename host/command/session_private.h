@@ -25,6 +25,9 @@ struct session {
 	struct session_view view;
 };
 
+/* Nobody wants op any longer: Ctrl-C or an ABORT came. ABORT itself is always wanted. */
+bool session_cancelled(struct session *session, enum wire_op op);
+
 extern const struct session_way session_can, session_lcm;
 
 #endif

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -59,8 +60,14 @@ int simulated_start(struct simulated *tower, const char *const *arguments, char 
 	int pipes[2], ready;
 
 	snprintf(tower->directory, sizeof(tower->directory), "/tmp/droptower-XXXXXX");
-	if (path_of_bench(path) != 0 || mkdtemp(tower->directory) == NULL || pipe2(pipes, O_CLOEXEC) != 0) {
+	if (path_of_bench(path) != 0 || pipe2(pipes, O_CLOEXEC) != 0) {
 		snprintf(message, size, "simulated tower: %s", strerror(errno));
+		return -1;
+	}
+	if (mkdtemp(tower->directory) == NULL) {
+		snprintf(message, size, "%s: %s", tower->directory, strerror(errno));
+		close(pipes[0]);
+		close(pipes[1]);
 		return -1;
 	}
 	snprintf(tower->url, sizeof(tower->url), "unix:%s/bus", tower->directory);
@@ -68,6 +75,7 @@ int simulated_start(struct simulated *tower, const char *const *arguments, char 
 	if (tower->pid == 0) {
 		fcntl(pipes[1], F_SETFD, 0);
 		setpgid(0, 0); /* Ctrl-C is for us: we abort the drop, then end the tower */
+		prctl(PR_SET_PDEATHSIG, SIGTERM); /* when we are killed, nobody else ends it */
 		become_bench(path, arguments, tower->url, pipes[1]);
 	}
 	close(pipes[1]);

@@ -14,8 +14,10 @@ int tower_setup_hear(struct session *session)
 	int64_t start_ms = session_now_ms();
 
 	while (!view->seen || !view->hash_known || view->state == WIRE_STATE_BOOT) {
-		int result = command_interrupted() ? DT_E_CLOSED : session_poll(session, 50);
+		int result = session_poll(session, 50);
 
+		if (command_interrupted())
+			return command_stopped();
 		if (result == 0 && session_now_ms() - start_ms > HEAR_MS)
 			result = DT_E_TIMEOUT;
 		if (result != 0)

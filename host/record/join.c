@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "common/crc.h"
+#include "common/segment.h"
 #include "common/wire.h"
 #include "host/record/drop.h"
 
@@ -32,6 +33,7 @@ struct join {
 	bool any_live[WIRE_SENSORS];
 	uint32_t newest_live_ms[WIRE_SENSORS];
 	uint64_t corrupt;
+	struct segment_join segments; /* of classic CAN */
 
 	/* the capture, by tick after the first */
 	struct wire_capture_end end;
@@ -210,9 +212,14 @@ static void feed_heartbeat(struct join *join, const struct frame *frame)
 		restart(join);
 }
 
-int join_feed(struct join *join, const struct frame *frame)
+int join_feed(struct join *join, const struct frame *part)
 {
-	if (frame->flags & (FRAME_EXTENDED | FRAME_REMOTE | FRAME_ERROR))
+	const struct frame *frame;
+
+	if (part->flags & (FRAME_EXTENDED | FRAME_REMOTE | FRAME_ERROR))
+		return 0;
+	frame = segment_feed(&join->segments, part);
+	if (frame == NULL)
 		return 0;
 	switch (frame->id) {
 	case WIRE_ID_BLOCK_S1:
@@ -330,7 +337,7 @@ static void fill_from_window(const struct join *join, struct record *record)
 			drop_put(record, s + 1, tick, block.x, block.y, block.z);
 		}
 	}
-	counters->corrupt = join->corrupt;
+	counters->corrupt = join->corrupt + join->segments.incomplete;
 	counters->gaps = join->gaps;
 }
 
@@ -343,6 +350,7 @@ static void fill_from_end(const struct join *join, struct record *record)
 	if (join->end.frame_speed_mm_s)
 		record->frame_speed_m_s = join->end.frame_speed_mm_s / 1e3;
 	record->crc32 = join->end.crc32;
+	record->camera_frame = join->end.camera_frame;
 	record->crc_known = true;
 }
 
@@ -375,6 +383,7 @@ int join_take(struct join *join, struct record *record)
 	strcpy(drop.format, "live");
 	join->has_capture = false;
 	join->corrupt = 0;
+	join->segments.incomplete = 0;
 	*record = drop;
 	return 0;
 }

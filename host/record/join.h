@@ -4,7 +4,9 @@
 /*
  * Frames to channels: puts the blocks of one capture in their places by tick, counts every gap, repeat,
  * reorder and corrupt block, and says what to ask for again until the capture's CRC-32 agrees. The same
- * code serves live reception, replay and files. Frames that are no blocks or capture ends are ignored.
+ * code serves live reception, replay and files. Frames that are no blocks or capture ends are ignored. On
+ * classic CAN both come in segments (common/segment.h); nothing is live there, so that all of a capture is
+ * missing when its end arrives and every block counts as resent.
  *
  * Live use: feed every received frame; after the capture end arrived and while !join_complete, send the
  * requests join_next_gap tells; when done, or given up, take the record.

@@ -107,6 +107,7 @@ static void fill_message(const struct record *record, droptower_drop *drop)
 	drop->crc_agrees = record->crc_agrees;
 	drop->frame_speed_mm_s =
 	        isnan(record->frame_speed_m_s) ? 0 : (int32_t)lround(record->frame_speed_m_s * 1e3);
+	drop->camera_frame = record->camera_frame;
 	drop->blocks = (int64_t)counters->blocks;
 	drop->repeated = (int64_t)counters->repeated;
 	drop->reordered = (int64_t)counters->reordered;
@@ -208,6 +209,7 @@ static void fill_record(const droptower_drop *drop, struct record *record)
 	if (drop->frame_speed_mm_s)
 		record->frame_speed_m_s = drop->frame_speed_mm_s / 1e3;
 	record->crc32 = (uint32_t)drop->crc32;
+	record->camera_frame = drop->camera_frame;
 	record->crc_known = drop->crc_known != 0;
 	record->counters = (struct record_counters){
 	        .blocks = (uint64_t)drop->blocks,
@@ -268,8 +270,8 @@ static int64_t count_at(const uint8_t *bytes, size_t size, size_t at)
 static bool counts_fit(const uint8_t *bytes, size_t size)
 {
 	enum {
-		GAP_COUNT =
-		        8 + 8 + 2 * 4 + 4 * 8 + 2 + 4 + 7 * 8, /* fingerprint, then utime to conflicting */
+		GAP_COUNT = 8 + 8 + 2 * 4 + 4 * 8 + 2 + 4 + 2 +
+		            7 * 8, /* fingerprint, then utime to conflicting */
 		GAP_BYTES = 1 + 8 + 8,
 	};
 	int64_t gaps = count_at(bytes, size, GAP_COUNT);

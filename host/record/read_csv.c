@@ -74,8 +74,21 @@ struct target {
 	uint64_t *u64;
 	uint32_t *u32;
 	uint16_t *u16;
+	int16_t *i16;
 	bool *seen;
 };
+
+static int read_signed(struct reading *reading, const struct target *target, const char *text)
+{
+	char *end;
+	long value = strtol(text, &end, 10);
+
+	if (end == text || *end || value < INT16_MIN || value > INT16_MAX)
+		return REFUSE(reading, DT_E_FORMAT, "%s \"%.80s\", expected a number that is whole and fits",
+		              target->key, text);
+	*target->i16 = (int16_t)value;
+	return 0;
+}
 
 static int read_value(struct reading *reading, const struct target *target, const char *text)
 {
@@ -85,6 +98,8 @@ static int read_value(struct reading *reading, const struct target *target, cons
 
 	if (target->real && number_parse(text, strlen(text), '.', target->real))
 		return 0;
+	if (target->i16)
+		return read_signed(reading, target, text);
 	errno = 0;
 	value = strtoull(text, &end, 10);
 	if (target->real || text[0] < '0' || text[0] > '9' || *end || errno || value > max)
@@ -113,6 +128,7 @@ static int read_key(struct reading *reading, const char *key, const char *text)
 	        {.key = "trigger_s", .real = &record->trigger_s},
 	        {.key = "frame_speed_m_s", .real = &record->frame_speed_m_s},
 	        {.key = "crc32", .u32 = &record->crc32, .seen = &record->crc_known},
+	        {.key = "camera_frame", .i16 = &record->camera_frame},
 	        {.key = "blocks", .u64 = &counters->blocks},
 	        {.key = "repeated", .u64 = &counters->repeated},
 	        {.key = "reordered", .u64 = &counters->reordered},
@@ -188,13 +204,13 @@ static int check_names(struct reading *reading)
 	const char *at = reading->line.text, *end = at + reading->line.length;
 	bool equal = starts_with(&reading->line, "time_s");
 
-	at += 6;
+	at += equal ? strlen("time_s") : 0;
 	for (size_t i = 0; i < record->channel_count && equal; i++) {
 		char name[40];
 		size_t length = (size_t)snprintf(name, sizeof(name), ",%s_g", record->channels[i].name);
 
 		equal = (size_t)(end - at) >= length && memcmp(at, name, length) == 0;
-		at += length;
+		at += equal ? length : 0;
 	}
 	if (!equal || at != end)
 		return REFUSE(reading, DT_E_FORMAT,

@@ -90,6 +90,9 @@ static unsigned flags_of_marks(unsigned marks)
 	        {WIRE_MARK_CLIPPED, RECORD_FLAG_CLIPPED},
 	        {WIRE_MARK_OVERRUN, RECORD_FLAG_OVERRUN},
 	        {WIRE_MARK_FULL_SCALE, RECORD_FLAG_FULL_SCALE},
+	        {WIRE_MARK_ZERO_SHIFT, RECORD_FLAG_ZERO_SHIFT},
+	        {WIRE_MARK_CABLE, RECORD_FLAG_CABLE},
+	        {WIRE_MARK_STUCK, RECORD_FLAG_STUCK},
 	};
 	unsigned flags = 0;
 
@@ -117,8 +120,9 @@ void record_finish(struct record *record)
 const char *record_flag_name(unsigned flags)
 {
 	static const char *const names[] = {
-	        "lost_samples", "bad_samples", "clipped",         "incomplete", "crc_unknown", "slow_frame",
-	        "no_impact",    "fault",       "uneven_sampling", "full_scale", "overrun",
+	        "lost_samples", "bad_samples", "clipped", "incomplete",      "crc_unknown",
+	        "slow_frame",   "no_impact",   "fault",   "uneven_sampling", "full_scale",
+	        "overrun",      "zero_shift",  "cable",   "stuck",
 	};
 
 	for (size_t bit = 0; bit < sizeof(names) / sizeof(names[0]); bit++)

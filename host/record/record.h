@@ -35,6 +35,9 @@ enum {
 	RECORD_FLAG_UNEVEN = 1u << 8,     /* "uneven_sampling": the time column deviates from its mean step */
 	RECORD_FLAG_FULL_SCALE = 1u << 9, /* "full_scale" */
 	RECORD_FLAG_OVERRUN = 1u << 10,   /* "overrun" */
+	RECORD_FLAG_ZERO_SHIFT = 1u << 11, /* "zero_shift": offset after the drop not the one before */
+	RECORD_FLAG_CABLE = 1u << 12,      /* "cable": a sensor's bias was lost */
+	RECORD_FLAG_STUCK = 1u << 13,      /* "stuck": a channel gave one value for 20 ms */
 };
 
 struct channel {
@@ -57,12 +60,13 @@ struct record_gap {
 
 /* What happened to the frames of the capture on their way. */
 struct record_counters {
-	uint64_t blocks;      /* distinct blocks held */
-	uint64_t repeated;    /* a block that was already there */
-	uint64_t reordered;   /* a live block that came after a newer one of its sensor */
-	uint64_t corrupt;     /* CRC-8 or length does not agree, or what a log holds is no frame; not used */
-	uint64_t gaps;        /* runs of ticks that were missing when the capture end came */
-	uint64_t resent;      /* blocks that came on request, needed or not */
+	uint64_t blocks;    /* distinct blocks held */
+	uint64_t repeated;  /* a block that was already there */
+	uint64_t reordered; /* a live block that came after a newer one of its sensor */
+	uint64_t corrupt;   /* CRC-8 or length does not agree, a segment is missing, or what a log holds is no
+	                       frame; not used */
+	uint64_t gaps;      /* runs of ticks that were missing when the capture end came */
+	uint64_t resent;    /* blocks that came on request, needed or not */
 	uint64_t conflicting; /* repeated with other samples: the first is kept */
 };
 
@@ -80,6 +84,7 @@ struct record {
 	double trigger_s;       /* after the first instant; NAN if unknown */
 	double frame_speed_m_s; /* between the gates; NAN if unknown */
 	uint32_t crc32;         /* as sent in the capture end */
+	int16_t camera_frame;   /* video frame, 1 000 a second, at the first instant; if crc_known */
 	bool crc_known, crc_agrees;
 	struct record_counters counters;
 	struct record_gap *gaps; /* what stayed missing */

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/write.h"
 
-#include <errno.h>
 #include <inttypes.h>
 #include <lcm/lcm.h>
 #include <math.h>
@@ -13,6 +12,7 @@
 #include "host/record/drop.h"
 #include "host/record/lcm_codec.h"
 #include "host/record/source.h"
+#include "host/record/whole.h"
 
 /* ---- frames ---- */
 
@@ -69,6 +69,7 @@ static void make_capture_end(const struct record *record, struct frame *frame)
 	        .first_tick_ms = record->first_tick_ms,
 	        .last_tick_ms = record->last_tick_ms,
 	        .crc32 = record->crc32,
+	        .camera_frame = record->camera_frame,
 	};
 
 	if (!isnan(record->trigger_s))
@@ -133,7 +134,7 @@ static void put_drop(const struct record *record, FILE *out)
 		fputc('\n', out);
 	}
 	if (record->crc_known)
-		fprintf(out, "# crc32 %" PRIu32 "\n", record->crc32);
+		fprintf(out, "# crc32 %" PRIu32 "\n# camera_frame %d\n", record->crc32, record->camera_frame);
 	fprintf(out,
 	        "# blocks %" PRIu64 "\n# repeated %" PRIu64 "\n# reordered %" PRIu64 "\n# corrupt %" PRIu64
 	        "\n",
@@ -264,8 +265,7 @@ static int put_event(FILE *out, int64_t time_us, uint8_t *bytes, int size)
 
 static int write_lcm(const struct record *record, FILE *out)
 {
-	int64_t time_us =
-	        ((int64_t)record->first_tick_ms + record->last_tick_ms - record->first_tick_ms + 1) * 1000;
+	int64_t time_us = ((int64_t)record->first_tick_ms + drop_ticks(record)) * 1000;
 	droptower_drop drop;
 	int error = lcm_codec_drop(record, time_us, &drop), size;
 	uint8_t *bytes;
@@ -307,8 +307,8 @@ static int (*writer_of(const char *file))(const struct record *, FILE *)
 int write_record(const struct record *record, const char *file, char message[READ_MESSAGE_MAX])
 {
 	int (*write)(const struct record *, FILE *) = writer_of(file);
-	int error, kept;
-	FILE *out;
+	struct whole whole;
+	int error;
 
 	if (!write)
 		return source_refuse(message, DT_E_ARGUMENT, file, 0,
@@ -316,19 +316,6 @@ int write_record(const struct record *record, const char *file, char message[REA
 	if (write != write_csv && !record->is_drop)
 		return source_refuse(message, DT_E_ARGUMENT, file, 0,
 		                     "not a drop of a tower, which only .csv can hold");
-	out = fopen(file, "wb");
-	if (!out)
-		return source_refuse(message, DT_E_SYSTEM, file, 0, "%s, expected to write it",
-		                     strerror(errno));
-	errno = 0;
-	error = write(record, out);
-	kept = errno;
-	if (fclose(out) && !error) {
-		error = DT_E_SYSTEM;
-		kept = errno;
-	}
-	if (error)
-		return source_refuse(message, error, file, 0, "%s",
-		                     error == DT_E_SYSTEM && kept ? strerror(kept) : error_text(error));
-	return 0;
+	error = whole_open(&whole, file, message, READ_MESSAGE_MAX);
+	return error ? error : whole_close(&whole, write(record, whole.out), message, READ_MESSAGE_MAX);
 }

@@ -12,6 +12,11 @@ const struct estimate_channel *report_estimate(const struct report *report, cons
 	return channel ? &report->analysis->channels[channel - report->record->channels] : NULL;
 }
 
+double report_offset(const struct estimate_channel *estimate)
+{
+	return isfinite(estimate->baseline.offset_g) ? estimate->baseline.offset_g : 0.0;
+}
+
 static bool has_pulse(const struct estimate_channel *estimate)
 {
 	return estimate && isfinite(estimate->pulse.start_s) && estimate->pulse.duration_s > 0.0 &&
@@ -122,9 +127,41 @@ const char *report_flag_words(unsigned flag)
 		return "samples are at the converter's limit: the true value is unknown";
 	case RECORD_FLAG_OVERRUN:
 		return "the controller missed samples; they are marked and left out";
+	case RECORD_FLAG_ZERO_SHIFT:
+		return "a sensor's offset after the drop is not the one before: it may have been overloaded";
+	case RECORD_FLAG_CABLE:
+		return "a sensor lost its supply during the drop: check its cable";
+	case RECORD_FLAG_STUCK:
+		return "a channel gave one value for 20 ms: check sensor and converter";
 	default:
 		return record_flag_name(flag);
 	}
+}
+
+bool report_video_frame(const struct report *report, double time_s, long *frame)
+{
+	const struct record *r = report->record;
+
+	if (!r->is_drop || !r->crc_known || !isfinite(time_s))
+		return false;
+	*frame = r->camera_frame + (long)floor(1000.0 * time_s);
+	return true;
+}
+
+bool report_video(const struct report *report, const struct report_zero *zero, char *line, size_t size)
+{
+	const struct estimate_channel *s2x = report_estimate(report, "S2X");
+	long at_zero, at_peak;
+
+	line[0] = '\0';
+	if (!report_video_frame(report, zero->time_s, &at_zero))
+		return false;
+	if (s2x && report_video_frame(report, s2x->peak.time_s, &at_peak))
+		snprintf(line, size, "1 000 Hz video: time 0 is in frame %ld, S2 X peaks in %ld", at_zero,
+		         at_peak);
+	else
+		snprintf(line, size, "1 000 Hz video: time 0 is in frame %ld", at_zero);
+	return true;
 }
 
 const char *report_channel_status(const struct estimate_channel *estimate, char *text, size_t size)
@@ -223,6 +260,8 @@ size_t report_compare(const struct report *report, struct report_row rows[REPORT
 	lag.predicted = p->lag_s;
 	lag.measured = a->lag.largest_peak_s;
 	add_row(rows, &count, lag, a->has_lag ? a->lag.status : ESTIMATE_SHORT);
+	if (!p->has_plate) /* the model's lag is 0 then: any measured one would differ by 100 % */
+		rows[count - 1].difference_percent = (double)NAN;
 	if (p->has_plate) {
 		frequency.predicted = p->plate_frequency_hz;
 		frequency.measured = a->plate.frequency_hz;

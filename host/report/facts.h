@@ -25,8 +25,19 @@ unsigned report_flags(const struct report *report);
 /* A sentence for one RECORD_FLAG_*. */
 const char *report_flag_words(unsigned flag);
 
+/* The frame of the 1 000 Hz video that an instant, s after the record's first, falls into: frame n begins
+ * with its tick. False when nothing says so. */
+bool report_video_frame(const struct report *report, double time_s, long *frame);
+
+/* "1 000 Hz video: time 0 is in frame 441, S2 X peaks in 442"; false and an empty line when nothing says so.
+ */
+bool report_video(const struct report *report, const struct report_zero *zero, char *line, size_t size);
+
 /* The estimate of the channel of that name; NULL if there is none. */
 const struct estimate_channel *report_estimate(const struct report *report, const char *name);
+
+/* The baseline that is taken off for pictures, g. */
+double report_offset(const struct estimate_channel *estimate);
 
 /* What of a channel's result is not ok, in a word or two: "ok", "clipped", "width short". */
 const char *report_channel_status(const struct estimate_channel *estimate, char *text, size_t size);

@@ -42,20 +42,27 @@ static void put_bool(struct builder *b, cJSON *object, const char *key, bool val
 	attach(b, object, key, cJSON_CreateBool(value));
 }
 
-/* Length of the UTF-8 character at s, 0 where there is none. */
+/* Length of the UTF-8 character at s, 0 where there is none. (RFC 3629: neither longer than it need be, nor
+ * half of a UTF-16 pair, nor beyond U+10FFFF) */
 static size_t utf8_length(const unsigned char *s)
 {
-	size_t length = s[0] < 0x80                   ? 1
-	                : s[0] >= 0xC2 && s[0] < 0xE0 ? 2
-	                : s[0] >= 0xE0 && s[0] < 0xF0 ? 3
-	                                              : 0;
+	static const struct {
+		unsigned char first, last, second_low, second_high, length;
+	} table[] = {
+	        {0x01, 0x7F, 0x00, 0xFF, 1}, {0xC2, 0xDF, 0x80, 0xBF, 2}, {0xE0, 0xE0, 0xA0, 0xBF, 3},
+	        {0xE1, 0xEC, 0x80, 0xBF, 3}, {0xED, 0xED, 0x80, 0x9F, 3}, {0xEE, 0xEF, 0x80, 0xBF, 3},
+	        {0xF0, 0xF0, 0x90, 0xBF, 4}, {0xF1, 0xF3, 0x80, 0xBF, 4}, {0xF4, 0xF4, 0x80, 0x8F, 4},
+	};
+	size_t row = 0, count = sizeof(table) / sizeof(table[0]);
 
-	if (s[0] >= 0xF0 && s[0] < 0xF5)
-		length = 4;
-	for (size_t i = 1; i < length; i++)
+	while (row < count && (s[0] < table[row].first || s[0] > table[row].last))
+		row++;
+	if (row == count || s[1] < table[row].second_low || s[1] > table[row].second_high)
+		return 0;
+	for (size_t i = 2; i < table[row].length; i++)
 		if ((s[i] & 0xC0) != 0x80)
 			return 0;
-	return length;
+	return table[row].length;
 }
 
 /* File names are bytes, JSON is UTF-8: what is no UTF-8 becomes a question mark. */
@@ -201,6 +208,7 @@ static void put_drop(struct builder *b, cJSON *root, const struct record *r)
 	put_number(b, drop, "frame_speed_m_s", r->frame_speed_m_s);
 	put_number(b, drop, "crc32", r->crc_known ? (double)r->crc32 : (double)NAN);
 	put_bool(b, drop, "crc_agrees", r->crc_known && r->crc_agrees);
+	put_number(b, drop, "camera_frame", r->crc_known ? r->camera_frame : (double)NAN);
 	counters = put_object(b, drop, "counters");
 	put_number(b, counters, "blocks", (double)r->counters.blocks);
 	put_number(b, counters, "repeated", (double)r->counters.repeated);

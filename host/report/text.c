@@ -49,6 +49,7 @@ static int name_width(const struct record *record)
 static void write_channels(const struct report *report, const struct report_zero *zero, FILE *out)
 {
 	int width = name_width(report->record);
+	char video[96];
 
 	fprintf(out, "\n%-*s %8s %9s %7s %9s %7s %9s %9s %8s  %s\n", width, "channel", "rate Hz", "peak g",
 	        "+-", "at ms", "+- us", "width ms", "dv m/s", "noise g", "status");
@@ -81,6 +82,8 @@ static void write_channels(const struct report *report, const struct report_zero
 		        r->axes_apart_s * 1e3);
 	}
 	fprintf(out, "Time 0: %s. Width at 10 %% of the peak; dv over that width.\n", zero->name);
+	if (report_video(report, zero, video, sizeof(video)))
+		fprintf(out, "%s.\n", video);
 }
 
 static void write_joint(const struct analysis *a, FILE *out)
@@ -165,9 +168,12 @@ static void write_frames(const struct record *r, FILE *out)
 	        " repeated, "
 	        "%" PRIu64 " reordered, %" PRIu64 " corrupt, %" PRIu64 " conflicting\n",
 	        c->blocks, c->gaps, c->resent, c->repeated, c->reordered, c->corrupt, c->conflicting);
-	for (size_t i = 0; i < r->gap_count && i < TEXT_GAPS_MAX; i++)
-		fprintf(out, "  missing: S%u tick %" PRIu32 " to %" PRIu32 "\n", r->gaps[i].sensor,
-		        r->gaps[i].first_tick_ms, r->gaps[i].last_tick_ms);
+	for (size_t i = 0; i < r->gap_count && i < TEXT_GAPS_MAX; i++) {
+		fprintf(out, "  missing: S%u tick %" PRIu32, r->gaps[i].sensor, r->gaps[i].first_tick_ms);
+		if (r->gaps[i].last_tick_ms != r->gaps[i].first_tick_ms)
+			fprintf(out, " to %" PRIu32, r->gaps[i].last_tick_ms);
+		fputc('\n', out);
+	}
 	if (r->gap_count > TEXT_GAPS_MAX)
 		fprintf(out, "  and %zu more, all listed by --json\n", r->gap_count - TEXT_GAPS_MAX);
 }

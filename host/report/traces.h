@@ -14,14 +14,6 @@
 
 #include "host/report/facts.h"
 
-struct traces_window {
-	double from_s, to_s; /* after the record's first instant */
-};
-
-/* Around the impact: wide enough for the pulse and what follows it. The whole record if there is none. */
-struct traces_window traces_impact(const struct report *report, const struct report_zero *zero);
-struct traces_window traces_whole(const struct record *record);
-
 /* Whether the scene's model has that channel. */
 bool traces_has_model(const struct report *report, const char *channel);
 

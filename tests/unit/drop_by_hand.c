@@ -54,7 +54,8 @@ void hand_fill(struct hand_drop *drop, uint32_t first_tick_ms, uint32_t ticks, u
 	                           .first_tick_ms = first_tick_ms,
 	                           .ticks = ticks,
 	                           .trigger_us = ticks * 200 + 123,
-	                           .frame_speed_mm_s = 3912};
+	                           .frame_speed_mm_s = 3912,
+	                           .camera_frame = 341};
 	for (unsigned s = 0; s < 2; s++)
 		for (uint32_t tick = 0; tick < ticks; tick++)
 			for (unsigned i = 0; i < HAND_PER_TICK; i++)
@@ -108,6 +109,7 @@ void hand_capture_end(const struct hand_drop *drop, struct frame *frame)
 	put_le(frame->data + 12, drop->trigger_us, 4);
 	put_le(frame->data + 16, hand_drop_crc32(drop), 4);
 	put_le(frame->data + 20, drop->frame_speed_mm_s, 2);
+	put_le(frame->data + 22, (uint16_t)drop->camera_frame, 2);
 }
 
 size_t hand_candump(const struct frame *frame, int64_t time_us, char line[256])
@@ -183,6 +185,7 @@ void hand_check_equal(const struct record *a, const struct record *b)
 	assert_true(same(a->frame_speed_m_s, b->frame_speed_m_s));
 	assert_int_equal(a->crc32, b->crc32);
 	assert_int_equal(a->crc_known, b->crc_known);
+	assert_int_equal(a->camera_frame, b->camera_frame);
 	assert_int_equal(a->crc_agrees, b->crc_agrees);
 	assert_memory_equal(&a->counters, &b->counters, sizeof(a->counters));
 	assert_int_equal(a->gap_count, b->gap_count);

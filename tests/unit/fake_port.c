@@ -12,6 +12,7 @@ void fake_init(void)
 {
 	memset(&fake, 0, sizeof(fake));
 	fake.inputs = FAKE_ALL_GOOD;
+	fake.can_room = UINT32_MAX;
 	fake.outputs = WIRE_IO_MAGNET_HOLD;
 }
 
@@ -92,12 +93,25 @@ void port_off_cancel(uint16_t output)
 	fake.planned &= (uint16_t)~output;
 }
 
+int port_can_setup(bool classic, uint32_t data_kbit_s)
+{
+	if (fake.no_setup || (fake.no_fd && !classic))
+		return DT_E_ARGUMENT;
+	if (data_kbit_s != 2000 && data_kbit_s != 5000 && data_kbit_s != 8000)
+		return DT_E_ARGUMENT;
+	fake.classic = classic;
+	fake.data_kbit_s = data_kbit_s;
+	fake.setups++;
+	return 0;
+}
+
 int port_can_send(const struct frame *frame)
 {
-	if (fake.can_full || fake.bus_off)
+	if (fake.can_full || fake.bus_off || fake.can_room == 0)
 		return DT_E_FULL;
 	if (fake.sent_count == FAKE_SENT_MAX)
 		abort();
+	fake.can_room -= fake.can_room != UINT32_MAX;
 	fake.sent[fake.sent_count++] = *frame;
 	return 0;
 }

@@ -27,6 +27,12 @@ struct fake_port {
 	struct frame sent[FAKE_SENT_MAX];
 	unsigned sent_count;
 	bool can_full, bus_off;
+	uint32_t can_room;    /* frames the controller takes; as many as come at first */
+	bool no_fd;           /* port_can_setup refuses FD */
+	bool no_setup;        /* and everything else */
+	bool classic;         /* as set up */
+	uint32_t data_kbit_s; /* 0: never set up */
+	unsigned setups;
 	uint32_t bus_errors;
 	struct frame received[FAKE_RECEIVED_MAX];
 	unsigned received_count, received_next;

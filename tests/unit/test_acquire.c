@@ -28,7 +28,7 @@ static int begin(void **state)
 static void open_tick(uint32_t tick_ms)
 {
 	acquire_open(&acquire,
-	             &(struct acquire_head){.tick_ms = tick_ms, .drop_id = 3, .io = 0x1234, .state = 5});
+	             &(struct acquire_head){.tick_ms = tick_ms, .drop_id = 3, .io = 0x7234, .state = 5});
 }
 
 static void give_x(int16_t s1, int16_t s2)
@@ -63,7 +63,7 @@ static void samples_keep_their_places(void **state)
 	assert_int_equal(acquire_take(&acquire, &tick), 0);
 	assert_int_equal(tick.tick_ms, 77);
 	assert_int_equal(tick.drop_id, 3);
-	assert_int_equal(tick.io, 0x1234);
+	assert_int_equal(tick.io, 0x7234);
 	assert_int_equal(tick.marks, 0);
 	for (unsigned s = 0; s < 2; s++) {
 		assert_int_equal(tick.status[s], 5);
@@ -98,7 +98,7 @@ static void missing_samples_are_marked_and_counted(void **state)
 		assert_int_equal(tick.sensor[0].y[k], WIRE_SAMPLE_NOT_TAKEN);
 		assert_int_equal(tick.sensor[1].z[k], WIRE_SAMPLE_NOT_TAKEN);
 	}
-	assert_int_equal(tick.io, 0x1234 | WIRE_IO_OVERRUN);
+	assert_int_equal(tick.io, 0x7234 | WIRE_IO_OVERRUN);
 	assert_int_equal(tick.marks, WIRE_MARK_OVERRUN);
 	assert_int_equal(counters[WIRE_COUNTER_samples_overrun], 3 * 2 + 6 * 4);
 	open_tick(2); /* one sample too many changes nothing */
@@ -129,6 +129,41 @@ static void clipping_is_marked_per_axis_and_sensor(void **state)
 	assert_int_equal(counters[WIRE_COUNTER_samples_clipped], 3);
 	assert_int_equal(counters[WIRE_COUNTER_samples_full_scale], 2);
 	assert_int_equal(counters[WIRE_COUNTER_samples_overrun], 0);
+}
+
+static void lost_bias_is_marked(void **state)
+{
+	static const uint16_t lost[] = {WIRE_IO_IEPE_S1, WIRE_IO_IEPE_S2, WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2,
+	                                0};
+	struct acquire_tick tick;
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(lost) / sizeof(lost[0]); i++) {
+		acquire_open(&acquire, &(struct acquire_head){.io = (uint16_t)(0x7FFF & ~lost[i])});
+		fill_tick(7, 10);
+		acquire_close(&acquire);
+		assert_int_equal(acquire_take(&acquire, &tick), 0);
+		assert_int_equal(tick.marks, lost[i] ? WIRE_MARK_CABLE : 0);
+	}
+}
+
+static void channels_by_number(void **state)
+{
+	struct acquire_tick tick;
+
+	(void)state;
+	open_tick(1);
+	fill_tick(7, 10);
+	acquire_close(&acquire);
+	assert_int_equal(acquire_take(&acquire, &tick), 0);
+	for (unsigned channel = 0; channel < 6; channel++) {
+		unsigned count = 0;
+		const int16_t *code = acquire_channel(&tick, channel, &count);
+
+		assert_int_equal(count, channel % 3 ? 10 : 7);
+		for (unsigned k = 0; k < count; k++)
+			assert_int_equal(code[k], 100 * (channel + 1) + k);
+	}
 }
 
 static void clocks_must_be_seven_to_ten(void **state)
@@ -177,7 +212,7 @@ static void full_queue_is_counted(void **state)
 
 static void block_has_the_bytes_of_the_wire(void **state)
 {
-	static const uint8_t head[9] = {3, 0, 0x04, 0x03, 0x02, 0x01, 5, 0x34, 0x12};
+	static const uint8_t head[9] = {3, 0, 0x04, 0x03, 0x02, 0x01, 5, 0x34, 0x72};
 	struct acquire_tick tick;
 	struct frame frame;
 
@@ -212,6 +247,8 @@ int main(void)
 	        cmocka_unit_test_setup(samples_keep_their_places, begin),
 	        cmocka_unit_test_setup(missing_samples_are_marked_and_counted, begin),
 	        cmocka_unit_test_setup(clipping_is_marked_per_axis_and_sensor, begin),
+	        cmocka_unit_test_setup(lost_bias_is_marked, begin),
+	        cmocka_unit_test_setup(channels_by_number, begin),
 	        cmocka_unit_test_setup(clocks_must_be_seven_to_ten, begin),
 	        cmocka_unit_test_setup(full_queue_is_counted, begin),
 	        cmocka_unit_test_setup(block_has_the_bytes_of_the_wire, begin),

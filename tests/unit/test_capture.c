@@ -215,6 +215,65 @@ static void forced_trigger_and_marks(void **state)
 	assert_int_equal(capture.marks, WIRE_MARK_NO_IMPACT | WIRE_MARK_CLIPPED);
 }
 
+/* A window with one channel off by so much in its last `shifted` ticks. */
+static void capture_with_offset(unsigned channel, int offset, unsigned shifted, bool taken)
+{
+	uint32_t post = parameters.value[WIRE_PARAMETER_post_trigger_ms];
+
+	capture_init(&capture, &parameters);
+	for (uint32_t t = 0; t < 100 + post; t++) {
+		struct acquire_tick tick = {.tick_ms = t, .status = {WIRE_STATE_BRAKED, WIRE_STATE_BRAKED}};
+
+		for (unsigned k = 0; k < (channel % 3 ? 10u : 7u); k++) {
+			struct acquire_samples *samples = &tick.sensor[channel / 3];
+			int16_t *at = channel % 3 == 0   ? &samples->x[k]
+			              : channel % 3 == 1 ? &samples->y[k]
+			                                 : &samples->z[k];
+
+			if (t >= 100 + post - shifted)
+				*at = taken ? (int16_t)(offset + (k < 6 ? k % 2 ? 20 : -20 : 0))
+				            : WIRE_SAMPLE_NOT_TAKEN;
+		}
+		if (t == 100)
+			tick.sensor[1].x[0] = 9000;
+		capture_put(&capture, &tick);
+	}
+	finish_crc();
+}
+
+static void zero_is_compared_with_the_one_before(void **state)
+{
+	int16_t before[6] = {0};
+
+	(void)state;
+	for (unsigned channel = 0; channel < 6; channel++) {
+		capture_with_offset(channel, 300, 50, true);
+		assert_true(capture_zero_shift(&capture, before, 299));
+		assert_false(capture_zero_shift(&capture, before, 300));
+		before[channel] = -1;
+		assert_true(capture_zero_shift(&capture, before, 300));
+		before[channel] = 250;
+		assert_false(capture_zero_shift(&capture, before, 50));
+		assert_true(capture_zero_shift(&capture, before, 49));
+		before[channel] = 0;
+		capture_with_offset(channel, -300, 50, true);
+		assert_true(capture_zero_shift(&capture, before, 299));
+		assert_false(capture_zero_shift(&capture, before, 300));
+	}
+	capture_with_offset(1, 300, 25, true); /* over the last 50 ms */
+	assert_true(capture_zero_shift(&capture, before, 149));
+	assert_false(capture_zero_shift(&capture, before, 150));
+	capture_with_offset(1, 0, 50, false);
+	before[1] = 1000;
+	assert_false(capture_zero_shift(&capture, before, 100)); /* nothing to compare */
+	parameters.value[WIRE_PARAMETER_post_trigger_ms] = 199;
+	capture_with_offset(1, 300, 50, true);
+	assert_false(capture_zero_shift(&capture, before, 100)); /* no time to ring down */
+	parameters.value[WIRE_PARAMETER_post_trigger_ms] = 200;
+	capture_with_offset(1, 300, 50, true);
+	assert_true(capture_zero_shift(&capture, before, 100));
+}
+
 static void lost_ticks_keep_their_places(void **state)
 {
 	const struct acquire_tick *held;
@@ -287,6 +346,7 @@ int main(void)
 	        cmocka_unit_test_setup(trigger_time_is_the_first_sample_beyond, begin),
 	        cmocka_unit_test_setup(what_does_not_trigger, begin),
 	        cmocka_unit_test_setup(forced_trigger_and_marks, begin),
+	        cmocka_unit_test_setup(zero_is_compared_with_the_one_before, begin),
 	        cmocka_unit_test_setup(lost_ticks_keep_their_places, begin),
 	        cmocka_unit_test_setup(largest_window_fits, begin),
 	        cmocka_unit_test_setup(ticks_wrap, begin),

@@ -10,15 +10,18 @@
 #include <string.h>
 
 #include "common/crc.h"
+#include "common/segment.h"
 #include "firmware/app.h"
 #include "tests/unit/fake_port.h"
 
 enum { TOKEN = 0x1234 };
 
 static uint32_t next_ms; /* the tick that comes next */
+static uint32_t release_ms;
 static bool host_alive;
 static uint32_t host_hash;
-static int16_t s2x; /* what S2 X reads */
+static int16_t s2x; /* what S2 X reads, 0: noise only */
+static int16_t s2y_offset;
 static struct frame seen[FAKE_SENT_MAX];
 
 static const struct frame *last(uint32_t id)
@@ -39,6 +42,11 @@ static void host_beat(void)
 	fake_receive(&frame);
 }
 
+static void forget_frames(void)
+{
+	fake.sent_count = 0;
+}
+
 /* One millisecond; main runs after each sample instant of Y. */
 static void run_ms(void)
 {
@@ -47,9 +55,11 @@ static void run_ms(void)
 		host_beat();
 	app_on_tick();
 	for (int k = 0; k < 10; k++) {
+		int16_t noise = (int16_t)(next_ms + (uint32_t)k) & 1;
+
 		if (k < 7)
-			app_on_x(1, s2x, true);
-		app_on_yz(2, 3, 4, 5, true);
+			app_on_x(noise, s2x ? s2x : noise, true);
+		app_on_yz(noise, noise, (int16_t)(4 + noise + s2y_offset), noise, true);
 		fake_time(next_ms * 1000 + 100 * (unsigned)k);
 		app_poll();
 	}
@@ -62,11 +72,6 @@ static void run(unsigned ms)
 		run_ms();
 }
 
-static void forget_frames(void)
-{
-	fake.sent_count = 0;
-}
-
 static void power_on(enum port_reset cause)
 {
 	fake_init();
@@ -74,6 +79,7 @@ static void power_on(enum port_reset cause)
 	host_alive = true;
 	host_hash = wire_hash();
 	s2x = 0;
+	s2y_offset = 0;
 	app_init(cause);
 }
 
@@ -173,6 +179,7 @@ static void fall(unsigned drop_id)
 	assert_int_equal(reply.result, 0);
 	assert_int_equal(reply.state, WIRE_STATE_FALLING);
 	assert_int_equal(reply.drop_id, drop_id);
+	release_ms = next_ms - 1;
 	run(12);
 	fake.inputs &= (uint16_t)~WIRE_IO_LATCH_CLOSED;
 }
@@ -298,7 +305,7 @@ static void live_blocks_in_every_tick(void **state)
 			assert_int_equal(block.status, WIRE_STATE_READY);
 			assert_int_equal(block.io, FAKE_ALL_GOOD | WIRE_IO_MAGNET_HOLD);
 			assert_int_equal(block.drop_id, 0);
-			assert_int_equal(block.y[9], 4);
+			assert_in_range(block.y[9], 4, 5);
 		}
 }
 
@@ -347,6 +354,7 @@ static void whole_drop(void **state)
 	assert_int_equal(end.last_tick_ms, hit_ms + 399);
 	assert_int_equal(end.trigger_us, 100000);
 	assert_int_equal(end.marks, 0);
+	assert_int_equal(end.camera_frame, end.first_tick_ms - release_ms);
 	assert_in_range(end.frame_speed_mm_s, 2842, 2844);
 	count = fake.sent_count;
 	memcpy(seen, fake.sent, count * sizeof(seen[0]));
@@ -617,7 +625,15 @@ static void parameters_by_sdo(void **state)
 	        {0x23, 0x2007, 0, 320, 0, 0x60},
 	        {0x40, 0x2007, 0, 0, 320, 0x43},
 	        {0x40, 0x1FFF, 0, 0, 0x06020000, 0x80},
-	        {0x23, 0x200D, 0, 1, 0x06020000, 0x80},
+	        {0x23, 0x2010, 0, 1, 0x06020000, 0x80},
+	        {0x23, 0x200E, 0, 2, 0x06090031, 0x80},
+	        {0x40, 0x200F, 0, 0, 5000, 0x43},
+	        {0x23, 0x200F, 0, 1999, 0x06090032, 0x80},
+	        {0x23, 0x200F, 0, 8001, 0x06090031, 0x80},
+	        {0x23, 0x200F, 0, 4000, 0x06090030, 0x80}, /* none of 2, 5, 8 Mbit/s */
+	        {0x23, 0x200F, 0, 2000, 0, 0x60},
+	        {0x23, 0x200F, 0, 8000, 0, 0x60},
+	        {0x40, 0x200F, 0, 0, 8000, 0x43},
 	        {0x40, 0x2007, 1, 0, 0x06090011, 0x80},
 	        {0x2F, 0x2007, 0, 1, 0x05040001, 0x80},
 	        {0x23, 0x2000, 0, 690001, 0x06040043, 0x80}, /* gates 10 mm apart */
@@ -639,6 +655,20 @@ static void parameters_by_sdo(void **state)
 			fail_msg("case %zu: %#x %#x, expected %#x %#x", i, m.specifier, m.value,
 			         cases[i].answer_specifier, cases[i].answer);
 	}
+}
+
+static void abort_of_a_transfer_needs_no_answer(void **state)
+{
+	struct frame frame;
+
+	(void)state;
+	to_ready();
+	wire_pack_sdo(&frame, WIRE_ID_SDO_REQUEST, &(struct wire_sdo){.specifier = 0x80, .index = 0x2007});
+	fake_receive(&frame);
+	forget_frames();
+	run(2);
+	assert_int_equal(fake_count(WIRE_ID_SDO_REPLY), 0);
+	assert_int_equal(counter(WIRE_COUNTER_frames_malformed), 0);
 }
 
 static void parameters_are_not_written_while_armed(void **state)
@@ -758,8 +788,8 @@ static void late_main_loses_nothing_in_the_capture(void **state)
 		app_on_tick();
 		for (unsigned k = 0; k < 10; k++) {
 			if (k < 7)
-				app_on_x(1, 0, true);
-			app_on_yz(2, 3, 4, 5, true);
+				app_on_x((int16_t)k, (int16_t)k, true);
+			app_on_yz((int16_t)k, (int16_t)k, (int16_t)k, (int16_t)k, true);
 		}
 		next_ms++;
 	}
@@ -770,6 +800,336 @@ static void late_main_loses_nothing_in_the_capture(void **state)
 	assert_int_equal(end.marks, WIRE_MARK_OVERRUN);
 	assert_int_equal(counter(WIRE_COUNTER_samples_overrun), 25 * 54);
 	assert_int_equal(counter(WIRE_COUNTER_ticks_late), 40);
+}
+
+/* ---- the bus ---- */
+
+static void bus_is_set_up_at_reset(void **state)
+{
+	(void)state;
+	power_on(PORT_RESET_POWER_ON);
+	assert_int_equal(fake.setups, 1);
+	assert_false(fake.classic);
+	assert_int_equal(fake.data_kbit_s, 5000);
+}
+
+static void bus_follows_its_parameters(void **state)
+{
+	(void)state;
+	to_ready();
+	assert_int_equal(sdo(0x23, 0x200F, 0, 8000).specifier, 0x60);
+	assert_int_equal(fake.data_kbit_s, 8000);
+	assert_false(fake.classic);
+	assert_int_equal(sdo(0x23, 0x200E, 0, 1).specifier, 0x60);
+	assert_true(fake.classic);
+	assert_int_equal(fake.setups, 3);
+	assert_int_equal(sdo(0x23, 0x2007, 0, 320).specifier, 0x60); /* not the bus's */
+	assert_int_equal(sdo(0x23, 0x200E, 0, 1).specifier, 0x60);   /* nothing new */
+	assert_int_equal(fake.setups, 3);
+	fake.no_setup = true;
+	assert_int_equal(sdo(0x23, 0x200E, 0, 0).value, 0x06060000);
+	assert_int_equal(sdo(0x40, 0x200E, 0, 0).value, 1); /* as it was */
+	forget_frames();
+	run(10);
+	assert_int_equal(fake_count(WIRE_ID_BLOCK_S1), 0);
+	fake.no_setup = false;
+	assert_int_equal(sdo(0x23, 0x200E, 0, 0).specifier, 0x60);
+	run(10);
+	assert_in_range(fake_count(WIRE_ID_BLOCK_S1), 9, 10);
+	to_armed();
+	assert_int_equal(sdo(0x23, 0x200E, 0, 1).value, 0x08000022);
+	assert_int_equal(fake.setups, 1);
+}
+
+/* The port is asked again as long as it refuses everything, but not in motion. */
+static void refused_bus_is_asked_for_again(void **state)
+{
+	(void)state;
+	fake_init();
+	fake.no_setup = true;
+	next_ms = 0;
+	app_init(PORT_RESET_POWER_ON);
+	fake.can_full = true;
+	run(50);
+	assert_int_equal(fake.setups, 0);
+	fake.no_setup = false;
+	run(2);
+	assert_int_equal(fake.setups, 1);
+	assert_true(fake.classic);
+	run(200);
+	assert_int_equal(fake.setups, 1);
+	fake_init();
+	fake.no_setup = true;
+	next_ms = 0;
+	app_init(PORT_RESET_POWER_ON);
+	run(250);
+	fall(1);
+	fake.no_setup = false;
+	run(100);
+	assert_int_equal(fake.setups, 0);
+	separate();
+	run(30);
+	s2x = 2000;
+	run(1);
+	s2x = 0;
+	run(405);
+	assert_int_equal(fake.setups, 1);
+}
+
+/* All frames of one identifier, put together; -1 where what came is no whole message. */
+static unsigned collect(uint32_t id, struct frame *messages, unsigned room)
+{
+	struct segment_join join = {0};
+	unsigned count = 0;
+
+	for (unsigned i = 0; i < fake.sent_count; i++) {
+		const struct frame *whole = NULL;
+
+		assert_true((fake.sent[i].flags & FRAME_FD) == 0 && fake.sent[i].length <= 8);
+		if (fake.sent[i].id == id)
+			whole = segment_feed(&join, &fake.sent[i]);
+		if (whole != NULL && count < room)
+			messages[count++] = *whole;
+	}
+	assert_int_equal(join.incomplete, 0);
+	return count;
+}
+
+static void classic_drop(void)
+{
+	static struct frame s1[64], s2[64], ends[64];
+	struct wire_capture_end end;
+	uint32_t crc = CRC32_INIT;
+
+	assert_int_equal(sdo(0x23, 0x2005, 0, 10).specifier, 0x60); /* a short window */
+	assert_int_equal(sdo(0x23, 0x2006, 0, 40).specifier, 0x60);
+	forget_frames();
+	fall(1);
+	separate();
+	run(30);
+	assert_int_equal(fake_count(WIRE_ID_BLOCK_S1), 0);
+	forget_frames();
+	s2x = 2000;
+	run(1);
+	s2x = 0;
+	for (unsigned ms = 0; ms < 220; ms++) { /* 1 Mbit/s takes 7.4 such frames a ms */
+		fake.can_room = 7;
+		run_ms();
+	}
+	assert_true(collect(WIRE_ID_CAPTURE_END, ends, 64) >= 1);
+	assert_int_equal(wire_unpack_capture_end(&ends[0], &end), 0);
+	assert_int_equal(end.last_tick_ms - end.first_tick_ms + 1, 50);
+	assert_int_equal(collect(WIRE_ID_RESENT_S1, s1, 64), 50);
+	assert_int_equal(collect(WIRE_ID_RESENT_S2, s2, 64), 50);
+	for (unsigned i = 0; i < 50; i++) {
+		assert_int_equal(wire_check_block(&s1[i]), 0);
+		crc = crc32(crc, s1[i].data + 10, 54);
+		crc = crc32(crc, s2[i].data + 10, 54);
+	}
+	assert_int_equal(crc, end.crc32);
+	fake.can_room = UINT32_MAX;
+	run(20);
+	forget_frames();
+	ask(2, end.first_tick_ms + 7, 1);
+	run(3);
+	assert_int_equal(collect(WIRE_ID_RESENT_S2, s1, 64), 1);
+	assert_memory_equal(s1[0].data, s2[7].data, 64);
+	assert_int_equal(order(WIRE_OP_ACCEPT, 0, end.crc32).result, 0);
+	run(300);
+	assert_int_equal(status().state, WIRE_STATE_SAFE);
+	assert_int_equal(counter(WIRE_COUNTER_frames_dropped), 0);
+	assert_int_equal(counter(WIRE_COUNTER_blocks_resent), 101);
+}
+
+static void classic_bus_uploads_after_the_drop(void **state)
+{
+	(void)state;
+	to_ready();
+	assert_int_equal(sdo(0x23, 0x200E, 0, 1).specifier, 0x60);
+	classic_drop();
+	fake_init(); /* a controller without FD */
+	fake.no_fd = true;
+	next_ms = 0;
+	app_init(PORT_RESET_POWER_ON);
+	run(250);
+	assert_int_equal(status().state, WIRE_STATE_READY);
+	assert_int_equal(sdo(0x40, 0x200E, 0, 0).value, 1);
+	assert_int_equal(sdo(0x23, 0x200E, 0, 0).value, 0x06060000);
+	classic_drop();
+}
+
+/* ---- what a capture end says ---- */
+
+static struct wire_capture_end capture_end(void)
+{
+	struct wire_capture_end end = {0};
+
+	forget_frames();
+	run(150);
+	assert_int_equal(wire_unpack_capture_end(last(WIRE_ID_CAPTURE_END), &end), 0);
+	return end;
+}
+
+static void zero_shift_is_marked(void **state)
+{
+	(void)state;
+	to_captured();
+	assert_int_equal(capture_end().marks, 0);
+	for (int sign = -1; sign <= 1; sign += 2)
+		for (int16_t beyond = 0; beyond < 2; beyond++) { /* default 480 counts */
+			to_separated();
+			run(30);
+			s2x = 2000;
+			run(1);
+			s2x = 0;
+			s2y_offset = (int16_t)(sign * (480 + 2 * beyond));
+			run(405);
+			assert_int_equal(capture_end().marks, beyond ? WIRE_MARK_ZERO_SHIFT : 0);
+		}
+}
+
+static void video_frame_of_the_first_tick(void **state)
+{
+	struct wire_capture_end end;
+
+	(void)state;
+	to_captured();
+	end = capture_end();
+	assert_int_equal(end.camera_frame, end.first_tick_ms - release_ms);
+	assert_true(end.camera_frame > 0);
+	/* a low tower with a long pre-trigger: the window begins before the release */
+	to_ready();
+	assert_int_equal(sdo(0x23, 0x2000, 0, 10000).specifier, 0x60);
+	assert_int_equal(sdo(0x23, 0x2001, 0, 20000).specifier, 0x60);
+	assert_int_equal(sdo(0x23, 0x2002, 0, 30000).specifier, 0x60);
+	assert_int_equal(sdo(0x23, 0x2003, 0, 40000).specifier, 0x60);
+	assert_int_equal(sdo(0x23, 0x2006, 0, 100).specifier, 0x60);
+	assert_int_equal(sdo(0x23, 0x2005, 0, 300).specifier, 0x60);
+	run(400);
+	fall(1);
+	app_on_gate(0, fake.now_us);
+	run(19);
+	app_on_gate(1, fake.now_us);
+	run(30);
+	assert_false(fake.outputs & WIRE_IO_MAGNET_HOLD);
+	s2x = 2000;
+	run(1);
+	s2x = 0;
+	run(105);
+	end = capture_end();
+	assert_in_range(end.camera_frame, -250, -230);
+	assert_int_equal(end.camera_frame, (int32_t)(end.first_tick_ms - release_ms));
+}
+
+/* Main is late just when the firmware decides that the frame never left its latch, and S2 was hit meanwhile.
+ */
+static void window_of_a_drop_that_was_none_is_thrown_away(void **state)
+{
+	(void)state;
+	to_armed();
+	assert_int_equal(order(WIRE_OP_RELEASE, TOKEN, 0).result, 0);
+	run(748); /* FAULT_HELD comes 756 ms after the release */
+	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
+	for (int16_t ms = 0; ms < 14; ms++) {
+		fake_time(next_ms++ * 1000);
+		app_on_tick();
+		for (int16_t k = 0; k < 10; k++) {
+			if (k < 7)
+				app_on_x(k, 2000, true);
+			app_on_yz(k, k, k, k, true);
+		}
+	}
+	forget_frames();
+	run(600);
+	assert_int_equal(fake_count(WIRE_ID_CAPTURE_END), 0);
+	assert_int_equal(status().state, WIRE_STATE_FAULT_HELD);
+	assert_int_equal(status().fault, WIRE_FAULT_LATCH);
+	assert_int_equal(order(WIRE_OP_CLEAR, 0, 0).result, 0);
+	run(200);
+	fall(2); /* the next one has its own */
+	separate();
+	run(130);
+	s2x = 2000;
+	run(1);
+	s2x = 0;
+	run(405);
+	assert_int_equal(capture_end().drop_id, 2);
+	assert_int_equal(capture_end().trigger_us, 100000);
+}
+
+/* ---- random frames, inputs, gates and a bus that comes and goes ---- */
+
+static void random_frame(uint32_t *seed)
+{
+	static const uint16_t ids[] = {0x000, 0x201, 0x201, 0x201, 0x301, 0x601, 0x601, 0x201};
+	struct frame frame = {.id = ids[fake_random(seed) % 8], .length = 8};
+	uint32_t r = fake_random(seed);
+
+	if (r % 16 == 0)
+		frame.length = (uint8_t)(r >> 8) % 9;
+	for (unsigned k = 0; k < 8; k++)
+		frame.data[k] = (uint8_t)fake_random(seed);
+	if (frame.id == WIRE_ID_COMMAND) { /* ARM and RELEASE with the same token, mostly */
+		frame.data[0] = (uint8_t)(1 + r / 16 % 7);
+		frame.data[2] = 0x34;
+		frame.data[3] = r / 128 % 8 ? 0x12 : 0x13;
+	}
+	if (frame.id == WIRE_ID_SDO_REQUEST) {
+		frame.data[0] = r % 64 == 0 ? 0x23 : 0x40;
+		frame.data[1] = (uint8_t)(r / 128 % 17);
+		frame.data[2] = 0x20;
+		frame.data[3] = 0;
+		frame.data[5] = frame.data[6] = frame.data[7] = 0;
+	}
+	if (frame.id == WIRE_ID_NMT && r % 4)
+		frame.length = 2;
+	fake_receive(&frame);
+}
+
+static void random_world(uint32_t *seed, bool falling)
+{
+	uint32_t r = fake_random(seed);
+
+	fake.inputs = FAKE_ALL_GOOD;
+	if (r % 256 == 0)
+		fake.inputs ^= (uint16_t)(1u << (4 + (r >> 8) % 11));
+	if (falling)
+		fake.inputs &= (uint16_t)~WIRE_IO_LATCH_CLOSED;
+	if (falling && r >> 16 & 1)
+		app_on_gate(r >> 17 & 1, fake.now_us);
+	fake.bus_off = (r >> 18) % 512 == 0;
+	fake.can_room = (r >> 24) % 16 ? UINT32_MAX : (r >> 28);
+	fake.no_setup = (r >> 20) % 16 == 0;
+	s2x = !falling || (r >> 12) % 64 ? 0 : 2000;
+}
+
+static void whole_firmware_stays_safe(void **state)
+{
+	uint32_t seed = 20261123;
+	bool falling = false;
+	unsigned falls = 0;
+
+	(void)state;
+	to_ready();
+	for (unsigned step = 0; step < 30000; step++) {
+		uint16_t before = fake.outputs;
+
+		if (fake_random(&seed) % 8 == 0)
+			random_frame(&seed);
+		if (fake_random(&seed) % 2)
+			random_world(&seed, falling);
+		run_ms();
+		if (fake.outputs & ~before & WIRE_IO_LATCH_OPEN) {
+			falls++;
+			if (!(fake.inputs & WIRE_IO_DOOR_CLOSED) || !(fake.inputs & WIRE_IO_DAMPERS_ENGAGED))
+				fail_msg("latch opened with door or dampers red, step %u", step);
+		}
+		falling = fake.outputs & WIRE_IO_LATCH_OPEN;
+		if ((before & ~fake.outputs & WIRE_IO_MAGNET_HOLD) && !(before & WIRE_IO_DAMPERS_RELIEVE))
+			fail_msg("magnet let go without a fall, step %u", step);
+		forget_frames();
+	}
+	assert_true(falls > 10);
 }
 
 int main(void)
@@ -791,11 +1151,20 @@ int main(void)
 	        cmocka_unit_test(aborted_fall_is_captured_and_marked),
 	        cmocka_unit_test(reset_at_rest_only),
 	        cmocka_unit_test(parameters_by_sdo),
+	        cmocka_unit_test(abort_of_a_transfer_needs_no_answer),
 	        cmocka_unit_test(parameters_are_not_written_while_armed),
 	        cmocka_unit_test(new_parameters_move_the_edges),
 	        cmocka_unit_test(strange_frames_are_counted),
 	        cmocka_unit_test(bus_off_is_counted_and_told),
 	        cmocka_unit_test(late_main_loses_nothing_in_the_capture),
+	        cmocka_unit_test(bus_is_set_up_at_reset),
+	        cmocka_unit_test(bus_follows_its_parameters),
+	        cmocka_unit_test(refused_bus_is_asked_for_again),
+	        cmocka_unit_test(classic_bus_uploads_after_the_drop),
+	        cmocka_unit_test(zero_shift_is_marked),
+	        cmocka_unit_test(video_frame_of_the_first_tick),
+	        cmocka_unit_test(window_of_a_drop_that_was_none_is_thrown_away),
+	        cmocka_unit_test(whole_firmware_stays_safe),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -76,6 +76,7 @@ static void test_one_drop_in_every_format(void **state)
 		drop.sample[1][6][19] = 16001;
 		drop.marks = seed == 3 ? 1u << 1 | 1u << 5 : 1u << 3;
 		drop.frame_speed_mm_s = (uint16_t)(seed == 4 ? 0 : 3912 + seed);
+		drop.camera_frame = (int16_t)(seed == 2 ? -300 : 32767);
 		record = make_drop(seed, seed > 1, seed != 4);
 		assert_int_equal(record.crc_agrees, seed == 1);
 		hand_unlink(round_trip(&record, ".log", "candump"));
@@ -229,6 +230,10 @@ static void test_refusals(void **state)
 	refuse("csv 1\n", "csv 1\n# blocks -1\n", 2, "blocks \"-1\"");
 	refuse("csv 1\n", "csv 1\n# blocks 18446744073709551616\n", 2, "blocks");
 	refuse("csv 1\n", "csv 1\n# trigger_s soon\n", 2, "trigger_s \"soon\"");
+	refuse("csv 1\n", "csv 1\n# camera_frame -32769\n", 2, "camera_frame \"-32769\"");
+	refuse("csv 1\n", "csv 1\n# camera_frame 32768\n", 2, "camera_frame \"32768\"");
+	refuse("csv 1\n", "csv 1\n# camera_frame 12.5\n", 2, "camera_frame \"12.5\"");
+	refuse("csv 1\n", "csv 1\n# camera_frame late\n", 2, "camera_frame \"late\"");
 	refuse("csv 1\n", "csv 1\n# drop_id 3\n", 5, "S1X S1Y");
 	refuse("csv 1\n", "csv 1\n# drop_id 3\n# last_tick_ms 5000\n", 6, "ticks");
 	refuse("rate_hz=4", "rate_hz=0", 2, "expected rate_hz=");
@@ -284,7 +289,7 @@ static void test_what_cannot_be_written(void **state)
 	assert_int_equal(write_record(&record, "/dev/null", message), DT_E_ARGUMENT);
 	assert_non_null(strstr(message, "/dev/null: unknown ending, expected"));
 	assert_int_equal(write_record(&record, "/nonexistent/x.csv", message), DT_E_SYSTEM);
-	assert_non_null(strstr(message, "/nonexistent/x.csv: No such file or directory"));
+	assert_non_null(strstr(message, "/nonexistent/x.csv: cannot be written: No such file or directory"));
 	assert_int_equal(write_record(&record, "/nonexistent/x.lcm", message), DT_E_ARGUMENT);
 	assert_non_null(strstr(message, "not a drop"));
 	assert_int_equal(write_csv(&record, stdout), DT_E_ARGUMENT);

@@ -135,6 +135,59 @@ static void host_must_beat_and_have_our_hash(void **state)
 	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), 0);
 }
 
+/* 100 ticks at rest with one S2 sample of a code. */
+static bool trigger_is_red(unsigned channel, unsigned k, int16_t code, unsigned state)
+{
+	for (unsigned t = 0; t < 100; t++) {
+		struct acquire_tick tick = {.status = {(uint8_t)state, (uint8_t)state}};
+
+		if (t == 37)
+			*at(&tick, channel, k) = code;
+		health_samples(&health, &tick);
+	}
+	return (health_checks(&health, FAKE_ALL_GOOD) & WIRE_CHECK_TRIGGER) != 0;
+}
+
+static void trigger_must_be_quiet_at_rest(void **state)
+{
+	(void)state;
+	assert_false(trigger_is_red(3, 0, 960, WIRE_STATE_READY)); /* the level itself does not trigger */
+	assert_true(trigger_is_red(3, 6, 961, WIRE_STATE_READY));
+	assert_true(trigger_is_red(4, 9, -961, WIRE_STATE_SAFE));
+	assert_false(trigger_is_red(0, 0, 5000, WIRE_STATE_READY)); /* S1 and Z do not trigger */
+	assert_false(trigger_is_red(5, 0, 5000, WIRE_STATE_READY));
+	assert_false(trigger_is_red(3, 0, WIRE_SAMPLE_NOT_TAKEN, WIRE_STATE_READY));
+	assert_false(trigger_is_red(3, 0, 5000, WIRE_STATE_BRAKED)); /* there it is the impact */
+	parameters.value[WIRE_PARAMETER_trigger_counts] = 160;
+	assert_true(trigger_is_red(4, 0, 161, WIRE_STATE_SAFE));
+}
+
+static void zero_is_the_offset_of_the_last_window_at_rest(void **state)
+{
+	(void)state;
+	after_window(4, -100, 50);
+	assert_int_equal(health.zero[4], -100);
+	assert_int_equal(health.zero[3], 0);
+	for (unsigned t = 0; t < 100; t++) { /* one tick in motion spoils the window */
+		struct acquire_tick tick = {.status = {t == 50 ? WIRE_STATE_FALLING : WIRE_STATE_ARMED}};
+
+		for (unsigned k = 0; k < 10; k++)
+			tick.sensor[1].y[k] = 300;
+		health_samples(&health, &tick);
+	}
+	assert_int_equal(health.zero[4], -100);
+	for (unsigned t = 0; t < 100; t++) { /* no sample, no news */
+		struct acquire_tick tick = {0};
+
+		for (unsigned k = 0; k < 10; k++)
+			tick.sensor[1].y[k] = WIRE_SAMPLE_NOT_TAKEN;
+		health_samples(&health, &tick);
+	}
+	assert_int_equal(health.zero[4], -100);
+}
+
+static uint16_t stuck_marks;
+
 static void run_stuck(unsigned ticks, unsigned state, int16_t other)
 {
 	for (unsigned t = 0; t < ticks; t++) {
@@ -144,6 +197,7 @@ static void run_stuck(unsigned ticks, unsigned state, int16_t other)
 			for (unsigned k = 0; k < (channel % 3 ? 10u : 7u); k++)
 				*at(&tick, channel, k) = channel == 4 ? 123 : (int16_t)((int)k + other);
 		health_samples(&health, &tick);
+		stuck_marks = tick.marks;
 	}
 }
 
@@ -152,11 +206,17 @@ static void stuck_channel_in_motion_is_counted_once(void **state)
 	(void)state;
 	run_stuck(200, WIRE_STATE_SAFE, 0);
 	assert_int_equal(counters[WIRE_COUNTER_samples_stuck], 0);
+	assert_int_equal(stuck_marks, 0);
 	run_stuck(19, WIRE_STATE_FALLING, 0);
 	assert_int_equal(counters[WIRE_COUNTER_samples_stuck], 0);
+	assert_int_equal(stuck_marks, 0);
+	run_stuck(1, WIRE_STATE_SEPARATED, 0);
+	assert_int_equal(stuck_marks, WIRE_MARK_STUCK);
 	run_stuck(100, WIRE_STATE_SEPARATED, 0);
 	assert_int_equal(counters[WIRE_COUNTER_samples_stuck], 1);
+	assert_int_equal(stuck_marks, WIRE_MARK_STUCK); /* as long as it lasts */
 	run_stuck(1, WIRE_STATE_CAPTURED, 0);
+	assert_int_equal(stuck_marks, 0);
 	run_stuck(30, WIRE_STATE_FALLING, 0); /* the next drop */
 	assert_int_equal(counters[WIRE_COUNTER_samples_stuck], 2);
 }
@@ -169,6 +229,8 @@ int main(void)
 	        cmocka_unit_test_setup(absent_samples_make_a_sensor_red, begin),
 	        cmocka_unit_test_setup(each_input_has_its_check, begin),
 	        cmocka_unit_test_setup(host_must_beat_and_have_our_hash, begin),
+	        cmocka_unit_test_setup(trigger_must_be_quiet_at_rest, begin),
+	        cmocka_unit_test_setup(zero_is_the_offset_of_the_last_window_at_rest, begin),
 	        cmocka_unit_test_setup(stuck_channel_in_motion_is_counted_once, begin),
 	};
 

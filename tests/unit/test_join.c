@@ -95,12 +95,63 @@ static void test_a_lossless_drop(void **state)
 	assert_int_equal(record.crc32, hand_drop_crc32(&drop));
 	assert_true(record.trigger_s == 0.100123);
 	assert_true(record.frame_speed_m_s == 3.912);
+	assert_int_equal(record.camera_frame, 341);
 	assert_true(record.channels[0].range_g == 500);
 	assert_int_equal(record.lost_samples, 0);
 	assert_int_equal(record.flags, 0);
 	assert_int_equal(record.gap_count, 0);
 	record_free(&record);
 	assert_false(join_has_capture(join));
+}
+
+/* A message in segments of seven bytes, laid out by hand, but for segment `lost`. */
+static int feed_segments(const struct frame *whole, unsigned lost)
+{
+	unsigned count = (whole->length + 6u) / 7u;
+	int result = 0;
+
+	for (unsigned i = 0; i < count; i++) {
+		struct frame segment = {.id = whole->id, .length = 8, .time_us = 1};
+
+		segment.data[0] = (uint8_t)(i | (i + 1 == count ? 0x80 : 0));
+		for (unsigned k = 0; k < 7 && 7 * i + k < whole->length; k++)
+			segment.data[1 + k] = whole->data[7 * i + k];
+		if (i != lost)
+			result = join_feed(join, &segment);
+	}
+	return result;
+}
+
+static void test_classic_upload(void **state)
+{
+	struct record record;
+	struct record_gap gap;
+	struct frame frame;
+
+	(void)state;
+	hand_fill(&drop, 5000, 300, 9);
+	hand_capture_end(&drop, &frame);
+	assert_int_equal(feed_segments(&frame, 2), 0);
+	assert_int_equal(feed_segments(&frame, 99), 1);
+	for (unsigned sensor = 1; sensor <= 2; sensor++)
+		for (uint32_t tick = 0; tick < 300; tick++) {
+			hand_block(&drop, sensor, tick, true, &frame);
+			feed_segments(&frame, sensor == 2 && tick == 77 ? 4 : 99);
+		}
+	assert_false(join_complete(join));
+	assert_true(join_next_gap(join, 0, 0, 32, &gap));
+	assert_int_equal(gap.sensor, 2);
+	assert_int_equal(gap.first_tick_ms, 5077);
+	assert_int_equal(gap.last_tick_ms, 5077);
+	hand_block(&drop, 2, 77, true, &frame);
+	feed_segments(&frame, 99);
+	assert_true(join_complete(join));
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	check_counters(&record,
+	               (struct record_counters){.blocks = 600, .resent = 600, .corrupt = 2, .gaps = 2});
+	assert_int_equal(record.camera_frame, 341);
+	record_free(&record);
 }
 
 static void test_marks_and_marked_samples(void **state)
@@ -720,6 +771,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        TEST(test_a_lossless_drop),
+	        TEST(test_classic_upload),
 	        TEST(test_marks_and_marked_samples),
 	        TEST(test_random_losses_are_counted_and_recovered),
 	        TEST(test_what_stays_missing_is_listed),

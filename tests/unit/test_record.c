@@ -93,6 +93,9 @@ static void test_flags_follow_from_the_drop(void **state)
 	assert_int_equal(flags_of(WIRE_MARK_CLIPPED, true, true), RECORD_FLAG_CLIPPED);
 	assert_int_equal(flags_of(WIRE_MARK_OVERRUN, true, true), RECORD_FLAG_OVERRUN);
 	assert_int_equal(flags_of(WIRE_MARK_FULL_SCALE, true, true), RECORD_FLAG_FULL_SCALE);
+	assert_int_equal(flags_of(WIRE_MARK_ZERO_SHIFT, true, true), RECORD_FLAG_ZERO_SHIFT);
+	assert_int_equal(flags_of(WIRE_MARK_CABLE, true, true), RECORD_FLAG_CABLE);
+	assert_int_equal(flags_of(WIRE_MARK_STUCK, true, true), RECORD_FLAG_STUCK);
 }
 
 static void test_names(void **state)
@@ -112,6 +115,9 @@ static void test_names(void **state)
 	        {RECORD_FLAG_UNEVEN, "uneven_sampling"},
 	        {RECORD_FLAG_FULL_SCALE, "full_scale"},
 	        {RECORD_FLAG_OVERRUN, "overrun"},
+	        {RECORD_FLAG_ZERO_SHIFT, "zero_shift"},
+	        {RECORD_FLAG_CABLE, "cable"},
+	        {RECORD_FLAG_STUCK, "stuck"},
 	        {0, ""},
 	        {1u << 31, ""},
 	};

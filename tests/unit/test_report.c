@@ -118,6 +118,7 @@ static int set_up(void **state)
 	f->record.trigger_s = 0.1004;
 	f->record.frame_speed_m_s = 3.703;
 	f->record.crc32 = 0xFEDCBA98u;
+	f->record.camera_frame = 341;
 	f->record.crc_known = true;
 	f->record.crc_agrees = true;
 	f->record.counters.blocks = 1000;
@@ -229,6 +230,7 @@ static void test_json(void **state)
 	assert_int_equal(cJSON_GetArraySize(item(root, "flags")), 0);
 	check_number(root, "lost_samples", 0);
 	check_number(root, "drop.drop_id", 7);
+	check_number(root, "drop.camera_frame", 341);
 	check_number(root, "drop.crc32", 4275878552.0);
 	assert_true(cJSON_IsTrue(item(root, "drop.crc_agrees")));
 	check_number(root, "drop.counters.blocks", 1000);
@@ -289,7 +291,7 @@ static void test_json_unknown_is_null(void **state)
 
 static void test_json_foreign(void **state)
 {
-	static const char bad_utf8[] = "caf\xe9 \xc3\xa9 \xed\x9f\xbf\xff.csv";
+	static const char bad_utf8[] = "caf\xe9 \xc3\xa9 \xed\x9f\xbf\xff \xed\xa0\x80 \xf4\x90\x80\x80.csv";
 	struct fixture *f = *state;
 	cJSON *root;
 
@@ -301,7 +303,7 @@ static void test_json_foreign(void **state)
 	f->report.prediction = NULL;
 	memcpy(f->record.file, bad_utf8, sizeof(bad_utf8));
 	root = parse(&f->report);
-	check_string(root, "file", "caf? \xc3\xa9 \xed\x9f\xbf?.csv");
+	check_string(root, "file", "caf? \xc3\xa9 \xed\x9f\xbf? ??? ????.csv");
 	assert_true(cJSON_IsNull(item(root, "drop")));
 	assert_true(cJSON_IsNull(item(root, "scene")));
 	assert_true(cJSON_IsNull(item(root, "lag")));
@@ -401,6 +403,8 @@ static void test_text(void **state)
 	check_has(text, "because it is by hand");
 	check_has(text, "363.0      340.5       +6.6 %");
 	check_has(text, "S2X leaves 10 % of its peak");
+	check_has(text,
+	          "1 000 Hz video: time 0 is in frame 441, S2 X peaks in 442.\n"); /* 341 + 100, 101.5 */
 	assert_null(strstr(text, "frames:"));
 	free(text);
 }
@@ -440,6 +444,30 @@ static void test_verdicts(void **state)
 	f->record.lost_samples = 3;
 	assert_false(report_verdict(&f->report, line, sizeof(line)));
 	check_has(line, "3 samples lost");
+}
+
+static void test_video_frames(void **state)
+{
+	struct fixture *f = *state;
+	struct report_zero zero = {.time_s = 0.0123};
+	char line[96];
+	long frame;
+
+	f->record.camera_frame = -13; /* the window begins before the release */
+	assert_true(report_video(&f->report, &zero, line, sizeof(line)));
+	assert_string_equal(line, "1 000 Hz video: time 0 is in frame -1, S2 X peaks in 88");
+	assert_true(report_video_frame(&f->report, 0.01301, &frame));
+	assert_int_equal(frame, 0);
+	f->estimates[3].peak.time_s = (double)NAN;
+	assert_true(report_video(&f->report, &zero, line, sizeof(line)));
+	assert_string_equal(line, "1 000 Hz video: time 0 is in frame -1");
+	assert_false(report_video_frame(&f->report, (double)NAN, &frame));
+	f->record.crc_known = false;
+	assert_false(report_video(&f->report, &zero, line, sizeof(line)));
+	assert_string_equal(line, "");
+	f->record.crc_known = true;
+	f->record.is_drop = false;
+	assert_false(report_video(&f->report, &zero, line, sizeof(line)));
 }
 
 /* ---- pictures ---- */
@@ -611,6 +639,7 @@ static void test_html(void **state)
 	check_has(page, "test &lt;version&gt;");
 	check_has(page, "complete: every sample arrived");
 	check_has(page, "300.33 &plusmn; 0.34");
+	check_has(page, "time 0 is in frame 441, S2 X peaks in 442. ");
 	check_has(page, "+6.6 %");
 	check_has(page, "129.37 &plusmn; 0.02 Hz");
 	check_has(page, "because it is by hand");
@@ -724,6 +753,7 @@ int main(void)
 	        TEST(test_text),
 	        TEST(test_text_of_holes),
 	        TEST(test_verdicts),
+	        TEST(test_video_frames),
 	        TEST(test_traces_keep_gaps_open),
 	        TEST(test_no_foreign_text_in_scripts),
 	        TEST(test_picture),

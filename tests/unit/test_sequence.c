@@ -9,8 +9,11 @@
 #include <setjmp.h>
 #include <cmocka.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
+#include "common/wire_table.h"
+#include "firmware/health.h"
 #include "firmware/sequence.h"
 #include "tests/unit/fake_port.h"
 
@@ -173,61 +176,75 @@ static void (*const reach[WIRE_STATES])(void) = {
         to_braked, to_captured, to_uploaded, to_fault_held, to_fault_moving,
 };
 
-/* Everything that may happen; what is not here must be SEQUENCE_NO. */
-static const struct {
-	uint8_t from, event, to;
-} expected[] = {
-        {STATE(BOOT), EVENT(TESTED), STATE(SAFE)},
-        {STATE(SAFE), EVENT(GREEN), STATE(READY)},
-        {STATE(SAFE), EVENT(RED), SEQUENCE_STAY},
-        {STATE(READY), EVENT(GREEN), SEQUENCE_STAY},
-        {STATE(READY), EVENT(RED), STATE(SAFE)},
-        {STATE(READY), EVENT(ARM), STATE(ARMED)},
-        {STATE(ARMED), EVENT(GREEN), SEQUENCE_STAY},
-        {STATE(ARMED), EVENT(RED), STATE(SAFE)},
-        {STATE(ARMED), EVENT(RELEASE), STATE(FALLING)},
-        {STATE(ARMED), EVENT(EXPIRED), STATE(READY)},
-        {STATE(FALLING), EVENT(FREE), STATE(SEPARATED)},
-        {STATE(SEPARATED), EVENT(BRAKE), STATE(BRAKED)},
-        {STATE(SEPARATED), EVENT(FULL), STATE(CAPTURED)},
-        {STATE(BRAKED), EVENT(FULL), STATE(CAPTURED)},
-        {STATE(FAULT_MOVING), EVENT(FULL), STATE(CAPTURED)},
-        {STATE(CAPTURED), EVENT(ACCEPT), STATE(UPLOADED)},
-        {STATE(CAPTURED), EVENT(DISCARD), STATE(UPLOADED)},
-        {STATE(UPLOADED), EVENT(DONE), STATE(SAFE)},
-        {STATE(FAULT_HELD), EVENT(CLEAR), STATE(SAFE)},
-        /* an abort disarms at rest, brakes in motion, and loses nothing that was recorded */
-        {STATE(BOOT), EVENT(ABORT), SEQUENCE_STAY},
-        {STATE(SAFE), EVENT(ABORT), SEQUENCE_STAY},
-        {STATE(READY), EVENT(ABORT), STATE(SAFE)},
-        {STATE(ARMED), EVENT(ABORT), STATE(SAFE)},
-        {STATE(FALLING), EVENT(ABORT), STATE(FAULT_MOVING)},
-        {STATE(SEPARATED), EVENT(ABORT), STATE(FAULT_MOVING)},
-        {STATE(BRAKED), EVENT(ABORT), STATE(FAULT_MOVING)},
-        {STATE(CAPTURED), EVENT(ABORT), SEQUENCE_STAY},
-        {STATE(UPLOADED), EVENT(ABORT), SEQUENCE_STAY},
-        {STATE(FAULT_HELD), EVENT(ABORT), SEQUENCE_STAY},
-        {STATE(FAULT_MOVING), EVENT(ABORT), SEQUENCE_STAY},
-        /* a fault */
-        {STATE(BOOT), EVENT(FAULT), STATE(FAULT_HELD)},
-        {STATE(SAFE), EVENT(FAULT), STATE(FAULT_HELD)},
-        {STATE(READY), EVENT(FAULT), STATE(FAULT_HELD)},
-        {STATE(ARMED), EVENT(FAULT), STATE(FAULT_HELD)},
-        {STATE(FALLING), EVENT(FAULT), STATE(FAULT_MOVING)},
-        {STATE(SEPARATED), EVENT(FAULT), STATE(FAULT_MOVING)},
-        {STATE(BRAKED), EVENT(FAULT), STATE(FAULT_MOVING)},
-        {STATE(CAPTURED), EVENT(FAULT), SEQUENCE_STAY},
-        {STATE(UPLOADED), EVENT(FAULT), STATE(FAULT_HELD)},
-        {STATE(FAULT_HELD), EVENT(FAULT), SEQUENCE_STAY},
-        {STATE(FAULT_MOVING), EVENT(FAULT), SEQUENCE_STAY},
+/* ---- the table in firmware/README.md ---- */
+
+static uint8_t expected[WIRE_STATES][SEQUENCE_EVENTS];
+static char reason[WIRE_STATES][SEQUENCE_EVENTS];
+static bool explained[128];
+
+static const char *const event_names[SEQUENCE_EVENTS] = {
+        "TESTED",  "GREEN",   "RED",  "ARM",   "RELEASE", "ABORT", "CLEAR", "ACCEPT",
+        "DISCARD", "EXPIRED", "FREE", "BRAKE", "FULL",    "DONE",  "STILL", "FAULT",
 };
+
+static unsigned find_state(const char *name)
+{
+	for (unsigned i = 0; i < WIRE_STATES; i++)
+		if (strcmp(name, wire_state_name(i)) == 0)
+			return i;
+	return strcmp(name, "stay") == 0 ? SEQUENCE_STAY : strcmp(name, "no") == 0 ? SEQUENCE_NO : 0xEE;
+}
+
+static unsigned find_event(const char *name)
+{
+	unsigned i = 0;
+
+	while (i < SEQUENCE_EVENTS && strcmp(name, event_names[i]) != 0)
+		i++;
+	return i;
+}
+
+/* "| EVENT | NEXT why | NEXT why | ..." with a cell for each state. */
+static bool read_row(char *line)
+{
+	char *rest, *word = strtok_r(line, "| \n", &rest);
+	unsigned event = word == NULL ? SEQUENCE_EVENTS : find_event(word);
+
+	if (event == SEQUENCE_EVENTS)
+		return false;
+	for (unsigned s = 0; s < WIRE_STATES; s++) {
+		const char *next = strtok_r(NULL, "| \n", &rest), *why = strtok_r(NULL, "| \n", &rest);
+
+		if (next == NULL || why == NULL || why[1] != '\0' || find_state(next) == 0xEE)
+			fail_msg("README, %s, column %u: no next state and reason", word, s);
+		expected[s][event] = (uint8_t)find_state(next);
+		reason[s][event] = why[0];
+	}
+	return true;
+}
+
+static int read_readme(void **state)
+{
+	FILE *file = fopen("firmware/README.md", "r");
+	char line[1024];
+	unsigned rows = 0;
+
+	(void)state;
+	if (file == NULL)
+		return -1;
+	while (fgets(line, sizeof(line), file) != NULL) {
+		if (line[0] == '|')
+			rows += read_row(line);
+		else if (strncmp(line, "- **", 4) == 0 && strncmp(line + 5, "** ", 3) == 0)
+			explained[line[4] & 0x7F] = true;
+	}
+	fclose(file);
+	return rows == SEQUENCE_EVENTS ? 0 : -1;
+}
 
 static unsigned expect(unsigned from, unsigned event)
 {
-	for (size_t i = 0; i < sizeof(expected) / sizeof(expected[0]); i++)
-		if (expected[i].from == from && expected[i].event == event)
-			return expected[i].to;
-	return SEQUENCE_NO;
+	return expected[from][event];
 }
 
 static void table_is_the_one_of_the_design(void **state)
@@ -238,8 +255,11 @@ static void table_is_the_one_of_the_design(void **state)
 			unsigned to = sequence_next(from, (enum sequence_event)event);
 
 			if (to != expect(from, event))
-				fail_msg("state %u event %u: goes to %u, expected %u", from, event, to,
-				         expect(from, event));
+				fail_msg("state %u event %s: goes to %u, expected %u", from,
+				         event_names[event], to, expect(from, event));
+			if (!explained[reason[from][event] & 0x7F])
+				fail_msg("state %u event %s: no reason \"%c\"", from, event_names[event],
+				         reason[from][event]);
 		}
 }
 
@@ -535,6 +555,7 @@ static void gates_out_of_order_or_missing(void **state)
 	assert_in_range(fake.off_us[1], 1387901, 1387904);
 }
 
+/* Twice the free fall to the lower gate, 0.7 m: 755.55 ms. */
 static void latch_must_open(void **state)
 {
 	(void)state;
@@ -546,6 +567,66 @@ static void latch_must_open(void **state)
 	assert_int_equal(sequence.state, STATE(FAULT_MOVING));
 	assert_int_equal(sequence.fault, WIRE_FAULT_LATCH);
 	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
+	ticks(654);
+	assert_int_equal(sequence.state, STATE(FAULT_MOVING));
+	assert_int_equal(sequence_tick_marks(&sequence), 0); /* nothing to record */
+	tick();
+	assert_int_equal(sequence.state, STATE(FAULT_HELD));
+	assert_int_equal(sequence.fault, WIRE_FAULT_LATCH);
+	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
+	assert_int_equal(command(WIRE_OP_CLEAR, 0, 0), 0);
+}
+
+static void abort_before_the_latch_opens_holds(void **state)
+{
+	(void)state;
+	to_armed();
+	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), 0);
+	ticks(5);
+	assert_int_equal(command(WIRE_OP_ABORT, 0, 0), 0);
+	ticks(750);
+	assert_int_equal(sequence.state, STATE(FAULT_MOVING));
+	tick();
+	assert_int_equal(sequence.state, STATE(FAULT_HELD));
+	assert_int_equal(sequence.fault, WIRE_FAULT_ABORTED);
+}
+
+/* Any one of the witnesses is enough: then it was a fall. */
+static void frame_that_moved_is_recorded(void **state)
+{
+	static const struct {
+		uint16_t toggle;
+		int gate;
+	} witnesses[] = {{WIRE_IO_LATCH_CLOSED, -1},
+	                 {WIRE_IO_GATE_UPPER, -1},
+	                 {WIRE_IO_GATE_LOWER, -1},
+	                 {WIRE_IO_FRAME_DOWN, -1},
+	                 {0, 0},
+	                 {0, 1}};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(witnesses) / sizeof(witnesses[0]); i++) {
+		to_armed();
+		assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), 0);
+		ticks(101);
+		assert_int_equal(sequence.state, STATE(FAULT_MOVING));
+		ticks(640); /* beyond the time for an impact: 600 ms */
+		assert_int_equal(sequence_tick_marks(&sequence), 0);
+		fake.inputs ^= witnesses[i].toggle;
+		if (witnesses[i].gate >= 0)
+			sequence_gate(&sequence, (unsigned)witnesses[i].gate, fake.now_us);
+		tick();
+		fake.inputs ^= witnesses[i].toggle;
+		assert_int_equal(sequence_tick_marks(&sequence), WIRE_MARK_NO_IMPACT);
+		ticks(200);
+		assert_int_equal(sequence.state, STATE(FAULT_MOVING));
+	}
+	to_armed(); /* and so is a window that is open already */
+	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), 0);
+	ticks(200);
+	sequence_triggered(&sequence);
+	ticks(800);
+	assert_int_equal(sequence.state, STATE(FAULT_MOVING));
 }
 
 static void product_must_stay_until_magnet_off(void **state)
@@ -578,9 +659,8 @@ static void fault_in_motion_brakes_and_keeps_holding(void **state)
 		uint16_t check;
 		uint8_t fault;
 	} faults[] = {
-	        {WIRE_CHECK_ESTOP, WIRE_FAULT_ESTOP},
-	        {WIRE_CHECK_DOOR, WIRE_FAULT_DOOR},
-	        {WIRE_CHECK_SUPPLY, WIRE_FAULT_BROWN_OUT},
+	        {WIRE_CHECK_ESTOP, WIRE_FAULT_ESTOP},      {WIRE_CHECK_DOOR, WIRE_FAULT_DOOR},
+	        {WIRE_CHECK_SUPPLY, WIRE_FAULT_BROWN_OUT}, {WIRE_CHECK_DAMPERS, WIRE_FAULT_DAMPERS},
 	        {WIRE_CHECK_HOST, WIRE_FAULT_NONE}, /* the drop goes on */
 	};
 
@@ -599,6 +679,77 @@ static void fault_in_motion_brakes_and_keeps_holding(void **state)
 		assert_int_equal((fake.outputs & WIRE_IO_MAGNET_HOLD) != 0, braked);
 		assert_false(fake.outputs & WIRE_IO_DAMPERS_RELIEVE);
 	}
+}
+
+/* What a lost check leads to at rest, armed and in motion: firmware/README.md's second table. */
+static void loss_in_every_state(void **state)
+{
+	static const struct {
+		uint16_t check;
+		uint8_t armed, moving; /* fault */
+	} losses[] = {
+	        {WIRE_CHECK_ESTOP, WIRE_FAULT_ESTOP, WIRE_FAULT_ESTOP},
+	        {WIRE_CHECK_DOOR, WIRE_FAULT_DOOR, WIRE_FAULT_DOOR},
+	        {WIRE_CHECK_SUPPLY, WIRE_FAULT_BROWN_OUT, WIRE_FAULT_BROWN_OUT},
+	        {WIRE_CHECK_DAMPERS, WIRE_FAULT_DAMPERS, WIRE_FAULT_DAMPERS},
+	        {WIRE_CHECK_LATCH, WIRE_FAULT_LATCH, 0},
+	        {WIRE_CHECK_PRODUCT, WIRE_FAULT_MAGNET, 0},
+	        {WIRE_CHECK_GATES, WIRE_FAULT_GATES, 0},
+	        {WIRE_CHECK_HOST, WIRE_FAULT_HOST_LOST, 0},
+	        {WIRE_CHECK_SENSOR_S1, 0, 0},
+	        {WIRE_CHECK_SENSOR_S2, 0, 0},
+	        {WIRE_CHECK_TRIGGER, 0, 0},
+	};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(losses) / sizeof(losses[0]); i++)
+		for (unsigned s = 0; s < WIRE_STATES; s++) {
+			bool moving = s >= STATE(FALLING) && s <= STATE(BRAKED);
+			unsigned fault = s == STATE(ARMED) ? losses[i].armed : moving ? losses[i].moving : 0;
+			unsigned next = s, magnet;
+
+			if (s == STATE(READY) || s == STATE(ARMED))
+				next = fault ? STATE(FAULT_HELD) : STATE(SAFE);
+			else if (fault)
+				next = STATE(FAULT_MOVING);
+			reach[s]();
+			if (s != STATE(FAULT_HELD) && s != STATE(FAULT_MOVING))
+				assert_int_equal(sequence.fault, 0);
+			else
+				fault = sequence.fault;
+			magnet = fake.outputs & WIRE_IO_MAGNET_HOLD;
+			checks |= losses[i].check;
+			tick();
+			if (sequence.state != next || sequence.fault != fault)
+				fail_msg("state %u, check %#x lost: state %u fault %u, expected %u %u", s,
+				         losses[i].check, sequence.state, sequence.fault, next, fault);
+			assert_int_equal(fake.outputs & WIRE_IO_MAGNET_HOLD, magnet);
+		}
+}
+
+/* The controller forgets everything; what is at the pins is what a fault in motion wants. */
+static void reset_in_every_state(void **state)
+{
+	static const enum port_reset causes[] = {PORT_RESET_WATCHDOG, PORT_RESET_BROWN_OUT};
+	static const uint8_t faults[] = {WIRE_FAULT_WATCHDOG, WIRE_FAULT_BROWN_OUT};
+
+	(void)state;
+	for (unsigned s = 0; s < WIRE_STATES; s++)
+		for (size_t i = 0; i < 2; i++) {
+			reach[s]();
+			fake.outputs = WIRE_IO_MAGNET_HOLD; /* as the drivers hold it in reset */
+			fake.planned = 0;
+			now_ms = 0;
+			sequence_init(&sequence, &parameters, counters, causes[i]);
+			ticks(200);
+			assert_int_equal(sequence.state, STATE(FAULT_HELD));
+			assert_int_equal(sequence.fault, faults[i]);
+			assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
+			assert_int_equal(command(WIRE_OP_ARM, TOKEN, 0), DT_E_STATE);
+			assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), DT_E_STATE);
+			assert_int_equal(command(WIRE_OP_CLEAR, 0, 0), 0);
+			assert_int_equal(sequence.state, STATE(SAFE));
+		}
 }
 
 static void no_impact_is_forced_after_600_ms(void **state)
@@ -669,105 +820,183 @@ static void drop_id_counts_releases_and_skips_zero(void **state)
 
 /* ---- random walks ---- */
 
+/* What the invariants need to know is kept here, from inputs, commands and outputs alone. */
 struct walk {
 	uint32_t seed, start_seed, step;
-	bool released; /* since SAFE was last entered */
-	bool armed_with_token;
+	bool released;        /* since the magnet was last seen on at rest */
+	uint16_t armed_token; /* of the last ARM that was taken; 0 once it cannot count any more */
+	uint16_t release_token;
+	uint32_t moving_ms; /* how long it has been in motion */
 	unsigned visited[WIRE_STATES];
+	unsigned opened, let_go, still;
 };
 
-static void check_invariants(struct walk *walk, uint16_t before, bool may_release)
-{
-	uint8_t s = sequence.state;
-	bool moving = s >= STATE(FALLING) && s <= STATE(BRAKED);
-	const char *wrong = NULL;
+static struct health health;
 
-	if (s == STATE(SAFE) || s == STATE(READY) || s == STATE(ARMED) || s == STATE(BOOT))
-		walk->released = false;
-	if (!(fake.outputs & WIRE_IO_MAGNET_HOLD) && !walk->released)
-		wrong = "magnet off without a release";
-	if ((fake.outputs & ~before & WIRE_IO_LATCH_OPEN) && !may_release)
-		wrong = "latch opened without armed token and green checks";
-	if ((fake.outputs & (WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE)) && !moving)
-		wrong = "latch open or dampers relieved at rest or in a fault";
-	if ((fake.planned != 0) && s != STATE(FALLING) && s != STATE(SEPARATED))
-		wrong = "an edge is left to come";
-	if ((s == STATE(FAULT_HELD) || s == STATE(FAULT_MOVING)) != (sequence.fault != 0) &&
-	    s < STATE(CAPTURED))
-		wrong = "fault and state disagree";
-	if (wrong != NULL)
-		fail_msg("%s: seed %u step %u state %u outputs %#x", wrong, walk->start_seed, walk->step, s,
-		         fake.outputs);
+static void complain(const struct walk *walk, const char *wrong)
+{
+	fail_msg("%s: seed %u step %u state %s outputs %#x inputs %#x", wrong, walk->start_seed, walk->step,
+	         wire_state_name(sequence.state), fake.outputs, fake.inputs);
 }
 
+static void check_outputs(struct walk *walk, uint16_t before)
+{
+	bool moving = sequence_moving(sequence.state);
+
+	if (!(fake.outputs & WIRE_IO_MAGNET_HOLD) && !walk->released)
+		complain(walk, "magnet off without a release");
+	if (!(fake.outputs & ~before & WIRE_IO_LATCH_OPEN))
+		return;
+	walk->opened++;
+	if (walk->armed_token == 0 || walk->release_token != walk->armed_token)
+		complain(walk, "latch opened without an armed token");
+	if (!(fake.inputs & WIRE_IO_DAMPERS_ENGAGED) || !(fake.inputs & WIRE_IO_DOOR_CLOSED) ||
+	    !(fake.inputs & WIRE_IO_ESTOP_CLEAR) || !(fake.inputs & WIRE_IO_PRODUCT_HELD))
+		complain(walk, "latch opened without dampers, door, emergency stop or product");
+	if (!moving)
+		complain(walk, "latch opened at rest");
+}
+
+static void check_state(struct walk *walk)
+{
+	uint8_t s = sequence.state;
+	bool driven = s >= STATE(FALLING) && s <= STATE(BRAKED), faulty = sequence.fault != 0;
+
+	if ((fake.outputs & (WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE)) && !driven)
+		complain(walk, "latch open or dampers relieved at rest or in a fault");
+	if (s == STATE(BRAKED) && (fake.outputs & WIRE_IO_DAMPERS_RELIEVE))
+		complain(walk, "braked with dampers relieved");
+	if (fake.planned != 0 && s != STATE(FALLING) && s != STATE(SEPARATED))
+		complain(walk, "an edge is left to come");
+	if ((s == STATE(FAULT_HELD) || s == STATE(FAULT_MOVING)) != faulty && s < STATE(CAPTURED))
+		complain(walk, "fault and state disagree");
+	if ((sequence.token != 0) != (s == STATE(ARMED)))
+		complain(walk, "a token outlives ARMED");
+	if (walk->moving_ms > 5000) /* the walk fills a window 600 ms after the last impact */
+		complain(walk, "motion does not end");
+}
+
+/* One of the inputs is wrong now and then, for a while. */
 static void random_inputs(struct walk *walk)
 {
 	uint32_t r = fake_random(&walk->seed);
+	uint16_t wrong = r % 16 ? 0 : (uint16_t)(1u << (4 + (r >> 8) % 11));
+	bool held = sequence.state < STATE(FALLING) || (r >> 13) % 2048 == 0;
 
-	checks = r % 16 ? 0 : (uint16_t)(1u << (r >> 8) % WIRE_CHECKS);
-	clocks_good = (r >> 4) % 64 != 0;
-	fake.inputs = FAKE_ALL_GOOD;
-	if (sequence.state >= STATE(FALLING))
+	fake.inputs = FAKE_ALL_GOOD ^ wrong;
+	if (!held && walk->still == 0)
 		fake.inputs &= (uint16_t)~WIRE_IO_LATCH_CLOSED;
-	if ((r >> 12) % 64 == 0)
-		fake.inputs ^= (uint16_t)(1u << (4 + (r >> 20) % 11));
+	clocks_good = (r >> 4) % 64 != 0;
+	health.sensor_checks = (r >> 24) % 32 ? 0 : (uint16_t)(WIRE_CHECK_SENSOR_S1 << (r >> 20) % 3);
+	health.host_here = (r >> 16) % 32 != 0;
+	checks = health_checks(&health, fake.inputs);
+}
+
+static void random_gate(struct walk *walk, uint32_t r)
+{
+	if (r % 8 == 0)
+		sequence_gate(&sequence, r >> 8 & 1, fake.now_us - (r >> 9) % 1000);
+	else if (walk->still == 0)
+		sequence_gate(&sequence, sequence.gates_seen,
+		              sequence.released_us + (sequence.gates_seen ? 377773 : 201928));
+}
+
+static void random_command(struct walk *walk, uint32_t r)
+{
+	unsigned op = 1 + r % 6;
+	uint16_t token = (r >> 8) % 4 ? TOKEN : (uint16_t)(r >> 16);
+	int result;
+
+	result = command(op, token, (r >> 12) % 2 ? 0xC0FFEE : 0);
+	if (op == WIRE_OP_ARM && result == 0)
+		walk->armed_token = token;
+	if (op == WIRE_OP_RELEASE && result == 0) {
+		walk->release_token = token;
+		walk->released = true;
+		walk->still = (r >> 23) % 16 == 0; /* this latch is stuck */
+	}
+}
+
+/* Ticks until the planned edges are made, or as many as told. */
+static void random_ticks(struct walk *walk, uint32_t r)
+{
+	unsigned count = r % 4 ? 1 : r >> 8 & 0xFF;
+
+	if (fake.planned && r % 2)
+		count = (fake.off_us[1] - fake.now_us) / 1000 % 1000;
+	for (; count > 0; count--) {
+		bool was_moving = sequence_moving(sequence.state);
+
+		tick();
+		walk->moving_ms = was_moving ? walk->moving_ms + 1 : 0;
+		if (sequence_separated(sequence.state) && walk->moving_ms > 2000)
+			sequence_full(&sequence);
+	}
 }
 
 static void random_event(struct walk *walk)
 {
-	uint32_t r = fake_random(&walk->seed), kind = r % 24;
-	uint16_t token = (r >> 8) % 4 ? TOKEN : (uint16_t)(r >> 16);
-	uint8_t state = sequence.state;
+	uint32_t r = fake_random(&walk->seed), kind = r % 24, more = r >> 5;
 
 	if (kind < 6)
-		(void)!command(kind + 1, token, (r >> 12) % 2 ? 0xC0FFEE : 0);
-	else if (kind == 6 && r >> 8 & 1)
-		sequence_fault(&sequence, (enum wire_fault)(1 + (r >> 9) % (WIRE_FAULTS - 1)));
-	else if (kind < 9)
+		random_command(walk, more);
+	else if (kind == 6 && more % 2)
+		sequence_fault(&sequence, (enum wire_fault)(1 + more / 2 % (WIRE_FAULTS - 1)));
+	else if (kind == 7 && more % 4 == 0)
 		sequence_triggered(&sequence);
-	else if (kind == 9 && sequence_separated(state))
+	else if (kind == 8 && sequence_separated(sequence.state) && sequence.triggered)
 		sequence_full(&sequence);
-	else if (kind < 14 && state == STATE(FALLING))
-		sequence_gate(&sequence, sequence.gates_seen,
-		              sequence.released_us + (sequence.gates_seen ? 377773 : 201928));
-	else if (kind == 14)
-		sequence_gate(&sequence, r >> 8 & 1, fake.now_us);
-	else if (kind == 15 && fake.planned)
-		ticks((fake.off_us[1] - fake.now_us) / 1000 % 1000); /* to the separation */
-	else if (kind == 15)
-		ticks(r >> 8 & 0xFF);
+	else if (kind < 14 && sequence.state == STATE(FALLING))
+		random_gate(walk, more);
 	else
-		tick();
-	if (state != STATE(FALLING) && sequence.state == STATE(FALLING))
-		walk->released = true;
+		random_ticks(walk, more);
+}
+
+static void random_reset(struct walk *walk)
+{
+	static const enum port_reset causes[] = {PORT_RESET_POWER_ON, PORT_RESET_WATCHDOG,
+	                                         PORT_RESET_BROWN_OUT};
+
+	fake.outputs = WIRE_IO_MAGNET_HOLD;
+	fake.planned = 0;
+	sequence_init(&sequence, &parameters, counters, causes[fake_random(&walk->seed) % 3]);
+	sequence.tick_ms = sequence.entered_ms = now_ms;
+	walk->armed_token = 0;
+	walk->moving_ms = 0;
 }
 
 static void random_walks_stay_safe(void **state)
 {
 	struct walk walk = {.seed = 20261121, .start_seed = 20261121};
+	unsigned mask = WIRE_IO_MAGNET_HOLD;
 
 	(void)state;
 	boot(PORT_RESET_POWER_ON);
-	for (walk.step = 0; walk.step < 200000; walk.step++) {
-		bool may_release = sequence.state == STATE(ARMED) && sequence.token == TOKEN;
+	health_init(&health, &parameters, counters);
+	health.host_hash_good = true;
+	for (walk.step = 0; walk.step < 1000000; walk.step++) {
 		uint16_t before = fake.outputs;
-		bool green;
+		uint8_t state_before = sequence.state;
 
 		random_inputs(&walk);
-		green = checks == 0;
-		if (fake_random(&walk.seed) % 1000 == 0) {
-			boot(PORT_RESET_POWER_ON);
-			ticks(100);
-			may_release = false;
-		}
+		if (fake_random(&walk.seed) % 2000 == 0)
+			random_reset(&walk);
 		random_event(&walk);
-		check_invariants(&walk, before, may_release && green);
+		check_outputs(&walk, before);
+		check_state(&walk);
+		walk.let_go += (before & ~fake.outputs & mask) != 0;
+		walk.released &= sequence_moving(sequence.state) || !(fake.outputs & mask);
+		if (state_before == STATE(ARMED) && sequence.state != STATE(ARMED))
+			walk.armed_token = 0;
 		walk.visited[sequence.state]++;
 	}
 	for (unsigned s = 0; s < WIRE_STATES; s++)
-		if (s != STATE(BOOT) && walk.visited[s] < 50)
-			fail_msg("state %u visited %u times only, seed %u", s, walk.visited[s],
-			         walk.start_seed);
+		if (walk.visited[s] < 200)
+			fail_msg("state %s visited %u times only, seed %u", wire_state_name(s),
+			         walk.visited[s], walk.start_seed);
+	if (walk.opened < 1000 || walk.let_go < 200)
+		fail_msg("%u times opened, %u let go only, seed %u", walk.opened, walk.let_go,
+		         walk.start_seed);
 }
 
 int main(void)
@@ -789,9 +1018,13 @@ int main(void)
 	        cmocka_unit_test(late_edge_is_made_at_once),
 	        cmocka_unit_test(gates_out_of_order_or_missing),
 	        cmocka_unit_test(latch_must_open),
+	        cmocka_unit_test(abort_before_the_latch_opens_holds),
+	        cmocka_unit_test(frame_that_moved_is_recorded),
 	        cmocka_unit_test(product_must_stay_until_magnet_off),
 	        cmocka_unit_test(frame_down_ends_the_relief),
 	        cmocka_unit_test(fault_in_motion_brakes_and_keeps_holding),
+	        cmocka_unit_test(loss_in_every_state),
+	        cmocka_unit_test(reset_in_every_state),
 	        cmocka_unit_test(no_impact_is_forced_after_600_ms),
 	        cmocka_unit_test(accept_needs_the_crc),
 	        cmocka_unit_test(fault_in_motion_ends_in_fault_held),
@@ -799,5 +1032,5 @@ int main(void)
 	        cmocka_unit_test(random_walks_stay_safe),
 	};
 
-	return cmocka_run_group_tests(tests, NULL, NULL);
+	return cmocka_run_group_tests(tests, read_readme, NULL);
 }

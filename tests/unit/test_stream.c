@@ -206,6 +206,109 @@ static void full_list_is_counted(void **state)
 	assert_int_equal(counters[WIRE_COUNTER_resends_overflowed], 2);
 }
 
+/* ---- classic CAN ---- */
+
+static void classic_sends_segments_and_nothing_live(void **state)
+{
+	struct acquire_tick tick = make(5);
+	struct frame end = {.id = 0x681, .length = 24, .flags = FRAME_FD | FRAME_BRS};
+
+	(void)state;
+	for (unsigned i = 0; i < 24; i++)
+		end.data[i] = (uint8_t)(0x40 + i);
+	stream_set_classic(&stream, true);
+	stream_tick(&stream, &tick);
+	assert_int_equal(fake.sent_count, 0);
+	stream_send(&stream, &(struct frame){.id = 0x682, .length = 8});
+	assert_int_equal(fake.sent_count, 1);
+	stream_send(&stream, &end);
+	assert_int_equal(fake.sent_count, 5);
+	for (unsigned i = 0; i < 4; i++) {
+		const struct frame *segment = &fake.sent[1 + i];
+
+		assert_int_equal(segment->id, 0x681);
+		assert_int_equal(segment->length, 8);
+		assert_int_equal(segment->flags, 0);
+		assert_int_equal(segment->data[0], i == 3 ? 0x83 : i);
+		for (unsigned k = 0; k < 7; k++)
+			assert_int_equal(segment->data[1 + k], 7 * i + k < 24 ? 0x40 + 7 * i + k : 0);
+	}
+	assert_int_equal(counters[WIRE_COUNTER_frames_sent], 5);
+	stream_set_classic(&stream, false);
+	stream_tick(&stream, &tick);
+	assert_int_equal(fake.sent_count, 7);
+	assert_int_equal(fake.sent[6].flags, FRAME_FD | FRAME_BRS);
+}
+
+static void upload_keeps_the_bus_busy_and_no_more(void **state)
+{
+	unsigned ms = 0;
+
+	(void)state;
+	for (uint32_t t = 0; t < 40; t++)
+		put(t);
+	capture.first_ms = 10;
+	capture.last_ms = 29;
+	stream_upload(&stream, &capture); /* not on FD */
+	stream_resend(&stream, &capture);
+	assert_int_equal(fake.sent_count, 0);
+	stream_set_classic(&stream, true);
+	stream_upload(&stream, &capture);
+	fake.can_room = 0;
+	for (; counters[WIRE_COUNTER_blocks_resent] < 40 && ms < 1000; ms++) {
+		unsigned before = fake.sent_count;
+
+		stream_resend(&stream, &capture);
+		for (unsigned poll = 0; poll < 7; poll++) { /* what 1 Mbit/s takes in a ms */
+			fake.can_room = 1;
+			stream_flush(&stream);
+		}
+		assert_int_equal(fake.sent_count - before, 7);
+		assert_true(ring_fill(&stream.queue) <= STREAM_UPLOAD_WAITING + 10);
+	}
+	fake.can_room = UINT32_MAX;
+	stream_flush(&stream);
+	assert_int_equal(fake_count(0x381), 200);
+	assert_int_equal(fake_count(0x481), 200);
+	assert_int_equal(counters[WIRE_COUNTER_frames_dropped], 0);
+	for (unsigned i = 0; i < 400; i++) {
+		assert_int_equal(fake.sent[i].flags, 0);
+		assert_int_equal(fake.sent[i].data[0], i % 10 == 9 ? 0x89 : i % 10);
+		if (i % 10 == 0)
+			assert_int_equal(fake.sent[i].data[3], 10 + i / 10 % 20); /* tick_ms */
+	}
+}
+
+static void change_of_bus_drops_what_does_not_fit(void **state)
+{
+	struct acquire_tick tick = make(5);
+	struct frame status = numbered(1);
+
+	(void)state;
+	fake.can_full = true;
+	stream_tick(&stream, &tick);
+	stream_flush(&stream); /* one block waits outside of the queue */
+	stream_send(&stream, &status);
+	stream_tick(&stream, &tick);
+	status = numbered(2);
+	stream_send(&stream, &status);
+	stream_set_classic(&stream, true);
+	assert_int_equal(counters[WIRE_COUNTER_frames_dropped], 4);
+	fake.can_full = false;
+	stream_flush(&stream);
+	assert_int_equal(fake.sent_count, 2);
+	assert_int_equal(fake.sent[0].data[0], 1);
+	assert_int_equal(fake.sent[1].data[0], 2);
+	fake.can_full = true;
+	stream_send(&stream, &status);
+	stream_flush(&stream);
+	stream_set_classic(&stream, false);
+	fake.can_full = false;
+	stream_flush(&stream);
+	assert_int_equal(fake.sent_count, 3);
+	assert_int_equal(counters[WIRE_COUNTER_frames_dropped], 4);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -217,6 +320,9 @@ int main(void)
 	        cmocka_unit_test_setup(a_few_per_tick_in_order, begin),
 	        cmocka_unit_test_setup(ticks_out_of_the_ring_are_counted, begin),
 	        cmocka_unit_test_setup(full_list_is_counted, begin),
+	        cmocka_unit_test_setup(classic_sends_segments_and_nothing_live, begin),
+	        cmocka_unit_test_setup(upload_keeps_the_bus_busy_and_no_more, begin),
+	        cmocka_unit_test_setup(change_of_bus_drops_what_does_not_fit, begin),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -288,7 +288,7 @@ static void braking_tears_the_product_off(void **state)
 	/* relieved dampers brake too little for that: it rides down to the mat */
 	tower = falling();
 	tower_output(tower, RELIEVE, true, 0.2);
-	assert_int_equal(tower_inputs(tower) & WIRE_IO_DAMPERS_ENGAGED, 0);
+	assert_true(tower_inputs(tower) & WIRE_IO_DAMPERS_ENGAGED); /* a position switch */
 	tower_advance(tower, 1);
 	assert_near(tower_truth(tower)->separation_travel_m, HEIGHT_M, 1e-11);
 	assert_near(tower_truth(tower)->impact_speed_m_s,

@@ -19,6 +19,7 @@ static const char usage[] =
         "  --can URL          CAN on a link of its own, unix:PATH, can:IF or slcan:DEV; without it CAN "
         "frames ride\n"
         "                     in the requests and answers\n"
+        "  --classic          the bus carries no CAN FD: captures are uploaded after the drop\n"
         "  --realtime         keep to the clock, a millisecond for a millisecond; without it time stands "
         "still\n"
         "                     until the other end has answered\n"
@@ -28,11 +29,12 @@ static const char usage[] =
         "Ends with 0 when the other end closes its pipe or says stop, 2 wrong arguments, 4 link or bus "
         "fault.\n";
 
-enum { OPTION_BUS = 1, OPTION_CAN, OPTION_REALTIME, OPTION_RESET_CAUSE, OPTION_HELP };
+enum { OPTION_BUS = 1, OPTION_CAN, OPTION_CLASSIC, OPTION_REALTIME, OPTION_RESET_CAUSE, OPTION_HELP };
 
 static const struct option options[] = {
         {"bus", required_argument, NULL, OPTION_BUS},
         {"can", required_argument, NULL, OPTION_CAN},
+        {"classic", no_argument, NULL, OPTION_CLASSIC},
         {"realtime", no_argument, NULL, OPTION_REALTIME},
         {"reset-cause", required_argument, NULL, OPTION_RESET_CAUSE},
         {"help", no_argument, NULL, OPTION_HELP},
@@ -68,6 +70,9 @@ int main(int argc, char **argv)
 			break;
 		case OPTION_CAN:
 			wanted.can = optarg;
+			break;
+		case OPTION_CLASSIC:
+			wanted.classic = true;
 			break;
 		case OPTION_REALTIME:
 			wanted.realtime = true;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/can/error.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -58,9 +59,11 @@ static struct {
 	bool first_request; /* after a reset */
 	int request_fd, answer_fd;
 	struct link *link; /* NULL: frames ride in the exchange */
+	bool no_fd;
 	int link_error;
 	uint32_t bus_errors;
 	bool bus_off, tx_blocked;
+	bool link_bus_off; /* by the link's last error report */
 } port;
 
 /* ---- what the core calls ---- */
@@ -120,6 +123,14 @@ static int send_on_link(const struct frame *frame)
 	return result == 0 ? 0 : DT_E_FULL;
 }
 
+int port_can_setup(bool classic, uint32_t data_kbit_s)
+{
+	bool known = data_kbit_s == 2000 || data_kbit_s == 5000 || data_kbit_s == 8000;
+
+	/* The rates are those of the link's interface, if it has any: nothing to set. */
+	return known && (classic || !port.no_fd) ? 0 : DT_E_ARGUMENT;
+}
+
 int port_can_send(const struct frame *frame)
 {
 	if (port.bus_off || port.tx_blocked)
@@ -138,12 +149,14 @@ static int receive_from_link(struct frame *frame)
 
 	if (result < 0)
 		port.link_error = result;
-	if (result != 1)
+	if (result == 1 && (frame->flags & FRAME_ERROR) != 0) {
+		port.bus_errors++;
+		port.link_bus_off = (frame->id & CAN_ERR_BUSOFF) != 0;
 		return 0;
-	if ((frame->flags & FRAME_ERROR) == 0)
-		return 1;
-	port.bus_errors++;
-	return 0;
+	}
+	if (result == 1) /* what is heard on the bus is not off it */
+		port.link_bus_off = false;
+	return result == 1;
 }
 
 int port_can_receive(struct frame *frame)
@@ -294,7 +307,7 @@ static int exchange(const struct instant *instant, struct sensorbus_answer *answ
 	sensorbus_get_answer(bytes, answer);
 	port.machine.inputs = answer->inputs & (uint16_t)~WIRE_IO_OUTPUTS & (uint16_t)~WIRE_IO_OVERRUN;
 	port.bus_errors += answer->bus_errors;
-	port.bus_off = answer->bus_off != 0;
+	port.bus_off = answer->bus_off != 0 || port.link_bus_off;
 	port.tx_blocked = answer->tx_blocked != 0;
 	result = read_frames(answer->frames);
 	return result == 0 && answer->stop ? GONE : result;
@@ -359,6 +372,7 @@ static int run(const struct posix_options *options)
 	int result = 0;
 
 	clock_gettime(CLOCK_MONOTONIC, &next);
+	port.no_fd = options->classic;
 	boot(options->cause);
 	while (result == 0) {
 		for (unsigned i = 0; i < INSTANTS && result == 0 && !port.machine.reset_wanted; i++)

@@ -22,6 +22,7 @@ struct posix_options {
 	const char *bus; /* prefix of the two FIFOs */
 	const char *can; /* a link's URL, or NULL */
 	bool realtime;
+	bool classic; /* the bus carries no CAN FD */
 	enum port_reset cause;
 };
 

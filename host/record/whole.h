@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_WHOLE_H
+#define DT_HOST_RECORD_WHOLE_H
+/*
+ * A result file that is whole or not there: written beside its place and renamed over it. What is no regular
+ * file (a device, a pipe) is never replaced but written to; a link stays, its target is written.
+ *
+ * whole_open, write to ->out, whole_close in any case.
+ */
+#include <stdio.h>
+
+#include "common/error.h"
+
+struct whole {
+	FILE *out;
+	const char *file; /* as given; must outlive the call of whole_close */
+	char *place;      /* where it comes to stand */
+	char *beside;     /* where it is written; NULL: in place */
+};
+
+/* 0, or DT_E_SYSTEM or DT_E_MEMORY with "FILE: why" in message and nothing to close. */
+DT_MUST_USE int whole_open(struct whole *whole, const char *file, char *message, size_t size);
+
+/* Puts the file in its place, or, when what wrote it returned an error, removes what is there of it. Returns
+ * result, or DT_E_SYSTEM if only now writing fails; errors with "FILE: why" in message. */
+DT_MUST_USE int whole_close(struct whole *whole, int result, char *message, size_t size);
+
+#endif

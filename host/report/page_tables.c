@@ -1,0 +1,165 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <inttypes.h>
+#include <math.h>
+
+#include "host/report/page.h"
+
+enum { GAPS_MAX = 20 }; /* listed */
+
+static void result_row(struct page *page, size_t i)
+{
+	const struct channel *c = &page->report->record->channels[i];
+	const struct estimate_channel *e = &page->report->analysis->channels[i];
+	FILE *out = page->out;
+	char status[48];
+
+	fputs("<tr><td>", out);
+	page_channel_name(out, c->name);
+	fputs("</td><td>", out);
+	page_number(out, 1, c->rate_hz);
+	fputs("</td><td>", out);
+	page_with_sigma(out, 2, e->peak.value_g, e->peak.sigma_g);
+	fputs("</td><td>", out);
+	page_with_sigma(out, 4, (e->peak.time_s - page->zero.time_s) * 1e3, e->peak.sigma_time_s * 1e3);
+	fputs("</td><td>", out);
+	page_with_sigma(out, 3, e->pulse.duration_s * 1e3, e->pulse.sigma_duration_s * 1e3);
+	fputs("</td><td>", out);
+	page_with_sigma(out, 3, e->pulse.velocity_change_m_s, e->pulse.sigma_velocity_m_s);
+	fputs("</td><td>", out);
+	page_number(out, 2, e->baseline.noise_g);
+	fprintf(out, "</td><td class=\"text\">%s</td></tr>\n",
+	        report_channel_status(e, status, sizeof(status)));
+}
+
+static void results(struct page *page)
+{
+	const struct analysis *a = page->report->analysis;
+	FILE *out = page->out;
+
+	fputs("<h2>Results</h2>\n<div class=\"scroll\"><table><tr><th>channel</th><th>rate, Hz</th><th>peak, "
+	      "g</th><th>at, ms</th><th>width at 10 %, ms</th><th>velocity change, m/s</th><th>noise, g</th>"
+	      "<th class=\"text\">status</th></tr>\n",
+	      out);
+	for (size_t i = 0; i < a->channel_count; i++)
+		result_row(page, i);
+	for (size_t i = 0; i < a->resultant_count; i++) {
+		const struct estimate_resultant *r = &a->resultants[i];
+
+		fprintf(out, "<tr><td>%s X, Y</td><td></td><td>", r->sensor);
+		page_with_sigma(out, 2, r->peak_g, r->sigma_g);
+		fputs("</td><td>", out);
+		page_number(out, 4, (r->time_s - page->zero.time_s) * 1e3);
+		fputs("</td><td colspan=\"3\" class=\"text soft\">Y peaks ", out);
+		page_number(out, 3, fabs(r->axes_apart_s) * 1e3);
+		fprintf(out, " ms %s X</td><td class=\"text\">%s</td></tr>\n",
+		        r->axes_apart_s < 0.0 ? "before" : "after", estimate_status_name(r->status));
+	}
+	fputs("</table></div>\n<p class=\"note\">&plusmn; is one standard uncertainty. Velocity change: the "
+	      "integral over the pulse.</p>\n",
+	      out);
+}
+
+static void joint_row(FILE *out, const char *label, const char *unit, int decimals, double value,
+                      double sigma, enum estimate_status status)
+{
+	fprintf(out, "<tr><td>%s</td><td>", label);
+	page_with_sigma(out, decimals, value, sigma);
+	fprintf(out, " %s</td><td class=\"text\">%s</td></tr>\n", unit, estimate_status_name(status));
+}
+
+static void joint(struct page *page)
+{
+	const struct analysis *a = page->report->analysis;
+	FILE *out = page->out;
+
+	if (!a->has_lag && !a->has_plate)
+		return;
+	fputs("<h2>S1 against S2</h2>\n<div class=\"scroll\"><table "
+	      "class=\"small\"><tr><th>quantity</th><th>value</th>"
+	      "<th class=\"text\">status</th></tr>\n",
+	      out);
+	if (a->has_lag) {
+		const struct estimate_lag *l = &a->lag;
+
+		joint_row(out, "S1 after S2, first peaks", "ms", 3, l->first_peak_s * 1e3, (double)NAN,
+		          l->status);
+		joint_row(out, "S1 after S2, largest peaks", "ms", 4, l->largest_peak_s * 1e3,
+		          l->sigma_s * 1e3, l->status);
+		joint_row(out, "S1 after S2, cross-correlation", "ms", 3, l->cross_correlation_s * 1e3,
+		          (double)NAN, l->status);
+		joint_row(out, "spread of the three", "ms", 3, l->spread_s * 1e3, (double)NAN, l->status);
+	}
+	if (a->has_plate) {
+		const struct estimate_ringdown *p = &a->plate;
+
+		joint_row(out, "plate frequency, damped", "Hz", 2, p->frequency_hz, p->sigma_hz, p->status);
+		joint_row(out, "plate frequency, undamped", "Hz", 2, p->natural_frequency_hz, (double)NAN,
+		          p->status);
+		joint_row(out, "plate frequency over three cycles", "Hz", 2, p->three_cycle_frequency_hz,
+		          (double)NAN, p->status);
+		joint_row(out, "plate damping ratio", "", 4, p->damping_ratio, p->sigma_damping, p->status);
+	}
+	fputs("</table></div>\n", out);
+}
+
+static void model(struct page *page)
+{
+	struct report_row rows[REPORT_ROWS_MAX];
+	size_t count = report_compare(page->report, rows);
+	FILE *out = page->out;
+
+	if (!count)
+		return;
+	fputs("<h2>Model against drop</h2>\n<p class=\"soft\">Model ", out);
+	page_text(out, page->report->prediction->fidelity);
+	fputs(", ", out);
+	page_text(out, page->report->prediction->reason);
+	fputs(".</p>\n<div class=\"scroll\"><table "
+	      "class=\"small\"><tr><th>quantity</th><th>model</th><th>measured</th>"
+	      "<th>difference</th></tr>\n",
+	      out);
+	for (size_t i = 0; i < count; i++) {
+		fprintf(out, "<tr><td>%s%s%s</td><td>", rows[i].label, rows[i].unit[0] ? ", " : "",
+		        rows[i].unit);
+		page_number(out, rows[i].decimals, rows[i].predicted * rows[i].scale);
+		fputs("</td><td>", out);
+		page_number(out, rows[i].decimals, rows[i].measured * rows[i].scale);
+		fprintf(out, "</td><td>%s", rows[i].difference_percent > 0.0 ? "+" : "");
+		page_number(out, 1, rows[i].difference_percent);
+		fputs(isfinite(rows[i].difference_percent) ? " %</td></tr>\n" : "</td></tr>\n", out);
+	}
+	fputs("</table></div>\n<p class=\"note\">Difference: model less measured, over measured. A dash: not "
+	      "known well enough to compare.</p>\n",
+	      out);
+}
+
+static void gaps(struct page *page)
+{
+	const struct record *r = page->report->record;
+	FILE *out = page->out;
+
+	if (!r->gap_count)
+		return;
+	fputs("<h2>Missing samples</h2>\n", out);
+	fputs("<table class=\"small\"><tr><th class=\"text\">missing</th><th>first tick, ms</th><th>last "
+	      "tick, ms</th>"
+	      "<th>blocks</th></tr>",
+	      out);
+	for (size_t i = 0; i < r->gap_count && i < GAPS_MAX; i++)
+		fprintf(out,
+		        "<tr><td>S%u</td><td>%" PRIu32 "</td><td>%" PRIu32 "</td><td>%" PRIu32 "</td></tr>",
+		        r->gaps[i].sensor, r->gaps[i].first_tick_ms, r->gaps[i].last_tick_ms,
+		        r->gaps[i].last_tick_ms - r->gaps[i].first_tick_ms + 1);
+	fputs("</table>\n", out);
+	if (r->gap_count > GAPS_MAX)
+		fprintf(out, "<p class=\"soft\">and %zu more gaps, all listed in the JSON.</p>\n",
+		        r->gap_count - GAPS_MAX);
+}
+
+void page_tables(struct page *page)
+{
+	results(page);
+	joint(page);
+	model(page);
+	gaps(page);
+}
