@@ -21,15 +21,21 @@
 #include "hil/target.h"
 
 enum {
-	GRID_PER_MS = 70,     /* both sample grids, k/7 and k/10 ms, are whole numbers of this */
-	QUEUE_FRAMES = 64,    /* on their way to the firmware; a power of two */
-	LINK_FRAMES = 64,     /* taken from the link in one ms */
-	LIFT_AFTER_MS = 2000, /* how long the technician takes once the tower is safe */
+	GRID_PER_MS = 70,  /* both sample grids, k/7 and k/10 ms, are whole numbers of this */
+	QUEUE_FRAMES = 64, /* on their way to the firmware; a power of two */
+	ANSWER_FRAMES = 2, /* to the firmware in one answer: more do not pass a bus of 1 Mbit/s between two */
+	LINK_FRAMES = 64,  /* taken from the link in one ms */
+	LIFT_AFTER_MS = 2000, /* how long the technician takes once the tower is safe ... */
+	LIFT_SOON_MS = 1000,  /* ... and in a scenario */
+	COUNTERS_MS = 100 * WIRE_COUNTERS + 200, /* in which every counter is told */
+	BABBLE_FRAMES = 8,                       /* of the foreign node, a ms */
+	BABBLE_ID = 0x010,
+	BUS_OFF_ERRORS = 32, /* that bring a controller there: 8 points each, 256 in all */
 };
 
 struct bench {
 	const struct bench_options *options;
-	struct scene scene;
+	struct bench_watch *watch; /* NULL: nobody looks */
 	struct tower *tower;
 	struct target *target;
 	struct link *link; /* NULL: the script is the host */
@@ -44,6 +50,7 @@ struct bench {
 
 	int64_t base_grid; /* virtual time of the firmware's latest reset, 1/70 ms */
 	int64_t now_grid;  /* of the present request */
+	double tower_rate; /* the tower's seconds in one of the firmware's */
 	bool running;      /* a request came */
 	uint16_t outputs;
 
@@ -51,7 +58,15 @@ struct bench {
 	int64_t safe_ms;      /* since when it is safe with the frame down, negative: it is not */
 	double impact_s;      /* of the latest impact seen */
 	bool burst_waiting;   /* for its time after that impact */
-	unsigned faults_done;
+
+	unsigned events_done;            /* a bit each */
+	uint8_t event_state;             /* the state events count from ... */
+	int64_t entered_ms[WIRE_STATES]; /* ... and when each was entered last, negative: never */
+	int64_t chain_ms;                /* the entry that the latest event at a state counted from */
+	int64_t until_ms[EVENT_ACTIONS]; /* end of a span */
+	int64_t done_ms;                 /* since when there is nothing left to do, negative: there is */
+	bool restart;                    /* the firmware, after this answer */
+	unsigned restart_cause;
 
 	unsigned impacts;
 	uint64_t edges_outside; /* output edges that were not in their request's span */
@@ -106,6 +121,12 @@ static double grid_s(int64_t grid)
 	return (double)grid / (1000.0 * GRID_PER_MS);
 }
 
+/* The tower's time: its clock is the true one. */
+static double tower_s(const struct bench *bench, int64_t grid)
+{
+	return grid_s(grid) * bench->tower_rate;
+}
+
 static int64_t now_ms(const struct bench *bench)
 {
 	return bench->now_grid / GRID_PER_MS;
@@ -117,8 +138,11 @@ static bool take_time(struct bench *bench, const struct sensorbus_request *reque
 	unsigned per_tick = request->group & SENSORBUS_X ? WIRE_X_PER_TICK : WIRE_YZ_PER_TICK;
 	int64_t grid;
 
-	if (request->reset && bench->running) /* the firmware's clock starts again at the next whole ms */
+	if (request->reset && bench->running) { /* the firmware's clock starts again at the next whole ms */
 		bench->base_grid = (now_ms(bench) + 1) * GRID_PER_MS;
+		if (bench->watch != NULL)
+			observe_reset(&bench->watch->observe);
+	}
 	grid = bench->base_grid + (int64_t)request->tick_ms * GRID_PER_MS +
 	       (int64_t)request->index * (GRID_PER_MS / (int64_t)per_tick);
 	if (request->group == 0 || request->group > (SENSORBUS_X | SENSORBUS_YZ) ||
@@ -165,26 +189,44 @@ static unsigned sort_edges(struct bench *bench, const struct sensorbus_request *
 	return count;
 }
 
+static void make_edge(struct bench *bench, unsigned bit, bool on, double time_us)
+{
+	double time_s = fmin(1e-6 * time_us * bench->tower_rate, tower_s(bench, bench->now_grid));
+
+	if (bench->watch != NULL)
+		observe_edge(&bench->watch->observe, bit, on, time_us, time_s);
+	tower_output(bench->tower, bit, on, time_s);
+}
+
 static void apply_outputs(struct bench *bench, const struct sensorbus_request *request, int64_t before_grid)
 {
 	struct edge edges[SENSORBUS_OUTPUTS];
 	unsigned count = sort_edges(bench, request, grid_us(before_grid), edges);
-	double now_s = grid_s(bench->now_grid);
 
 	for (unsigned i = 0; i < count; i++)
-		tower_output(bench->tower, edges[i].bit, request->outputs >> edges[i].bit & 1,
-		             fmin(1e-6 * (double)edges[i].time_us, now_s));
+		make_edge(bench, edges[i].bit, request->outputs >> edges[i].bit & 1,
+		          (double)edges[i].time_us);
 	/* Levels that changed without an edge: after a reset. */
 	for (unsigned bit = 0; bit < SENSORBUS_OUTPUTS; bit++)
 		if (!(request->edges & 1u << bit) && (request->outputs ^ bench->outputs) >> bit & 1)
-			tower_output(bench->tower, bit, request->outputs >> bit & 1, now_s);
+			make_edge(bench, bit, request->outputs >> bit & 1, 1e6 * grid_s(bench->now_grid));
 	bench->outputs = request->outputs;
+}
+
+/* Whole us of the tower's clock, rounded down, as the firmware's clock stamps the same instant. */
+static uint32_t capture_us(const struct bench *bench, uint32_t time_us)
+{
+	double firmware_us = floor(((double)time_us + 0.5) / bench->tower_rate);
+
+	return (uint32_t)(int64_t)firmware_us - (uint32_t)grid_us(bench->base_grid);
 }
 
 static void sample(struct bench *bench, const struct sensorbus_request *request,
                    struct sensorbus_answer *answer)
 {
-	tower_advance(bench->tower, grid_s(bench->now_grid));
+	double time_s = tower_s(bench, bench->now_grid);
+
+	tower_advance(bench->tower, time_s);
 	tower_sample(bench->tower, request->group, answer->codes);
 	codes_put(&bench->codes, request, answer->codes);
 	answer->ready = request->group;
@@ -195,8 +237,15 @@ static void sample(struct bench *bench, const struct sensorbus_request *request,
 		if (!tower_capture(bench->tower, gate, &time_us))
 			continue;
 		answer->captures |= (uint8_t)(1u << gate);
-		answer->capture_us[gate] = time_us - (uint32_t)grid_us(bench->base_grid);
+		answer->capture_us[gate] = capture_us(bench, time_us);
 	}
+	if (bench->watch == NULL)
+		return;
+	observe_sample(&bench->watch->observe, request->group, answer->codes, answer->inputs,
+	               tower_truth(bench->tower), time_s);
+	timeline_sample(bench->watch->timeline, grid_s(bench->now_grid),
+	                (uint16_t)(answer->inputs | request->outputs), bench->watch->observe.state,
+	                request->group, answer->codes);
 }
 
 static void watch_impact(struct bench *bench)
@@ -212,32 +261,23 @@ static void watch_impact(struct bench *bench)
 		          truth->impact_speed_m_s, truth->angle_deg);
 	}
 	if (bench->burst_waiting &&
-	    grid_s(bench->now_grid) >= bench->impact_s + bench->options->burst_after_s) {
+	    tower_s(bench, bench->now_grid) >= bench->impact_s + bench->options->burst_after_s) {
 		busfault_burst(&bench->to_host, bench->options->burst);
 		bench->burst_waiting = false;
 	}
 }
 
-/* The technician: lifts frame and product once the tower is safe, and makes the faults asked for. */
+/* The technician: lifts frame and product once the tower is safe. */
 static void attend(struct bench *bench)
 {
-	const struct bench_options *options = bench->options;
 	bool waiting = bench->state == WIRE_STATE_SAFE && tower_inputs(bench->tower) & WIRE_IO_FRAME_DOWN;
 
 	if (!waiting)
 		bench->safe_ms = -1;
 	else if (bench->safe_ms < 0)
 		bench->safe_ms = now_ms(bench);
-	else if (now_ms(bench) - bench->safe_ms >= LIFT_AFTER_MS)
+	else if (now_ms(bench) - bench->safe_ms >= (bench->watch ? LIFT_SOON_MS : LIFT_AFTER_MS))
 		tower_lift(bench->tower);
-	for (unsigned i = 0; i < options->fault_count; i++) {
-		if (bench->faults_done & 1u << i || grid_s(bench->now_grid) < options->faults[i].time_s)
-			continue;
-		tower_fault(bench->tower, options->faults[i].fault, true);
-		bench->faults_done |= 1u << i;
-		bench_say("%s at %.3f s", tower_fault_name(options->faults[i].fault),
-		          grid_s(bench->now_grid));
-	}
 }
 
 /* ---- the bus ---- */
@@ -258,6 +298,8 @@ static void give_to_host(struct bench *bench, const struct frame *frame)
 	int result;
 
 	log_frame(bench, frame);
+	if (bench->watch != NULL)
+		observe_at_host(&bench->watch->observe, frame);
 	if (bench->link == NULL) {
 		script_feed(&bench->script, frame, (uint32_t)now_ms(bench));
 		return;
@@ -282,12 +324,27 @@ static void watch_status(struct bench *bench, const struct frame *frame)
 	bench->fault = status.fault;
 }
 
+/* The state that events count from: seen in every live block, without one in the status. */
+static void watch_state(struct bench *bench, const struct frame *frame)
+{
+	struct observe *observe = &bench->watch->observe;
+
+	observe->now_s = grid_s(bench->now_grid);
+	observe_from_firmware(observe, frame, tower_s(bench, bench->base_grid));
+	if (observe->state >= WIRE_STATES || observe->state == bench->event_state)
+		return;
+	bench->event_state = observe->state;
+	bench->entered_ms[observe->state] = now_ms(bench);
+}
+
 static void from_firmware(struct bench *bench, const struct frame *frame)
 {
 	struct frame out[BUSFAULT_OUT_MAX];
 	unsigned count;
 
 	watch_status(bench, frame);
+	if (bench->watch != NULL)
+		watch_state(bench, frame);
 	count = busfault_pass(&bench->to_host, frame, out);
 	for (unsigned i = 0; i < count; i++)
 		give_to_host(bench, &out[i]);
@@ -328,17 +385,127 @@ static void poll_link(struct bench *bench)
 	}
 }
 
+static bool in_span(const struct bench *bench, enum event_action action)
+{
+	return now_ms(bench) < bench->until_ms[action];
+}
+
 static void poll_script(struct bench *bench)
 {
 	struct frame out[SCRIPT_SEND_MAX];
-	unsigned count = script_poll(&bench->script, (uint32_t)now_ms(bench), out);
+	unsigned count;
 
+	if (in_span(bench, EVENT_HOST_SILENT))
+		return;
+	count = script_poll(&bench->script, (uint32_t)now_ms(bench), out);
 	for (unsigned i = 0; i < count; i++)
 		from_host(bench, &out[i]);
+	if (bench->watch != NULL)
+		return;
 	if (bench->script.phase == SCRIPT_FAILED ||
 	    (bench->script.phase == SCRIPT_DONE && bench->script.incomplete))
 		fail(bench, BENCH_NOT_SAFE, "%s", bench->script.why);
 	bench->stop |= bench->script.phase == SCRIPT_DONE;
+}
+
+/* ---- what happens to the tower and its bus ---- */
+
+static void happen(struct bench *bench, const struct event *event)
+{
+	switch (event->action) {
+	case EVENT_FAULT:
+	case EVENT_REPAIR:
+		tower_fault(bench->tower, (enum tower_fault)event->number, event->action == EVENT_FAULT);
+		bench_say("%s%s at %.3f s", tower_fault_name((enum tower_fault)event->number),
+		          event->action == EVENT_FAULT ? "" : " repaired", grid_s(bench->now_grid));
+		break;
+	case EVENT_SEND:
+		from_host(bench, &event->frame);
+		break;
+	case EVENT_BUS_BURST:
+		busfault_burst(&bench->to_host, event->number);
+		break;
+	case EVENT_RESET:
+		bench->restart = true;
+		bench->restart_cause = event->number;
+		break;
+	default:
+		if (event->action == EVENT_BUS_OFF)
+			bench->bus_errors = (uint16_t)(bench->bus_errors + BUS_OFF_ERRORS);
+		bench->until_ms[event->action] = now_ms(bench) + (int64_t)(1000 * event->duration_s + 0.5);
+	}
+}
+
+/* Events at a state come in their order: each counts from an entry that does not lie before the one that the
+ * event before it counted from. */
+static bool is_due(const struct bench *bench, const struct event *event, bool chain_free)
+{
+	int64_t entered_ms;
+
+	if (event->state == EVENT_AT_TIME)
+		return grid_s(bench->now_grid) >= event->time_s;
+	entered_ms = bench->entered_ms[event->state];
+	return chain_free && entered_ms >= 0 && entered_ms >= bench->chain_ms &&
+	       (double)(now_ms(bench) - entered_ms) >= 1000 * event->time_s;
+}
+
+static void make_events(struct bench *bench)
+{
+	bool chain_free = true;
+
+	for (unsigned i = 0; i < bench->options->event_count; i++) {
+		const struct event *event = &bench->options->events[i];
+
+		if (bench->events_done & 1u << i)
+			continue;
+		if (is_due(bench, event, chain_free)) {
+			bench->events_done |= 1u << i;
+			if (event->state != EVENT_AT_TIME)
+				bench->chain_ms = bench->entered_ms[event->state];
+			happen(bench, event);
+		} else if (event->state != EVENT_AT_TIME) {
+			chain_free = false;
+		}
+	}
+}
+
+/* What the spans do to both directions. */
+static void make_spans(struct bench *bench)
+{
+	bool silent = in_span(bench, EVENT_BUS_SILENT);
+	bool deaf = in_span(bench, EVENT_BUS_BLOCKED) || in_span(bench, EVENT_BUS_OFF);
+	struct frame foreign = {.id = BABBLE_ID, .length = 8};
+
+	busfault_silence(&bench->to_host, silent);
+	busfault_silence(&bench->to_tower, silent || deaf);
+	if (!in_span(bench, EVENT_BUS_BABBLE))
+		return;
+	for (unsigned i = 0; i < BABBLE_FRAMES; i++)
+		if (ring_put(&bench->queue, &foreign) != 0)
+			bench->queue_lost++;
+}
+
+static bool is_blocked(const struct bench *bench)
+{
+	return in_span(bench, EVENT_BUS_BLOCKED) ||
+	       (in_span(bench, EVENT_BUS_BABBLE) && now_ms(bench) % 2 == 0);
+}
+
+static bool all_done(const struct bench *bench)
+{
+	return bench->script.phase == SCRIPT_DONE &&
+	       bench->events_done == (1ull << bench->options->event_count) - 1;
+}
+
+static void watch_end(struct bench *bench)
+{
+	if (!all_done(bench))
+		bench->done_ms = -1;
+	else if (bench->done_ms < 0)
+		bench->done_ms = now_ms(bench);
+	if ((bench->done_ms >= 0 && now_ms(bench) - bench->done_ms >= COUNTERS_MS) ||
+	    grid_s(bench->now_grid) >= bench->watch->end_s)
+		bench->stop = true;
 }
 
 /* ---- one request ---- */
@@ -346,10 +513,14 @@ static void poll_script(struct bench *bench)
 static void each_ms(struct bench *bench)
 {
 	attend(bench);
+	make_events(bench);
+	make_spans(bench);
 	if (bench->link != NULL)
 		poll_link(bench);
 	else
 		poll_script(bench);
+	if (bench->watch != NULL)
+		watch_end(bench);
 }
 
 static void handle(struct bench *bench, const struct sensorbus_request *request, const struct frame *sent,
@@ -367,9 +538,14 @@ static void handle(struct bench *bench, const struct sensorbus_request *request,
 	if (!bench->running || now_ms(bench) != before_ms)
 		each_ms(bench);
 	bench->running = true;
-	while (answer->frames < SENSORBUS_FRAMES_MAX &&
-	       ring_get(&bench->queue, &received[answer->frames]) == 0)
+	while (answer->frames < ANSWER_FRAMES && ring_get(&bench->queue, &received[answer->frames]) == 0) {
+		if (bench->watch != NULL)
+			observe_to_firmware(&bench->watch->observe, &received[answer->frames],
+			                    1e6 * grid_s(bench->now_grid));
 		answer->frames++;
+	}
+	answer->bus_off = in_span(bench, EVENT_BUS_OFF);
+	answer->tx_blocked = is_blocked(bench);
 	answer->bus_errors = bench->bus_errors;
 	bench->bus_errors = 0;
 }
@@ -381,6 +557,35 @@ static void tell_ready(struct bench *bench)
 	if (write(bench->options->ready_fd, "r", 1) != 1)
 		bench_say("--ready-fd %d: %s", bench->options->ready_fd, strerror(errno));
 	close(bench->options->ready_fd);
+}
+
+static void start_target(struct bench *bench, unsigned cause)
+{
+	const struct bench_options *options = bench->options;
+	char message[TARGET_MESSAGE_MAX];
+
+	bench->target = target_start(options->firmware, options->realtime, cause, message);
+	if (bench->target == NULL)
+		fail(bench, BENCH_LINK, "%s", message);
+}
+
+static void end_target(struct bench *bench)
+{
+	char message[TARGET_MESSAGE_MAX];
+
+	if (target_end(bench->target, message) != 0)
+		fail(bench, BENCH_LINK, "%s", message);
+	bench->target = NULL;
+}
+
+/* A reset from outside: another process with the same tower. What it held of outputs the drivers take over
+ * when the new one shows its own. */
+static void restart_target(struct bench *bench)
+{
+	bench->restart = false;
+	end_target(bench);
+	if (!bench->stop)
+		start_target(bench, bench->restart_cause);
 }
 
 static void serve(struct bench *bench)
@@ -400,7 +605,7 @@ static void serve(struct bench *bench)
 		if (result == 1) {
 			tell_ready(bench);
 			handle(bench, &request, sent, &answer, received);
-			answer.stop = bench->stop;
+			answer.stop = bench->stop || bench->restart;
 			result = target_answer(bench->target, &answer, received, message);
 		}
 		if (result < 0)
@@ -408,6 +613,8 @@ static void serve(struct bench *bench)
 			     grid_s(bench->now_grid));
 		if (bench->stop)
 			return;
+		if (bench->restart)
+			restart_target(bench);
 	}
 }
 
@@ -430,20 +637,6 @@ static void close_file(struct bench *bench, FILE *file, const char *path)
 		fail(bench, BENCH_LINK, "%s: could not be written", path);
 }
 
-static void read_scene(struct bench *bench)
-{
-	const struct bench_options *options = bench->options;
-	char message[SCENE_MESSAGE_MAX];
-	int result = scene_read(&bench->scene, options->scene_file, message);
-
-	if (result == 0 && !isnan(options->angle_deg)) {
-		bench->scene.drop_angle_deg = options->angle_deg;
-		result = scene_check(&bench->scene, "--angle", message);
-	}
-	if (result != 0)
-		fail(bench, BENCH_INPUT, "%s", message);
-}
-
 static void open_link(struct bench *bench)
 {
 	char message[TARGET_MESSAGE_MAX];
@@ -455,17 +648,14 @@ static void open_link(struct bench *bench)
 		fail(bench, BENCH_LINK, "%s", message);
 }
 
-static void start_target(struct bench *bench)
+static void start(struct bench *bench)
 {
 	const struct bench_options *options = bench->options;
-	char message[TARGET_MESSAGE_MAX];
 
-	bench->target = target_start(options->firmware, options->realtime, message);
-	if (bench->target == NULL)
-		fail(bench, BENCH_LINK, "%s", message);
-	else
-		bench_say("%s at %g deg, seed %llu, %s, %s", bench->scene.name, bench->scene.drop_angle_deg,
-		          (unsigned long long)options->seed,
+	start_target(bench, 0);
+	if (!bench->stop)
+		bench_say("%s at %g deg, seed %llu, %s, %s", options->scene.name,
+		          options->scene.drop_angle_deg, (unsigned long long)options->seed,
 		          options->realtime ? "paced by the clock" : "as fast as it goes",
 		          options->link ? options->link : "scripted operator");
 }
@@ -482,16 +672,21 @@ static void set_up(struct bench *bench)
 	bench->queue = (struct ring)RING_OVER(bench->queue_storage);
 	bench->safe_ms = -1;
 	bench->impact_s = NAN;
-	script_init(&bench->script, options->drops);
+	bench->tower_rate = 1 / (1 + 1e-6 * options->clock_ppm);
+	bench->watch = options->watch;
+	bench->done_ms = -1;
+	bench->event_state = UINT8_MAX;
+	for (unsigned state = 0; state < WIRE_STATES; state++)
+		bench->entered_ms[state] = -1;
+	if (bench->watch != NULL)
+		observe_init(&bench->watch->observe, &options->scene);
+	script_init(&bench->script, &options->script);
 	if (options->ready_fd >= 0) /* the firmware must not keep it open */
 		(void)fcntl(options->ready_fd, F_SETFD, FD_CLOEXEC);
-	read_scene(bench);
-	if (!bench->stop) {
-		bench->tower = tower_create(&bench->scene, &(struct tower_options){.seed = options->seed,
-		                                                                   .ideal = options->ideal});
-		if (bench->tower == NULL)
-			fail(bench, BENCH_LINK, "out of memory");
-	}
+	bench->tower = tower_create(&options->scene,
+	                            &(struct tower_options){.seed = options->seed, .ideal = options->ideal});
+	if (bench->tower == NULL)
+		fail(bench, BENCH_LINK, "out of memory");
 	if (!bench->stop)
 		bench->log = open_file(bench, options->log);
 	if (!bench->stop)
@@ -500,15 +695,12 @@ static void set_up(struct bench *bench)
 	if (!bench->stop)
 		open_link(bench);
 	if (!bench->stop)
-		start_target(bench);
+		start(bench);
 }
 
 static void tear_down(struct bench *bench)
 {
-	char message[TARGET_MESSAGE_MAX];
-
-	if (target_end(bench->target, message) != 0)
-		fail(bench, BENCH_LINK, "%s", message);
+	end_target(bench);
 	codes_flush(&bench->codes);
 	close_file(bench, bench->log, bench->options->log);
 	close_file(bench, bench->truth, bench->options->truth);
@@ -523,11 +715,13 @@ static void say_bus(const char *way, const struct busfault *fault)
 
 	if (c->taken == c->given && c->duplicated == 0 && c->reordered == 0)
 		return; /* a bus that did nothing to its frames is not worth a line */
-	bench_say("%s: %llu frames sent, %llu arrived; lost %llu at random, %llu in bursts, %llu resent; "
+	bench_say("%s: %llu frames sent, %llu arrived; lost %llu at random, %llu in bursts, %llu resent, "
+	          "%llu in silence; "
 	          "doubled %llu, reordered %llu, held %u",
 	          way, (unsigned long long)c->taken, (unsigned long long)c->given,
 	          (unsigned long long)c->lost, (unsigned long long)c->burst_lost, (unsigned long long)c->cut,
-	          (unsigned long long)c->duplicated, (unsigned long long)c->reordered, busfault_held(fault));
+	          (unsigned long long)c->silenced, (unsigned long long)c->duplicated,
+	          (unsigned long long)c->reordered, busfault_held(fault));
 }
 
 static void say_summary(const struct bench *bench, double wall_s)
@@ -543,8 +737,34 @@ static void say_summary(const struct bench *bench, double wall_s)
 		        (unsigned long long)bench->edges_outside, (unsigned long long)bench->queue_lost,
 		        (unsigned long long)bench->not_carried, (unsigned long long)bench->link_full);
 	bench_say("%u drop%s, seed %llu, %.3f s of virtual time in %.3f s, %.2f times real time",
-	          bench->impacts, bench->impacts == 1 ? "" : "s", (unsigned long long)bench->options->seed, virtual_s, wall_s,
-	          wall_s > 0 ? virtual_s / wall_s : 0.0);
+	          bench->impacts, bench->impacts == 1 ? "" : "s", (unsigned long long)bench->options->seed,
+	          virtual_s, wall_s, wall_s > 0 ? virtual_s / wall_s : 0.0);
+}
+
+static double bus_error(const struct busfault *fault)
+{
+	const struct busfault_counters *c = &fault->counters;
+
+	return (double)(c->taken + c->duplicated) -
+	       (double)(c->given + c->lost + c->burst_lost + c->cut + c->silenced + busfault_held(fault));
+}
+
+static void take_results(const struct bench *bench, double wall_s)
+{
+	struct bench_watch *watch = bench->watch;
+	double *results = watch->results;
+
+	for (unsigned i = 0; i < SCENARIO_RESULTS; i++)
+		results[i] = NAN;
+	observe_results(&watch->observe, results);
+	results[SCENARIO_done] = all_done(bench);
+	results[SCENARIO_complete] = bench->script.drops_done - bench->script.incomplete;
+	results[SCENARIO_discarded] = bench->script.incomplete;
+	results[SCENARIO_ledger_bus] = fabs(bus_error(&bench->to_host)) + fabs(bus_error(&bench->to_tower));
+	results[SCENARIO_edges_outside] = (double)bench->edges_outside;
+	results[SCENARIO_queue_lost] = (double)bench->queue_lost;
+	watch->virtual_s = grid_s(bench->now_grid);
+	watch->wall_s = wall_s;
 }
 
 static double clock_s(void)
@@ -571,6 +791,8 @@ int bench_run(const struct bench_options *options)
 		serve(bench);
 		if (bench->running)
 			say_summary(bench, clock_s() - begin_s);
+		if (bench->watch != NULL)
+			take_results(bench, clock_s() - begin_s);
 	}
 	tear_down(bench);
 	status = bench->status;

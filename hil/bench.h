@@ -13,11 +13,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "common/scenes/scene.h"
 #include "hil/busfault.h"
-#include "hil/tower.h"
+#include "hil/event.h"
+#include "hil/observe.h"
+#include "hil/script.h"
+#include "hil/timeline.h"
 
 enum {
-	BENCH_FAULTS_MAX = 16,
 	/* The program's exit statuses. */
 	BENCH_DONE = 0,
 	BENCH_NOT_SAFE = 1, /* a drop of the script did not end as it should */
@@ -30,25 +33,33 @@ enum {
 #define BENCH_EPOCH_US INT64_C(1000000000000000)
 
 struct bench_options {
-	const char *scene_file;
-	double angle_deg;     /* NAN: the scene's */
+	struct scene scene;
 	const char *link;     /* NULL: the script is the host */
 	const char *firmware; /* NULL: droptower-firmware beside this program */
 	uint64_t seed;
-	bool realtime;  /* paced by the clock, else as fast as it goes */
-	unsigned drops; /* the script's */
+	bool realtime; /* paced by the clock, else as fast as it goes */
+	struct script_options script;
 	bool ideal;
+	double clock_ppm;            /* the firmware's clock is this much too fast */
 	struct busfault_options bus; /* cut_resend counts for the way to the host */
 	unsigned burst;              /* live blocks lost in a row after each impact */
 	double burst_after_s;        /* so long after it */
-	unsigned fault_count;
-	struct bench_fault {
-		enum tower_fault fault;
-		double time_s;
-	} faults[BENCH_FAULTS_MAX];
-	const char *log;   /* candump text of the host's side of the bus, NULL: none */
-	const char *truth; /* codes as given to the firmware (hil/codes.h), NULL: none */
-	int ready_fd;      /* gets one byte when the firmware runs; -1: none */
+	unsigned event_count;
+	struct event events[EVENTS_MAX];
+	/* A run that is watched does not fail by what happens in it: it ends when the script has done its
+	 * drops, all events have happened and every counter was told since, or at end_s. */
+	struct bench_watch *watch; /* NULL: nobody looks */
+	const char *log;           /* candump text of the host's side of the bus, NULL: none */
+	const char *truth;         /* codes as given to the firmware (hil/codes.h), NULL: none */
+	int ready_fd;              /* gets one byte when the firmware runs; -1: none */
+};
+
+struct bench_watch {
+	double end_s;
+	struct timeline *timeline; /* NULL: none */
+	struct observe observe;
+	double results[SCENARIO_RESULTS]; /* NAN: did not happen */
+	double virtual_s, wall_s;
 };
 
 /* Runs until the script has ended or SIGINT, SIGTERM, SIGHUP; says what goes on and what is wrong on stderr;

@@ -29,6 +29,11 @@ void busfault_burst(struct busfault *fault, unsigned frames)
 	fault->burst_left = frames;
 }
 
+void busfault_silence(struct busfault *fault, bool on)
+{
+	fault->silent = on;
+}
+
 static bool burst_takes(struct busfault *fault, uint32_t id)
 {
 	if (fault->burst_left == 0 || (id != WIRE_ID_BLOCK_S1 && id != WIRE_ID_BLOCK_S2))
@@ -84,6 +89,10 @@ unsigned busfault_pass(struct busfault *fault, const struct frame *frame, struct
 	unsigned count;
 
 	counters->taken++;
+	if (fault->silent) {
+		counters->silenced++;
+		return 0;
+	}
 	if (options->cut_resend && (frame->id == WIRE_ID_RESENT_S1 || frame->id == WIRE_ID_RESENT_S2)) {
 		counters->cut++;
 		return 0;

@@ -7,7 +7,7 @@
  * with and without the other troubles.
  *
  * No heap; any context; frames are copied. At all times
- *     taken + duplicated = given + lost + burst_lost + cut + busfault_held()
+ *     taken + duplicated = given + lost + burst_lost + cut + silenced + busfault_held()
  */
 #include <stdbool.h>
 #include <stdint.h>
@@ -31,6 +31,7 @@ struct busfault_counters {
 	uint64_t lost;         /* at random */
 	uint64_t burst_lost;
 	uint64_t cut;
+	uint64_t silenced; /* while the bus was silent */
 	uint64_t duplicated;
 	uint64_t reordered; /* held back */
 };
@@ -40,6 +41,7 @@ struct busfault {
 	struct busfault_counters counters;
 	uint64_t random;
 	unsigned burst_left;
+	bool silent;
 	struct busfault_slot {
 		struct frame frame;
 		unsigned copies; /* 0: free */
@@ -51,6 +53,9 @@ void busfault_init(struct busfault *fault, const struct busfault_options *option
 
 /* The next `frames` live blocks (BLOCK_S1, BLOCK_S2) are lost. */
 void busfault_burst(struct busfault *fault, unsigned frames);
+
+/* Nothing passes until it is switched off again. */
+void busfault_silence(struct busfault *fault, bool on);
 
 /* Takes one frame in; returns how many come out, in their order, in out. */
 unsigned busfault_pass(struct busfault *fault, const struct frame *frame, struct frame out[BUSFAULT_OUT_MAX]);

@@ -7,15 +7,17 @@
 
 enum {
 	HEARTBEAT_MS = 100,
-	RELEASE_MS = 500,  /* a person's pause between ARM and RELEASE */
-	REPEAT_MS = 200,   /* a command without effect is sent again */
-	SETTLE_MS = 20,    /* frames still on their way when the capture end comes */
-	RESEND_MS = 100,   /* one round of requests */
+	REPEAT_MS = 200, /* a command without effect is sent again */
+	SETTLE_MS = 20,  /* frames still on their way when the capture end comes */
+	RESEND_MS =
+	        50, /* between two rounds of requests, and the time the firmware takes for the first ... */
+	RESEND_PER_MS = 2, /* ... at this rate */
 	RESEND_RUNS = 8,   /* requests in a round */
 	RESEND_TICKS = 64, /* ticks in a request */
 	GIVE_UP_MS = 3000, /* so long without a missing block coming */
 	NMT_OPERATIONAL = 5,
 	TOKEN = 0x5A5A,
+	SDO_WRITE = 0x23,
 };
 
 static void enter(struct script *script, enum script_phase phase, uint32_t send_ms)
@@ -24,9 +26,17 @@ static void enter(struct script *script, enum script_phase phase, uint32_t send_
 	script->send_ms = send_ms;
 }
 
-void script_init(struct script *script, unsigned drops)
+static enum script_phase first_phase(const struct script *script)
 {
-	*script = (struct script){.drops = drops};
+	if (script->parameters_done < script->options.parameter_count)
+		return SCRIPT_SET;
+	return script->drops_done < script->options.drops ? SCRIPT_ARM : SCRIPT_DONE;
+}
+
+void script_init(struct script *script, const struct script_options *options)
+{
+	*script = (struct script){.options = *options};
+	script->phase = first_phase(script);
 }
 
 static bool due(uint32_t time_ms, uint32_t now_ms)
@@ -82,8 +92,26 @@ static void feed_reply(struct script *script, const struct frame *frame)
 	script->status.checks = reply.checks;
 }
 
-void script_feed(struct script *script, const struct frame *frame, uint32_t now_ms)
+/* Written or refused: who looks at the bus sees which. */
+static void feed_sdo(struct script *script, const struct frame *frame, uint32_t now_ms)
 {
+	struct wire_sdo sdo;
+
+	if (script->phase != SCRIPT_SET || wire_unpack_sdo(frame, &sdo) != 0 ||
+	    sdo.index != script->options.parameters[script->parameters_done].index)
+		return;
+	script->parameters_done++;
+	enter(script, first_phase(script), now_ms);
+}
+
+void script_feed(struct script *script, const struct frame *part, uint32_t now_ms)
+{
+	const struct frame *frame = segment_feed(&script->segments, part);
+
+	if (frame == NULL)
+		return;
+	if (frame != part)
+		script->classic = true;
 	switch (frame->id) {
 	case WIRE_ID_BLOCK_S1:
 	case WIRE_ID_RESENT_S1:
@@ -102,6 +130,9 @@ void script_feed(struct script *script, const struct frame *frame, uint32_t now_
 		break;
 	case WIRE_ID_REPLY:
 		feed_reply(script, frame);
+		break;
+	case WIRE_ID_SDO_REPLY:
+		feed_sdo(script, frame, now_ms);
 		break;
 	default:
 		break;
@@ -159,9 +190,9 @@ static unsigned count_missing(const struct script *script)
 }
 
 /* One round goes on where the one before ended, so that all runs get their turn. */
-static unsigned request_missing(struct script *script, struct frame *out)
+static unsigned request_missing(struct script *script, uint32_t now_ms, struct frame *out)
 {
-	uint32_t ticks = capture_ticks(script), block = script->resend_at;
+	uint32_t ticks = capture_ticks(script), block = script->resend_at, asked = 0;
 	unsigned count = 0;
 
 	while (block < WIRE_SENSORS * ticks && count < RESEND_RUNS) {
@@ -173,6 +204,7 @@ static unsigned request_missing(struct script *script, struct frame *out)
 			block++;
 			continue;
 		}
+		asked += block - first;
 		wire_pack_resend(&out[count++], WIRE_ID_RESEND,
 		                 &(struct wire_resend){.sensor = (uint8_t)(sensor + 1),
 		                                       .count = (uint16_t)(block - first),
@@ -180,13 +212,27 @@ static unsigned request_missing(struct script *script, struct frame *out)
 		                                                        first % ticks});
 	}
 	script->resend_at = block < WIRE_SENSORS * ticks ? block : 0;
+	script->send_ms = now_ms + RESEND_MS + asked / RESEND_PER_MS;
 	return count;
+}
+
+static unsigned do_set(struct script *script, uint32_t now_ms, struct frame *out)
+{
+	const struct scenario_parameter *parameter = &script->options.parameters[script->parameters_done];
+	unsigned state = script->status.state;
+
+	if ((state != WIRE_STATE_SAFE && state != WIRE_STATE_READY) || !due(script->send_ms, now_ms))
+		return 0;
+	wire_pack_sdo(out, WIRE_ID_SDO_REQUEST,
+	              &(struct wire_sdo){SDO_WRITE, parameter->index, 0, parameter->value});
+	script->send_ms = now_ms + REPEAT_MS;
+	return 1;
 }
 
 static unsigned do_arm(struct script *script, uint32_t now_ms, struct frame *out)
 {
 	if (script->status.state == WIRE_STATE_ARMED) {
-		enter(script, SCRIPT_RELEASE, now_ms + RELEASE_MS);
+		enter(script, SCRIPT_RELEASE, now_ms + script->options.release_ms);
 		return 0;
 	}
 	if (script->status.state != WIRE_STATE_READY || !due(script->send_ms, now_ms))
@@ -215,6 +261,8 @@ static unsigned do_fetch(struct script *script, uint32_t now_ms, struct frame *o
 
 	if (!due(script->send_ms, now_ms))
 		return 0;
+	if (script->classic && !due(script->progress_ms + SETTLE_MS, now_ms))
+		return 0; /* the upload goes on */
 	if (!script->captured) {
 		script->send_ms = now_ms + REPEAT_MS;
 		if (script->status.state != WIRE_STATE_CAPTURED)
@@ -229,8 +277,7 @@ static unsigned do_fetch(struct script *script, uint32_t now_ms, struct frame *o
 	}
 	lacking = count_missing(script);
 	if (lacking > 0 && !due(script->progress_ms + GIVE_UP_MS, now_ms)) {
-		script->send_ms = now_ms + RESEND_MS;
-		return request_missing(script, out);
+		return request_missing(script, now_ms, out);
 	}
 	if (lacking > 0) {
 		snprintf(script->why, sizeof(script->why), "drop %u: discarded with %u blocks missing",
@@ -267,13 +314,15 @@ static unsigned do_return(struct script *script, uint32_t now_ms, struct frame *
 	script->drops_done++;
 	script->captured = false;
 	script->drop_ms = now_ms;
-	enter(script, script->drops_done < script->drops ? SCRIPT_ARM : SCRIPT_DONE, now_ms);
+	enter(script, first_phase(script), now_ms);
 	return 0;
 }
 
 static unsigned do_phase(struct script *script, uint32_t now_ms, struct frame *out)
 {
 	switch (script->phase) {
+	case SCRIPT_SET:
+		return do_set(script, now_ms, out);
 	case SCRIPT_ARM:
 		return do_arm(script, now_ms, out);
 	case SCRIPT_RELEASE:
@@ -291,21 +340,40 @@ static unsigned do_phase(struct script *script, uint32_t now_ms, struct frame *o
 	return 0;
 }
 
+/* A fault at rest before the drop, or a tower that knows nothing of the drop any more. */
+static bool drop_is_off(const struct script *script)
+{
+	unsigned state = script->status.state;
+
+	if (script->phase == SCRIPT_FETCH && !script->captured)
+		return state == WIRE_STATE_FAULT_HELD || state == WIRE_STATE_SAFE ||
+		       state == WIRE_STATE_READY;
+	return state == WIRE_STATE_FAULT_HELD && script->phase < SCRIPT_ACCEPT;
+}
+
+static void stopped(struct script *script, uint32_t now_ms)
+{
+	if (!script->options.patient)
+		fail(script, "stopped");
+	else if (script->phase != SCRIPT_SET && script->phase != SCRIPT_ARM)
+		enter(script, SCRIPT_ARM, now_ms);
+}
+
 unsigned script_poll(struct script *script, uint32_t now_ms, struct frame out[SCRIPT_SEND_MAX])
 {
 	unsigned count = 0;
 
 	if (due(script->heartbeat_ms, now_ms)) {
 		script->heartbeat_ms = now_ms + HEARTBEAT_MS;
-		wire_pack_heartbeat(&out[count++], WIRE_ID_HEARTBEAT_HOST,
-		                    &(struct wire_heartbeat){NMT_OPERATIONAL, wire_hash()});
+		wire_pack_heartbeat(
+		        &out[count++], WIRE_ID_HEARTBEAT_HOST,
+		        &(struct wire_heartbeat){NMT_OPERATIONAL, wire_hash() ^ script->options.wrong_hash});
 	}
 	if (script->phase == SCRIPT_DONE || script->phase == SCRIPT_FAILED)
 		return count;
-	if (script->status.state == WIRE_STATE_FAULT_HELD && script->phase != SCRIPT_ACCEPT &&
-	    script->phase != SCRIPT_RETURN)
-		fail(script, "stopped");
-	else if (due(script->drop_ms + SCRIPT_LIMIT_MS, now_ms))
+	if (drop_is_off(script))
+		stopped(script, now_ms);
+	else if (!script->options.patient && due(script->drop_ms + SCRIPT_LIMIT_MS, now_ms))
 		fail(script, "not done in time");
 	return count + do_phase(script, now_ms, out + count);
 }

@@ -12,16 +12,20 @@
 #include <stdint.h>
 
 #include "common/frame.h"
+#include "common/segment.h"
 #include "common/wire.h"
+#include "hil/scenario.h"
 
 enum {
 	SCRIPT_TICKS = 2048,     /* blocks remembered of a sensor, more than the longest capture has */
 	SCRIPT_SEND_MAX = 12,    /* frames in one call */
+	SCRIPT_RELEASE_MS = 500, /* a person's pause between ARM and RELEASE */
 	SCRIPT_LIMIT_MS = 30000, /* for one drop, from SAFE to SAFE */
 	SCRIPT_WHY_MAX = 200,
 };
 
 enum script_phase {
+	SCRIPT_SET,     /* wait for SAFE, write the parameters */
 	SCRIPT_ARM,     /* wait for READY, arm */
 	SCRIPT_RELEASE, /* armed: release */
 	SCRIPT_FETCH,   /* falling; then until no block is missing */
@@ -31,9 +35,20 @@ enum script_phase {
 	SCRIPT_FAILED,
 };
 
+struct script_options {
+	unsigned drops;      /* 0: heartbeats only */
+	uint32_t release_ms; /* from ARM to RELEASE */
+	bool patient;        /* a fault at rest does not end it: it waits for READY, for ever */
+	bool wrong_hash;     /* as if built from another wire.def */
+	const struct scenario_parameter *parameters; /* to write before the first drop, in this order */
+	unsigned parameter_count;
+};
+
 struct script {
+	struct script_options options;
 	enum script_phase phase;
-	unsigned drops, drops_done;
+	unsigned drops_done;
+	unsigned parameters_done;
 	unsigned incomplete;   /* drops that came back to SAFE with blocks missing */
 	uint32_t drop_ms;      /* when this drop began */
 	uint32_t heartbeat_ms; /* when the next one is due */
@@ -43,13 +58,16 @@ struct script {
 	uint8_t sequence;
 	uint8_t accept_op;
 	bool captured; /* capture is this drop's */
+	bool classic;  /* it came in segments: the tower uploads by itself */
+	struct segment_join segments;
 	struct wire_capture_end capture;
 	struct wire_status status;                 /* the tower's last */
 	uint32_t held[WIRE_SENSORS][SCRIPT_TICKS]; /* tick + 1 of the block that came, at tick modulo size */
 	char why[SCRIPT_WHY_MAX];                  /* one line: why FAILED, or which drop is incomplete */
 };
 
-void script_init(struct script *script, unsigned drops);
+/* The parameters stay the caller's. */
+void script_init(struct script *script, const struct script_options *options);
 
 /* A frame from the tower. */
 void script_feed(struct script *script, const struct frame *frame, uint32_t now_ms);

@@ -207,10 +207,11 @@ static void share_processor(void)
 	(void)sched_setaffinity(0, sizeof(set), &set);
 }
 
-static int run_command(struct target *target, const char *command, bool realtime,
+static int run_command(struct target *target, const char *command, bool realtime, unsigned cause,
                        char message[TARGET_MESSAGE_MAX])
 {
-	static char bus[] = "--bus", clock_paced[] = "--realtime";
+	static char bus[] = "--bus", clock_paced[] = "--realtime", reset_cause[] = "--reset-cause";
+	char number[12];
 	wordexp_t words = {.we_offs = 0};
 	char beside[PATH_MAX_BYTES];
 	char *argv[64];
@@ -235,6 +236,11 @@ static int run_command(struct target *target, const char *command, bool realtime
 	argv[count++] = target->prefix;
 	if (realtime)
 		argv[count++] = clock_paced;
+	if (cause != 0) {
+		snprintf(number, sizeof(number), "%u", cause);
+		argv[count++] = reset_cause;
+		argv[count++] = number;
+	}
 	argv[count] = NULL;
 	error = spawn(target, argv);
 	if (error != 0)
@@ -245,7 +251,8 @@ static int run_command(struct target *target, const char *command, bool realtime
 	return error == 0 ? 0 : -1;
 }
 
-struct target *target_start(const char *command, bool realtime, char message[TARGET_MESSAGE_MAX])
+struct target *target_start(const char *command, bool realtime, unsigned cause,
+                            char message[TARGET_MESSAGE_MAX])
 {
 	struct target *target = calloc(1, sizeof(*target));
 
@@ -262,7 +269,7 @@ struct target *target_start(const char *command, bool realtime, char message[TAR
 	}
 	if (!realtime)
 		share_processor();
-	if (run_command(target, command, realtime, message) != 0) {
+	if (run_command(target, command, realtime, cause, message) != 0) {
 		close_all(target);
 		return NULL;
 	}

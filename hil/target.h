@@ -19,9 +19,11 @@ enum { TARGET_MESSAGE_MAX = 512 };
 
 struct target;
 
-/* Runs `COMMAND --bus PREFIX [--realtime]`; command is split into words as a shell would, without
- * running any other; NULL is droptower-firmware next to this program. NULL on error. */
-struct target *target_start(const char *command, bool realtime, char message[TARGET_MESSAGE_MAX]);
+/* Runs `COMMAND --bus PREFIX [--realtime] [--reset-cause CAUSE]`, the last for a cause that is not 0; command
+ * is split into words as a shell would, without running any other; NULL is droptower-firmware next to this
+ * program. NULL on error. */
+struct target *target_start(const char *command, bool realtime, unsigned cause,
+                            char message[TARGET_MESSAGE_MAX]);
 
 /* Waits for the next request. 1 with it and its frames, 0 when a signal asks to stop, DT_E_TIMEOUT after
  * 5 s without one, DT_E_CLOSED when the firmware is gone, DT_E_FORMAT for bytes that are no request. */

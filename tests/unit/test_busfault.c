@@ -177,6 +177,26 @@ static void cut_stops_resent_blocks_only(void **state)
 		assert_int_equal(ids[i], i % 2 ? WIRE_ID_CAPTURE_END : WIRE_ID_BLOCK_S1);
 }
 
+static void silence_takes_all_and_ends(void **state)
+{
+	static const uint32_t turn[4] = {WIRE_ID_BLOCK_S1, WIRE_ID_STATUS};
+	struct busfault_options options = {0};
+	struct busfault fault;
+
+	(void)state;
+	busfault_init(&fault, &options, SEED);
+	busfault_silence(&fault, true);
+	for (unsigned i = 0; i < 10; i++) {
+		struct frame out[BUSFAULT_OUT_MAX], frame = {.id = turn[i % 2]};
+
+		assert_int_equal(busfault_pass(&fault, &frame, out), 0);
+	}
+	assert_int_equal(fault.counters.silenced, 10);
+	busfault_silence(&fault, false);
+	fault.counters = (struct busfault_counters){0};
+	assert_int_equal(pass_all(&fault, turn), FRAMES);
+}
+
 /* The same frames are lost whatever else is switched on, and other ones with another seed. */
 static void seed_decides(void **state)
 {
@@ -207,6 +227,7 @@ int main(void)
 	        cmocka_unit_test(counts_only_true_reorders),
 	        cmocka_unit_test(burst_takes_live_blocks_only),
 	        cmocka_unit_test(cut_stops_resent_blocks_only),
+	        cmocka_unit_test(silence_takes_all_and_ends),
 	        cmocka_unit_test(seed_decides),
 	};
 

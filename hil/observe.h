@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HIL_OBSERVE_H
+#define DT_HIL_OBSERVE_H
+/*
+ * Watches a run and writes down what a verdict needs: states, emergencies, replies, counters, what the
+ * outputs did against what the tower did, and who lost which frames. Decides nothing.
+ *
+ * The bench calls it with what it carries; it takes nothing from the firmware's code and asks no host.
+ * "From the firmware" is before the fault injector, "at the host" behind it. tower_s is the tower's own
+ * time, now_us the firmware's since the run began. No heap; one thread; a struct of 300 kB.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/frame.h"
+#include "common/scenes/scene.h"
+#include "common/wire.h"
+#include "hil/busfault.h"
+#include "hil/scenario.h"
+#include "hil/tower.h"
+
+enum {
+	OBSERVE_TICKS = 1 << 16, /* blocks are told apart up to this tick since a reset */
+	OBSERVE_NOTES = 64,      /* of each kind that are kept; further ones are counted */
+};
+
+struct observe_note {
+	uint32_t number; /* state, fault, error or abort code */
+	double time_s;   /* virtual */
+};
+
+struct observe_notes {
+	unsigned count; /* all of them */
+	struct observe_note note[OBSERVE_NOTES];
+};
+
+/* The live blocks of one sensor since the latest reset. */
+struct observe_blocks {
+	uint8_t sent[OBSERVE_TICKS], received[OBSERVE_TICKS]; /* 0 or 1 */
+	int64_t last;                                         /* tick received, -1: none */
+	int64_t gaps;
+};
+
+struct observe {
+	double planned_travel_m; /* where the product shall leave the frame */
+	double now_s;            /* virtual time */
+
+	struct observe_notes path, emcy, replies, refused, aborts;
+	uint8_t state, fault;
+	double block_s;     /* when the last live block told the state, negative: none yet */
+	bool emcy_is_wrong; /* a code that is not its fault's */
+
+	bool has_counter[WIRE_COUNTERS];
+	uint32_t counter[WIRE_COUNTERS];
+	uint64_t sent, given;            /* frames from and to the firmware since its reset */
+	int64_t sent_error, given_error; /* the firmware's count less ours, the worst */
+	uint64_t hash;                   /* FNV-1a of all frames from the firmware, with their times */
+
+	struct observe_blocks blocks[WIRE_SENSORS];
+	int64_t blocks_error; /* of boots before the present one */
+	double gaps_before, blocks_before;
+
+	struct wire_capture_end capture;
+	unsigned captures;
+	double capture_first_s; /* tower's time of its first tick */
+
+	struct tower_truth truth; /* of the latest drop that began */
+	unsigned impacts, resets, unsafe;
+	double release_us; /* when the last RELEASE reached the firmware, NAN: never */
+	double latch_us;   /* from there to the latch's edge, NAN */
+	double relieve_s;  /* dampers not relieved any more, tower's time, NAN */
+	int peak_x;        /* counts */
+	unsigned bursts;
+	double burst_end_s;
+	uint16_t outputs, inputs;
+};
+
+void observe_init(struct observe *observe, const struct scene *scene);
+
+/* The firmware started anew: its counters and ticks begin at 0. */
+void observe_reset(struct observe *observe);
+
+/* An edge of the firmware's output; the tower has not made it yet. */
+void observe_edge(struct observe *observe, unsigned bit, bool on, double edge_us, double tower_s);
+
+/* What was converted, and the tower as it is now. */
+void observe_sample(struct observe *observe, unsigned group, const int16_t codes[6], uint16_t inputs,
+                    const struct tower_truth *truth, double tower_s);
+
+/* tick_s: tower's time of the firmware's tick 0. */
+void observe_from_firmware(struct observe *observe, const struct frame *frame, double tick_s);
+void observe_at_host(struct observe *observe, const struct frame *frame);
+void observe_to_firmware(struct observe *observe, const struct frame *frame, double now_us);
+
+/* The numbers of scenario.def that come from here; the rest (done, complete, discarded, ledger_bus,
+ * edges_outside, queue_lost) is the bench's. NAN: did not happen. */
+void observe_results(const struct observe *observe, double results[SCENARIO_RESULTS]);
+
+#endif

@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "hil/verdict.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+#include "common/wire_table.h"
+
+enum { TEXT_MAX = 400 };
+
+struct verdict {
+	FILE *out;
+	unsigned failures;
+	char *failed; /* names */
+	size_t size;
+};
+
+static void say(struct verdict *verdict, bool good, const char *name, const char *measured,
+                const char *expected)
+{
+	size_t used = strlen(verdict->failed);
+
+	fprintf(verdict->out, "  %-5s%-22s %-28s %s\n", good ? "ok" : "FAIL", name, measured, expected);
+	if (good)
+		return;
+	verdict->failures++;
+	if (used + strlen(name) + 2 < verdict->size)
+		snprintf(verdict->failed + used, verdict->size - used, "%s%s", used ? " " : "", name);
+}
+
+static void judge_range(struct verdict *verdict, const char *name, double value,
+                        const struct scenario_range *range)
+{
+	char measured[40], expected[80];
+
+	if (isnan(range->min))
+		return;
+	snprintf(measured, sizeof(measured), isnan(value) ? "did not happen" : "%.9g", value);
+	if (range->min == range->max)
+		snprintf(expected, sizeof(expected), "%.9g", range->min);
+	else
+		snprintf(expected, sizeof(expected), "%.9g..%.9g", range->min, range->max);
+	say(verdict, value >= range->min && value <= range->max, name, measured, expected);
+}
+
+/* ---- lists ---- */
+
+static const char *error_of(unsigned number)
+{
+	return scenario_error_name((int)(int32_t)number);
+}
+
+static void add_item(char text[TEXT_MAX], uint32_t number, const char *(*name_of)(unsigned))
+{
+	size_t used = strlen(text);
+
+	if (name_of != NULL)
+		snprintf(text + used, TEXT_MAX - used, "%s%s", used ? " " : "", name_of(number));
+	else
+		snprintf(text + used, TEXT_MAX - used, "%s0x%08" PRIX32, used ? " " : "", number);
+}
+
+static void judge_notes(struct verdict *verdict, const char *name, const struct observe_notes *notes,
+                        const struct scenario_list *list, const char *(*name_of)(unsigned))
+{
+	char measured[TEXT_MAX] = "", expected[TEXT_MAX] = "";
+	bool good = notes->count == list->count;
+
+	if (!list->given)
+		return;
+	for (unsigned i = 0; i < notes->count && i < OBSERVE_NOTES; i++) {
+		add_item(measured, notes->note[i].number, name_of);
+		good = good && (int32_t)notes->note[i].number == list->item[i];
+	}
+	for (unsigned i = 0; i < list->count; i++)
+		add_item(expected, (uint32_t)list->item[i], name_of);
+	say(verdict, good, name, measured[0] ? measured : "-", expected[0] ? expected : "-");
+}
+
+static void judge_one(struct verdict *verdict, const char *name, uint32_t number,
+                      const struct scenario_list *list, const char *(*name_of)(unsigned))
+{
+	const struct observe_notes notes = {1, {{number, 0}}};
+
+	judge_notes(verdict, name, &notes, list, name_of);
+}
+
+static void judge_marks(struct verdict *verdict, const struct observe *observe,
+                        const struct scenario_list *list)
+{
+	char measured[TEXT_MAX] = "", expected[TEXT_MAX] = "";
+	unsigned wanted = 0;
+
+	if (!list->given)
+		return;
+	for (unsigned i = 0; i < list->count; i++)
+		wanted |= 1u << list->item[i];
+	for (unsigned bit = 0; bit < 16; bit++) {
+		if (observe->capture.marks >> bit & 1)
+			add_item(measured, bit, wire_mark_name);
+		if (wanted >> bit & 1)
+			add_item(expected, bit, wire_mark_name);
+	}
+	if (observe->captures == 0)
+		snprintf(measured, sizeof(measured), "no capture");
+	say(verdict, observe->captures > 0 && wanted == observe->capture.marks, "marks",
+	    measured[0] ? measured : "-", expected[0] ? expected : "-");
+}
+
+static void judge_counters(struct verdict *verdict, const struct scenario *scenario,
+                           const struct observe *observe)
+{
+	for (unsigned i = 0; i < WIRE_COUNTERS; i++)
+		judge_range(verdict, wire_counter_name(i),
+		            observe->has_counter[i] ? (double)observe->counter[i] : (double)NAN,
+		            &scenario->counter[i]);
+}
+
+unsigned verdict_print(const struct scenario *scenario, const struct observe *observe,
+                       const double results[SCENARIO_RESULTS], FILE *out, char *failed, size_t size)
+{
+	struct verdict verdict = {.out = out, .failed = failed, .size = size};
+
+	failed[0] = '\0';
+	judge_one(&verdict, "end", observe->state, &scenario->end, wire_state_name);
+	judge_one(&verdict, "fault", observe->fault, &scenario->fault, wire_fault_name);
+	judge_notes(&verdict, "emcy", &observe->emcy, &scenario->emcy, wire_fault_name);
+	judge_notes(&verdict, "path", &observe->path, &scenario->path, wire_state_name);
+	judge_marks(&verdict, observe, &scenario->marks);
+	judge_notes(&verdict, "replies", &observe->replies, &scenario->replies, wire_state_name);
+	judge_notes(&verdict, "refused", &observe->refused, &scenario->refused, error_of);
+	judge_notes(&verdict, "aborts", &observe->aborts, &scenario->aborts, NULL);
+	for (unsigned i = 0; i < SCENARIO_RESULTS; i++)
+		judge_range(&verdict, scenario_result_name(i), results[i], &scenario->result[i]);
+	judge_counters(&verdict, scenario, observe);
+	return verdict.failures;
+}
