@@ -31,7 +31,7 @@ static void help(FILE *out)
 		fprintf(out, "  %-8s %s\n", commands[i].name, commands[i].what);
 	fputs("\n'droptower COMMAND --help' tells the options. Exit codes: 0 done, 2 usage, 3 input "
 	      "unusable,\n"
-	      "4 link or hardware, 5 refused by an interlock.\n",
+	      "4 link or hardware, 5 refused by an interlock or stopped.\n",
 	      out);
 }
 

@@ -22,6 +22,7 @@ enum {
 	CROSSINGS_START = 3, /* one cycle, enough to start from */
 	PARAMETERS = 5,
 	ITERATIONS = 40,
+	GROWING_MAX = 5, /* steps with a swing that grows: a drift, not a decay, and it will not come back */
 };
 
 enum { DECAY, OMEGA, COSINE, SINE, OFFSET };
@@ -164,6 +165,7 @@ static bool fit(const struct window *window, double p[PARAMETERS], double *squar
 {
 	double normal[CHOLESKY_MAX][CHOLESKY_MAX], damped[CHOLESKY_MAX][CHOLESKY_MAX], right[CHOLESKY_MAX];
 	double next_right[CHOLESKY_MAX], lambda = 1e-3, moved;
+	int growing = 0;
 
 	(void)normal_equations(window, p, false, normal, right, squares);
 	for (int i = 0; i < ITERATIONS; i++) {
@@ -191,6 +193,8 @@ static bool fit(const struct window *window, double p[PARAMETERS], double *squar
 		memcpy(right, next_right, sizeof(right));
 		*squares = trial_squares;
 		lambda *= 0.1;
+		if (p[DECAY] < 0 && ++growing == GROWING_MAX)
+			return false;
 		if (moved < STEP_MIN)
 			return cholesky_factor(factor, PARAMETERS, normal);
 	}
