@@ -352,6 +352,7 @@ static void boot(enum port_reset cause)
 {
 	port.machine = (struct machine){.outputs = WIRE_IO_MAGNET_HOLD}; /* as the drivers hold it in reset */
 	port.first_request = true;
+	port.bus_errors = 0;
 	app_init(cause);
 }
 

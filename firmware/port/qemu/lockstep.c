@@ -1,0 +1,297 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "firmware/port/qemu/lockstep.h"
+
+#include "common/memory.h"
+#include "common/sensorbus.h"
+#include "firmware/app.h"
+
+enum { TICK_US = 1000 };
+
+/* The sample instants of a millisecond. Those of X from 1 on are a fraction of a us after floor_us. */
+static const struct instant {
+	uint8_t group, index;
+	uint16_t floor_us;
+} instants[LOCKSTEP_INSTANTS] = {
+        {SENSORBUS_X | SENSORBUS_YZ, 0, 0},
+        {SENSORBUS_YZ, 1, 100},
+        {SENSORBUS_X, 1, 142},
+        {SENSORBUS_YZ, 2, 200},
+        {SENSORBUS_X, 2, 285},
+        {SENSORBUS_YZ, 3, 300},
+        {SENSORBUS_YZ, 4, 400},
+        {SENSORBUS_X, 3, 428},
+        {SENSORBUS_YZ, 5, 500},
+        {SENSORBUS_X, 4, 571},
+        {SENSORBUS_YZ, 6, 600},
+        {SENSORBUS_YZ, 7, 700},
+        {SENSORBUS_X, 5, 714},
+        {SENSORBUS_YZ, 8, 800},
+        {SENSORBUS_X, 6, 857},
+        {SENSORBUS_YZ, 9, 900},
+};
+
+static struct machine {
+	uint32_t tick_ms, now_us;
+	uint16_t outputs, inputs;
+	uint8_t edges;                       /* outputs that changed since the last request ... */
+	uint32_t edge_us[SENSORBUS_OUTPUTS]; /* ... and when */
+	uint8_t off_planned;                 /* outputs that port_off_at will switch ... */
+	uint32_t off_us[SENSORBUS_OUTPUTS];  /* ... and when */
+	bool first_request, reset_wanted, bus_classic;
+	bool bus_off, tx_blocked;
+	uint32_t bus_errors;
+	struct sensorbus_answer answer;
+	unsigned sent_count, received_count, received_next;
+	size_t request_bytes; /* in request[], its frames included */
+	/* As the frames are sent, so they wait: each is written once. */
+	uint8_t request[SENSORBUS_REQUEST_BYTES + SENSORBUS_FRAMES_MAX * SENSORBUS_FRAME_BYTES_MAX];
+	struct frame received[SENSORBUS_FRAMES_MAX];
+} machine;
+
+/* ---- what the core calls ---- */
+
+uint32_t port_time_us(void)
+{
+	return machine.now_us;
+}
+
+uint16_t port_io(void)
+{
+	return machine.inputs | machine.outputs;
+}
+
+static void set_outputs(uint16_t outputs, uint32_t time_us)
+{
+	uint16_t changed = outputs ^ machine.outputs;
+
+	machine.outputs = outputs;
+	if (changed == 0)
+		return;
+	for (unsigned i = 0; i < SENSORBUS_OUTPUTS; i++)
+		if (changed & 1u << i) {
+			machine.edges |= (uint8_t)(1u << i);
+			machine.edge_us[i] = time_us;
+		}
+}
+
+void port_outputs(uint16_t on, uint16_t off)
+{
+	uint32_t before = board_hold();
+
+	set_outputs((uint16_t)((machine.outputs & ~off) | on), machine.now_us);
+	board_release(before);
+}
+
+static int plan_off(uint16_t output, uint32_t time_us)
+{
+	if ((int32_t)(time_us - machine.now_us) < 0) {
+		set_outputs(machine.outputs & (uint16_t)~output, machine.now_us);
+		return 1;
+	}
+	for (unsigned i = 0; i < SENSORBUS_OUTPUTS; i++)
+		if (output & 1u << i) {
+			machine.off_planned |= (uint8_t)(1u << i);
+			machine.off_us[i] = time_us;
+		}
+	return 0;
+}
+
+int port_off_at(uint16_t output, uint32_t time_us)
+{
+	uint32_t before = board_hold();
+	int late = plan_off(output, time_us);
+
+	board_release(before);
+	return late;
+}
+
+void port_off_cancel(uint16_t output)
+{
+	uint32_t before = board_hold();
+
+	machine.off_planned &= (uint8_t)~output;
+	board_release(before);
+}
+
+int port_can_setup(bool classic, uint32_t data_kbit_s)
+{
+	bool known = data_kbit_s == 2000 || data_kbit_s == 5000 || data_kbit_s == 8000;
+
+	/* The sensor bus carries frames, not bits: nothing to set. */
+	return known && (classic || !machine.bus_classic) ? 0 : DT_E_ARGUMENT;
+}
+
+static int take_frame(const struct frame *frame)
+{
+	if (machine.bus_off || machine.tx_blocked || machine.sent_count == SENSORBUS_FRAMES_MAX)
+		return DT_E_FULL;
+	machine.request_bytes += sensorbus_put_frame(machine.request + machine.request_bytes, frame);
+	machine.sent_count++;
+	return 0;
+}
+
+int port_can_send(const struct frame *frame)
+{
+	uint32_t before = board_hold();
+	int result = take_frame(frame);
+
+	board_release(before);
+	return result;
+}
+
+int port_can_receive(struct frame *frame)
+{
+	uint32_t before = board_hold();
+	bool any = machine.received_next != machine.received_count;
+
+	if (any)
+		*frame = machine.received[machine.received_next++];
+	board_release(before);
+	return any;
+}
+
+uint32_t port_can_errors(bool *bus_off)
+{
+	*bus_off = machine.bus_off;
+	return machine.bus_errors;
+}
+
+void port_reset(void)
+{
+	machine.reset_wanted = true;
+}
+
+bool lockstep_reset_wanted(void)
+{
+	return machine.reset_wanted;
+}
+
+/* ---- an instant ---- */
+
+static unsigned at;
+
+unsigned lockstep_group(unsigned instant)
+{
+	return instants[instant].group;
+}
+
+/* Makes the planned edges whose time has come by up_to_us. */
+static void make_edges(uint32_t up_to_us)
+{
+	for (unsigned i = 0; i < SENSORBUS_OUTPUTS && machine.off_planned != 0; i++)
+		if ((machine.off_planned & 1u << i) && (int32_t)(up_to_us - machine.off_us[i]) >= 0) {
+			set_outputs((uint16_t)(machine.outputs & ~(1u << i)), machine.off_us[i]);
+			machine.off_planned &= (uint8_t) ~(1u << i);
+		}
+}
+
+static void set_time(const struct instant *instant)
+{
+	uint32_t floor_us = machine.tick_ms * TICK_US + instant->floor_us;
+	bool whole = instant->index == 0 || instant->group == SENSORBUS_YZ;
+
+	make_edges(floor_us);
+	machine.now_us = floor_us + (whole ? 0 : 1);
+}
+
+static int send_request(const struct instant *instant)
+{
+	struct sensorbus_request request = {
+	        .tick_ms = machine.tick_ms,
+	        .group = instant->group,
+	        .index = instant->index,
+	        .outputs = machine.outputs,
+	        .edges = machine.edges,
+	        .frames = (uint8_t)machine.sent_count,
+	        .reset = machine.first_request,
+	};
+	int result;
+
+	memcpy(request.edge_us, machine.edge_us, sizeof(request.edge_us));
+	(void)sensorbus_put_request(machine.request, &request);
+	result = board_write(machine.request, machine.request_bytes);
+	machine.request_bytes = SENSORBUS_REQUEST_BYTES;
+	machine.sent_count = 0;
+	machine.edges = 0;
+	machine.first_request = false;
+	return result;
+}
+
+static int read_frames(unsigned count)
+{
+	uint8_t head[4];
+
+	if (count > SENSORBUS_FRAMES_MAX)
+		return DT_E_FORMAT;
+	machine.received_next = 0;
+	machine.received_count = 0;
+	for (unsigned i = 0; i < count; i++) {
+		struct frame *frame = &machine.received[i];
+		int result = board_read(head, sizeof(head));
+
+		if (result != 0)
+			return result;
+		result = sensorbus_frame_head(head, frame);
+		if (result > 0)
+			result = board_read(frame->data, (size_t)result);
+		if (result != 0)
+			return result;
+		machine.received_count++;
+	}
+	return 0;
+}
+
+static int read_answer(void)
+{
+	uint8_t bytes[SENSORBUS_ANSWER_BYTES];
+	struct sensorbus_answer *answer = &machine.answer;
+	int result = board_read(bytes, sizeof(bytes));
+
+	if (result != 0)
+		return result;
+	sensorbus_get_answer(bytes, answer);
+	machine.inputs = answer->inputs & (uint16_t)~WIRE_IO_OUTPUTS & (uint16_t)~WIRE_IO_OVERRUN;
+	machine.bus_errors += answer->bus_errors;
+	machine.bus_off = answer->bus_off != 0;
+	machine.tx_blocked = answer->tx_blocked != 0;
+	result = read_frames(answer->frames);
+	return result == 0 && answer->stop ? LOCKSTEP_GONE : result;
+}
+
+int lockstep_exchange(unsigned instant)
+{
+	int result;
+
+	at = instant;
+	set_time(&instants[instant]);
+	result = send_request(&instants[instant]);
+	if (instant == LOCKSTEP_INSTANTS - 1)
+		machine.tick_ms++;
+	return result == 0 ? read_answer() : result;
+}
+
+void lockstep_deliver(void)
+{
+	const struct sensorbus_answer *answer = &machine.answer;
+	const int16_t *codes = answer->codes;
+
+	for (unsigned gate = 0; gate < 2; gate++)
+		if (answer->captures & 1u << gate)
+			app_on_gate(gate, answer->capture_us[gate]);
+	if (at == 0)
+		app_on_tick();
+	if (instants[at].group & SENSORBUS_X)
+		app_on_x(codes[0], codes[3], answer->ready & SENSORBUS_X);
+	if (instants[at].group & SENSORBUS_YZ)
+		app_on_yz(codes[1], codes[2], codes[4], codes[5], answer->ready & SENSORBUS_YZ);
+}
+
+void lockstep_boot(enum port_reset cause, bool bus_classic)
+{
+	memset(&machine, 0, sizeof(machine));
+	machine.outputs = WIRE_IO_MAGNET_HOLD; /* as the drivers hold it in reset */
+	machine.request_bytes = SENSORBUS_REQUEST_BYTES;
+	machine.first_request = true;
+	machine.bus_classic = bus_classic;
+	app_init(cause);
+}

@@ -1,0 +1,371 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * The board half of the port: mps2-an386 with two sample timers, a dual timer that checks them, a watchdog,
+ * and the sensor bus on two FIFOs of the host. Source: Arm, Cortex-M System Design Kit TRM (DDI 0479), AN386.
+ *
+ * The YZ timer has a period of exactly 2 500 cycles. 25 MHz / 7 000 is no whole number, so the X timer is put
+ * in phase with the YZ timer at every tick and makes six periods of 3 571 cycles.
+ */
+#include "common/sensorbus.h"
+#include "firmware/app.h"
+#include "firmware/port/qemu/lockstep.h"
+#include "firmware/port/qemu/qemu.h"
+#include "firmware/port/qemu/semihost.h"
+
+struct timer {
+	volatile uint32_t control, value, reload, interrupt_clear;
+};
+
+struct dual_timer {
+	volatile uint32_t load, value, control;
+};
+
+struct watchdog {
+	volatile uint32_t load, value, control, interrupt_clear;
+};
+
+#define TIMER_X ((struct timer *)0x40000000u)
+#define TIMER_YZ ((struct timer *)0x40001000u)
+#define DUAL_TIMER ((struct dual_timer *)0x40002000u)
+#define WATCHDOG ((struct watchdog *)0x40008000u)
+#define NVIC_ENABLE (*(volatile uint32_t *)0xE000E100u)
+#define NVIC_PRIORITY ((volatile uint8_t *)0xE000E400u)
+#define AIRCR (*(volatile uint32_t *)0xE000ED0Cu)
+
+enum {
+	IRQ_X = 8,
+	IRQ_YZ = 9,
+	PRIORITY_SAMPLES = 0x40, /* both, so that they do not nest; faults and the watchdog are above */
+	TIMER_ENABLE = 1 << 0,
+	TIMER_INTERRUPT = 1 << 3,
+	DUAL_TIMER_ENABLE = 1 << 7,
+	DUAL_TIMER_32_BITS = 1 << 1,
+	WATCHDOG_INTERRUPT = 1 << 0,
+	AIRCR_RESET = 0x05FA0004,
+	CYCLES_PER_MS = 25000,
+	CYCLES_YZ = CYCLES_PER_MS / WIRE_YZ_PER_TICK,
+	CYCLES_X = CYCLES_PER_MS / WIRE_X_PER_TICK,
+	CYCLES_WATCHDOG = 50 * CYCLES_PER_MS,
+	CLOCK_ERROR_MAX = 25, /* cycles between a tick and the dual timer: reading takes a few */
+	LINE_BYTES = 256,
+	LAST_X = LOCKSTEP_INSTANTS - 2, /* instant of a tick's last X sample */
+	EXIT_USAGE = 2,
+	EXIT_LINK = 4,
+	EXIT_CLOCKS = 71,
+};
+
+/* What a restart by port_reset leaves; zero at power-on. */
+static struct {
+	bool restarted;
+	int request, answer;
+} kept __attribute__((section(".kept")));
+
+static struct {
+	const char *bus;
+	enum port_reset cause;
+	bool preempt, report, classic;
+} options;
+
+static volatile bool poll_due;
+static unsigned next_instant;
+static uint32_t ticks, first_cycle;
+static int32_t clock_error_max; /* cycles */
+static uint32_t poll_level;     /* BASEPRI while app_poll runs */
+
+/* ---- interrupts held ---- */
+
+static uint32_t base_priority(void)
+{
+	uint32_t value;
+
+	__asm__ volatile("mrs %0, basepri" : "=r"(value)::"memory");
+	return value;
+}
+
+static void set_base_priority(uint32_t value)
+{
+	__asm__ volatile("msr basepri, %0\n\tisb" ::"r"(value) : "memory");
+}
+
+uint32_t board_hold(void)
+{
+	uint32_t before = base_priority();
+
+	set_base_priority(PRIORITY_SAMPLES);
+	return before;
+}
+
+void board_release(uint32_t before)
+{
+	set_base_priority(before);
+}
+
+void port_lock(void)
+{
+	set_base_priority(PRIORITY_SAMPLES);
+}
+
+void port_unlock(void)
+{
+	set_base_priority(poll_level);
+}
+
+void port_watchdog_kick(void)
+{
+	WATCHDOG->interrupt_clear = 1;
+}
+
+/* ---- the sensor bus ---- */
+
+static _Noreturn void end(int code, const char *what, const char *detail)
+{
+	semihost_say("droptower-firmware-qemu: ");
+	semihost_say(what);
+	semihost_say(detail);
+	semihost_say("\n");
+	semihost_exit(code);
+}
+
+int board_write(const void *bytes, size_t count)
+{
+	return semihost_write(kept.request, bytes, count) == 0 ? 0 : LOCKSTEP_GONE;
+}
+
+int board_read(void *bytes, size_t count)
+{
+	unsigned char *p = bytes;
+
+	while (count > 0) {
+		size_t left = semihost_read(kept.answer, p, count);
+
+		if (left == count)
+			return LOCKSTEP_GONE;
+		p += count - left;
+		count = left;
+	}
+	return 0;
+}
+
+static int open_pipe(const char *suffix, int mode)
+{
+	char path[LINE_BYTES + 16];
+	size_t length = 0;
+	int handle;
+
+	for (const char *p = options.bus; *p != '\0'; p++)
+		path[length++] = *p;
+	do
+		path[length++] = *suffix;
+	while (*suffix++ != '\0');
+	handle = semihost_open(path, mode);
+	if (handle < 0)
+		end(EXIT_LINK, "cannot open ", path);
+	return handle;
+}
+
+/* ---- samples ---- */
+
+static _Noreturn void end_run(int result)
+{
+	if (result != LOCKSTEP_GONE)
+		end(EXIT_LINK, "the sensor bus's answer is none", "");
+	if (options.report) {
+		semihost_say_number("droptower-firmware-qemu: ", ticks, 10);
+		semihost_say(" ticks of 7 and 10 samples, sample clocks 0 ticks off");
+		semihost_say_number(" (at most ", (uint32_t)clock_error_max, 10);
+		semihost_say(" of 25000 cycles)\n");
+	}
+	semihost_exit(0);
+}
+
+/* Since the latest interrupt of the YZ timer, which comes with 0; the reload is a cycle later. */
+static uint32_t cycles_since_yz(void)
+{
+	return (CYCLES_YZ - TIMER_YZ->value) % CYCLES_YZ;
+}
+
+static void start_timer(struct timer *timer, uint32_t period, uint32_t gone)
+{
+	timer->control = 0;
+	timer->reload = period - 1;
+	timer->value = period - 1 - gone;
+	timer->interrupt_clear = 1;
+	timer->control = TIMER_ENABLE | TIMER_INTERRUPT;
+}
+
+/* The tick against the timer that nobody touches: a period lost or invented shows here. */
+static void check_clock(void)
+{
+	uint32_t cycle = ~DUAL_TIMER->value - cycles_since_yz();
+	int32_t error;
+
+	if (ticks == 0)
+		first_cycle = cycle;
+	error = (int32_t)(cycle - first_cycle - ticks * CYCLES_PER_MS);
+	if (error < 0)
+		error = -error;
+	if (error > clock_error_max)
+		clock_error_max = error;
+	if (error > CLOCK_ERROR_MAX)
+		end(EXIT_CLOCKS, "a tick differs from the dual timer", "");
+	ticks++;
+}
+
+/* What follows the core's part of an interrupt; where it begins the counting of instructions stops. What is
+ * held here stays held when the interrupt returns, so that no sample comes before app_poll. */
+__attribute__((noinline)) void board_delivered(void)
+{
+	poll_due = true;
+	set_base_priority(poll_level);
+}
+
+static void sample(unsigned group)
+{
+	unsigned instant = next_instant;
+	int result;
+
+	if (!(lockstep_group(instant) & group))
+		end(EXIT_CLOCKS, "sample interrupts out of step", "");
+	next_instant = (instant + 1) % LOCKSTEP_INSTANTS;
+	result = lockstep_exchange(instant);
+	if (result != 0)
+		end_run(result);
+	lockstep_deliver();
+	board_delivered();
+}
+
+void board_irq_x(void)
+{
+	TIMER_X->interrupt_clear = 1;
+	if (next_instant == LAST_X)
+		TIMER_X->control = 0; /* the next is the tick's */
+	sample(SENSORBUS_X);
+}
+
+void board_irq_yz(void)
+{
+	TIMER_YZ->interrupt_clear = 1;
+	if (next_instant == 0) {
+		start_timer(TIMER_X, CYCLES_X, cycles_since_yz());
+		check_clock();
+	}
+	sample(SENSORBUS_YZ);
+}
+
+/* ---- start ---- */
+
+static bool equal(const char *a, const char *b)
+{
+	while (*a == *b && *a != '\0') {
+		a++;
+		b++;
+	}
+	return *a == *b;
+}
+
+/* Ends the word at *rest and returns it, NULL after the last. */
+static const char *next_word(char **rest)
+{
+	char *word = *rest;
+	char *p;
+
+	while (*word == ' ')
+		word++;
+	for (p = word; *p != ' ' && *p != '\0'; p++) {
+	}
+	*rest = *p == '\0' ? p : p + 1;
+	*p = '\0';
+	return *word == '\0' ? NULL : word;
+}
+
+static void take_cause(const char *word)
+{
+	if (word == NULL || *word < '0' || *word >= '0' + PORT_RESETS || word[1] != '\0')
+		end(EXIT_USAGE, "--reset-cause takes 0 to 3", "");
+	options.cause = (enum port_reset)(*word - '0');
+}
+
+static void read_options(void)
+{
+	static char line[LINE_BYTES];
+	char *rest = line;
+	const char *word;
+
+	if (semihost_command_line(line, sizeof(line)) != 0)
+		end(EXIT_USAGE, "the command line is too long", "");
+	(void)next_word(&rest); /* the program's name */
+	while ((word = next_word(&rest)) != NULL) {
+		if (equal(word, "--bus"))
+			options.bus = next_word(&rest);
+		else if (equal(word, "--reset-cause"))
+			take_cause(next_word(&rest));
+		else if (equal(word, "--preempt"))
+			options.preempt = true;
+		else if (equal(word, "--report"))
+			options.report = true;
+		else if (equal(word, "--classic"))
+			options.classic = true;
+		else
+			end(EXIT_USAGE, "no such option: ", word);
+	}
+	if (options.bus == NULL)
+		end(EXIT_USAGE, "--bus PREFIX is needed", "");
+}
+
+static void start_clocks(void)
+{
+	WATCHDOG->load = CYCLES_WATCHDOG;
+	WATCHDOG->control = WATCHDOG_INTERRUPT;
+	DUAL_TIMER->control = DUAL_TIMER_ENABLE | DUAL_TIMER_32_BITS;
+	NVIC_PRIORITY[IRQ_X] = PRIORITY_SAMPLES;
+	NVIC_PRIORITY[IRQ_YZ] = PRIORITY_SAMPLES;
+	NVIC_ENABLE = 1u << IRQ_X | 1u << IRQ_YZ;
+	start_timer(TIMER_YZ, CYCLES_YZ, 0);
+}
+
+static void restart(void)
+{
+	set_base_priority(PRIORITY_SAMPLES);
+	kept.restarted = true;
+	AIRCR = AIRCR_RESET;
+	for (;;) {
+	}
+}
+
+/* As board_delivered, for app_poll. */
+__attribute__((noinline)) void board_polled(void)
+{
+	if (lockstep_reset_wanted())
+		restart();
+	set_base_priority(0);
+}
+
+/* Not "wait for interrupt": the emulator then loses timer periods or invents some. */
+static void wait_for_sample(void)
+{
+	while (!poll_due) {
+	}
+}
+
+/* In lockstep app_poll runs once after each sample and takes no virtual time, as in the posix port: a sample
+ * that comes meanwhile waits. With --preempt it does not. */
+_Noreturn void board_main(void)
+{
+	enum port_reset cause = PORT_RESET_COMMAND;
+
+	read_options();
+	poll_level = options.preempt ? 0 : PRIORITY_SAMPLES;
+	if (!kept.restarted) {
+		kept.request = open_pipe(".request", SEMIHOST_WRITE);
+		kept.answer = open_pipe(".answer", SEMIHOST_READ);
+		cause = options.cause;
+	}
+	lockstep_boot(cause, options.classic);
+	start_clocks();
+	for (;;) {
+		wait_for_sample();
+		poll_due = false;
+		app_poll();
+		board_polled();
+	}
+}

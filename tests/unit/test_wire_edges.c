@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * The wire at its limits: every length, every refusal, every field read from the frame and nowhere else.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <string.h>
+
+#include "common/crc.h"
+#include "common/wire.h"
+
+/* A struct full of something else before: a field that unpack leaves out cannot come back right. */
+#define WIRE_LAYOUT(layout, doc)                                                                   \
+	static void all_of_##layout(const uint8_t *bytes, int before)                              \
+	{                                                                                          \
+		struct frame frame = {.id = 0x123, .length = WIRE_LENGTH_##layout}, back = {0};    \
+		struct wire_##layout message;                                                      \
+		memcpy(frame.data, bytes, sizeof(frame.data));                                     \
+		memset(&message, before, sizeof(message));                                         \
+		assert_int_equal(wire_unpack_##layout(&frame, &message), 0);                       \
+		memset(back.data, ~before, sizeof(back.data));                                     \
+		wire_pack_##layout(&back, 0x7FF, &message);                                        \
+		assert_int_equal(back.id, 0x7FF);                                                  \
+		assert_int_equal(back.length, WIRE_LENGTH_##layout);                               \
+		assert_int_equal(back.flags, WIRE_LENGTH_##layout > 8 ? FRAME_FD | FRAME_BRS : 0); \
+		assert_memory_equal(back.data, bytes, WIRE_LENGTH_##layout);                       \
+		for (unsigned i = WIRE_LENGTH_##layout; i < sizeof(back.data); i++)                \
+			assert_int_equal(back.data[i], (uint8_t)~before); /* nothing beyond it */  \
+	}
+#include "common/wire.def"
+
+static void every_field_of_every_layout(void **state)
+{
+	uint8_t bytes[64];
+
+	(void)state;
+	for (int before = 0; before <= 0xFF; before += 0xFF) {
+		for (unsigned i = 0; i < sizeof(bytes); i++)
+			bytes[i] = (uint8_t)(0x11 + 37 * i);
+#define WIRE_LAYOUT(layout, doc) all_of_##layout(bytes, before);
+#include "common/wire.def"
+	}
+}
+
+static void what_is_no_data_frame_is_refused(void **state)
+{
+	static const uint8_t flags[] = {FRAME_REMOTE, FRAME_ERROR, FRAME_EXTENDED};
+	struct wire_status status = {.state = 77};
+	struct frame frame;
+
+	(void)state;
+	wire_pack_status(&frame, WIRE_ID_STATUS, &(struct wire_status){.state = 3});
+	for (size_t i = 0; i < sizeof(flags); i++) {
+		frame.flags = flags[i];
+		assert_int_equal(wire_unpack_status(&frame, &status), DT_E_LENGTH);
+		assert_int_equal(status.state, 77); /* unchanged */
+	}
+	for (unsigned good = 0; good < 8; good++) { /* FD, BRS and ESI are the bus's business */
+		frame.flags = (uint8_t)good;
+		assert_int_equal(wire_unpack_status(&frame, &status), 0);
+		assert_int_equal(status.state, 3);
+		status.state = 77;
+	}
+}
+
+static void every_length_of_can_fd(void **state)
+{
+	static const uint8_t has[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
+	size_t next = 0;
+
+	(void)state;
+	for (size_t count = 0; count <= 64; count++) {
+		if (count > has[next])
+			next++;
+		assert_int_equal(wire_fd_length(count), has[next]);
+	}
+	for (size_t count = 65; count < 400; count++)
+		assert_int_equal(wire_fd_length(count), 0);
+}
+
+/* The text that the hash is over, from wire.def once more, and its CRC-32 with nothing before or behind. */
+static void the_hash_is_of_the_whole_text(void **state)
+{
+	static const char text[] =
+#define WIRE_LAYOUT(layout, doc) "{" #layout
+#define WIRE_FIELD(layout, type, name, scale, unit, doc) ";" #type " " #name " " #scale
+#define WIRE_ARRAY(layout, type, name, count, scale, unit, doc) ";" #type " " #name "[" #count "] " #scale
+#define WIRE_END(layout) "}"
+#define WIRE_ID(NAME, id, layout, sender, doc) #NAME " " #id " " #layout " " #sender ";"
+#define WIRE_STATE(NAME, moving, doc) #NAME " " #moving ";"
+#define WIRE_FAULT(NAME, emcy, doc) #NAME " " #emcy ";"
+#define WIRE_CHECK(NAME, doc) #NAME ";"
+#define WIRE_OUTPUT(NAME, bit, doc) #NAME " out " #bit ";"
+#define WIRE_INPUT(NAME, bit, doc) #NAME " in " #bit ";"
+#define WIRE_OP(NAME, value, doc) #NAME " " #value ";"
+#define WIRE_MARK(NAME, bit, doc) #NAME " " #bit ";"
+#define WIRE_COUNTER(name, doc) #name ";"
+#define WIRE_PARAMETER(name, index, unit, min, max, initial, doc) #name " " #index " " #min " " #max ";"
+#include "common/wire.def"
+	        ;
+
+	(void)state;
+	assert_int_equal(wire_hash(), crc32(CRC32_INIT, (const uint8_t *)text, strlen(text)));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(every_field_of_every_layout),
+	        cmocka_unit_test(what_is_no_data_frame_is_refused),
+	        cmocka_unit_test(every_length_of_can_fd),
+	        cmocka_unit_test(the_hash_is_of_the_whole_text),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
