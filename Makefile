@@ -43,6 +43,7 @@ FREESTANDING_C = $(wildcard common/*.c firmware/*.c)
 COMMON_C = $(wildcard common/*.c)
 FIRMWARE_C = $(wildcard firmware/*.c)
 POSIX_C = $(wildcard firmware/port/posix/*.c)
+LOCKSTEP_C = firmware/port/lockstep.c
 LINK_C = $(wildcard common/link/*.c common/scenes/*.c)
 HOST_C = $(filter-out host/main.c,$(wildcard host/*.c host/*/*.c))
 HIL_C = $(filter-out hil/main.c,$(wildcard hil/*.c))
@@ -54,7 +55,7 @@ obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 lib = $(BUILD)/lib/lib$(1).a
 
 LCM_O = $(LCM_C:.c=.o)
-ALL_O = $(call obj,$(FREESTANDING_C) $(POSIX_C) $(LINK_C) $(HOST_C) host/main.c $(HIL_C) hil/main.c \
+ALL_O = $(call obj,$(FREESTANDING_C) $(LOCKSTEP_C) $(POSIX_C) $(LINK_C) $(HOST_C) host/main.c $(HIL_C) hil/main.c \
 	$(UNIT_C) $(UNIT_HELPER_C) $(TOOL_C))
 PROGRAMS = $(BUILD)/droptower $(BUILD)/droptower-firmware $(BUILD)/droptower-bench
 UNITS = $(UNIT_C:tests/unit/%.c=$(BUILD)/tests/%)
@@ -65,7 +66,7 @@ all: $(PROGRAMS) ## build the three programs into build/
 
 # ---- compiling --------------------------------------------------------------------------------------
 
-$(call obj,$(FREESTANDING_C)): CFLAGS += -ffreestanding
+$(call obj,$(FREESTANDING_C) $(LOCKSTEP_C)): CFLAGS += -ffreestanding
 $(call obj,$(POSIX_C) $(LINK_C) $(HOST_C) host/main.c $(HIL_C) hil/main.c $(UNIT_C) $(UNIT_HELPER_C) $(TOOL_C)): \
 	CPPFLAGS += $(LINUX)
 
@@ -115,7 +116,7 @@ $(BUILD)/droptower-bench: $(call obj,hil/main.c) $(foreach l,hil link common,$(c
 	$(call say,LINK,$@)
 	$(link)
 
-$(BUILD)/droptower-firmware: $(call obj,$(POSIX_C)) $(foreach l,firmware link common,$(call lib,$l))
+$(BUILD)/droptower-firmware: $(call obj,$(LOCKSTEP_C) $(POSIX_C)) $(foreach l,firmware link common,$(call lib,$l))
 	$(call say,LINK,$@)
 	$(link)
 

@@ -54,7 +54,8 @@ DT_MUST_USE int port_can_send(const struct frame *frame);
 /* Main: 1 with a frame, 0 without. */
 DT_MUST_USE int port_can_receive(struct frame *frame);
 
-/* Main: bus errors since reset. *bus_off tells the present state; the port restarts the controller. */
+/* Main: bus errors and received frames lost since reset. *bus_off tells the present state; the port restarts
+ * the controller. */
 uint32_t port_can_errors(bool *bus_off);
 
 /* Main: must come at least every 50 ms or the controller is reset with PORT_RESET_WATCHDOG. */

@@ -72,6 +72,8 @@ uint16_t port_io(void)
 
 void port_outputs(uint16_t on, uint16_t off)
 {
+	if (on & off)
+		abort(); /* says nothing */
 	fake.outputs = (uint16_t)((fake.outputs & ~off) | on);
 }
 

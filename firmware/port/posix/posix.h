@@ -2,12 +2,8 @@
 #ifndef DT_FIRMWARE_PORT_POSIX_POSIX_H
 #define DT_FIRMWARE_PORT_POSIX_POSIX_H
 /*
- * The posix port: the firmware core in lockstep with a plant behind two FIFOs (common/sensorbus.h).
+ * The posix port: the firmware core in lockstep (firmware/port/lockstep.h) with a plant behind two FIFOs.
  * One thread; the core's "interrupts" are calls between two calls of app_poll, so lock has nothing to do.
- *
- * Time is virtual. At each of the 16 sample instants of a millisecond the port sends a request and gets the
- * answer; all that the core then does, it does at that instant, rounded up to the next whole us. An output
- * edge that is planned for a time is made at that us, whenever the next request comes.
  */
 #include <stdbool.h>
 

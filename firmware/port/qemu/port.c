@@ -8,7 +8,7 @@
  */
 #include "common/sensorbus.h"
 #include "firmware/app.h"
-#include "firmware/port/qemu/lockstep.h"
+#include "firmware/port/lockstep.h"
 #include "firmware/port/qemu/qemu.h"
 #include "firmware/port/qemu/semihost.h"
 
@@ -87,7 +87,7 @@ static void set_base_priority(uint32_t value)
 	__asm__ volatile("msr basepri, %0\n\tisb" ::"r"(value) : "memory");
 }
 
-uint32_t board_hold(void)
+uint32_t lockstep_hold(void)
 {
 	uint32_t before = base_priority();
 
@@ -95,7 +95,7 @@ uint32_t board_hold(void)
 	return before;
 }
 
-void board_release(uint32_t before)
+void lockstep_release(uint32_t before)
 {
 	set_base_priority(before);
 }
@@ -117,6 +117,16 @@ void port_watchdog_kick(void)
 
 /* ---- the sensor bus ---- */
 
+int port_can_send(const struct frame *frame)
+{
+	return lockstep_can_send(frame);
+}
+
+int port_can_receive(struct frame *frame)
+{
+	return lockstep_can_receive(frame);
+}
+
 static _Noreturn void end(int code, const char *what, const char *detail)
 {
 	semihost_say("droptower-firmware-qemu: ");
@@ -126,12 +136,12 @@ static _Noreturn void end(int code, const char *what, const char *detail)
 	semihost_exit(code);
 }
 
-int board_write(const void *bytes, size_t count)
+int lockstep_write(const void *bytes, size_t count)
 {
 	return semihost_write(kept.request, bytes, count) == 0 ? 0 : LOCKSTEP_GONE;
 }
 
-int board_read(void *bytes, size_t count)
+int lockstep_read(void *bytes, size_t count)
 {
 	unsigned char *p = bytes;
 

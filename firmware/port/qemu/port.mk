@@ -5,7 +5,7 @@
 PACKAGES_TEST += gcc-arm-none-eabi qemu-system-arm python3
 
 M4 = $(BUILD)/firmware-qemu
-M4_C = $(FREESTANDING_C) $(filter-out %/count.c,$(wildcard firmware/port/qemu/*.c))
+M4_C = $(FREESTANDING_C) $(wildcard firmware/port/*.c) $(filter-out %/count.c,$(wildcard firmware/port/qemu/*.c))
 M4_O = $(M4_C:%.c=$(M4)/obj/%.o)
 M4_CC = arm-none-eabi-gcc
 M4_CPU = -mcpu=cortex-m4 -mthumb -mfloat-abi=soft

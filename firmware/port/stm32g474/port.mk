@@ -7,8 +7,7 @@ PACKAGES_TEST += gcc-arm-none-eabi
 
 STM32G474 = $(BUILD)/firmware-stm32g474
 STM32G474_DRIVER_C = $(filter-out %/port.c %/start.c,$(wildcard firmware/port/stm32g474/*.c))
-# memory.c is the one of the emulated port, where it runs in every test.
-STM32G474_C = $(FREESTANDING_C) $(wildcard firmware/port/stm32g474/*.c) firmware/port/qemu/memory.c
+STM32G474_C = $(FREESTANDING_C) $(wildcard firmware/port/stm32g474/*.c) firmware/port/memory.c
 STM32G474_O = $(STM32G474_C:%.c=$(STM32G474)/obj/%.o)
 STM32G474_TESTS = $(filter $(BUILD)/tests/test_stm32g474%,$(UNITS))
 STM32G474_CC = arm-none-eabi-gcc

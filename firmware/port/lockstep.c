@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "firmware/port/qemu/lockstep.h"
+#include "firmware/port/lockstep.h"
 
 #include "common/memory.h"
+#include "common/ring.h"
 #include "common/sensorbus.h"
 #include "firmware/app.h"
 
-enum { TICK_US = 1000 };
+enum {
+	TICK_US = 1000,
+	RECEIVED = 32, /* twice what an answer brings */
+};
 
 /* The sample instants of a millisecond. Those of X from 1 on are a fraction of a us after floor_us. */
 static const struct instant {
@@ -39,14 +43,18 @@ static struct machine {
 	uint32_t off_us[SENSORBUS_OUTPUTS];  /* ... and when */
 	bool first_request, reset_wanted, bus_classic;
 	bool bus_off, tx_blocked;
-	uint32_t bus_errors;
+	uint32_t bus_errors, frames_lost;
 	struct sensorbus_answer answer;
-	unsigned sent_count, received_count, received_next;
+	unsigned sent_count;
 	size_t request_bytes; /* in request[], its frames included */
 	/* As the frames are sent, so they wait: each is written once. */
 	uint8_t request[SENSORBUS_REQUEST_BYTES + SENSORBUS_FRAMES_MAX * SENSORBUS_FRAME_BYTES_MAX];
-	struct frame received[SENSORBUS_FRAMES_MAX];
+	struct ring received;
 } machine;
+
+/* app_poll takes fewer frames than an answer may bring: the others wait here for the next. */
+static struct frame received[RECEIVED];
+static bool link_off; /* by a link of the port's own, which a reset leaves as it is */
 
 /* ---- what the core calls ---- */
 
@@ -76,10 +84,10 @@ static void set_outputs(uint16_t outputs, uint32_t time_us)
 
 void port_outputs(uint16_t on, uint16_t off)
 {
-	uint32_t before = board_hold();
+	uint32_t before = lockstep_hold();
 
 	set_outputs((uint16_t)((machine.outputs & ~off) | on), machine.now_us);
-	board_release(before);
+	lockstep_release(before);
 }
 
 static int plan_off(uint16_t output, uint32_t time_us)
@@ -98,62 +106,67 @@ static int plan_off(uint16_t output, uint32_t time_us)
 
 int port_off_at(uint16_t output, uint32_t time_us)
 {
-	uint32_t before = board_hold();
+	uint32_t before = lockstep_hold();
 	int late = plan_off(output, time_us);
 
-	board_release(before);
+	lockstep_release(before);
 	return late;
 }
 
 void port_off_cancel(uint16_t output)
 {
-	uint32_t before = board_hold();
+	uint32_t before = lockstep_hold();
 
 	machine.off_planned &= (uint8_t)~output;
-	board_release(before);
+	lockstep_release(before);
 }
 
 int port_can_setup(bool classic, uint32_t data_kbit_s)
 {
 	bool known = data_kbit_s == 2000 || data_kbit_s == 5000 || data_kbit_s == 8000;
 
-	/* The sensor bus carries frames, not bits: nothing to set. */
+	/* Neither the sensor bus nor a link of the port has bits to set. */
 	return known && (classic || !machine.bus_classic) ? 0 : DT_E_ARGUMENT;
+}
+
+bool lockstep_can_open(void)
+{
+	return !machine.bus_off && !machine.tx_blocked;
 }
 
 static int take_frame(const struct frame *frame)
 {
-	if (machine.bus_off || machine.tx_blocked || machine.sent_count == SENSORBUS_FRAMES_MAX)
+	if (!lockstep_can_open() || machine.sent_count == SENSORBUS_FRAMES_MAX)
 		return DT_E_FULL;
 	machine.request_bytes += sensorbus_put_frame(machine.request + machine.request_bytes, frame);
 	machine.sent_count++;
 	return 0;
 }
 
-int port_can_send(const struct frame *frame)
+int lockstep_can_send(const struct frame *frame)
 {
-	uint32_t before = board_hold();
+	uint32_t before = lockstep_hold();
 	int result = take_frame(frame);
 
-	board_release(before);
+	lockstep_release(before);
 	return result;
 }
 
-int port_can_receive(struct frame *frame)
+int lockstep_can_receive(struct frame *frame)
 {
-	uint32_t before = board_hold();
-	bool any = machine.received_next != machine.received_count;
+	return ring_get(&machine.received, frame) == 0;
+}
 
-	if (any)
-		*frame = machine.received[machine.received_next++];
-	board_release(before);
-	return any;
+void lockstep_can_link(uint32_t errors, bool off)
+{
+	machine.bus_errors += errors;
+	link_off = off;
 }
 
 uint32_t port_can_errors(bool *bus_off)
 {
 	*bus_off = machine.bus_off;
-	return machine.bus_errors;
+	return machine.bus_errors + machine.frames_lost;
 }
 
 void port_reset(void)
@@ -209,7 +222,7 @@ static int send_request(const struct instant *instant)
 
 	memcpy(request.edge_us, machine.edge_us, sizeof(request.edge_us));
 	(void)sensorbus_put_request(machine.request, &request);
-	result = board_write(machine.request, machine.request_bytes);
+	result = lockstep_write(machine.request, machine.request_bytes);
 	machine.request_bytes = SENSORBUS_REQUEST_BYTES;
 	machine.sent_count = 0;
 	machine.edges = 0;
@@ -217,42 +230,43 @@ static int send_request(const struct instant *instant)
 	return result;
 }
 
+static int read_frame(void)
+{
+	struct frame frame;
+	uint8_t head[4];
+	int result = lockstep_read(head, sizeof(head));
+
+	if (result != 0)
+		return result;
+	result = sensorbus_frame_head(head, &frame);
+	if (result > 0)
+		result = lockstep_read(frame.data, (size_t)result);
+	if (result == 0 && ring_put(&machine.received, &frame) != 0)
+		machine.frames_lost++;
+	return result;
+}
+
 static int read_frames(unsigned count)
 {
-	uint8_t head[4];
+	int result = count <= SENSORBUS_FRAMES_MAX ? 0 : DT_E_FORMAT;
 
-	if (count > SENSORBUS_FRAMES_MAX)
-		return DT_E_FORMAT;
-	machine.received_next = 0;
-	machine.received_count = 0;
-	for (unsigned i = 0; i < count; i++) {
-		struct frame *frame = &machine.received[i];
-		int result = board_read(head, sizeof(head));
-
-		if (result != 0)
-			return result;
-		result = sensorbus_frame_head(head, frame);
-		if (result > 0)
-			result = board_read(frame->data, (size_t)result);
-		if (result != 0)
-			return result;
-		machine.received_count++;
-	}
-	return 0;
+	for (unsigned i = 0; i < count && result == 0; i++)
+		result = read_frame();
+	return result;
 }
 
 static int read_answer(void)
 {
 	uint8_t bytes[SENSORBUS_ANSWER_BYTES];
 	struct sensorbus_answer *answer = &machine.answer;
-	int result = board_read(bytes, sizeof(bytes));
+	int result = lockstep_read(bytes, sizeof(bytes));
 
 	if (result != 0)
 		return result;
 	sensorbus_get_answer(bytes, answer);
 	machine.inputs = answer->inputs & (uint16_t)~WIRE_IO_OUTPUTS & (uint16_t)~WIRE_IO_OVERRUN;
 	machine.bus_errors += answer->bus_errors;
-	machine.bus_off = answer->bus_off != 0;
+	machine.bus_off = answer->bus_off != 0 || link_off;
 	machine.tx_blocked = answer->tx_blocked != 0;
 	result = read_frames(answer->frames);
 	return result == 0 && answer->stop ? LOCKSTEP_GONE : result;
@@ -290,6 +304,7 @@ void lockstep_boot(enum port_reset cause, bool bus_classic)
 {
 	memset(&machine, 0, sizeof(machine));
 	machine.outputs = WIRE_IO_MAGNET_HOLD; /* as the drivers hold it in reset */
+	machine.received = (struct ring)RING_OVER(received);
 	machine.request_bytes = SENSORBUS_REQUEST_BYTES;
 	machine.first_request = true;
 	machine.bus_classic = bus_classic;

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_FIRMWARE_PORT_LOCKSTEP_H
+#define DT_FIRMWARE_PORT_LOCKSTEP_H
+/*
+ * The firmware core in lockstep with a simulated tower (common/sensorbus.h): what the ports posix and qemu
+ * have in common. lockstep.c also defines the functions of port.h that deal with outputs, time, the state of
+ * the bus and port_reset.
+ *
+ * Time is virtual: at each of the 16 sample instants of a millisecond one request and its answer; all that
+ * the core then does, it does at that instant, rounded up to the next whole us. An output edge that is
+ * planned for a time carries that us, whenever the next request goes.
+ *
+ * Context: interrupt, but for lockstep_boot and lockstep_can_*, which are main's. The functions of port.h
+ * exclude interrupts where they must. One instance, static.
+ */
+#include <stddef.h>
+
+#include "firmware/port.h"
+
+enum {
+	LOCKSTEP_GONE = 1, /* the other end has ended the run */
+	LOCKSTEP_INSTANTS = 16,
+};
+
+/* Which samples the instant takes: SENSORBUS_X, SENSORBUS_YZ, and both where a tick begins. */
+unsigned lockstep_group(unsigned instant);
+
+/* After a reset, interrupts off: a new machine, and app_init. */
+void lockstep_boot(enum port_reset cause, bool bus_classic);
+
+/* Request and answer; 0, LOCKSTEP_GONE or DT_E_*. Then, if 0, what the answer brought goes to the core. */
+DT_MUST_USE int lockstep_exchange(unsigned instant);
+void lockstep_deliver(void);
+
+/* The core has asked for a restart. */
+bool lockstep_reset_wanted(void);
+
+/* As port_can_send and port_can_receive: the frames ride in the exchange. What an answer brought waits until
+ * it is received; what finds no place counts in port_can_errors, as with the board. */
+DT_MUST_USE int lockstep_can_send(const struct frame *frame);
+DT_MUST_USE int lockstep_can_receive(struct frame *frame);
+
+/* For a port with a CAN link of its own. By the latest answer the bus takes frames; and what the link says:
+ * errors since the call before, off the bus from the next answer on. */
+bool lockstep_can_open(void);
+void lockstep_can_link(uint32_t errors, bool off);
+
+/* From the port, the two pipes: all bytes; 0, LOCKSTEP_GONE or DT_E_*. */
+DT_MUST_USE int lockstep_write(const void *bytes, size_t count);
+DT_MUST_USE int lockstep_read(void *bytes, size_t count);
+
+/* From the port: no interrupt from here on; the argument of lockstep_release, which ends it. May be nested.
+ */
+uint32_t lockstep_hold(void);
+void lockstep_release(uint32_t before);
+
+#endif
