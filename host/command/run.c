@@ -274,6 +274,11 @@ static int follow(struct run *run, struct record *record)
 		tell_state(run, view->state, &told);
 		if (run->aborted && at_rest(view->state))
 			return command_stopped();
+		if (view->state == WIRE_STATE_FAULT_HELD && view->fault != WIRE_FAULT_NONE) {
+			command_error("nothing to capture, the frame did not move: %s",
+			              wire_fault_text(view->fault));
+			return COMMAND_REFUSED;
+		}
 		if (command_interrupted() && !run->aborted) {
 			run->aborted = true;
 			progress(run, "abort");

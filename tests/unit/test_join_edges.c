@@ -100,6 +100,26 @@ static void first_gap(unsigned sensor, uint32_t first_ms, uint32_t last_ms)
 	assert_int_equal(gap.last_tick_ms, last_ms);
 }
 
+/* What memory holds behind a frame's data is none of it. */
+static void nothing_behind_the_data_tells_a_conflict(void **state)
+{
+	struct record record;
+	struct frame frame;
+
+	(void)state;
+	hand_fill(&drop, 1000, 1, 1);
+	feed_both(0, 0);
+	hand_block(&drop, 2, 0, false, &frame);
+	memset((uint8_t *)&frame + offsetof(struct frame, data) + sizeof(frame.data), 0xA5,
+	       sizeof(frame) - offsetof(struct frame, data) - sizeof(frame.data));
+	join_feed(join, &frame);
+	feed_end();
+	record = take();
+	assert_int_equal(record.counters.repeated, 1);
+	assert_int_equal(record.counters.conflicting, 0);
+	record_free(&record);
+}
+
 static void every_sample_byte_tells_a_conflict(void **state)
 {
 	struct record record;
@@ -334,10 +354,12 @@ static void what_was_taken_is_gone(void **state)
 	hand_block(&drop, 1, 0, false, &frame);
 	frame.data[30] ^= 1;
 	join_feed(join, &frame);
+	frame = (struct frame){.id = 0x381, .length = 8, .data = {1}}; /* a segment without the one before */
+	join_feed(join, &frame);
 	feed_end();
 	assert_true(join_complete(join));
 	record = take();
-	assert_int_equal(record.counters.corrupt, 1);
+	assert_int_equal(record.counters.corrupt, 2);
 	record_free(&record);
 	assert_false(join_complete(join));
 	drop.drop_id++;
@@ -474,6 +496,7 @@ static void runs_and_holes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+	        TEST(nothing_behind_the_data_tells_a_conflict),
 	        TEST(every_sample_byte_tells_a_conflict),
 	        TEST(the_oldest_tick_of_the_ring),
 	        TEST(overtaken_or_started_again),

@@ -12,23 +12,29 @@
 #include "common/crc.h"
 #include "common/wire.h"
 
-/* A struct full of something else before: a field that unpack leaves out cannot come back right. */
+/* A struct full of something else before: a field that unpack leaves out cannot come back right. Neither
+ * writes a byte beyond its own. */
 #define WIRE_LAYOUT(layout, doc)                                                                   \
 	static void all_of_##layout(const uint8_t *bytes, int before)                              \
 	{                                                                                          \
 		struct frame frame = {.id = 0x123, .length = WIRE_LENGTH_##layout}, back = {0};    \
-		struct wire_##layout message;                                                      \
+		struct {                                                                           \
+			struct wire_##layout message;                                              \
+			uint8_t after[8];                                                          \
+		} here;                                                                            \
 		memcpy(frame.data, bytes, sizeof(frame.data));                                     \
-		memset(&message, before, sizeof(message));                                         \
-		assert_int_equal(wire_unpack_##layout(&frame, &message), 0);                       \
+		memset(&here, before, sizeof(here));                                               \
+		assert_int_equal(wire_unpack_##layout(&frame, &here.message), 0);                  \
 		memset(back.data, ~before, sizeof(back.data));                                     \
-		wire_pack_##layout(&back, 0x7FF, &message);                                        \
+		wire_pack_##layout(&back, 0x7FF, &here.message);                                   \
 		assert_int_equal(back.id, 0x7FF);                                                  \
 		assert_int_equal(back.length, WIRE_LENGTH_##layout);                               \
 		assert_int_equal(back.flags, WIRE_LENGTH_##layout > 8 ? FRAME_FD | FRAME_BRS : 0); \
 		assert_memory_equal(back.data, bytes, WIRE_LENGTH_##layout);                       \
 		for (unsigned i = WIRE_LENGTH_##layout; i < sizeof(back.data); i++)                \
-			assert_int_equal(back.data[i], (uint8_t)~before); /* nothing beyond it */  \
+			assert_int_equal(back.data[i], (uint8_t)~before);                          \
+		for (unsigned i = 0; i < sizeof(here.after); i++)                                  \
+			assert_int_equal(here.after[i], (uint8_t)before);                          \
 	}
 #include "common/wire.def"
 

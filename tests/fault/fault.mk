@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Tests of the tests: mutants, canaries, coverage.
+
+PACKAGES_TEST += python3
+
+# ---- mutants ------------------------------------------------------------------------------------------
+
+MUTATED_C = firmware/sequence.c firmware/command.c firmware/stream.c firmware/capture.c common/wire.c \
+	common/segment.c host/record/join.c
+MUTATED_O = $(MUTATED_C:%.c=$(BUILD)/mutate/%.o)
+# The unit tests that come near them. Not test_port_faults: thousands of drops for each mutant.
+MUTATED_BY = sequence command stream capture wire segment join acquire health parameter
+MUTATED_UNIT_C = $(wildcard $(foreach m,$(MUTATED_BY),tests/unit/test_$m.c tests/unit/test_$m_*.c))
+MUTATED_UNITS = $(MUTATED_UNIT_C:tests/unit/%.c=$(BUILD)/mutate/%)
+
+# Each file's mutants are numbered from its place in the list times 10000.
+
+$(BUILD)/mutate/%.src.i: %.c Makefile
+	$(Q)mkdir -p $(@D)
+	$(Q)clang -std=c11 $(if $(filter $(FREESTANDING_C),$<),-ffreestanding,$(LINUX)) $(CPPFLAGS) -E -MMD -MP -MT $@ \
+		-MF $(@:.i=.d) $< -o $@
+
+$(BUILD)/mutate/%.i: $(BUILD)/mutate/%.src.i tests/fault/instrument
+	$(call say,MUTATE,$*.c)
+	$(Q)tests/fault/instrument $$(echo $(MUTATED_C) | tr ' ' '\n' | grep -n '^$*.c$$' | cut -d: -f1)0000 $< $@ \
+		$(BUILD)/mutate/$(subst /,-,$*).json $*.c $(if $(filter %wire,$*),common/wire.def)
+
+$(MUTATED_O): %.o: %.i
+	$(Q)clang -std=c11 -O1 -g -w -fsanitize=undefined -fsanitize-trap=undefined \
+		$(if $(filter $(FREESTANDING_C),$(@:$(BUILD)/mutate/%.o=%.c)),-ffreestanding) -x cpp-output -c $< -o $@
+
+$(BUILD)/mutate/mutant.o: tests/fault/mutant.c Makefile
+	$(Q)mkdir -p $(@D)
+	$(Q)$(CC) $(CFLAGS) $(LINUX) -c $< -o $@
+
+$(MUTATED_UNITS): $(BUILD)/mutate/%: $(BUILD)/obj/tests/unit/%.o $(call obj,$(UNIT_HELPER_C)) $(MUTATED_O) \
+		$(BUILD)/mutate/mutant.o $(foreach l,host hil firmware link common,$(call lib,$l))
+	$(call say,LINK,$@)
+	$(Q)$(CC) $(LDFLAGS) $(filter %.o,$^) -Wl,--start-group $(filter %.a,$^) -Wl,--end-group $(LIBRARIES) -lcmocka -o $@
+
+.SECONDARY: $(MUTATED_O:.o=.i) $(MUTATED_O:.o=.src.i)
+
+# What tests/system/test_mutants is to run; only the plain build has it.
+$(BUILD)/mutate/tests: $(MUTATED_UNITS)
+	$(Q)echo $^ >$@
+ifeq ($(SANITIZE)$(COVERAGE),)
+tests: $(BUILD)/mutate/tests
+endif
+
+.PHONY: mutate
+mutate: setup-test ## make every small mistake in the heart of the firmware and see a unit test fail
+	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(BUILD)/mutate/tests
+	@tests/fault/mutate $(BUILD)/mutate tests/fault/survivors $(MUTATED_UNITS)
+
+-include $(MUTATED_O:.o=.src.d)
+
+# ---- failing port calls: the test stands between the firmware and the fake port -----------------------------
+
+WRAPPED = port_time_us port_io port_outputs port_off_at port_off_cancel port_can_setup port_can_send \
+	port_can_receive port_can_errors port_watchdog_kick command_handle
+$(BUILD)/tests/test_port_faults: LDFLAGS += $(WRAPPED:%=-Wl,--wrap=%)
+
+# ---- canaries: what must be caught, built exactly as the unit tests are ------------------------------------
+
+CANARY_C = $(wildcard tests/fault/canary_*.c)
+CANARIES = $(CANARY_C:tests/fault/%.c=$(BUILD)/tests/%)
+
+$(call obj,$(CANARY_C)): CPPFLAGS += $(LINUX)
+$(CANARIES): $(BUILD)/tests/%: $(BUILD)/obj/tests/fault/%.o
+	$(call say,LINK,$@)
+	$(Q)mkdir -p $(@D) && $(CC) $(LDFLAGS) $< -lcmocka -o $@
+tests: $(CANARIES)
+
+-include $(CANARY_C:%.c=$(BUILD)/obj/%.d)
+
+# ---- coverage -----------------------------------------------------------------------------------------
+
+ifdef COVERAGE
+CFLAGS += -O0 --coverage
+LDFLAGS += --coverage
+endif
+
+.PHONY: cov units
+units: $(UNITS)
+cov: setup-test ## run the unit tests and say which lines and branches of common/ and firmware/ they reach
+	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD)/cov CC=gcc COVERAGE=1 units
+	@tests/fault/cover $(BUILD)/cov
