@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/random.h>
 
 #include "common/wire_table.h"
 #include "host/command/command.h"
@@ -74,17 +73,6 @@ static int refused(const char *verb, int result, const struct session_view *view
 	                                                                              : COMMAND_REFUSED;
 }
 
-/* A token from the kernel's generator, never 0. */
-static uint16_t random_token(void)
-{
-	uint16_t token = 0;
-
-	while (token == 0)
-		if (getrandom(&token, sizeof(token), 0) != sizeof(token))
-			token = (uint16_t)(session_utime() | 1);
-	return token;
-}
-
 static int act(struct session *session, const char *verb, uint16_t token)
 {
 	static const struct {
@@ -97,7 +85,7 @@ static int act(struct session *session, const char *verb, uint16_t token)
 	const struct session_view *view = session_view(session);
 
 	if (strcmp(verb, "arm") == 0)
-		token = random_token();
+		token = session_token();
 	for (size_t i = 0; i < sizeof(verbs) / sizeof(verbs[0]); i++) {
 		int result;
 

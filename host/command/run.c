@@ -7,7 +7,6 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -213,12 +212,9 @@ static int wait_until_ready(struct run *run)
 
 static int arm_and_release(struct run *run)
 {
-	uint16_t token = 0;
+	uint16_t token = session_token();
 	int result;
 
-	while (token == 0)
-		if (getrandom(&token, sizeof(token), 0) != sizeof(token))
-			token = (uint16_t)(session_utime() | 1);
 	result = session_command(run->session, WIRE_OP_ARM, token);
 	if (command_interrupted()) {
 		result = session_command(run->session, WIRE_OP_ABORT, 0);

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 #include <time.h>
 
 #include "host/command/command.h"
@@ -66,6 +67,16 @@ int session_set_parameter(struct session *session, enum wire_parameter_number nu
 int session_take_drop(struct session *session, struct record *record)
 {
 	return session->how->take_drop(session, record);
+}
+
+uint16_t session_token(void)
+{
+	uint16_t token = 0;
+
+	while (token == 0)
+		if (getrandom(&token, sizeof(token), 0) != sizeof(token))
+			token = (uint16_t)(session_utime() | 1);
+	return token;
 }
 
 int64_t session_now_ms(void)

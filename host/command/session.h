@@ -72,6 +72,9 @@ DT_MUST_USE int session_set_parameter(struct session *session, enum wire_paramet
 /* 1 and a record (free it) when a drop was collected, complete or given up; 0 when there is none. */
 DT_MUST_USE int session_take_drop(struct session *session, struct record *record);
 
+/* A token for ARM from the kernel's generator, never 0. */
+uint16_t session_token(void);
+
 /* Monotonic milliseconds, and microseconds since the epoch. */
 int64_t session_now_ms(void);
 int64_t session_utime(void);

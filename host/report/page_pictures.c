@@ -97,7 +97,10 @@ static void picture_of_channel(struct page *page, size_t channel)
 	fputs("</figure>\n", page->out);
 }
 
-static void picture_of_resultant(struct page *page)
+/* One picture over the whole width. */
+static void wide_picture(struct page *page,
+                         bool (*traces)(FILE *, const struct report *, const struct report_zero *),
+                         const char *name)
 {
 	size_t length;
 	char *buffer;
@@ -106,22 +109,7 @@ static void picture_of_resultant(struct page *page)
 	if (!script)
 		return;
 	fputs("<figure class=\"scroll\">", page->out);
-	draw(page, script, &buffer, &length, traces_resultant(script, page->report, &page->zero),
-	     "resultants");
-	fputs("</figure>\n", page->out);
-}
-
-static void picture_of_whole(struct page *page)
-{
-	size_t length;
-	char *buffer;
-	FILE *script = begin_script(page, &buffer, &length);
-
-	if (!script)
-		return;
-	fputs("<figure class=\"scroll\">", page->out);
-	draw(page, script, &buffer, &length, traces_overview(script, page->report, &page->zero),
-	     "whole capture");
+	draw(page, script, &buffer, &length, traces(script, page->report, &page->zero), name);
 	fputs("</figure>\n", page->out);
 }
 
@@ -216,7 +204,7 @@ static void more_pictures(struct page *page)
 		      "samples at Y's instants; the figures come from the curves fitted to each axis. ",
 		      out);
 		fputs(any_model(report) ? "Dashed: the model.</p>\n" : "</p>\n", out);
-		picture_of_resultant(page);
+		wide_picture(page, traces_resultant, "resultants");
 	}
 	if (report->analysis->has_plate && report->analysis->plate.frequency_hz > 0.0) {
 		fputs("<h2>Ring-down of the plate</h2>\n<p class=\"soft\">Circles: measured. Line: a damped "
@@ -233,7 +221,7 @@ static void more_pictures(struct page *page)
 	        record_channel(report->record, "S1X") || record_channel(report->record, "S2X")
 	                ? "Along X"
 	                : "The channel with the largest peak");
-	picture_of_whole(page);
+	wide_picture(page, traces_overview, "whole capture");
 }
 
 void page_pictures(struct page *page)
