@@ -56,6 +56,48 @@ const char *estimate_status_name(enum estimate_status status)
 	return (unsigned)status < sizeof(names) / sizeof(names[0]) ? names[status] : "unknown";
 }
 
+const char *estimate_flag_name(unsigned flags)
+{
+	static const char *const names[] = {"extrapolated",
+	                                    "gaps",
+	                                    "spike",
+	                                    "hum",
+	                                    "two_modes",
+	                                    "amplitude_dependent",
+	                                    "tolerance_not_met",
+	                                    "model_refused",
+	                                    "weak_axis",
+	                                    "not_separable"};
+
+	for (unsigned i = 0; i < sizeof(names) / sizeof(names[0]); i++)
+		if (flags & 1u << i)
+			return names[i];
+	return "";
+}
+
+static const char *const family_names[ESTIMATE_FAMILIES] = {
+        [ESTIMATE_FAMILY_AUTO] = "auto",
+        [ESTIMATE_FAMILY_HALF_SINE] = "half-sine",
+        [ESTIMATE_FAMILY_HAVERSINE] = "haversine",
+        [ESTIMATE_FAMILY_SINE_POWER] = "sine-power",
+};
+
+const char *estimate_family_name(enum estimate_family family)
+{
+	return (unsigned)family < ESTIMATE_FAMILIES ? family_names[family] : "unknown";
+}
+
+int estimate_family_parse(const char *name, enum estimate_family *family)
+{
+	for (unsigned i = 0; i < ESTIMATE_FAMILIES; i++) {
+		if (strcmp(name, family_names[i]) == 0) {
+			*family = (enum estimate_family)i;
+			return 0;
+		}
+	}
+	return DT_E_UNKNOWN;
+}
+
 static int analyse_channel(const struct desk *desk, size_t i, const struct estimate_options *options,
                            struct estimate_channel *out)
 {
@@ -143,7 +185,7 @@ static void analyse_ringdown(const struct desk *desk, size_t i, struct analysis 
 		                     hit->peak.value_g);
 	ringdown_find(&work->trace, from, until, fabs(channel->peak.value_g), &work->ringdown);
 	if (!isfinite(channel->peak.value_g))
-		work->ringdown.result.status = channel->peak.status;
+		work->ringdown.result.how.status = channel->peak.how.status;
 	channel->ringdown = work->ringdown.result;
 }
 
@@ -181,7 +223,7 @@ static bool rings(const struct desk *desk, char axis)
 	       none = desk->record->channel_count;
 	double amplitude;
 
-	if (plate == none || desk->work[plate].ringdown.result.status != ESTIMATE_OK)
+	if (plate == none || desk->work[plate].ringdown.result.how.status != ESTIMATE_OK)
 		return false;
 	amplitude = desk->work[plate].ringdown.amplitude_g;
 	if (amplitude < PLATE_LEVEL * fabs(desk->work[plate].peak.result.value_g))

@@ -22,10 +22,59 @@ enum estimate_status {
 /* "ok" "clipped" "short" "no_peak" "ambiguous" "not_converged" */
 const char *estimate_status_name(enum estimate_status status);
 
+/* What is remarkable about one value. Bits; names by estimate_flag_name. */
+enum {
+	ESTIMATE_FLAG_EXTRAPOLATED =
+	        1u << 0,               /* "extrapolated": clipped, the true value follows from the family */
+	ESTIMATE_FLAG_GAPS = 1u << 1,  /* "gaps": samples it would have used are missing */
+	ESTIMATE_FLAG_SPIKE = 1u << 2, /* "spike": outliers were left out */
+	ESTIMATE_FLAG_HUM = 1u << 3,   /* "hum": mains terms were fitted along */
+	ESTIMATE_FLAG_TWO_MODES = 1u << 4, /* "two_modes": the value is the stronger mode's */
+	ESTIMATE_FLAG_AMPLITUDE =
+	        1u << 5, /* "amplitude_dependent": frequency follows the swing; value as it vanishes */
+	ESTIMATE_FLAG_TOLERANCE = 1u << 6, /* "tolerance_not_met" */
+	ESTIMATE_FLAG_MODEL = 1u << 7,     /* "model_refused": the residual is no noise; sigma is widened */
+	ESTIMATE_FLAG_WEAK = 1u << 8,      /* "weak_axis": by the strong axis' shape */
+	ESTIMATE_FLAG_NOT_SEPARABLE = 1u << 9, /* "not_separable": two modes nearer than their width */
+};
+
+/* Name of the lowest flag bit in flags; "" for 0. */
+const char *estimate_flag_name(unsigned flags);
+
+enum { ESTIMATE_PATH_MAX = 5 };
+
+/* How a value was got: cheapest method first, the next one only while the residual refuses it or its
+ * uncertainty exceeds the tolerance. */
+struct estimate_how {
+	const char *method;                  /* the one that gave the value; "" when none did */
+	const char *path[ESTIMATE_PATH_MAX]; /* tried, in this order; NULL after the last */
+	double chi_square; /* reduced, of method against the noise; NAN without a residual test */
+	unsigned flags;    /* ESTIMATE_FLAG_* */
+	enum estimate_status status;
+};
+
+/* Pulse families. AUTO: family-free unless precision asks for more. */
+enum estimate_family {
+	ESTIMATE_FAMILY_AUTO,
+	ESTIMATE_FAMILY_HALF_SINE,  /* "half-sine": A sin(pi s), s in 0..1 */
+	ESTIMATE_FAMILY_HAVERSINE,  /* "haversine": A sin^2(pi s) */
+	ESTIMATE_FAMILY_SINE_POWER, /* "sine-power": A sin^p(pi s), p fitted */
+	ESTIMATE_FAMILIES
+};
+
+/* "auto" "half-sine" "haversine" "sine-power"; parse: DT_E_UNKNOWN for another name. */
+const char *estimate_family_name(enum estimate_family family);
+DT_MUST_USE int estimate_family_parse(const char *name, enum estimate_family *family);
+
 struct estimate_baseline {
-	double offset_g; /* mean before the pulse; 0 when the record starts inside it (samples 0) */
-	double noise_g;  /* standard deviation per sample as read, from the median absolute deviation */
-	size_t samples;  /* used for the offset */
+	double offset_g;    /* mean before the pulse; 0 when the record starts inside it (samples 0) */
+	double noise_g;     /* standard deviation per sample as read, from the median absolute deviation */
+	double deviation_g; /* plain standard deviation of the same samples: larger with spikes, drift or hum
+	                     */
+	double drift_g_s;   /* slope, 0 unless significant */
+	double hum_g;       /* amplitude of the mains term, 0 unless significant */
+	double hum_hz;      /* 50 or 60; NAN when there is none */
+	size_t samples;     /* used for the offset */
 };
 
 struct estimate_peak {
@@ -34,28 +83,39 @@ struct estimate_peak {
 	double sigma_g;
 	double time_s;
 	double sigma_time_s;
-	const char *method; /* "poly4/poly6", "parabola", "sample" */
-	enum estimate_status status;
+	struct estimate_how how; /* "poly4/poly6" "sine-power" "half-sine" "haversine" "strong-axis"
+	                            "parabola" "sample" */
 };
 
 struct estimate_pulse {
-	double duration_s; /* width at 10 % of the peak */
+	double duration_s; /* width at 10 % of the peak: family-free */
 	double sigma_duration_s;
 	double velocity_change_m_s; /* integral over the pulse, signed */
 	double sigma_velocity_m_s;
 	double start_s, end_s; /* where the pulse leaves and meets 10 % */
 	enum estimate_status status;
+	/* the fitted pulse of a named family: foot to foot, and its area; NAN unless one fits */
+	enum estimate_family family;
+	double contact_time_s;
+	double sigma_contact_s;
+	double contact_start_s;
+	double fitted_velocity_m_s;
+	double sigma_fitted_velocity_m_s;
+	struct estimate_how contact;
 };
 
 struct estimate_ringdown {
 	double frequency_hz; /* damped */
 	double sigma_hz;
 	double natural_frequency_hz; /* undamped */
+	double sigma_natural_hz;
 	double damping_ratio;
 	double sigma_damping;
+	double amplitude_g;         /* envelope at the start of the free decay */
+	double second_frequency_hz; /* of a second mode; NAN when there is none */
+	double second_damping_ratio;
 	double three_cycle_frequency_hz; /* mean over the first three oscillations, as the study has it */
-	const char *method;
-	enum estimate_status status;
+	struct estimate_how how;         /* "block" "full" "full+hum" "amplitude" "two-modes" */
 };
 
 struct estimate_channel {
@@ -71,19 +131,35 @@ struct estimate_resultant {
 	double peak_g;  /* maximum of hypot(X(t), Y(t)) on one continuous time */
 	double sigma_g;
 	double time_s;
+	double sigma_time_s;
 	bool axes_coincide;  /* X and Y have their own maxima within the coincidence limit of each other */
 	double axes_apart_s; /* Y's time minus X's */
-	enum estimate_status status;
+	struct estimate_how how;
 };
 
 /* The time from S2's peak to S1's, positive when S1 is later. A lag without its definition says little:
- * three of them, and their spread. */
+ * all of them, and the spread of the first three. */
 struct estimate_lag {
 	double first_peak_s;
 	double largest_peak_s;
 	double cross_correlation_s;
 	double spread_s; /* largest minus smallest of the three */
 	double sigma_s;  /* statistical, of largest_peak_s */
+	double driven_s; /* S1 as a damped oscillator on S2: X and Y combined */
+	double sigma_driven_s;
+	double driven_axis_s[2]; /* X, Y; NAN when that axis does not follow the oscillator */
+	double sigma_driven_axis_s[2];
+	struct estimate_how driven; /* "driven-oscillator" */
+	enum estimate_status status;
+};
+
+/* Rebound speed over impact speed. */
+struct estimate_rebound {
+	double velocity_ratio; /* from the resultant velocity change of the case */
+	double sigma_velocity_ratio;
+	double flight_ratio; /* from the time of flight to the second impact */
+	double sigma_flight_ratio;
+	double second_impact_s; /* NAN when the record ends before it */
 	enum estimate_status status;
 };
 
@@ -98,14 +174,23 @@ struct analysis {
 	struct estimate_lag lag;
 	bool has_plate;                 /* S1 rings on its own: it and S2 differ */
 	struct estimate_ringdown plate; /* X and Y of S1 combined by their weights */
+	bool has_rebound;               /* the impact speed was given, and S2 has a velocity change */
+	struct estimate_rebound rebound;
 };
+
+#define ESTIMATE_TOLERANCE 0.005
 
 struct estimate_options {
 	double lowpass_hz; /* zero-phase low-pass with this corner before everything else; 0 = raw */
+	double iepe_time_constant_s; /* the sensor supply's high-pass is undone; 0 = left as it is */
+	enum estimate_family family; /* of the contact pulse, when it is known */
+	double tolerance; /* standard uncertainty asked for: part of the value, for instants part of the
+	                     pulse's width; 0 = ESTIMATE_TOLERANCE */
+	double impact_speed_m_s; /* for the rebound; 0 = not known */
 };
 
 /* Analyses a record; the record is only read. 0; DT_E_EMPTY if no channel has a single good sample;
- * DT_E_ARGUMENT for a low-pass that is negative or not finite; DT_E_MEMORY. Uncertain results are not errors:
+ * DT_E_ARGUMENT for an option that is negative or not finite; DT_E_MEMORY. Uncertain results are not errors:
  * they carry a status. On success free with estimate_free. */
 DT_MUST_USE int estimate_record(const struct record *record, const struct estimate_options *options,
                                 struct analysis *analysis);

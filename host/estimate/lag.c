@@ -92,10 +92,22 @@ static bool usable(const struct resultant *resultant)
 void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag)
 {
 	const struct resultant *r1 = s1->resultant, *r2 = s2->resultant;
-	struct estimate_lag found = {NAN, NAN, NAN, NAN, NAN, r2->result.status};
+	struct estimate_lag found = {
+	        .first_peak_s = NAN,
+	        .largest_peak_s = NAN,
+	        .cross_correlation_s = NAN,
+	        .spread_s = NAN,
+	        .sigma_s = NAN,
+	        .driven_s = NAN,
+	        .sigma_driven_s = NAN,
+	        .driven_axis_s = {NAN, NAN},
+	        .sigma_driven_axis_s = {NAN, NAN},
+	        .driven = {.method = "", .chi_square = NAN, .status = ESTIMATE_SHORT},
+	        .status = r2->result.how.status,
+	};
 
 	if (found.status == ESTIMATE_OK || !usable(r1))
-		found.status = r1->result.status;
+		found.status = r1->result.how.status;
 	*lag = found;
 	if (!usable(r1) || !usable(r2))
 		return;

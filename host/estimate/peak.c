@@ -72,12 +72,12 @@ static void take_sample(const struct trace *trace, struct peak *peak)
 	struct estimate_peak *result = &peak->result;
 	size_t k = peak->at;
 
-	result->method = "sample";
+	result->how.method = "sample";
 	result->value_g = trace->value_g[k];
 	result->time_s = trace_time(trace, k);
 	result->sigma_g = NAN;
 	result->sigma_time_s = 1 / trace->rate_hz;
-	result->status = ESTIMATE_AMBIGUOUS;
+	result->how.status = ESTIMATE_AMBIGUOUS;
 }
 
 /* Top of the parabola through the highest sample and its neighbours. */
@@ -97,7 +97,7 @@ static bool take_parabola(const struct trace *trace, struct peak *peak)
 		return false;
 	shift = (before - after) / (2 * bend);
 	rise = (before - after) * shift / -4;
-	result->method = "parabola";
+	result->how.method = "parabola";
 	result->value_g = top + rise;
 	result->time_s = trace_time(trace, k) + shift / trace->rate_hz;
 	result->sigma_g = hypot(trace->noise_g, fmax(fabs(rise), fabs(bend) / 8));
@@ -113,13 +113,13 @@ static bool take_crest(const struct trace *trace, struct peak *peak)
 
 	if (!crest_fit(&crest, axes, 1, trace_time(trace, peak->at), peak->width_s, &peak->span))
 		return false;
-	result->method = "poly4/poly6";
+	result->how.method = "poly4/poly6";
 	result->value_g = peak->sign * crest.value_g;
 	result->sigma_g = crest.sigma_g;
 	result->time_s = crest.time_s;
 	result->sigma_time_s = crest.sigma_time_s;
 	if (hole(trace, crest.time_s) > fmax(HOLE_MAX * peak->width_s, 1.5 / trace->rate_hz))
-		result->status = ESTIMATE_AMBIGUOUS;
+		result->how.status = ESTIMATE_AMBIGUOUS;
 	return true;
 }
 
@@ -140,7 +140,11 @@ static double clipped_half(const struct trace *trace, const struct peak *peak)
 
 void peak_find(const struct trace *trace, struct peak *peak)
 {
-	struct peak found = {.result = {NAN, NAN, NAN, NAN, "sample", ESTIMATE_SHORT}};
+	struct peak found = {.result = {NAN,
+	                                NAN,
+	                                NAN,
+	                                NAN,
+	                                {.method = "sample", .chi_square = NAN, .status = ESTIMATE_SHORT}}};
 	size_t good;
 	double half;
 
@@ -151,17 +155,17 @@ void peak_find(const struct trace *trace, struct peak *peak)
 	peak->sign = trace->value_g[found.at] < 0 ? -1 : 1;
 	if (!(fabs(trace->value_g[found.at]) > 0) ||
 	    fabs(trace->value_g[found.at]) < NOISE_FACTOR_MIN * trace->noise_g) {
-		peak->result.status = ESTIMATE_NO_PEAK;
+		peak->result.how.status = ESTIMATE_NO_PEAK;
 		return;
 	}
 	if (!measure_width(trace, peak))
 		return;
-	peak->result.status = ESTIMATE_OK;
+	peak->result.how.status = ESTIMATE_OK;
 	if (!take_crest(trace, peak) && !take_parabola(trace, peak))
 		take_sample(trace, peak);
 	half = clipped_half(trace, peak);
 	if (half > 0) {
-		peak->result.status = ESTIMATE_CLIPPED;
+		peak->result.how.status = ESTIMATE_CLIPPED;
 		peak->result.sigma_g = NAN;
 		peak->result.sigma_time_s = fmax(peak->result.sigma_time_s, half);
 	}

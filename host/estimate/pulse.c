@@ -103,7 +103,21 @@ static void velocity(const struct trace *trace, const struct peak *peak,
 void pulse_measure(const struct trace *trace, const struct peak *peak,
                    const struct estimate_baseline *baseline, struct estimate_pulse *pulse)
 {
-	struct estimate_pulse found = {NAN, NAN, NAN, NAN, NAN, NAN, peak->result.status};
+	struct estimate_pulse found = {
+	        .duration_s = NAN,
+	        .sigma_duration_s = NAN,
+	        .velocity_change_m_s = NAN,
+	        .sigma_velocity_m_s = NAN,
+	        .start_s = NAN,
+	        .end_s = NAN,
+	        .status = peak->result.how.status,
+	        .contact_time_s = NAN,
+	        .sigma_contact_s = NAN,
+	        .contact_start_s = NAN,
+	        .fitted_velocity_m_s = NAN,
+	        .sigma_fitted_velocity_m_s = NAN,
+	        .contact = {.method = "", .chi_square = NAN, .status = ESTIMATE_SHORT},
+	};
 	double level = EDGE_LEVEL * fabs(peak->result.value_g), tilt;
 	struct edge edge[2];
 

@@ -82,27 +82,27 @@ static struct local_span span_around(const struct resultant_axes *axes, unsigned
 
 static bool usable(const struct peak *peak)
 {
-	return peak->result.status != ESTIMATE_SHORT && peak->result.status != ESTIMATE_NO_PEAK;
+	return peak->result.how.status != ESTIMATE_SHORT && peak->result.how.status != ESTIMATE_NO_PEAK;
 }
 
 /* X and Y against each other, and what a hole or a limit under the pulse does to the resultant. */
 static void compare_axes(const struct resultant_axes *axes, unsigned strong, struct resultant *found)
 {
 	const struct peak *x = axes->peak[0], *y = axes->peak[1];
-	enum estimate_status status = axes->peak[strong]->result.status;
+	enum estimate_status status = axes->peak[strong]->result.how.status;
 
 	if (usable(x) && usable(y)) {
 		found->result.axes_apart_s = y->result.time_s - x->result.time_s;
 		found->result.axes_coincide = fabs(found->result.axes_apart_s) <= RESULTANT_COINCIDE_S;
 	}
 	if (status == ESTIMATE_OK && usable(axes->peak[1 - strong]))
-		status = axes->peak[1 - strong]->result.status;
+		status = axes->peak[1 - strong]->result.how.status;
 	if (trace_any(axes->trace[0], found->span.from_s, found->span.until_s, SAMPLE_CLIPPED) ||
 	    trace_any(axes->trace[1], found->span.from_s, found->span.until_s, SAMPLE_CLIPPED)) {
 		status = ESTIMATE_CLIPPED;
 		found->result.sigma_g = NAN;
 	}
-	found->result.status = status;
+	found->result.how.status = status;
 }
 
 void resultant_find(const struct resultant_axes *axes, struct resultant *resultant)
@@ -118,11 +118,11 @@ void resultant_find(const struct resultant_axes *axes, struct resultant *resulta
 	double top;
 	size_t at, first;
 
-	found.result.status = axes->peak[strong]->result.status;
+	found.result.how.status = axes->peak[strong]->result.how.status;
 	*resultant = found;
 	if (!usable(axes->peak[strong]))
 		return;
-	resultant->result.status = ESTIMATE_SHORT;
+	resultant->result.how.status = ESTIMATE_SHORT;
 	found.width_s = axes->peak[strong]->width_s;
 	at = largest(axes, fast, &top);
 	if (at == axes->trace[fast]->count)

@@ -270,7 +270,18 @@ static enum estimate_status solve(const struct window *window, const struct cros
 void ringdown_find(const struct trace *trace, double from_s, double until_s, double peak_g,
                    struct ringdown *ringdown)
 {
-	struct ringdown found = {.result = {NAN, NAN, NAN, NAN, NAN, NAN, "least_squares", ESTIMATE_SHORT}};
+	struct ringdown found = {
+	        .result = {.frequency_hz = NAN,
+	                   .sigma_hz = NAN,
+	                   .natural_frequency_hz = NAN,
+	                   .sigma_natural_hz = NAN,
+	                   .damping_ratio = NAN,
+	                   .sigma_damping = NAN,
+	                   .amplitude_g = NAN,
+	                   .second_frequency_hz = NAN,
+	                   .second_damping_ratio = NAN,
+	                   .three_cycle_frequency_hz = NAN,
+	                   .how = {.method = "least_squares", .chi_square = NAN, .status = ESTIMATE_SHORT}}};
 	struct window window = {trace, trace_index(trace, from_s), trace_index(trace, until_s), from_s};
 	double threshold = fmax(SWING_NOISE * trace->noise_g, SWING_LEVEL * peak_g);
 	struct crossings crossings;
@@ -280,11 +291,11 @@ void ringdown_find(const struct trace *trace, double from_s, double until_s, dou
 		return;
 	find_crossings(&window, 0, threshold, &crossings);
 	if (crossings.count < CROSSINGS_START) {
-		ringdown->result.status = crossings.ended ? ESTIMATE_SHORT : ESTIMATE_NO_PEAK;
+		ringdown->result.how.status = crossings.ended ? ESTIMATE_SHORT : ESTIMATE_NO_PEAK;
 		return;
 	}
-	found.result.status = solve(&window, &crossings, &found);
-	if (found.result.status == ESTIMATE_OK) {
+	found.result.how.status = solve(&window, &crossings, &found);
+	if (found.result.how.status == ESTIMATE_OK) {
 		find_crossings(&window, found.offset_g, threshold, &crossings);
 		if (crossings.count == CROSSINGS)
 			found.result.three_cycle_frequency_hz =
@@ -316,8 +327,8 @@ void ringdown_combine(const struct ringdown *x, const struct ringdown *y, struct
 	struct estimate_ringdown found = *a;
 	struct value hz, damping;
 
-	if (a->status != ESTIMATE_OK || b->status != ESTIMATE_OK) {
-		*combined = b->status == ESTIMATE_OK ? *b : *a;
+	if (a->how.status != ESTIMATE_OK || b->how.status != ESTIMATE_OK) {
+		*combined = b->how.status == ESTIMATE_OK ? *b : *a;
 		return;
 	}
 	hz = weighted_mean((struct value){a->frequency_hz, a->sigma_hz},
@@ -331,6 +342,6 @@ void ringdown_combine(const struct ringdown *x, const struct ringdown *y, struct
 	found.natural_frequency_hz = hz.value / sqrt(1 - damping.value * damping.value);
 	found.three_cycle_frequency_hz = (a->three_cycle_frequency_hz + b->three_cycle_frequency_hz) / 2;
 	if (fabs(a->frequency_hz - b->frequency_hz) > APART_MAX * hz.value)
-		found.status = ESTIMATE_AMBIGUOUS;
+		found.how.status = ESTIMATE_AMBIGUOUS;
 	*combined = found;
 }

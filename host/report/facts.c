@@ -166,8 +166,8 @@ bool report_video(const struct report *report, const struct report_zero *zero, c
 
 const char *report_channel_status(const struct estimate_channel *estimate, char *text, size_t size)
 {
-	if (estimate->peak.status != ESTIMATE_OK)
-		snprintf(text, size, "%s", estimate_status_name(estimate->peak.status));
+	if (estimate->peak.how.status != ESTIMATE_OK)
+		snprintf(text, size, "%s", estimate_status_name(estimate->peak.how.status));
 	else if (estimate->pulse.status != ESTIMATE_OK)
 		snprintf(text, size, "width %s", estimate_status_name(estimate->pulse.status));
 	else
@@ -203,7 +203,7 @@ static void compare_peaks(const struct report *report, struct report_row *rows, 
 		                            .decimals = 1,
 		                            .predicted = report->prediction->peak[axis].value_g,
 		                            .measured = e ? e->peak.value_g : (double)NAN},
-		        e ? e->peak.status : ESTIMATE_SHORT);
+		        e ? e->peak.how.status : ESTIMATE_SHORT);
 	}
 }
 
@@ -229,7 +229,7 @@ static void compare_resultants(const struct report *report, struct report_row *r
 			if (strcmp(r->sensor, names[sensor]))
 				continue;
 			row.measured = r->peak_g;
-			status = r->status;
+			status = r->how.status;
 		}
 		add_row(rows, count, row, status);
 	}
@@ -267,8 +267,8 @@ size_t report_compare(const struct report *report, struct report_row rows[REPORT
 		frequency.measured = a->plate.frequency_hz;
 		damping.predicted = p->plate_damping_ratio;
 		damping.measured = a->plate.damping_ratio;
-		add_row(rows, &count, frequency, a->has_plate ? a->plate.status : ESTIMATE_SHORT);
-		add_row(rows, &count, damping, a->has_plate ? a->plate.status : ESTIMATE_SHORT);
+		add_row(rows, &count, frequency, a->has_plate ? a->plate.how.status : ESTIMATE_SHORT);
+		add_row(rows, &count, damping, a->has_plate ? a->plate.how.status : ESTIMATE_SHORT);
 	}
 	return count;
 }

@@ -136,7 +136,7 @@ static void cards(struct page *page)
 		begin_card(out, label);
 		page_with_sigma(out, 1, r->peak_g, r->sigma_g);
 		end_card(out, "g",
-		         unless_ok(r->status,
+		         unless_ok(r->how.status,
 		                   r->axes_coincide ? "X and Y peak together" : "X and Y peak apart"));
 	}
 	if (a->has_lag) {
@@ -147,10 +147,10 @@ static void cards(struct page *page)
 	if (a->has_plate) {
 		begin_card(out, "Plate frequency, damped");
 		page_number(out, 1, a->plate.frequency_hz);
-		end_card(out, "Hz", unless_ok(a->plate.status, "ring-down of S1"));
+		end_card(out, "Hz", unless_ok(a->plate.how.status, "ring-down of S1"));
 		begin_card(out, "Plate damping ratio");
 		page_number(out, 3, a->plate.damping_ratio);
-		end_card(out, "", unless_ok(a->plate.status, "of critical"));
+		end_card(out, "", unless_ok(a->plate.how.status, "of critical"));
 	}
 	fputs("</div>\n", out);
 }

@@ -143,8 +143,8 @@ static void put_ringdown(struct builder *b, cJSON *object, const char *key, cons
 	put_number(b, item, "three_cycle_frequency_hz", r->three_cycle_frequency_hz);
 	put_number(b, item, "damping_ratio", r->damping_ratio);
 	put_number(b, item, "sigma_damping", r->sigma_damping);
-	put_method(b, item, r->method);
-	put_status(b, item, r->status);
+	put_method(b, item, r->how.method);
+	put_status(b, item, r->how.status);
 }
 
 static void put_peak(struct builder *b, cJSON *object, const struct estimate_peak *peak)
@@ -155,8 +155,8 @@ static void put_peak(struct builder *b, cJSON *object, const struct estimate_pea
 	put_number(b, item, "sigma_g", peak->sigma_g);
 	put_number(b, item, "time_s", peak->time_s);
 	put_number(b, item, "sigma_time_s", peak->sigma_time_s);
-	put_method(b, item, peak->method);
-	put_status(b, item, peak->status);
+	put_method(b, item, peak->how.method);
+	put_status(b, item, peak->how.status);
 }
 
 static void put_pulse(struct builder *b, cJSON *object, const struct estimate_pulse *pulse)
@@ -240,7 +240,7 @@ static void put_resultants(struct builder *b, cJSON *root, const struct analysis
 		put_number(b, item, "time_s", a->resultants[i].time_s);
 		put_bool(b, item, "axes_coincide", a->resultants[i].axes_coincide);
 		put_number(b, item, "axes_apart_s", a->resultants[i].axes_apart_s);
-		put_status(b, item, a->resultants[i].status);
+		put_status(b, item, a->resultants[i].how.status);
 	}
 }
 

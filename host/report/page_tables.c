@@ -52,7 +52,7 @@ static void results(struct page *page)
 		fputs("</td><td colspan=\"3\" class=\"text soft\">Y peaks ", out);
 		page_number(out, 3, fabs(r->axes_apart_s) * 1e3);
 		fprintf(out, " ms %s X</td><td class=\"text\">%s</td></tr>\n",
-		        r->axes_apart_s < 0.0 ? "before" : "after", estimate_status_name(r->status));
+		        r->axes_apart_s < 0.0 ? "before" : "after", estimate_status_name(r->how.status));
 	}
 	fputs("</table></div>\n<p class=\"note\">&plusmn; is one standard uncertainty. Velocity change: the "
 	      "integral over the pulse.</p>\n",
@@ -92,12 +92,14 @@ static void joint(struct page *page)
 	if (a->has_plate) {
 		const struct estimate_ringdown *p = &a->plate;
 
-		joint_row(out, "plate frequency, damped", "Hz", 2, p->frequency_hz, p->sigma_hz, p->status);
+		joint_row(out, "plate frequency, damped", "Hz", 2, p->frequency_hz, p->sigma_hz,
+		          p->how.status);
 		joint_row(out, "plate frequency, undamped", "Hz", 2, p->natural_frequency_hz, (double)NAN,
-		          p->status);
+		          p->how.status);
 		joint_row(out, "plate frequency over three cycles", "Hz", 2, p->three_cycle_frequency_hz,
-		          (double)NAN, p->status);
-		joint_row(out, "plate damping ratio", "", 4, p->damping_ratio, p->sigma_damping, p->status);
+		          (double)NAN, p->how.status);
+		joint_row(out, "plate damping ratio", "", 4, p->damping_ratio, p->sigma_damping,
+		          p->how.status);
 	}
 	fputs("</table></div>\n", out);
 }

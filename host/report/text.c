@@ -77,7 +77,7 @@ static void write_channels(const struct report *report, const struct report_zero
 		cell(out, 9, 2, r->peak_g);
 		cell(out, 7, 2, r->sigma_g);
 		cell(out, 9, 3, (r->time_s - zero->time_s) * 1e3);
-		fprintf(out, " %7s  %s", "", estimate_status_name(r->status));
+		fprintf(out, " %7s  %s", "", estimate_status_name(r->how.status));
 		fprintf(out, r->axes_coincide ? ", X and Y peak together\n" : ", Y peaks %+.3f ms after X\n",
 		        r->axes_apart_s * 1e3);
 	}
@@ -115,7 +115,7 @@ static void write_joint(const struct analysis *a, FILE *out)
 		cell(out, 1, 4, a->plate.damping_ratio);
 		fprintf(out, " +-");
 		cell(out, 1, 4, a->plate.sigma_damping);
-		fprintf(out, "  %s\n", estimate_status_name(a->plate.status));
+		fprintf(out, "  %s\n", estimate_status_name(a->plate.how.status));
 	}
 }
 

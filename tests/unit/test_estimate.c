@@ -104,7 +104,7 @@ static void check_mounted(const struct analysis *a)
 			at = k;
 		}
 	}
-	assert_int_equal(a->channels[S1X].peak.status, ESTIMATE_OK);
+	assert_int_equal(a->channels[S1X].peak.how.status, ESTIMATE_OK);
 	assert_near(a->channels[S1X].peak.value_g, 0.906 * HEIGHT_G * top, 4);
 	assert_near(a->channels[S2Y].peak.value_g, 0.423 * HEIGHT_G, 4);
 	assert_int_equal(a->resultant_count, 2);
@@ -116,7 +116,7 @@ static void check_mounted(const struct analysis *a)
 	assert_true(a->has_lag);
 	assert_near(a->lag.largest_peak_s, (double)at * SYNTH_STEP_S - 0.251244620 * BASE_S, 30e-6);
 	assert_true(a->has_plate);
-	assert_int_equal(a->plate.status, ESTIMATE_OK);
+	assert_int_equal(a->plate.how.status, ESTIMATE_OK);
 	assert_near(a->plate.frequency_hz, damped_hz(), 4 * a->plate.sigma_hz + 0.02);
 	assert_near(a->plate.damping_ratio, 0.1, 4 * a->plate.sigma_damping + 2e-4);
 	assert_true(a->plate.sigma_hz > 0.005 && a->plate.sigma_hz < 0.2);
@@ -156,7 +156,7 @@ static void rigid(void **state)
 	assert_false(a.has_plate);
 	assert_near(a.lag.largest_peak_s, 0, 4 * a.lag.sigma_s);
 	for (int i = 0; i < CHANNELS; i++) {
-		enum estimate_status status = a.channels[i].ringdown.status;
+		enum estimate_status status = a.channels[i].ringdown.how.status;
 
 		assert_true(status == ESTIMATE_NO_PEAK || status == ESTIMATE_SHORT);
 		assert_true(isnan(a.channels[i].ringdown.frequency_hz));
@@ -166,7 +166,7 @@ static void rigid(void **state)
 	/* All of it rings alike: that is no plate either. */
 	make(&drop, RINGS_AS_A_WHOLE, 1, 3);
 	a = analyse(&drop.record, 0);
-	assert_int_equal(a.channels[S1X].ringdown.status, ESTIMATE_OK);
+	assert_int_equal(a.channels[S1X].ringdown.how.status, ESTIMATE_OK);
 	assert_near(a.channels[S1X].ringdown.frequency_hz, damped_hz(), 1);
 	assert_false(a.has_plate);
 	estimate_free(&a);
@@ -222,9 +222,9 @@ static void poison(void **state)
 		assert_near(dirty.channels[i].pulse.velocity_change_m_s,
 		            clean.channels[i].pulse.velocity_change_m_s, 0);
 	}
-	assert_int_equal(dirty.channels[S1Y].peak.status, ESTIMATE_SHORT);
+	assert_int_equal(dirty.channels[S1Y].peak.how.status, ESTIMATE_SHORT);
 	assert_true(dirty.channels[S1Y].flags & RECORD_FLAG_BAD);
-	assert_int_equal(dirty.resultants[0].status, ESTIMATE_SHORT);
+	assert_int_equal(dirty.resultants[0].how.status, ESTIMATE_SHORT);
 	assert_near(dirty.resultants[1].peak_g, clean.resultants[1].peak_g, 0);
 	assert_true(dirty.has_plate);
 	assert_near(dirty.plate.frequency_hz, clean.channels[S1X].ringdown.frequency_hz, 0);
@@ -245,12 +245,12 @@ static void clip_flag(void **state)
 		drop.channel[S2X].value_g[k] = fmin(drop.channel[S2X].value_g[k], 300);
 	a = analyse(&drop.record, 0);
 	assert_true(a.channels[S2X].flags & RECORD_FLAG_CLIPPED);
-	assert_int_equal(a.channels[S2X].peak.status, ESTIMATE_CLIPPED);
+	assert_int_equal(a.channels[S2X].peak.how.status, ESTIMATE_CLIPPED);
 	assert_int_equal(a.channels[S2X].pulse.status, ESTIMATE_CLIPPED);
-	assert_int_equal(a.resultants[1].status, ESTIMATE_CLIPPED);
+	assert_int_equal(a.resultants[1].how.status, ESTIMATE_CLIPPED);
 	assert_int_equal(a.lag.status, ESTIMATE_CLIPPED);
 	assert_true(a.channels[S2X].peak.value_g > 295 && a.channels[S2X].peak.value_g < 362);
-	assert_int_equal(a.channels[S1X].peak.status, ESTIMATE_OK);
+	assert_int_equal(a.channels[S1X].peak.how.status, ESTIMATE_OK);
 	assert_int_equal(drop.channel[S2X].sample[703], 0);
 	estimate_free(&a);
 	drop_free(&drop);
@@ -292,18 +292,18 @@ static void check_sane(const struct record *record, double lowpass_hz)
 	for (size_t i = 0; i < a.channel_count; i++) {
 		const struct estimate_channel *c = &a.channels[i];
 
-		assert_string_not_equal(estimate_status_name(c->peak.status), "unknown");
-		assert_non_null(c->peak.method);
-		assert_non_null(c->ringdown.method);
-		if (c->peak.status == ESTIMATE_OK)
+		assert_string_not_equal(estimate_status_name(c->peak.how.status), "unknown");
+		assert_non_null(c->peak.how.method);
+		assert_non_null(c->ringdown.how.method);
+		if (c->peak.how.status == ESTIMATE_OK)
 			assert_true(isfinite(c->peak.value_g) && isfinite(c->peak.time_s));
 		if (c->pulse.status == ESTIMATE_OK)
 			assert_true(c->pulse.duration_s > 0 && isfinite(c->pulse.velocity_change_m_s));
-		if (c->ringdown.status == ESTIMATE_OK)
+		if (c->ringdown.how.status == ESTIMATE_OK)
 			assert_true(c->ringdown.frequency_hz > 0 && c->ringdown.sigma_hz >= 0);
 	}
 	for (size_t i = 0; i < a.resultant_count; i++)
-		if (a.resultants[i].status == ESTIMATE_OK)
+		if (a.resultants[i].how.status == ESTIMATE_OK)
 			assert_true(isfinite(a.resultants[i].peak_g) && isfinite(a.resultants[i].time_s));
 	estimate_free(&a);
 }
@@ -431,7 +431,7 @@ static void fixture(void **state)
 		a = analyse(&record, 50e3);
 		printf("%s: %.0f +- %.0f g, %.1f us\n", file[i], a.channels[0].peak.value_g,
 		       a.channels[0].peak.sigma_g, a.channels[0].pulse.duration_s * 1e6);
-		assert_int_equal(a.channels[0].peak.status, ESTIMATE_OK);
+		assert_int_equal(a.channels[0].peak.how.status, ESTIMATE_OK);
 		assert_near_part(a.channels[0].peak.value_g, peak[i], 0.02);
 		assert_near_part(a.channels[0].pulse.duration_s, width[i], 0.15);
 		estimate_free(&a);
@@ -454,10 +454,10 @@ static void board(void **state)
 		if (!read_two(path, 1, &channel))
 			skip();
 		a = analyse(&record, 0);
-		assert_int_equal(a.channels[0].peak.status, ESTIMATE_CLIPPED);
+		assert_int_equal(a.channels[0].peak.how.status, ESTIMATE_CLIPPED);
 		assert_true(a.channels[0].flags & RECORD_FLAG_CLIPPED);
 		assert_near_part(fabs(a.channels[0].peak.value_g), 546.5, 0.02);
-		assert_int_equal(a.channels[0].ringdown.status, ESTIMATE_OK);
+		assert_int_equal(a.channels[0].ringdown.how.status, ESTIMATE_OK);
 		assert_near(a.channels[0].ringdown.frequency_hz, 801, 4);
 		assert_near(a.channels[0].ringdown.damping_ratio, 0.01, 0.005);
 		estimate_free(&a);
@@ -466,7 +466,7 @@ static void board(void **state)
 		snprintf(path, sizeof(path), DATA "/repeated_impacts/acc_base_a%d.txt", i);
 		assert_true(read_two(path, 1, &channel));
 		a = analyse(&record, 0);
-		assert_int_equal(a.channels[0].peak.status, ESTIMATE_OK);
+		assert_int_equal(a.channels[0].peak.how.status, ESTIMATE_OK);
 		assert_near_part(a.channels[0].peak.value_g, 487.0, 0.02);
 		assert_near_part(a.channels[0].pulse.duration_s, 0.405e-3, 0.02);
 		assert_int_equal(a.channels[0].flags, 0);

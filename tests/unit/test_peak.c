@@ -62,8 +62,8 @@ static void shapes(void **state)
 			    fabs(peak.time_s - truth) > error_s[shape])
 				fail_msg("shape %u phase %d: %.3f g off, %.2f us off", shape, phase,
 				         peak.value_g - HEIGHT_G, (peak.time_s - truth) * 1e6);
-			assert_string_equal(peak.method, "poly4/poly6");
-			assert_int_equal(peak.status, ESTIMATE_OK);
+			assert_string_equal(peak.how.method, "poly4/poly6");
+			assert_int_equal(peak.how.status, ESTIMATE_OK);
 			synth_free(&channel);
 		}
 	}
@@ -144,7 +144,7 @@ static void holes(void **state)
 		peak = find(&channel, 1);
 		printf("seed %zu, %zu missing: %+.2f g, sigma %.2f\n", 77 + i, missing[i],
 		       peak.value_g - HEIGHT_G, peak.sigma_g);
-		assert_int_equal(peak.status, i < 2 ? ESTIMATE_OK : ESTIMATE_AMBIGUOUS);
+		assert_int_equal(peak.how.status, i < 2 ? ESTIMATE_OK : ESTIMATE_AMBIGUOUS);
 		assert_true(fabs(peak.value_g - HEIGHT_G) < 3 * peak.sigma_g);
 		assert_true(peak.sigma_g > whole.sigma_g && peak.sigma_g < 20);
 		synth_free(&channel);
@@ -161,7 +161,7 @@ static void summit_lost(void **state)
 	(void)state;
 	synth_lose(&channel, 146, 60);
 	peak = find(&channel, 1);
-	assert_int_equal(peak.status, ESTIMATE_AMBIGUOUS);
+	assert_int_equal(peak.how.status, ESTIMATE_AMBIGUOUS);
 	synth_free(&channel);
 }
 
@@ -175,7 +175,7 @@ static void clipped(void **state)
 	for (size_t k = 0; k < channel.count; k++)
 		channel.value_g[k] = -fmin(channel.value_g[k], 450);
 	peak = find(&channel, 0.3);
-	assert_int_equal(peak.status, ESTIMATE_CLIPPED);
+	assert_int_equal(peak.how.status, ESTIMATE_CLIPPED);
 	assert_true(peak.value_g < -449 && peak.value_g > -HEIGHT_G);
 	assert_true(isnan(peak.sigma_g));
 	assert_true(fabs(peak.time_s - 0.0215) < 3 * peak.sigma_time_s && peak.sigma_time_s > 0.2e-3);
@@ -187,12 +187,12 @@ static void clipped(void **state)
 		if (channel.value_g[k] > 450)
 			channel.sample[k] = SAMPLE_CLIPPED;
 	peak = find(&channel, 0.3);
-	assert_int_equal(peak.status, ESTIMATE_CLIPPED);
+	assert_int_equal(peak.how.status, ESTIMATE_CLIPPED);
 	assert_true(fabs(peak.value_g - HEIGHT_G) < 0.1);
 	/* A limit elsewhere is not this peak's business. */
 	memset(channel.sample, 0, channel.count);
 	channel.sample[10] = SAMPLE_CLIPPED;
-	assert_int_equal(find(&channel, 0.3).status, ESTIMATE_OK);
+	assert_int_equal(find(&channel, 0.3).how.status, ESTIMATE_OK);
 	synth_free(&channel);
 }
 
@@ -225,14 +225,14 @@ static void few_samples(void **state)
 	for (size_t k = 0; k < channel.count; k++)
 		channel.value_g[k] = 17 * synth_pulse(SYNTH_HAVERSINE, ((double)k - 18.2) / 6);
 	peak = find(&channel, 0.03);
-	assert_string_equal(peak.method, "parabola");
+	assert_string_equal(peak.how.method, "parabola");
 	assert_true(fabs(peak.value_g - 17) < 2 * peak.sigma_g && peak.sigma_g < 1.5);
 	assert_true(fabs(peak.time_s - (1 + 21.2 / 200)) < 2 * peak.sigma_time_s &&
 	            peak.sigma_time_s < 1.0 / 200);
 	channel.count = 21;
 	peak = find(&channel, 0.03);
-	assert_string_equal(peak.method, "sample");
-	assert_int_equal(peak.status, ESTIMATE_AMBIGUOUS);
+	assert_string_equal(peak.how.method, "sample");
+	assert_int_equal(peak.how.status, ESTIMATE_AMBIGUOUS);
 	synth_free(&channel);
 }
 
@@ -248,7 +248,7 @@ static void many_samples(void **state)
 		channel.value_g[k] = 20000 * synth_pulse(SYNTH_HAVERSINE, ((double)k - 1000.37) / 300) +
 		                     20 * synth_normal(&random);
 	peak = find(&channel, 20);
-	assert_string_equal(peak.method, "poly4/poly6");
+	assert_string_equal(peak.how.method, "poly4/poly6");
 	assert_true(fabs(peak.value_g - 20000) < 3 * peak.sigma_g && peak.sigma_g < 10);
 	assert_true(fabs(peak.time_s - 1150.37e-6) < 3 * peak.sigma_time_s && peak.sigma_time_s < 0.5e-6);
 	synth_free(&channel);
@@ -261,11 +261,11 @@ static void no_peak(void **state)
 	struct estimate_peak peak;
 
 	(void)state;
-	assert_int_equal(find(&channel, 0).status, ESTIMATE_NO_PEAK);
+	assert_int_equal(find(&channel, 0).how.status, ESTIMATE_NO_PEAK);
 	for (size_t k = 0; k < channel.count; k++)
 		channel.value_g[k] = synth_normal(&random);
 	peak = find(&channel, 1);
-	assert_int_equal(peak.status, ESTIMATE_NO_PEAK);
+	assert_int_equal(peak.how.status, ESTIMATE_NO_PEAK);
 	assert_true(isnan(peak.value_g) && isnan(peak.sigma_g) && isnan(peak.time_s));
 	synth_free(&channel);
 }
@@ -279,13 +279,13 @@ static void degenerate(void **state)
 		channel.count = n;
 		for (size_t k = 0; k < n; k++)
 			channel.value_g[k] = k == n / 2 ? 1 : 0;
-		assert_int_equal(find(&channel, NAN).status, n < 3 ? ESTIMATE_SHORT : ESTIMATE_OK);
+		assert_int_equal(find(&channel, NAN).how.status, n < 3 ? ESTIMATE_SHORT : ESTIMATE_OK);
 	}
 	for (size_t k = 0; k < 5; k++)
 		channel.value_g[k] = k % 2 ? NAN : 1e300;
-	assert_int_equal(find(&channel, NAN).status, ESTIMATE_SHORT);
+	assert_int_equal(find(&channel, NAN).how.status, ESTIMATE_SHORT);
 	channel.rate_hz = 0;
-	assert_int_equal(find(&channel, NAN).status, ESTIMATE_SHORT);
+	assert_int_equal(find(&channel, NAN).how.status, ESTIMATE_SHORT);
 	synth_free(&channel);
 }
 

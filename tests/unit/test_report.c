@@ -41,8 +41,7 @@ static const struct estimate_ringdown ring = {
         .damping_ratio = 0.1,
         .sigma_damping = 1.0 / 7.0,
         .three_cycle_frequency_hz = 128.125,
-        .method = "least_squares",
-        .status = ESTIMATE_OK,
+        .how = {.method = "least_squares", .status = ESTIMATE_OK},
 };
 
 /* Half-sine of 3 ms at 100 ms; S1 later and smaller. */
@@ -62,8 +61,18 @@ static void make_channel(struct fixture *f, size_t i, const char *name)
 	}
 	f->estimates[i] = (struct estimate_channel){
 	        .baseline = {.offset_g = 0.125, .noise_g = 1.0, .samples = 600},
-	        .peak = {peak_g + 1.0 / 3.0, 0.34, at_s + 0.0015, 1.1e-6, "poly4/poly6", ESTIMATE_OK},
-	        .pulse = {0.0028, 1e-5, 5.7, 0.01, at_s, at_s + 0.0028, ESTIMATE_OK},
+	        .peak = {peak_g + 1.0 / 3.0,
+	                 0.34,
+	                 at_s + 0.0015,
+	                 1.1e-6,
+	                 {.method = "poly4/poly6", .status = ESTIMATE_OK}},
+	        .pulse = {.duration_s = 0.0028,
+	                  .sigma_duration_s = 1e-5,
+	                  .velocity_change_m_s = 5.7,
+	                  .sigma_velocity_m_s = 0.01,
+	                  .start_s = at_s,
+	                  .end_s = at_s + 0.0028,
+	                  .status = ESTIMATE_OK},
 	        .ringdown = ring,
 	};
 }
@@ -127,11 +136,26 @@ static int set_up(void **state)
 	f->analysis = (struct analysis){
 	        .channels = f->estimates,
 	        .channel_count = CHANNELS,
-	        .resultants = {{"S1", 340.5, 0.4, 0.1035, true, 1e-5, ESTIMATE_OK},
-	                       {"S2", 500.25, 0.5, 0.1015, false, -4e-4, ESTIMATE_OK}},
+	        .resultants = {{.sensor = "S1",
+	                        .peak_g = 340.5,
+	                        .sigma_g = 0.4,
+	                        .time_s = 0.1035,
+	                        .sigma_time_s = 2e-6,
+	                        .axes_coincide = true,
+	                        .axes_apart_s = 1e-5},
+	                       {.sensor = "S2",
+	                        .peak_g = 500.25,
+	                        .sigma_g = 0.5,
+	                        .time_s = 0.1015,
+	                        .sigma_time_s = 2e-6,
+	                        .axes_apart_s = -4e-4}},
 	        .resultant_count = 2,
 	        .has_lag = true,
-	        .lag = {0.0019, 0.002, 0.0016, 0.0004, 1e-6, ESTIMATE_OK},
+	        .lag = {.first_peak_s = 0.0019,
+	                .largest_peak_s = 0.002,
+	                .cross_correlation_s = 0.0016,
+	                .spread_s = 0.0004,
+	                .sigma_s = 1e-6},
 	        .has_plate = true,
 	        .plate = ring,
 	};
@@ -277,7 +301,7 @@ static void test_json_unknown_is_null(void **state)
 
 	f->estimates[0].peak.value_g = (double)NAN;
 	f->estimates[0].peak.sigma_g = (double)INFINITY;
-	f->estimates[0].peak.status = ESTIMATE_NO_PEAK;
+	f->estimates[0].peak.how.status = ESTIMATE_NO_PEAK;
 	f->record.trigger_s = (double)NAN;
 	root = parse(&f->report);
 	assert_true(cJSON_IsNull(item(root, "channels.0.peak.value_g")));
@@ -334,7 +358,7 @@ static void make_holes(struct fixture *f)
 			}
 	}
 	f->record.channels[3].sample[710] |= SAMPLE_CLIPPED;
-	f->estimates[3].peak.status = ESTIMATE_CLIPPED;
+	f->estimates[3].peak.how.status = ESTIMATE_CLIPPED;
 	record_finish(&f->record);
 }
 
@@ -416,7 +440,7 @@ static void test_text_of_holes(void **state)
 
 	make_holes(f);
 	f->estimates[4].peak.value_g = (double)NAN;
-	f->estimates[4].peak.status = ESTIMATE_NO_PEAK;
+	f->estimates[4].peak.how.status = ESTIMATE_NO_PEAK;
 	text = print(&f->report);
 	check_has(text, "INCOMPLETE: 54 samples lost in 1 gap, 2 blocks");
 	check_has(text, "lost_samples:");
@@ -672,8 +696,11 @@ static void test_html_foreign(void **state)
 	memcpy(many, f->estimates, sizeof(f->estimates));
 	for (size_t i = CHANNELS; i < 15; i++) {
 		assert_non_null(record_add_channel(&f->record, "<i>strange</i>", 1e6, i == 8 ? 0 : 50));
-		many[i].peak = (struct estimate_peak){(double)NAN, (double)NAN, (double)NAN,
-		                                      (double)NAN, "sample",    ESTIMATE_SHORT};
+		many[i].peak = (struct estimate_peak){(double)NAN,
+		                                      (double)NAN,
+		                                      (double)NAN,
+		                                      (double)NAN,
+		                                      {.method = "sample", .status = ESTIMATE_SHORT}};
 		many[i].pulse.status = ESTIMATE_SHORT;
 	}
 	for (size_t i = 0; i < CHANNELS; i++)

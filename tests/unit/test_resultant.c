@@ -94,7 +94,7 @@ static void continuous_time(void **state)
 			make(&s, phase / 8.0, apart[i], 0, NULL);
 			r = find(&s, 0.3);
 			truth(phase / 8.0, apart[i], &peak, &time);
-			assert_int_equal(r.result.status, ESTIMATE_OK);
+			assert_int_equal(r.result.how.status, ESTIMATE_OK);
 			assert_near(r.result.peak_g, peak, 0.2);
 			assert_near(r.result.time_s, time, 1e-6);
 			assert_near(r.result.axes_apart_s, apart[i], 1e-6);
@@ -184,32 +184,32 @@ static void flawed(void **state)
 	for (size_t k = 0; k < s.y.count; k++)
 		s.y.value_g[k] = 0.2;
 	r = find(&s, 0.3);
-	assert_int_equal(r.result.status, ESTIMATE_OK);
+	assert_int_equal(r.result.how.status, ESTIMATE_OK);
 	assert_near(r.result.peak_g, X_G, 0.1);
 	assert_true(isnan(r.result.axes_apart_s) && !r.result.axes_coincide);
 	/* Y was lost under the pulse. */
 	synth_lose(&s.y, 190, 60);
 	r = find(&s, 0.3);
-	assert_int_equal(r.result.status, ESTIMATE_SHORT);
+	assert_int_equal(r.result.how.status, ESTIMATE_SHORT);
 	assert_true(isnan(r.result.peak_g));
 	/* Nothing at all. */
 	for (size_t k = 0; k < s.x.count; k++)
 		s.x.value_g[k] = 0;
-	assert_int_equal(find(&s, 0.3).result.status, ESTIMATE_NO_PEAK);
+	assert_int_equal(find(&s, 0.3).result.how.status, ESTIMATE_NO_PEAK);
 	drop(&s);
 	/* One axis at its end. */
 	make(&s, 0.3, 0, 0, NULL);
 	for (size_t k = 0; k < s.x.count; k++)
 		s.x.value_g[k] = fmin(s.x.value_g[k], 460);
 	r = find(&s, 0.3);
-	assert_int_equal(r.result.status, ESTIMATE_CLIPPED);
+	assert_int_equal(r.result.how.status, ESTIMATE_CLIPPED);
 	assert_true(isnan(r.result.sigma_g) && r.result.peak_g > 500 && r.result.peak_g < 532);
 	drop(&s);
 	/* A few samples missing at the summit of X. */
 	make(&s, 0.3, 0, 0, NULL);
 	synth_lose(&s.x, 150, 2);
 	r = find(&s, 0.3);
-	assert_int_equal(r.result.status, ESTIMATE_OK);
+	assert_int_equal(r.result.how.status, ESTIMATE_OK);
 	assert_near(r.result.peak_g, hypot(X_G, Y_G), 0.3);
 	drop(&s);
 }

@@ -68,7 +68,7 @@ static void exact(void **state)
 			d.offset_g = -3;
 			channel = make(&d, NULL);
 			r = find(&channel, 0.01, INFINITY);
-			assert_int_equal(r.result.status, ESTIMATE_OK);
+			assert_int_equal(r.result.how.status, ESTIMATE_OK);
 			assert_near(r.result.frequency_hz, 129, 1e-6);
 			assert_near(r.result.damping_ratio, damping[i], 1e-8);
 			assert_near(r.result.natural_frequency_hz, 129 / sqrt(1 - damping[i] * damping[i]),
@@ -106,7 +106,7 @@ static void noise(void **state)
 			d.noise_g = level[l];
 			channel = make(&d, &random);
 			r = find(&channel, level[l], INFINITY);
-			assert_int_equal(r.result.status, ESTIMATE_OK);
+			assert_int_equal(r.result.how.status, ESTIMATE_OK);
 			mean += (r.result.frequency_hz - 129) / TIMES;
 			hz += pow(r.result.frequency_hz - 129, 2) / TIMES;
 			damping += pow(r.result.damping_ratio - 0.1, 2) / TIMES;
@@ -171,7 +171,7 @@ static void holes(void **state)
 		}
 	}
 	r = find(&channel, 1, INFINITY);
-	assert_int_equal(r.result.status, ESTIMATE_OK);
+	assert_int_equal(r.result.how.status, ESTIMATE_OK);
 	assert_near(r.result.frequency_hz, 129, 3 * r.result.sigma_hz);
 	assert_near(r.result.damping_ratio, 0.1, 3 * r.result.sigma_damping);
 	assert_true(r.result.sigma_hz > 0.02 && r.result.sigma_hz < 0.08);
@@ -196,7 +196,7 @@ static void stiffening(void **state)
 		angle += 2 * PI * 129 * step * (1.05 - 0.05 * swing);
 	}
 	r = find(&channel, 0.3, INFINITY);
-	assert_int_equal(r.result.status, ESTIMATE_OK);
+	assert_int_equal(r.result.how.status, ESTIMATE_OK);
 	assert_true(r.result.frequency_hz > 129 && r.result.frequency_hz < 129 * 1.05);
 	/* Four times what noise alone would leave, 0.0057 Hz. */
 	assert_true(r.result.sigma_hz > 4 * 0.0057 && r.result.sigma_hz < 1);
@@ -258,7 +258,7 @@ static void against_gsl(void **state)
 	gsl_blas_ddot(gsl_multifit_nlinear_residual(work), gsl_multifit_nlinear_residual(work), &squares);
 	sigma = sqrt(squares / (double)(data.count - 5) * gsl_matrix_get(covariance, 1, 1)) / (2 * PI);
 	w = gsl_vector_get(gsl_multifit_nlinear_position(work), 1) / (2 * PI);
-	assert_int_equal(r.result.status, ESTIMATE_OK);
+	assert_int_equal(r.result.how.status, ESTIMATE_OK);
 	assert_near(r.result.frequency_hz, w, 1e-5);
 	assert_near_part(r.result.sigma_hz, sigma, 1e-3);
 	gsl_multifit_nlinear_free(work);
@@ -277,20 +277,20 @@ static void nothing(void **state)
 	for (size_t k = 0; k < channel.count; k++)
 		channel.value_g[k] = synth_normal(&random) - 3 * exp(-(double)k / 7000 / 0.3);
 	r = find(&channel, 1, INFINITY);
-	assert_int_equal(r.result.status, ESTIMATE_NO_PEAK);
+	assert_int_equal(r.result.how.status, ESTIMATE_NO_PEAK);
 	assert_true(isnan(r.result.frequency_hz) && isnan(r.result.damping_ratio) &&
 	            isnan(r.result.sigma_hz));
 	/* The tail of a pulse, without noise. */
 	for (size_t k = 0; k < channel.count; k++)
 		channel.value_g[k] = 40 * exp(-(double)k / 7000 / 0.001);
-	assert_int_equal(find(&channel, 0, INFINITY).result.status, ESTIMATE_NO_PEAK);
+	assert_int_equal(find(&channel, 0, INFINITY).result.how.status, ESTIMATE_NO_PEAK);
 	/* Something that grows, and noise alone. */
 	for (size_t k = 0; k < channel.count; k++)
 		channel.value_g[k] = 50 * exp((double)k / 500) * cos((double)k / 10);
-	assert_true(find(&channel, 1, INFINITY).result.status != ESTIMATE_OK);
+	assert_true(find(&channel, 1, INFINITY).result.how.status != ESTIMATE_OK);
 	for (size_t k = 0; k < channel.count; k++)
 		channel.value_g[k] = 100 * synth_normal(&random);
-	assert_true(find(&channel, 1, INFINITY).result.status != ESTIMATE_OK);
+	assert_true(find(&channel, 1, INFINITY).result.how.status != ESTIMATE_OK);
 	synth_free(&channel);
 }
 
@@ -301,17 +301,17 @@ static void too_short(void **state)
 
 	(void)state;
 	/* Less than a cycle, by the trace's end or by the next contact. */
-	assert_int_equal(find(&channel, 0.1, 0.005).result.status, ESTIMATE_SHORT);
+	assert_int_equal(find(&channel, 0.1, 0.005).result.how.status, ESTIMATE_SHORT);
 	channel.count = 40;
-	assert_int_equal(find(&channel, 0.1, INFINITY).result.status, ESTIMATE_SHORT);
+	assert_int_equal(find(&channel, 0.1, INFINITY).result.how.status, ESTIMATE_SHORT);
 	for (size_t n = 0; n < 3; n++) {
 		channel.count = n;
-		assert_int_equal(find(&channel, 0.1, INFINITY).result.status, ESTIMATE_SHORT);
+		assert_int_equal(find(&channel, 0.1, INFINITY).result.how.status, ESTIMATE_SHORT);
 	}
 	/* Two cycles are enough for a fit, not for three cycles end to end. */
 	channel.count = 110;
 	r = find(&channel, 0.1, INFINITY);
-	assert_int_equal(r.result.status, ESTIMATE_OK);
+	assert_int_equal(r.result.how.status, ESTIMATE_OK);
 	assert_near(r.result.frequency_hz, 129, 1e-4);
 	assert_true(isnan(r.result.three_cycle_frequency_hz));
 	synth_free(&channel);
@@ -319,7 +319,14 @@ static void too_short(void **state)
 
 static void combined(void **state)
 {
-	struct ringdown x = {.result = {129, 0.02, 130, 0.1, 1e-4, 128, "least_squares", ESTIMATE_OK}}, y = x;
+	struct ringdown x = {.result = {.frequency_hz = 129,
+	                                .sigma_hz = 0.02,
+	                                .natural_frequency_hz = 130,
+	                                .damping_ratio = 0.1,
+	                                .sigma_damping = 1e-4,
+	                                .three_cycle_frequency_hz = 128,
+	                                .how = {.method = "least_squares", .status = ESTIMATE_OK}}},
+	                y = x;
 	struct estimate_ringdown both;
 
 	(void)state;
@@ -327,20 +334,20 @@ static void combined(void **state)
 	y.result.sigma_hz = 0.04;
 	y.result.three_cycle_frequency_hz = 129;
 	ringdown_combine(&x, &y, &both);
-	assert_int_equal(both.status, ESTIMATE_OK);
+	assert_int_equal(both.how.status, ESTIMATE_OK);
 	assert_near(both.frequency_hz, 129 + 0.06 / 5, 1e-9);
 	/* 1/sqrt(1/.02^2 + 1/.04^2), widened by sqrt(chi2) = 0.06 / hypot(.02, .04). */
 	assert_near(both.sigma_hz, 0.0178885438 * 0.06 / 0.0447213595, 1e-8);
 	assert_near(both.three_cycle_frequency_hz, 128.5, 1e-9);
-	y.result.status = ESTIMATE_NO_PEAK;
+	y.result.how.status = ESTIMATE_NO_PEAK;
 	ringdown_combine(&x, &y, &both);
 	assert_near(both.frequency_hz, 129, 0);
 	ringdown_combine(&y, &x, &both);
 	assert_near(both.frequency_hz, 129, 0);
-	y.result.status = ESTIMATE_OK;
+	y.result.how.status = ESTIMATE_OK;
 	y.result.frequency_hz = 177;
 	ringdown_combine(&x, &y, &both);
-	assert_int_equal(both.status, ESTIMATE_AMBIGUOUS);
+	assert_int_equal(both.how.status, ESTIMATE_AMBIGUOUS);
 }
 
 int main(void)

@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/estimate/lm.h"
+
+#include <math.h>
+#include <string.h>
+
+#define DAMPING_START 1e-4
+#define DAMPING_DOWN 0.1
+#define DAMPING_UP 10.0
+
+/* Damped this much and still no better: this is the bottom, as far as rounding can tell. */
+#define DAMPING_MAX 1e6
+
+/* A step that promises less of the sum of squares than this cannot be told from rounding. */
+#define GAIN_MIN 1e-14
+
+struct place {
+	double normal[CHOLESKY_MAX][CHOLESKY_MAX];
+	double right[CHOLESKY_MAX];
+	double squares;
+	size_t used;
+};
+
+static bool stand(const struct lm_problem *problem, const double *p, struct place *place)
+{
+	memset(place, 0, sizeof(*place));
+	place->used = problem->normal(problem->model, p, place->normal, place->right, &place->squares);
+	return place->used > problem->size && isfinite(place->squares);
+}
+
+/* The damped step from a place, and what of the sum of squares the straight model promises for it. */
+static bool step(const struct lm_problem *problem, const struct place *place, double damping, double *change,
+                 double *promise)
+{
+	double damped[CHOLESKY_MAX][CHOLESKY_MAX];
+	struct cholesky factor;
+
+	memcpy(damped, place->normal, sizeof(damped));
+	for (unsigned i = 0; i < problem->size; i++)
+		damped[i][i] *= 1 + damping;
+	if (!cholesky_factor(&factor, problem->size, damped))
+		return false;
+	cholesky_solve(&factor, place->right, change);
+	*promise = 0;
+	for (unsigned i = 0; i < problem->size; i++)
+		*promise += change[i] * place->right[i];
+	return isfinite(*promise);
+}
+
+static bool finish(const struct lm_problem *problem, const struct place *place, struct lm_result *result)
+{
+	double normal[CHOLESKY_MAX][CHOLESKY_MAX];
+
+	memcpy(normal, place->normal, sizeof(normal));
+	result->squares = place->squares;
+	result->used = place->used;
+	return cholesky_factor(&result->factor, problem->size, normal);
+}
+
+bool lm_fit(const struct lm_problem *problem, double *p, struct lm_result *result)
+{
+	struct place here, there;
+	double damping = DAMPING_START;
+
+	if (!stand(problem, p, &here))
+		return false;
+	result->iterations = 1;
+	while (result->iterations < LM_ITERATIONS) {
+		double change[CHOLESKY_MAX], trial[CHOLESKY_MAX], promise, variance;
+
+		if (!step(problem, &here, damping, change, &promise))
+			return false;
+		for (unsigned i = 0; i < problem->size; i++)
+			trial[i] = p[i] + change[i];
+		result->iterations++;
+		if (!stand(problem, trial, &there) || there.squares > here.squares) {
+			if (promise <= GAIN_MIN * here.squares || damping > DAMPING_MAX)
+				return finish(problem, &here, result);
+			damping *= DAMPING_UP;
+			continue;
+		}
+		memcpy(p, trial, problem->size * sizeof(*p));
+		here = there;
+		damping *= DAMPING_DOWN;
+		variance = here.squares / (double)(here.used - problem->size);
+		if (promise <= LM_STEP * LM_STEP * variance || promise <= GAIN_MIN * here.squares)
+			return finish(problem, &here, result);
+	}
+	return false;
+}
