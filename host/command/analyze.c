@@ -19,6 +19,10 @@ static const char help[] =
         "  --scene FILE     compare with the model's prediction for this scene\n"
         "  --angle DEG      contact angle, instead of the scene's\n"
         "  --lowpass HZ     zero-phase low-pass before everything else\n"
+        "  --iepe S         undo the sensor supply's high-pass of this time constant (0: leave it);\n"
+        "                   without it, the scene's\n"
+        "  --family NAME    the contact pulse is a half-sine, haversine or sine-power (auto)\n"
+        "  --tolerance PCT  standard uncertainty asked for, of the value (0.5); what it takes is done\n"
         "  --json           one JSON object per file on standard output\n"
         "  --html PAGE      write a page (one FILE only)\n"
         "  --strict         a flagged result is a failure (exit 3)\n";
@@ -28,6 +32,9 @@ enum {
 	OPTION_SCENE,
 	OPTION_ANGLE,
 	OPTION_LOWPASS,
+	OPTION_IEPE,
+	OPTION_FAMILY,
+	OPTION_TOLERANCE,
 	OPTION_JSON,
 	OPTION_HTML,
 	OPTION_STRICT
@@ -38,6 +45,9 @@ static const struct option long_options[] = {
         {"scene", required_argument, NULL, OPTION_SCENE},
         {"angle", required_argument, NULL, OPTION_ANGLE},
         {"lowpass", required_argument, NULL, OPTION_LOWPASS},
+        {"iepe", required_argument, NULL, OPTION_IEPE},
+        {"family", required_argument, NULL, OPTION_FAMILY},
+        {"tolerance", required_argument, NULL, OPTION_TOLERANCE},
         {"json", no_argument, NULL, OPTION_JSON},
         {"html", required_argument, NULL, OPTION_HTML},
         {"strict", no_argument, NULL, OPTION_STRICT},
@@ -55,6 +65,7 @@ struct arguments {
 static int parse(struct arguments *arguments, int argc, char **argv)
 {
 	int option, code = COMMAND_DONE;
+	double percent = 0;
 
 	opterr = 0;
 	while (code == COMMAND_DONE && (option = getopt_long(argc, argv, "h", long_options, NULL)) != -1) {
@@ -71,6 +82,21 @@ static int parse(struct arguments *arguments, int argc, char **argv)
 		case OPTION_LOWPASS:
 			code = command_number("analyze", "lowpass", optarg, 1e-3, 1e9,
 			                      &arguments->evaluate.lowpass_hz);
+			break;
+		case OPTION_IEPE:
+			code = command_number("analyze", "iepe", optarg, 0, 1e3,
+			                      &arguments->evaluate.iepe_time_constant_s);
+			break;
+		case OPTION_FAMILY:
+			if (estimate_family_parse(optarg, &arguments->evaluate.family) != 0)
+				code = command_usage("analyze",
+				                     "--family: '%s' is none of auto, half-sine, haversine, "
+				                     "sine-power",
+				                     optarg);
+			break;
+		case OPTION_TOLERANCE:
+			code = command_number("analyze", "tolerance", optarg, 1e-6, 100, &percent);
+			arguments->evaluate.tolerance = percent / 100;
 			break;
 		case OPTION_JSON:
 			arguments->evaluate.json = true;
@@ -109,7 +135,7 @@ static int analyze_file(const char *file, const struct arguments *arguments)
 
 int command_analyze(int argc, char **argv)
 {
-	struct arguments arguments = {.angle_deg = NAN};
+	struct arguments arguments = {.angle_deg = NAN, .evaluate = {.iepe_time_constant_s = NAN}};
 	struct scene scene;
 	int code = parse(&arguments, argc, argv);
 

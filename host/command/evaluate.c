@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/units.h"
 #include "host/command/command.h"
 #include "host/record/whole.h"
 #include "host/report/report.h"
@@ -46,12 +47,31 @@ static bool any_flag(const struct record *record, const struct analysis *analysi
 	return flagged;
 }
 
+/* What a scene knows of sensors and drop goes into the estimates. */
+static struct estimate_options estimate_options_of(const struct evaluate_options *options)
+{
+	const struct scene *scene = options->scene;
+	struct estimate_options estimate = {
+	        .lowpass_hz = options->lowpass_hz,
+	        .iepe_time_constant_s = options->iepe_time_constant_s,
+	        .family = options->family,
+	        .tolerance = options->tolerance,
+	};
+
+	if (isnan(estimate.iepe_time_constant_s))
+		estimate.iepe_time_constant_s = scene ? scene->sensor_iepe_time_constant_s : 0;
+	if (scene)
+		estimate.impact_speed_m_s = sqrt(2 * UNITS_G_M_S2 * scene->drop_height_m);
+	return estimate;
+}
+
 /* Estimates and predicts; the report points into the other two. 0 or DT_E_*. */
 static int make_report(struct report *report, struct analysis *analysis, struct model_prediction *prediction,
-                       const struct record *record, const struct scene *scene, double lowpass_hz)
+                       const struct record *record, const struct evaluate_options *options)
 {
-	struct estimate_options options = {.lowpass_hz = lowpass_hz};
-	int result = estimate_record(record, &options, analysis);
+	struct estimate_options estimate = estimate_options_of(options);
+	const struct scene *scene = options->scene;
+	int result = estimate_record(record, &estimate, analysis);
 
 	if (result != 0)
 		return result;
@@ -72,8 +92,7 @@ int evaluate(const struct record *record, const struct evaluate_options *options
 	struct model_prediction prediction;
 	struct analysis analysis;
 	struct report report;
-	int code, result = make_report(&report, &analysis, &prediction, record, options->scene,
-	                               options->lowpass_hz);
+	int code, result = make_report(&report, &analysis, &prediction, record, options);
 
 	if (result != 0) {
 		command_error("%s: %s", record->file,
@@ -91,6 +110,7 @@ int evaluate(const struct record *record, const struct evaluate_options *options
 
 char *evaluate_json(const struct record *record, const struct scene *scene)
 {
+	struct evaluate_options options = {.scene = scene, .iepe_time_constant_s = NAN};
 	struct model_prediction prediction;
 	struct analysis analysis;
 	struct report report;
@@ -98,7 +118,7 @@ char *evaluate_json(const struct record *record, const struct scene *scene)
 	size_t size = 0;
 	FILE *out;
 
-	if (make_report(&report, &analysis, &prediction, record, scene, 0.0) != 0)
+	if (make_report(&report, &analysis, &prediction, record, &options) != 0)
 		return NULL;
 	out = open_memstream(&json, &size);
 	if (out != NULL) {

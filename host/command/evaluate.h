@@ -8,21 +8,26 @@
 #include <stdbool.h>
 
 #include "common/scenes/scene.h"
+#include "host/estimate/estimate.h"
 #include "host/record/record.h"
 
 struct evaluate_options {
-	const struct scene *scene; /* NULL: no model */
-	double lowpass_hz;         /* 0 = raw */
-	bool json;                 /* JSON to stdout instead of the table */
-	const char *html;          /* page to write; NULL: none */
-	const char *json_file;     /* JSON beside it; NULL: none */
-	bool strict;               /* a flag is a failure */
+	const struct scene *scene;   /* NULL: no model */
+	double lowpass_hz;           /* 0 = raw */
+	double iepe_time_constant_s; /* 0 = not undone, NAN = the scene's */
+	enum estimate_family family;
+	double tolerance;      /* of estimate_options */
+	bool json;             /* JSON to stdout instead of the table */
+	const char *html;      /* page to write; NULL: none */
+	const char *json_file; /* JSON beside it; NULL: none */
+	bool strict;           /* a flag is a failure */
 };
 
 /* Prints and writes what was asked for. Returns a COMMAND_* exit code; errors were printed. */
 int evaluate(const struct record *record, const struct evaluate_options *options);
 
-/* The JSON of a record, to be freed; NULL if it cannot be analysed. scene may be NULL. */
+/* The JSON of a record as `analyze --scene` gives it, to be freed; NULL if it cannot be analysed. scene may
+ * be NULL. */
 char *evaluate_json(const struct record *record, const struct scene *scene);
 
 /* Reads a scene and lays angle_deg over it when that is not NAN. 0 or a COMMAND_* code, errors printed. */

@@ -344,6 +344,7 @@ static int report(struct run *run, struct record *record)
 {
 	char csv[4200], json[4200], html[4200], message[READ_MESSAGE_MAX];
 	struct evaluate_options options = {.scene = &run->scene,
+	                                   .iepe_time_constant_s = NAN,
 	                                   .json = run->json,
 	                                   .html = html,
 	                                   .json_file = json,

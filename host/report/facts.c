@@ -138,6 +138,76 @@ const char *report_flag_words(unsigned flag)
 	}
 }
 
+const char *report_note_words(unsigned flag)
+{
+	switch (flag) {
+	case ESTIMATE_FLAG_EXTRAPOLATED:
+		return "clipped; the value follows from the pulse family, not from samples";
+	case ESTIMATE_FLAG_GAPS:
+		return "samples it would have used are missing";
+	case ESTIMATE_FLAG_SPIKE:
+		return "outliers were left out";
+	case ESTIMATE_FLAG_HUM:
+		return "mains hum was fitted along";
+	case ESTIMATE_FLAG_TWO_MODES:
+		return "two modes; the value is the stronger one's";
+	case ESTIMATE_FLAG_AMPLITUDE:
+		return "the frequency follows the swing; the value is that of a vanishing one";
+	case ESTIMATE_FLAG_TOLERANCE:
+		return "less certain than asked for";
+	case ESTIMATE_FLAG_MODEL:
+		return "the samples refuse the model; its uncertainty is widened";
+	case ESTIMATE_FLAG_WEAK:
+		return "weak; by the shape of the sensor's strong axis";
+	case ESTIMATE_FLAG_NOT_SEPARABLE:
+		return "two modes lie too near each other to be told apart";
+	default:
+		return estimate_flag_name(flag);
+	}
+}
+
+/* Notes still to be written of one flag. */
+struct noting {
+	struct report_note *notes;
+	size_t count;
+	unsigned flag;
+};
+
+static void note(struct noting *noting, double value, unsigned flags, const char *subject, const char *what)
+{
+	struct report_note *next = &noting->notes[noting->count];
+
+	if (!(flags & noting->flag) || !isfinite(value) || noting->count == REPORT_NOTES_MAX)
+		return;
+	next->flag = noting->flag;
+	snprintf(next->of, sizeof(next->of), "%.32s %s", subject, what);
+	noting->count++;
+}
+
+size_t report_notes(const struct report *report, struct report_note notes[REPORT_NOTES_MAX])
+{
+	const struct analysis *a = report->analysis;
+	struct noting noting = {.notes = notes, .flag = 1};
+
+	for (; estimate_flag_name(noting.flag)[0]; noting.flag <<= 1) {
+		for (size_t i = 0; i < a->channel_count; i++) {
+			const struct estimate_channel *e = &a->channels[i];
+			const char *name = report->record->channels[i].name;
+
+			note(&noting, e->peak.value_g, e->peak.how.flags, name, "peak");
+			note(&noting, e->pulse.contact_time_s, e->pulse.contact.flags, name, "contact");
+		}
+		for (size_t i = 0; i < a->resultant_count; i++)
+			note(&noting, a->resultants[i].peak_g, a->resultants[i].how.flags,
+			     a->resultants[i].sensor, "resultant");
+		if (a->has_lag)
+			note(&noting, a->lag.driven_s, a->lag.driven.flags, "S1", "lag");
+		if (a->has_plate)
+			note(&noting, a->plate.frequency_hz, a->plate.how.flags, "plate", "frequency");
+	}
+	return noting.count;
+}
+
 bool report_video_frame(const struct report *report, double time_s, long *frame)
 {
 	const struct record *r = report->record;
@@ -179,7 +249,7 @@ static void add_row(struct report_row *rows, size_t *count, struct report_row ro
                     enum estimate_status status)
 {
 	if (status != ESTIMATE_OK)
-		row.measured = (double)NAN;
+		row.measured = row.sigma = (double)NAN;
 	row.difference_percent = 100.0 * (row.predicted - row.measured) / row.measured;
 	if (!isfinite(row.difference_percent))
 		row.difference_percent = (double)NAN;
@@ -202,7 +272,8 @@ static void compare_peaks(const struct report *report, struct report_row *rows, 
 		                            .scale = 1.0,
 		                            .decimals = 1,
 		                            .predicted = report->prediction->peak[axis].value_g,
-		                            .measured = e ? e->peak.value_g : (double)NAN},
+		                            .measured = e ? e->peak.value_g : (double)NAN,
+		                            .sigma = e ? e->peak.sigma_g : (double)NAN},
 		        e ? e->peak.how.status : ESTIMATE_SHORT);
 	}
 }
@@ -220,7 +291,8 @@ static void compare_resultants(const struct report *report, struct report_row *r
 		                         .scale = 1.0,
 		                         .decimals = 1,
 		                         .predicted = report->prediction->resultant[sensor].value_g,
-		                         .measured = (double)NAN};
+		                         .measured = (double)NAN,
+		                         .sigma = (double)NAN};
 		enum estimate_status status = ESTIMATE_SHORT;
 
 		for (size_t i = 0; i < report->analysis->resultant_count; i++) {
@@ -229,10 +301,19 @@ static void compare_resultants(const struct report *report, struct report_row *r
 			if (strcmp(r->sensor, names[sensor]))
 				continue;
 			row.measured = r->peak_g;
+			row.sigma = r->sigma_g;
 			status = r->how.status;
 		}
 		add_row(rows, count, row, status);
 	}
+}
+
+bool report_driven(const struct report *report)
+{
+	const struct estimate_lag *lag = &report->analysis->lag;
+
+	return report->analysis->has_lag && lag->driven.status == ESTIMATE_OK &&
+	       !(lag->driven.flags & ESTIMATE_FLAG_MODEL) && isfinite(lag->driven_s);
 }
 
 size_t report_compare(const struct report *report, struct report_row rows[REPORT_ROWS_MAX])
@@ -251,6 +332,7 @@ size_t report_compare(const struct report *report, struct report_row rows[REPORT
 	                             .unit = "",
 	                             .scale = 1.0,
 	                             .decimals = 4};
+	bool driven = report_driven(report);
 	size_t count = 0;
 
 	if (!p)
@@ -258,15 +340,18 @@ size_t report_compare(const struct report *report, struct report_row rows[REPORT
 	compare_peaks(report, rows, &count);
 	compare_resultants(report, rows, &count);
 	lag.predicted = p->lag_s;
-	lag.measured = a->lag.largest_peak_s;
-	add_row(rows, &count, lag, a->has_lag ? a->lag.status : ESTIMATE_SHORT);
+	lag.measured = driven ? a->lag.driven_s : a->lag.largest_peak_s;
+	lag.sigma = driven ? a->lag.sigma_driven_s : a->lag.sigma_s;
+	add_row(rows, &count, lag, driven ? ESTIMATE_OK : a->has_lag ? a->lag.status : ESTIMATE_SHORT);
 	if (!p->has_plate) /* the model's lag is 0 then: any measured one would differ by 100 % */
 		rows[count - 1].difference_percent = (double)NAN;
 	if (p->has_plate) {
 		frequency.predicted = p->plate_frequency_hz;
 		frequency.measured = a->plate.frequency_hz;
+		frequency.sigma = a->plate.sigma_hz;
 		damping.predicted = p->plate_damping_ratio;
 		damping.measured = a->plate.damping_ratio;
+		damping.sigma = a->plate.sigma_damping;
 		add_row(rows, &count, frequency, a->has_plate ? a->plate.how.status : ESTIMATE_SHORT);
 		add_row(rows, &count, damping, a->has_plate ? a->plate.how.status : ESTIMATE_SHORT);
 	}

@@ -33,6 +33,21 @@ bool report_video_frame(const struct report *report, double time_s, long *frame)
  */
 bool report_video(const struct report *report, const struct report_zero *zero, char *line, size_t size);
 
+enum { REPORT_NOTES_MAX = 64 };
+
+/* An ESTIMATE_FLAG_* and the value that carries it. */
+struct report_note {
+	unsigned flag; /* one bit */
+	char of[48];   /* "S1X peak" */
+};
+
+/* Fills notes, those of one flag together; returns how many. What says nothing worth knowing is left out:
+ * the flags of a value that is not there. */
+size_t report_notes(const struct report *report, struct report_note notes[REPORT_NOTES_MAX]);
+
+/* A sentence for one ESTIMATE_FLAG_*. */
+const char *report_note_words(unsigned flag);
+
 /* The estimate of the channel of that name; NULL if there is none. */
 const struct estimate_channel *report_estimate(const struct report *report, const char *name);
 
@@ -41,6 +56,9 @@ double report_offset(const struct estimate_channel *estimate);
 
 /* What of a channel's result is not ok, in a word or two: "ok", "clipped", "width short". */
 const char *report_channel_status(const struct estimate_channel *estimate, char *text, size_t size);
+
+/* Whether S1 follows S2 as an oscillator does: its lag is then the one to be shown first. */
+bool report_driven(const struct report *report);
 
 enum { REPORT_ROWS_MAX = 10 };
 
@@ -53,6 +71,7 @@ struct report_row {
 	double scale;      /* value times scale is in unit */
 	int decimals;      /* in unit */
 	double predicted, measured;
+	double sigma;              /* standard uncertainty of measured */
 	double difference_percent; /* (predicted - measured)/measured */
 };
 

@@ -141,8 +141,13 @@ static void cards(struct page *page)
 	}
 	if (a->has_lag) {
 		begin_card(out, "S1 after S2");
-		page_number(out, 3, a->lag.largest_peak_s * 1e3);
-		end_card(out, "ms", unless_ok(a->lag.status, "between largest peaks"));
+		if (report_driven(page->report)) {
+			page_with_sigma(out, 3, a->lag.driven_s * 1e3, a->lag.sigma_driven_s * 1e3);
+			end_card(out, "ms", "as a driven oscillator");
+		} else {
+			page_number(out, 3, a->lag.largest_peak_s * 1e3);
+			end_card(out, "ms", unless_ok(a->lag.status, "between largest peaks"));
+		}
 	}
 	if (a->has_plate) {
 		begin_card(out, "Plate frequency, damped");
@@ -155,14 +160,34 @@ static void cards(struct page *page)
 	fputs("</div>\n", out);
 }
 
+static void notes(struct page *page)
+{
+	struct report_note note[REPORT_NOTES_MAX];
+	size_t count = report_notes(page->report, note);
+
+	for (size_t i = 0; i < count; i++) {
+		bool first = i == 0 || note[i].flag != note[i - 1].flag;
+		bool last = i + 1 == count || note[i].flag != note[i + 1].flag;
+
+		if (first)
+			fprintf(page->out, "<li><b>%s</b>: ", estimate_flag_name(note[i].flag));
+		page_text(page->out, note[i].of);
+		if (last)
+			fprintf(page->out, ": %s.</li>", report_note_words(note[i].flag));
+		else
+			fputs(", ", page->out);
+	}
+}
+
 static void flags(struct page *page)
 {
+	struct report_note note[REPORT_NOTES_MAX];
 	const struct record *r = page->report->record;
 	const struct analysis *a = page->report->analysis;
 	unsigned all = report_flags(page->report);
 	FILE *out = page->out;
 
-	if (!all)
+	if (!all && !report_notes(page->report, note))
 		return;
 	fputs("<h2>What to know about this record</h2>\n<ul>", out);
 	for (unsigned f = all; f; f &= f - 1) {
@@ -176,6 +201,7 @@ static void flags(struct page *page)
 			}
 		fputs(named ? ").</li>" : ".</li>", out);
 	}
+	notes(page);
 	fputs("</ul>\n", out);
 }
 

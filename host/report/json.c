@@ -109,12 +109,13 @@ static cJSON *append_object(struct builder *b, cJSON *array)
 	return item;
 }
 
-static void put_flags(struct builder *b, cJSON *object, unsigned flags)
+/* Names of the bits in flags, by the function that knows the lowest. */
+static void put_flags(struct builder *b, cJSON *object, unsigned flags, const char *(*name_of)(unsigned))
 {
 	cJSON *array = put_array(b, object, "flags");
 
 	for (; flags; flags &= flags - 1) {
-		cJSON *name = cJSON_CreateString(record_flag_name(flags));
+		cJSON *name = cJSON_CreateString(name_of(flags));
 
 		if (!name || !cJSON_AddItemToArray(array, name)) {
 			cJSON_Delete(name);
@@ -128,9 +129,24 @@ static void put_status(struct builder *b, cJSON *object, enum estimate_status st
 	put_text(b, object, "status", estimate_status_name(status));
 }
 
-static void put_method(struct builder *b, cJSON *object, const char *method)
+/* How a value was got, into the value's own object. */
+static void put_how(struct builder *b, cJSON *object, const struct estimate_how *how)
 {
-	put_text(b, object, "method", method ? method : "");
+	cJSON *path;
+
+	put_text(b, object, "method", how->method ? how->method : "");
+	path = put_array(b, object, "path");
+	for (unsigned i = 0; i < ESTIMATE_PATH_MAX && how->path[i]; i++) {
+		cJSON *name = cJSON_CreateString(how->path[i]);
+
+		if (!name || !cJSON_AddItemToArray(path, name)) {
+			cJSON_Delete(name);
+			b->failed = true;
+		}
+	}
+	put_number(b, object, "chi_square", how->chi_square);
+	put_flags(b, object, how->flags, estimate_flag_name);
+	put_status(b, object, how->status);
 }
 
 static void put_ringdown(struct builder *b, cJSON *object, const char *key, const struct estimate_ringdown *r)
@@ -140,11 +156,14 @@ static void put_ringdown(struct builder *b, cJSON *object, const char *key, cons
 	put_number(b, item, "frequency_hz", r->frequency_hz);
 	put_number(b, item, "sigma_hz", r->sigma_hz);
 	put_number(b, item, "natural_frequency_hz", r->natural_frequency_hz);
+	put_number(b, item, "sigma_natural_hz", r->sigma_natural_hz);
 	put_number(b, item, "three_cycle_frequency_hz", r->three_cycle_frequency_hz);
 	put_number(b, item, "damping_ratio", r->damping_ratio);
 	put_number(b, item, "sigma_damping", r->sigma_damping);
-	put_method(b, item, r->how.method);
-	put_status(b, item, r->how.status);
+	put_number(b, item, "amplitude_g", r->amplitude_g);
+	put_number(b, item, "second_frequency_hz", r->second_frequency_hz);
+	put_number(b, item, "second_damping_ratio", r->second_damping_ratio);
+	put_how(b, item, &r->how);
 }
 
 static void put_peak(struct builder *b, cJSON *object, const struct estimate_peak *peak)
@@ -155,13 +174,13 @@ static void put_peak(struct builder *b, cJSON *object, const struct estimate_pea
 	put_number(b, item, "sigma_g", peak->sigma_g);
 	put_number(b, item, "time_s", peak->time_s);
 	put_number(b, item, "sigma_time_s", peak->sigma_time_s);
-	put_method(b, item, peak->how.method);
-	put_status(b, item, peak->how.status);
+	put_how(b, item, &peak->how);
 }
 
+/* The family-free pulse, and the contact of a named family that fits it. */
 static void put_pulse(struct builder *b, cJSON *object, const struct estimate_pulse *pulse)
 {
-	cJSON *item = put_object(b, object, "pulse");
+	cJSON *item = put_object(b, object, "pulse"), *contact;
 
 	put_number(b, item, "duration_s", pulse->duration_s);
 	put_number(b, item, "sigma_duration_s", pulse->sigma_duration_s);
@@ -170,23 +189,41 @@ static void put_pulse(struct builder *b, cJSON *object, const struct estimate_pu
 	put_number(b, item, "start_s", pulse->start_s);
 	put_number(b, item, "end_s", pulse->end_s);
 	put_status(b, item, pulse->status);
+	contact = put_object(b, item, "contact");
+	put_text(b, contact, "family", estimate_family_name(pulse->family));
+	put_number(b, contact, "duration_s", pulse->contact_time_s);
+	put_number(b, contact, "sigma_duration_s", pulse->sigma_contact_s);
+	put_number(b, contact, "start_s", pulse->contact_start_s);
+	put_number(b, contact, "velocity_change_m_s", pulse->fitted_velocity_m_s);
+	put_number(b, contact, "sigma_velocity_m_s", pulse->sigma_fitted_velocity_m_s);
+	put_how(b, contact, &pulse->contact);
+}
+
+static void put_baseline(struct builder *b, cJSON *object, const struct estimate_baseline *baseline)
+{
+	cJSON *item = put_object(b, object, "baseline");
+
+	put_number(b, item, "offset_g", baseline->offset_g);
+	put_number(b, item, "noise_g", baseline->noise_g);
+	put_number(b, item, "deviation_g", baseline->deviation_g);
+	put_number(b, item, "drift_g_s", baseline->drift_g_s);
+	put_number(b, item, "hum_g", baseline->hum_g);
+	put_number(b, item, "hum_hz", baseline->hum_hz);
+	put_number(b, item, "samples", (double)baseline->samples);
 }
 
 static void put_channel(struct builder *b, cJSON *array, const struct channel *channel,
                         const struct estimate_channel *e)
 {
-	cJSON *item = append_object(b, array), *baseline;
+	cJSON *item = append_object(b, array);
 
 	put_text(b, item, "name", channel->name);
 	put_number(b, item, "rate_hz", channel->rate_hz);
 	put_number(b, item, "start_s", channel->start_s);
 	put_number(b, item, "count", (double)channel->count);
 	put_number(b, item, "range_g", channel->range_g > 0.0 ? channel->range_g : (double)NAN);
-	put_flags(b, item, e->flags);
-	baseline = put_object(b, item, "baseline");
-	put_number(b, baseline, "offset_g", e->baseline.offset_g);
-	put_number(b, baseline, "noise_g", e->baseline.noise_g);
-	put_number(b, baseline, "samples", (double)e->baseline.samples);
+	put_flags(b, item, e->flags, record_flag_name);
+	put_baseline(b, item, &e->baseline);
 	put_peak(b, item, &e->peak);
 	put_pulse(b, item, &e->pulse);
 	put_ringdown(b, item, "ringdown", &e->ringdown);
@@ -240,13 +277,14 @@ static void put_resultants(struct builder *b, cJSON *root, const struct analysis
 		put_number(b, item, "time_s", a->resultants[i].time_s);
 		put_bool(b, item, "axes_coincide", a->resultants[i].axes_coincide);
 		put_number(b, item, "axes_apart_s", a->resultants[i].axes_apart_s);
-		put_status(b, item, a->resultants[i].how.status);
+		put_number(b, item, "sigma_time_s", a->resultants[i].sigma_time_s);
+		put_how(b, item, &a->resultants[i].how);
 	}
 }
 
 static void put_lag(struct builder *b, cJSON *root, const struct analysis *a)
 {
-	cJSON *item;
+	cJSON *item, *driven;
 
 	if (!a->has_lag) {
 		attach(b, root, "lag", cJSON_CreateNull());
@@ -259,6 +297,31 @@ static void put_lag(struct builder *b, cJSON *root, const struct analysis *a)
 	put_number(b, item, "spread_s", a->lag.spread_s);
 	put_number(b, item, "sigma_s", a->lag.sigma_s);
 	put_status(b, item, a->lag.status);
+	driven = put_object(b, item, "driven");
+	put_number(b, driven, "lag_s", a->lag.driven_s);
+	put_number(b, driven, "sigma_s", a->lag.sigma_driven_s);
+	put_number(b, driven, "x_lag_s", a->lag.driven_axis_s[0]);
+	put_number(b, driven, "sigma_x_s", a->lag.sigma_driven_axis_s[0]);
+	put_number(b, driven, "y_lag_s", a->lag.driven_axis_s[1]);
+	put_number(b, driven, "sigma_y_s", a->lag.sigma_driven_axis_s[1]);
+	put_how(b, driven, &a->lag.driven);
+}
+
+static void put_rebound(struct builder *b, cJSON *root, const struct analysis *a)
+{
+	cJSON *item;
+
+	if (!a->has_rebound) {
+		attach(b, root, "rebound", cJSON_CreateNull());
+		return;
+	}
+	item = put_object(b, root, "rebound");
+	put_number(b, item, "velocity_ratio", a->rebound.velocity_ratio);
+	put_number(b, item, "sigma_velocity_ratio", a->rebound.sigma_velocity_ratio);
+	put_number(b, item, "flight_ratio", a->rebound.flight_ratio);
+	put_number(b, item, "sigma_flight_ratio", a->rebound.sigma_flight_ratio);
+	put_number(b, item, "second_impact_s", a->rebound.second_impact_s);
+	put_status(b, item, a->rebound.status);
 }
 
 static void put_scene(struct builder *b, cJSON *root, const struct scene *scene)
@@ -313,7 +376,7 @@ static cJSON *build(struct builder *b, const struct report *report)
 	b->failed = !root;
 	put_text(b, root, "file", r->file);
 	put_text(b, root, "format", r->format);
-	put_flags(b, root, report_flags(report));
+	put_flags(b, root, report_flags(report), record_flag_name);
 	put_number(b, root, "lost_samples", (double)r->lost_samples);
 	put_drop(b, root, r);
 	put_scene(b, root, report->scene);
@@ -326,6 +389,7 @@ static cJSON *build(struct builder *b, const struct report *report)
 		put_ringdown(b, root, "plate", &a->plate);
 	else
 		attach(b, root, "plate", cJSON_CreateNull());
+	put_rebound(b, root, a);
 	put_model(b, root, report);
 	return root;
 }

@@ -48,7 +48,7 @@ static void results(struct page *page)
 		fprintf(out, "<tr><td>%s X, Y</td><td></td><td>", r->sensor);
 		page_with_sigma(out, 2, r->peak_g, r->sigma_g);
 		fputs("</td><td>", out);
-		page_number(out, 4, (r->time_s - page->zero.time_s) * 1e3);
+		page_with_sigma(out, 4, (r->time_s - page->zero.time_s) * 1e3, r->sigma_time_s * 1e3);
 		fputs("</td><td colspan=\"3\" class=\"text soft\">Y peaks ", out);
 		page_number(out, 3, fabs(r->axes_apart_s) * 1e3);
 		fprintf(out, " ms %s X</td><td class=\"text\">%s</td></tr>\n",
@@ -72,7 +72,7 @@ static void joint(struct page *page)
 	const struct analysis *a = page->report->analysis;
 	FILE *out = page->out;
 
-	if (!a->has_lag && !a->has_plate)
+	if (!a->has_lag && !a->has_plate && !a->has_rebound)
 		return;
 	fputs("<h2>S1 against S2</h2>\n<div class=\"scroll\"><table "
 	      "class=\"small\"><tr><th>quantity</th><th>value</th>"
@@ -81,6 +81,8 @@ static void joint(struct page *page)
 	if (a->has_lag) {
 		const struct estimate_lag *l = &a->lag;
 
+		joint_row(out, "S1 after S2, driven oscillator", "ms", 4, l->driven_s * 1e3,
+		          l->sigma_driven_s * 1e3, l->driven.status);
 		joint_row(out, "S1 after S2, first peaks", "ms", 3, l->first_peak_s * 1e3, (double)NAN,
 		          l->status);
 		joint_row(out, "S1 after S2, largest peaks", "ms", 4, l->largest_peak_s * 1e3,
@@ -94,12 +96,23 @@ static void joint(struct page *page)
 
 		joint_row(out, "plate frequency, damped", "Hz", 2, p->frequency_hz, p->sigma_hz,
 		          p->how.status);
-		joint_row(out, "plate frequency, undamped", "Hz", 2, p->natural_frequency_hz, (double)NAN,
-		          p->how.status);
+		joint_row(out, "plate frequency, undamped", "Hz", 2, p->natural_frequency_hz,
+		          p->sigma_natural_hz, p->how.status);
 		joint_row(out, "plate frequency over three cycles", "Hz", 2, p->three_cycle_frequency_hz,
 		          (double)NAN, p->how.status);
 		joint_row(out, "plate damping ratio", "", 4, p->damping_ratio, p->sigma_damping,
 		          p->how.status);
+		if (isfinite(p->second_frequency_hz))
+			joint_row(out, "second mode", "Hz", 2, p->second_frequency_hz, (double)NAN,
+			          p->how.status);
+	}
+	if (a->has_rebound) {
+		const struct estimate_rebound *r = &a->rebound;
+
+		joint_row(out, "rebound by velocity change", "", 3, r->velocity_ratio,
+		          r->sigma_velocity_ratio, r->status);
+		joint_row(out, "rebound by time of flight", "", 4, r->flight_ratio, r->sigma_flight_ratio,
+		          isfinite(r->flight_ratio) ? r->status : ESTIMATE_SHORT);
 	}
 	fputs("</table></div>\n", out);
 }
@@ -125,7 +138,8 @@ static void model(struct page *page)
 		        rows[i].unit);
 		page_number(out, rows[i].decimals, rows[i].predicted * rows[i].scale);
 		fputs("</td><td>", out);
-		page_number(out, rows[i].decimals, rows[i].measured * rows[i].scale);
+		page_with_sigma(out, rows[i].decimals, rows[i].measured * rows[i].scale,
+		                rows[i].sigma * rows[i].scale);
 		fprintf(out, "</td><td>%s", rows[i].difference_percent > 0.0 ? "+" : "");
 		page_number(out, 1, rows[i].difference_percent);
 		fputs(isfinite(rows[i].difference_percent) ? " %</td></tr>\n" : "</td></tr>\n", out);

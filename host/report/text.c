@@ -77,7 +77,8 @@ static void write_channels(const struct report *report, const struct report_zero
 		cell(out, 9, 2, r->peak_g);
 		cell(out, 7, 2, r->sigma_g);
 		cell(out, 9, 3, (r->time_s - zero->time_s) * 1e3);
-		fprintf(out, " %7s  %s", "", estimate_status_name(r->how.status));
+		cell(out, 7, 1, r->sigma_time_s * 1e6);
+		fprintf(out, "  %s", estimate_status_name(r->how.status));
 		fprintf(out, r->axes_coincide ? ", X and Y peak together\n" : ", Y peaks %+.3f ms after X\n",
 		        r->axes_apart_s * 1e3);
 	}
@@ -86,36 +87,92 @@ static void write_channels(const struct report *report, const struct report_zero
 		fprintf(out, "%s.\n", video);
 }
 
-static void write_joint(const struct analysis *a, FILE *out)
+/* " 1.9026 +- 0.0012" */
+static void with_sigma(FILE *out, int decimals, double value, double sigma)
 {
-	if (a->has_lag || a->has_plate)
-		fputc('\n', out);
-	if (a->has_lag) {
-		fprintf(out, "S1 after S2: first peak");
-		cell(out, 1, 3, a->lag.first_peak_s * 1e3);
-		fprintf(out, ", largest");
-		cell(out, 1, 3, a->lag.largest_peak_s * 1e3);
+	cell(out, 1, decimals, value);
+	if (isfinite(sigma)) {
 		fprintf(out, " +-");
-		cell(out, 1, 4, a->lag.sigma_s * 1e3);
-		fprintf(out, ", correlation");
-		cell(out, 1, 3, a->lag.cross_correlation_s * 1e3);
-		fprintf(out, " ms; spread");
-		cell(out, 1, 3, a->lag.spread_s * 1e3);
-		fprintf(out, " ms  %s\n", estimate_status_name(a->lag.status));
+		cell(out, 1, decimals, sigma);
 	}
-	if (a->has_plate) {
-		fprintf(out, "plate:");
-		cell(out, 1, 2, a->plate.frequency_hz);
-		fprintf(out, " +-");
-		cell(out, 1, 2, a->plate.sigma_hz);
-		fprintf(out, " Hz damped (");
-		fprintf(out, isfinite(a->plate.three_cycle_frequency_hz) ? "%.2f" : "-",
-		        a->plate.three_cycle_frequency_hz);
-		fprintf(out, " over three cycles), damping");
-		cell(out, 1, 4, a->plate.damping_ratio);
-		fprintf(out, " +-");
-		cell(out, 1, 4, a->plate.sigma_damping);
-		fprintf(out, "  %s\n", estimate_status_name(a->plate.how.status));
+}
+
+static void write_lag(const struct report *report, FILE *out)
+{
+	const struct estimate_lag *lag = &report->analysis->lag;
+
+	fprintf(out, "S1 after S2: ");
+	if (report_driven(report)) {
+		fprintf(out, "driven oscillator");
+		with_sigma(out, 4, lag->driven_s * 1e3, lag->sigma_driven_s * 1e3);
+		fprintf(out, " ms\n  by peaks: ");
+	}
+	fprintf(out, "first");
+	cell(out, 1, 3, lag->first_peak_s * 1e3);
+	fprintf(out, ", largest");
+	with_sigma(out, 4, lag->largest_peak_s * 1e3, lag->sigma_s * 1e3);
+	fprintf(out, ", correlation");
+	cell(out, 1, 3, lag->cross_correlation_s * 1e3);
+	fprintf(out, "; spread");
+	cell(out, 1, 3, lag->spread_s * 1e3);
+	fprintf(out, " ms  %s\n", estimate_status_name(lag->status));
+}
+
+static void write_plate(const struct estimate_ringdown *plate, FILE *out)
+{
+	fprintf(out, "plate:");
+	with_sigma(out, 2, plate->frequency_hz, plate->sigma_hz);
+	fprintf(out, " Hz damped,");
+	with_sigma(out, 2, plate->natural_frequency_hz, plate->sigma_natural_hz);
+	fprintf(out, " undamped,");
+	cell(out, 1, 2, plate->three_cycle_frequency_hz);
+	fprintf(out, " over three cycles\n  damping");
+	with_sigma(out, 4, plate->damping_ratio, plate->sigma_damping);
+	if (isfinite(plate->second_frequency_hz)) {
+		fprintf(out, "; second mode");
+		cell(out, 1, 2, plate->second_frequency_hz);
+		fprintf(out, " Hz, damping");
+		cell(out, 1, 4, plate->second_damping_ratio);
+	}
+	fprintf(out, "  (%s) %s\n", plate->how.method, estimate_status_name(plate->how.status));
+}
+
+static void write_rebound(const struct estimate_rebound *rebound, FILE *out)
+{
+	fprintf(out, "rebound:");
+	with_sigma(out, 3, rebound->velocity_ratio, rebound->sigma_velocity_ratio);
+	fprintf(out, " by velocity change,");
+	with_sigma(out, 4, rebound->flight_ratio, rebound->sigma_flight_ratio);
+	fprintf(out, " by time of flight  %s\n", estimate_status_name(rebound->status));
+}
+
+static void write_joint(const struct report *report, FILE *out)
+{
+	const struct analysis *a = report->analysis;
+
+	if (a->has_lag || a->has_plate || a->has_rebound)
+		fputc('\n', out);
+	if (a->has_lag)
+		write_lag(report, out);
+	if (a->has_plate)
+		write_plate(&a->plate, out);
+	if (a->has_rebound)
+		write_rebound(&a->rebound, out);
+}
+
+/* "note: S1X peak, S2X peak: clipped; ..." one line for each flag. */
+static void write_notes(const struct report *report, FILE *out)
+{
+	struct report_note notes[REPORT_NOTES_MAX];
+	size_t count = report_notes(report, notes);
+
+	for (size_t i = 0; i < count; i++) {
+		bool first = i == 0 || notes[i].flag != notes[i - 1].flag;
+		bool last = i + 1 == count || notes[i].flag != notes[i + 1].flag;
+
+		fprintf(out, "%s%s", first ? "note: " : ", ", notes[i].of);
+		if (last)
+			fprintf(out, ": %s\n", report_note_words(notes[i].flag));
 	}
 }
 
@@ -143,11 +200,13 @@ static void write_model(const struct report *report, FILE *out)
 
 	if (!count)
 		return;
-	fprintf(out, "\n%-20s %10s %10s %12s\n", "model against drop", "model", "measured", "difference");
+	fprintf(out, "\n%-20s %10s %10s %8s %12s\n", "model against drop", "model", "measured", "+-",
+	        "difference");
 	for (size_t i = 0; i < count; i++) {
 		fprintf(out, "%-17s %2s", rows[i].label, rows[i].unit);
 		cell(out, 10, rows[i].decimals, rows[i].predicted * rows[i].scale);
 		cell(out, 10, rows[i].decimals, rows[i].measured * rows[i].scale);
+		cell(out, 8, rows[i].decimals, rows[i].sigma * rows[i].scale);
 		if (isfinite(rows[i].difference_percent))
 			fprintf(out, " %+10.1f %%\n", rows[i].difference_percent);
 		else
@@ -184,7 +243,8 @@ int report_text(const struct report *report, FILE *out)
 
 	write_head(report, out);
 	write_channels(report, &zero, out);
-	write_joint(report->analysis, out);
+	write_joint(report, out);
+	write_notes(report, out);
 	write_model(report, out);
 	write_frames(report->record, out);
 	return fflush(out) != 0 || ferror(out) ? DT_E_SYSTEM : 0;

@@ -384,6 +384,38 @@ static void test_json_of_holes(void **state)
 	cJSON_Delete(root);
 }
 
+/* How a value was got travels with it. */
+static void test_json_how(void **state)
+{
+	struct fixture *f = *state;
+	cJSON *root;
+
+	f->estimates[0].peak.how = (struct estimate_how){
+	        .method = "half-sine",
+	        .path = {"poly4/poly6", "half-sine"},
+	        .chi_square = 1.25,
+	        .flags = ESTIMATE_FLAG_EXTRAPOLATED | ESTIMATE_FLAG_TOLERANCE,
+	        .status = ESTIMATE_CLIPPED,
+	};
+	f->analysis.lag.driven_s = 0.0019026;
+	f->analysis.has_rebound = true;
+	f->analysis.rebound = (struct estimate_rebound){.velocity_ratio = 0.5, .flight_ratio = (double)NAN};
+	root = parse(&f->report);
+	check_string(root, "channels.0.peak.method", "half-sine");
+	check_string(root, "channels.0.peak.path.0", "poly4/poly6");
+	check_string(root, "channels.0.peak.path.1", "half-sine");
+	assert_int_equal(cJSON_GetArraySize(item(root, "channels.0.peak.path")), 2);
+	check_number(root, "channels.0.peak.chi_square", 1.25);
+	check_string(root, "channels.0.peak.flags.0", "extrapolated");
+	check_string(root, "channels.0.peak.flags.1", "tolerance_not_met");
+	check_string(root, "channels.0.peak.status", "clipped");
+	check_string(root, "channels.1.pulse.contact.family", "auto");
+	check_number(root, "lag.driven.lag_s", 0.0019026);
+	check_number(root, "rebound.velocity_ratio", 0.5);
+	assert_true(cJSON_IsNull(item(root, "rebound.flight_ratio")));
+	cJSON_Delete(root);
+}
+
 /* ---- text ---- */
 
 static char *print(const struct report *report)
@@ -402,10 +434,36 @@ static char *print(const struct report *report)
 	return text;
 }
 
+static size_t count_of(const char *text, const char *piece)
+{
+	size_t count = 0;
+
+	for (const char *s = strstr(text, piece); s; s = strstr(s + 1, piece))
+		count++;
+	return count;
+}
+
 static void check_has(const char *text, const char *piece)
 {
 	if (!strstr(text, piece))
 		fail_msg("\"%s\" is not in:\n%s", piece, text);
+}
+
+/* One line for each flag, naming every value that carries it, and none for a value that is not there. */
+static void test_text_notes(void **state)
+{
+	struct fixture *f = *state;
+	char *text;
+
+	f->estimates[0].peak.how.flags = ESTIMATE_FLAG_EXTRAPOLATED;
+	f->estimates[3].peak.how.flags = ESTIMATE_FLAG_EXTRAPOLATED | ESTIMATE_FLAG_SPIKE;
+	f->estimates[4].peak.value_g = (double)NAN;
+	f->estimates[4].peak.how.flags = ESTIMATE_FLAG_EXTRAPOLATED;
+	text = print(&f->report);
+	check_has(text, "note: S1X peak, S2X peak: clipped;");
+	check_has(text, "note: S2X peak: outliers");
+	assert_int_equal(count_of(text, "note: "), 2);
+	free(text);
 }
 
 static void test_text(void **state)
@@ -419,13 +477,13 @@ static void test_text(void **state)
 	check_has(text, "300.33    0.34     3.500     1.1     2.800     5.700"); /* 103.5 ms, 0 at 100 ms */
 	check_has(text, "500.25");
 	check_has(text, "Y peaks -0.400 ms after X");
-	check_has(text, "first peak 1.900");
+	check_has(text, "first 1.900");
 	check_has(text, "largest 2.000");
 	check_has(text, "correlation 1.600");
 	check_has(text, "129.37 +- 0.02 Hz");
 	check_has(text, "128.12");
 	check_has(text, "because it is by hand");
-	check_has(text, "363.0      340.5       +6.6 %");
+	check_has(text, "363.0      340.5      0.4       +6.6 %");
 	check_has(text, "S2X leaves 10 % of its peak");
 	check_has(text,
 	          "1 000 Hz video: time 0 is in frame 441, S2 X peaks in 442.\n"); /* 341 + 100, 101.5 */
@@ -603,15 +661,6 @@ static char *read_file(const char *path)
 	return text;
 }
 
-static size_t count_of(const char *text, const char *piece)
-{
-	size_t count = 0;
-
-	for (const char *s = strstr(text, piece); s; s = strstr(s + 1, piece))
-		count++;
-	return count;
-}
-
 /* Makes the page in a folder of its own, which must hold nothing else afterwards. */
 static char *make_page(const struct report *report)
 {
@@ -777,6 +826,8 @@ int main(void)
 	        TEST(test_json_unknown_is_null),
 	        TEST(test_json_foreign),
 	        TEST(test_json_of_holes),
+	        TEST(test_json_how),
+	        TEST(test_text_notes),
 	        TEST(test_text),
 	        TEST(test_text_of_holes),
 	        TEST(test_verdicts),
