@@ -35,77 +35,113 @@ void segment_cut(const struct frame *message, unsigned i, struct frame *segment)
 	wire_pack_segment(segment, message->id, &piece);
 }
 
-/* The identifier's part and the length of its messages; NULL if its messages are never cut. */
-static struct segment_part *find(struct segment_join *join, uint32_t id, uint8_t *length)
+/* Where an identifier's messages are put together; copy NULL: they are never cut. */
+struct place {
+	struct segment_copy *copy;
+	struct segment_message *messages;
+	unsigned modulus; /* of messages */
+	uint8_t length;
+};
+
+static struct place find(struct segment_join *join, uint32_t id)
 {
-	*length = WIRE_LENGTH_block;
 	switch (id) {
 	case WIRE_ID_RESENT_S1:
-		return &join->block[0];
+		return (struct place){&join->block_copy[0], join->block[0], SEGMENT_BLOCKS,
+		                      WIRE_LENGTH_block};
 	case WIRE_ID_RESENT_S2:
-		return &join->block[1];
+		return (struct place){&join->block_copy[1], join->block[1], SEGMENT_BLOCKS,
+		                      WIRE_LENGTH_block};
 	case WIRE_ID_CAPTURE_END:
-		*length = WIRE_LENGTH_capture_end;
-		return &join->end;
+		return (struct place){&join->end_copy, &join->end, 1, WIRE_LENGTH_capture_end};
 	default:
-		return NULL;
+		return (struct place){0};
 	}
 }
 
 /* The one before has come again. */
-static bool repeated(const struct segment_part *part, unsigned position, const uint8_t *payload,
+static bool repeated(const struct segment_copy *copy, unsigned position, const uint8_t *payload,
                      unsigned length)
 {
-	return position + 1 == part->next &&
-	       memcmp(part->message.data + PAYLOAD * position, payload, bytes_in(length, position)) == 0;
+	return position + 1 == copy->next && copy->message != NULL &&
+	       memcmp(copy->message->data + PAYLOAD * position, payload, bytes_in(length, position)) == 0;
 }
 
-static void give_up(struct segment_join *join, struct segment_part *part)
+static void give_up(struct segment_join *join, struct segment_copy *copy)
 {
-	if (!part->lost)
+	if (!copy->lost)
 		join->incomplete++;
-	part->lost = true;
-	part->next = 0;
+	copy->lost = true;
 }
 
-/* True when it completes the message. */
-static bool append(struct segment_join *join, struct segment_part *part, const struct wire_segment *piece,
-                   unsigned length)
+/* A copy begins with its first segment, or with one that lies before the position expected: then the first
+ * was lost. */
+static void begin(struct segment_join *join, const struct place *place, unsigned position,
+                  const uint8_t *payload)
 {
-	unsigned position = piece->sequence & POSITION, count = segment_count(length);
-	bool last = (piece->sequence & LAST) != 0;
+	struct segment_copy *copy = place->copy;
 
-	if (repeated(part, position, piece->payload, length))
+	if (copy->next > 0 && copy->next < segment_count(place->length))
+		give_up(join, copy);
+	copy->lost = false;
+	copy->next = 0;
+	copy->message = NULL;
+	if (position > 0)
+		return;
+	/* A block's tick is little endian at byte 2; modulus 1 needs none. */
+	copy->message = &place->messages[(payload[2] | (unsigned)payload[3] << 8) % place->modulus];
+}
+
+/* True when it completes the message. What is held and differs, or has another first segment, is another's:
+ * the new one is believed. */
+static bool keep(struct segment_message *message, unsigned position, const uint8_t *payload, unsigned length)
+{
+	uint8_t *to = message->data + PAYLOAD * position;
+	unsigned bytes = bytes_in(length, position);
+
+	if ((position == 0 || (message->held & 1u << position)) && memcmp(to, payload, bytes) != 0)
+		message->held = 0;
+	memcpy(to, payload, bytes);
+	message->held |= (uint16_t)(1u << position);
+	if (message->held + 1u != 1u << segment_count(length))
 		return false;
-	if (position == 0) {
-		if (part->next > 0 && part->next < count)
-			give_up(join, part);
-		part->lost = false;
-		part->next = 0;
-	}
-	if (position != part->next || position >= count || last != (position + 1 == count)) {
-		give_up(join, part);
+	message->held = 0;
+	return true;
+}
+
+/* True when it completes the message that copy->message then is. */
+static bool append(struct segment_join *join, const struct place *place, const struct wire_segment *piece)
+{
+	unsigned position = piece->sequence & POSITION, count = segment_count(place->length);
+	struct segment_copy *copy = place->copy;
+
+	if (position >= count || (piece->sequence & LAST) != (position + 1 == count ? LAST : 0)) {
+		give_up(join, copy);
 		return false;
 	}
-	memcpy(part->message.data + PAYLOAD * position, piece->payload, bytes_in(length, position));
-	part->next++;
-	return last;
+	if (repeated(copy, position, piece->payload, place->length))
+		return false;
+	if (position == 0 || position < copy->next)
+		begin(join, place, position, piece->payload);
+	if (position != copy->next)
+		give_up(join, copy);
+	copy->next = (uint8_t)(position + 1);
+	return copy->message != NULL && keep(copy->message, position, piece->payload, place->length);
 }
 
 const struct frame *segment_feed(struct segment_join *join, const struct frame *frame)
 {
-	struct segment_part *part;
+	struct place place = find(join, frame->id);
 	struct wire_segment piece;
-	uint8_t length;
 
-	part = find(join, frame->id, &length);
-	if (part == NULL || (frame->flags & FRAME_FD) || wire_unpack_segment(frame, &piece) != 0)
+	if (place.copy == NULL || (frame->flags & FRAME_FD) || wire_unpack_segment(frame, &piece) != 0)
 		return frame;
-	if (!append(join, part, &piece, length))
+	if (!append(join, &place, &piece))
 		return NULL;
-	part->message.time_us = frame->time_us;
-	part->message.id = frame->id;
-	part->message.flags = FRAME_FD | FRAME_BRS;
-	part->message.length = length;
-	return &part->message;
+	join->whole = (struct frame){.time_us = frame->time_us,
+	                             .id = frame->id,
+	                             .flags = FRAME_FD | FRAME_BRS,
+	                             .length = place.length};
+	memcpy(join->whole.data, place.copy->message->data, place.length);
+	return &join->whole;
 }

@@ -7,6 +7,11 @@
  * tower sends after a drop travel so: resent blocks and the capture end. Different identifiers may
  * interleave.
  *
+ * What came of a message that lost segments is kept: when it is sent again, the second copy fills what is
+ * missing. The first segment names the message (drop, tick), so that the others of a copy without it are of
+ * no use. A splice of two messages needs the end of one and the beginning of the next lost, and longer than
+ * that; it is found by the block's CRC-8, at the latest by the capture's CRC-32.
+ *
  * Freestanding; any context; the state belongs to the caller, all zeros is empty.
  */
 #include <stdbool.h>
@@ -21,16 +26,27 @@ unsigned segment_count(unsigned length);
 /* Segment i of the message, 0 to segment_count - 1, as a classic frame. */
 void segment_cut(const struct frame *message, unsigned i, struct frame *segment);
 
-/* What has come of one identifier. */
-struct segment_part {
-	struct frame message; /* flags, length as of a whole frame once it is one */
-	uint8_t next;         /* position that must come */
-	bool lost;            /* one was missing; waits for the next message to begin */
+enum { SEGMENT_BLOCKS = 512 }; /* the longest capture, in ticks; a power of two */
+
+/* What is held of one message. */
+struct segment_message {
+	uint16_t held; /* a bit for each segment */
+	uint8_t data[FRAME_DATA_MAX];
+};
+
+/* The copy that comes under one identifier. */
+struct segment_copy {
+	struct segment_message *message; /* NULL: its first segment was lost */
+	uint8_t next;                    /* position that must come */
+	bool lost;                       /* one was missing */
 };
 
 struct segment_join {
-	struct segment_part block[WIRE_SENSORS], end;
-	uint32_t incomplete; /* messages given up: a segment lost, out of order, or of the wrong length */
+	struct segment_copy block_copy[WIRE_SENSORS], end_copy;
+	struct segment_message block[WIRE_SENSORS][SEGMENT_BLOCKS],
+	        end; /* blocks at their tick modulo that */
+	struct frame whole;
+	uint32_t incomplete; /* copies with a segment lost, out of order, or of the wrong length */
 };
 
 /* The message that the frame is or completes, or NULL while more segments must come. A frame that is no

@@ -74,7 +74,8 @@ size_t sensorbus_put_answer(uint8_t *out, const struct sensorbus_answer *answer)
 	p = put16(p, answer->bus_errors);
 	*p++ = answer->bus_off;
 	*p++ = answer->tx_blocked;
-	p = put16(p, 0);
+	*p++ = answer->bias_high;
+	*p++ = answer->hang;
 	return (size_t)(p - out);
 }
 
@@ -90,6 +91,8 @@ size_t sensorbus_get_answer(const uint8_t *in, struct sensorbus_answer *answer)
 	        .bus_errors = get16(in + 26),
 	        .bus_off = in[28],
 	        .tx_blocked = in[29],
+	        .bias_high = in[30],
+	        .hang = in[31],
 	};
 	for (int i = 0; i < 6; i++)
 		answer->codes[i] = (int16_t)get16(in + 2 * i);

@@ -60,7 +60,9 @@ struct sensorbus_answer {
 	uint16_t bus_errors; /* CAN errors since the answer before */
 	uint8_t bus_off;     /* 1: the controller is bus-off now */
 	uint8_t tx_blocked;  /* 1: the bus takes no frame now */
-	uint16_t reserved;
+	uint8_t bias_high;   /* bit 0 S1, 1 S2: where inputs say that the bias is lost, it is above its window
+	                      */
+	uint8_t hang;        /* 1: the firmware's main loop hangs from now on, until its watchdog resets it */
 };
 
 /* Each returns the bytes it wrote or read. Buffers hold at least the fixed length. */

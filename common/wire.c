@@ -131,7 +131,7 @@ int wire_check_block(const struct frame *frame)
 
 uint8_t wire_fd_length(size_t count)
 {
-	static const uint8_t lengths[] = {8, 12, 16, 20, 24, 32, 48, 64};
+	static const uint8_t lengths[] = {12, 16, 20, 24, 32, 48, 64};
 
 	if (count <= 8)
 		return (uint8_t)count;

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "firmware/acquire.h"
 
+#include <stdatomic.h>
+
 #include "common/memory.h"
 
 void acquire_init(struct acquire *acquire, const struct parameters *parameters, volatile uint32_t *counters)
@@ -11,69 +13,60 @@ void acquire_init(struct acquire *acquire, const struct parameters *parameters, 
 	acquire->queue = (struct ring)RING_OVER(acquire->storage);
 }
 
-static int16_t not_taken(struct acquire *acquire)
+/* ---- sample interrupts: as few instructions as it takes to give each sample its place ---- */
+
+void acquire_turn(struct acquire *acquire)
 {
-	acquire->tick.marks |= WIRE_MARK_OVERRUN;
-	acquire->tick.io |= WIRE_IO_OVERRUN;
-	acquire->counters[WIRE_COUNTER_samples_overrun]++;
-	return WIRE_SAMPLE_NOT_TAKEN;
+	struct acquire_page *page;
+
+	acquire->turns++;
+	if (!atomic_load_explicit(&acquire->waiting, memory_order_acquire)) {
+		acquire->filling ^= 1;
+		atomic_store_explicit(&acquire->waiting, true, memory_order_release);
+	}
+	page = &acquire->page[acquire->filling];
+	page->x_count = page->yz_count = 0;
 }
 
-/* Judges one sample and returns what stands for it in the block. */
-static int16_t judge(struct acquire *acquire, unsigned sensor, uint8_t clip_bit, int16_t code, bool ready)
+/* What stands for it in the block: there -32768 has another meaning. */
+static int16_t taken(int16_t code, bool ready)
 {
-	int32_t size = code < 0 ? -code : code;
-
 	if (!ready)
-		return not_taken(acquire);
-	if (size > (int32_t)acquire->parameters->value[WIRE_PARAMETER_range_counts]) {
-		acquire->tick.status[sensor] |= clip_bit;
-		acquire->tick.marks |= WIRE_MARK_CLIPPED;
-		acquire->counters[WIRE_COUNTER_samples_clipped]++;
-	}
-	if (size < WIRE_SAMPLE_FULL_SCALE)
-		return code;
-	acquire->tick.marks |= WIRE_MARK_FULL_SCALE;
-	acquire->counters[WIRE_COUNTER_samples_full_scale]++;
-	return code < 0 ? -WIRE_SAMPLE_FULL_SCALE : WIRE_SAMPLE_FULL_SCALE; /* -32768 has another meaning */
-}
-
-static void store_x(struct acquire *acquire, const int16_t code[WIRE_SENSORS], bool ready)
-{
-	unsigned k = acquire->x_count++;
-
-	for (unsigned s = 0; s < WIRE_SENSORS; s++)
-		acquire->tick.sensor[s].x[k] = judge(acquire, s, WIRE_STATUS_CLIP_X, code[s], ready);
-}
-
-static void store_yz(struct acquire *acquire, const int16_t y[WIRE_SENSORS], const int16_t z[WIRE_SENSORS],
-                     bool ready)
-{
-	unsigned k = acquire->yz_count++;
-
-	for (unsigned s = 0; s < WIRE_SENSORS; s++) {
-		acquire->tick.sensor[s].y[k] = judge(acquire, s, WIRE_STATUS_CLIP_Y, y[s], ready);
-		acquire->tick.sensor[s].z[k] = judge(acquire, s, WIRE_STATUS_CLIP_Z, z[s], ready);
-	}
+		return WIRE_SAMPLE_NOT_TAKEN;
+	return code < -WIRE_SAMPLE_FULL_SCALE ? -WIRE_SAMPLE_FULL_SCALE : code;
 }
 
 void acquire_x(struct acquire *acquire, const int16_t code[WIRE_SENSORS], bool ready)
 {
-	acquire->clock_x++;
-	if (acquire->open && acquire->x_count < WIRE_X_PER_TICK)
-		store_x(acquire, code, ready);
+	struct acquire_page *page = &acquire->page[acquire->filling];
+	unsigned k = page->x_count++;
+
+	if (k >= WIRE_X_PER_TICK)
+		return;
+	for (unsigned s = 0; s < WIRE_SENSORS; s++)
+		page->sensor[s].x[k] = taken(code[s], ready);
 }
 
 void acquire_yz(struct acquire *acquire, const int16_t y[WIRE_SENSORS], const int16_t z[WIRE_SENSORS],
                 bool ready)
 {
-	acquire->clock_yz++;
-	if (acquire->open && acquire->yz_count < WIRE_YZ_PER_TICK)
-		store_yz(acquire, y, z, ready);
+	struct acquire_page *page = &acquire->page[acquire->filling];
+	unsigned k = page->yz_count++;
+
+	if (k >= WIRE_YZ_PER_TICK)
+		return;
+	for (unsigned s = 0; s < WIRE_SENSORS; s++) {
+		page->sensor[s].y[k] = taken(y[s], ready);
+		page->sensor[s].z[k] = taken(z[s], ready);
+	}
 }
 
-static void judge_clocks(struct acquire *acquire)
+/* ---- control ---- */
+
+static void judge_clocks(struct acquire *acquire, const struct acquire_page *page)
 {
+	acquire->clock_x = (uint16_t)(acquire->clock_x + page->x_count);
+	acquire->clock_yz = (uint16_t)(acquire->clock_yz + page->yz_count);
 	if (++acquire->clock_ticks < ACQUIRE_CLOCK_TICKS)
 		return;
 	acquire->clocks_good = acquire->clock_x == ACQUIRE_CLOCK_TICKS * WIRE_X_PER_TICK &&
@@ -83,20 +76,75 @@ static void judge_clocks(struct acquire *acquire)
 	acquire->clock_yz = 0;
 }
 
-void acquire_close(struct acquire *acquire)
+/* A sample that is not simply good. */
+static void mark(struct acquire *acquire, unsigned sensor, uint8_t clip_bit, int32_t range, int32_t size)
 {
-	static const int16_t none[WIRE_SENSORS];
+	struct acquire_tick *tick = &acquire->tick;
 
-	if (!acquire->open)
+	if (size > WIRE_SAMPLE_FULL_SCALE) {
+		tick->marks |= WIRE_MARK_OVERRUN;
+		tick->io |= WIRE_IO_OVERRUN;
+		acquire->counters[WIRE_COUNTER_samples_overrun]++;
 		return;
-	judge_clocks(acquire);
-	while (acquire->x_count < WIRE_X_PER_TICK)
-		store_x(acquire, none, false);
-	while (acquire->yz_count < WIRE_YZ_PER_TICK)
-		store_yz(acquire, none, none, false);
-	if (ring_put(&acquire->queue, &acquire->tick) != 0)
+	}
+	if (size > range) {
+		tick->status[sensor] |= clip_bit;
+		tick->marks |= WIRE_MARK_CLIPPED;
+		acquire->counters[WIRE_COUNTER_samples_clipped]++;
+	}
+	if (size == WIRE_SAMPLE_FULL_SCALE) {
+		tick->marks |= WIRE_MARK_FULL_SCALE;
+		acquire->counters[WIRE_COUNTER_samples_full_scale]++;
+	}
+}
+
+/* One channel; what did not come behind `count` was not taken. */
+static void judge(struct acquire *acquire, unsigned sensor, uint8_t clip_bit, int16_t *code, unsigned count,
+                  unsigned places)
+{
+	int32_t range = (int32_t)acquire->parameters->value[WIRE_PARAMETER_range_counts];
+	int32_t good = range < WIRE_SAMPLE_FULL_SCALE ? range : WIRE_SAMPLE_FULL_SCALE - 1;
+
+	for (unsigned k = count; k < places; k++)
+		code[k] = WIRE_SAMPLE_NOT_TAKEN;
+	for (unsigned k = 0; k < places; k++) {
+		int32_t size = code[k] < 0 ? -code[k] : code[k];
+
+		if (size > good)
+			mark(acquire, sensor, clip_bit, range, size);
+	}
+}
+
+static void finish(struct acquire *acquire, const struct acquire_page *page)
+{
+	struct acquire_tick *tick = &acquire->tick;
+
+	judge_clocks(acquire, page);
+	memcpy(tick->sensor, page->sensor, sizeof(page->sensor));
+	for (unsigned s = 0; s < WIRE_SENSORS; s++) {
+		struct acquire_samples *samples = &tick->sensor[s];
+
+		judge(acquire, s, WIRE_STATUS_CLIP_X, samples->x, page->x_count, WIRE_X_PER_TICK);
+		judge(acquire, s, WIRE_STATUS_CLIP_Y, samples->y, page->yz_count, WIRE_YZ_PER_TICK);
+		judge(acquire, s, WIRE_STATUS_CLIP_Z, samples->z, page->yz_count, WIRE_YZ_PER_TICK);
+	}
+	if (ring_put(&acquire->queue, tick) != 0)
 		acquire->counters[WIRE_COUNTER_samples_overrun] += ACQUIRE_SAMPLES_PER_TICK;
-	acquire->open = false;
+}
+
+uint32_t acquire_close(struct acquire *acquire)
+{
+	uint32_t turns = acquire->turns, begun = turns - acquire->turns_seen, lost = begun;
+
+	acquire->turns_seen = turns;
+	if (atomic_load_explicit(&acquire->waiting, memory_order_acquire)) {
+		if (acquire->open)
+			finish(acquire, &acquire->page[!acquire->filling]);
+		lost--;
+		atomic_store_explicit(&acquire->waiting, false, memory_order_release);
+	}
+	acquire->counters[WIRE_COUNTER_samples_overrun] += lost * ACQUIRE_SAMPLES_PER_TICK;
+	return begun;
 }
 
 void acquire_open(struct acquire *acquire, const struct acquire_head *head)
@@ -111,9 +159,9 @@ void acquire_open(struct acquire *acquire, const struct acquire_head *head)
 		tick->marks |= WIRE_MARK_CABLE;
 	tick->status[0] = tick->status[1] = head->state;
 	acquire->open = true;
-	acquire->x_count = 0;
-	acquire->yz_count = 0;
 }
+
+/* ---- main ---- */
 
 int acquire_take(struct acquire *acquire, struct acquire_tick *tick)
 {

@@ -5,7 +5,9 @@
  * Samples into ticks. Each millisecond both sensors give 7 X and 10 Y and Z; a sample that did not come
  * keeps its place as WIRE_SAMPLE_NOT_TAKEN and is counted. Finished ticks wait in a short queue for main.
  *
- * Context: interrupt, except acquire_init (before interrupts), acquire_take and acquire_pack (main).
+ * Context: acquire_turn, acquire_x and acquire_yz are the sample interrupts'; acquire_close and acquire_open
+ * the control interrupt's, which they interrupt: the samples of a millisecond gather on one page while
+ * control has the page before. acquire_init runs before interrupts, acquire_take and acquire_pack in main.
  * Counts are 1/32 g. Clipping is judged against the parameter range_counts.
  */
 #include <stdbool.h>
@@ -44,12 +46,24 @@ struct acquire_head {
 	uint8_t state; /* WIRE_STATE_* */
 };
 
+/* The samples of a millisecond as they come. */
+struct acquire_page {
+	struct acquire_samples sensor[WIRE_SENSORS];
+	uint16_t x_count, yz_count; /* instants that came; those beyond a tick's have no place */
+};
+
 struct acquire {
 	const struct parameters *parameters;
-	volatile uint32_t *counters;
-	struct acquire_tick tick; /* the one being filled */
+	volatile uint32_t *counters; /* control's */
+	/* sample interrupts */
+	struct acquire_page page[2];
+	uint8_t filling;         /* which of them; the other is control's while it waits there */
+	volatile uint32_t turns; /* milliseconds that have begun */
+	_Atomic bool waiting;    /* set by the turn, taken back by control */
+	/* control */
+	uint32_t turns_seen;
+	struct acquire_tick tick; /* its head is known, its samples are not */
 	bool open;
-	uint8_t x_count, yz_count;
 	uint8_t clock_ticks;
 	uint16_t clock_x, clock_yz;
 	bool clocks_good; /* over the last ACQUIRE_CLOCK_TICKS X:YZ was 7:10 exactly */
@@ -59,10 +73,15 @@ struct acquire {
 
 void acquire_init(struct acquire *acquire, const struct parameters *parameters, volatile uint32_t *counters);
 
-/* Ends the tick that is open, if any, and queues it. */
-void acquire_close(struct acquire *acquire);
+/* A millisecond begins. If control still has not taken the one before the last, the last is lost. */
+void acquire_turn(struct acquire *acquire);
 
-/* Opens the next; a sensor without its bias marks it. */
+/* Control, after each turn: ends the tick that is open, if any, and queues it. Returns the milliseconds that
+ * have begun since the call before: 1, or more when control was late; the samples of the others are counted
+ * as not taken. */
+uint32_t acquire_close(struct acquire *acquire);
+
+/* Control: the tick of the millisecond that has begun. A sensor without its bias marks it. */
 void acquire_open(struct acquire *acquire, const struct acquire_head *head);
 
 /* The next sample instant has come; ready false = the converter did not deliver, the codes are nothing. */

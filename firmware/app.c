@@ -62,20 +62,22 @@ struct sequence_view app_view(const struct app *a)
 	return (struct sequence_view){
 	        .now_us = port_time_us(),
 	        .io = io,
-	        .checks = health_checks(&a->health, io),
+	        .checks = health_checks(&a->health, io, port_bias_high()),
 	        .clocks_good = a->acquire.clocks_good,
 	        .hash_differs = a->health.host_here && !a->health.host_hash_good,
 	};
 }
 
-/* ---- interrupt ---- */
+/* ---- control interrupt ---- */
 
 void app_on_tick(void)
 {
+	uint32_t begun = acquire_close(&app.acquire);
 	struct sequence_view view;
 
-	acquire_close(&app.acquire);
-	app.tick_ms++;
+	if (begun == 0)
+		return;
+	app.tick_ms += begun;
 	health_tick(&app.health, app.tick_ms);
 	view = app_view(&app);
 	sequence_tick(&app.sequence, &view, app.tick_ms);
@@ -88,6 +90,18 @@ void app_on_tick(void)
 	                           });
 }
 
+void app_on_gate(unsigned gate, uint32_t time_us)
+{
+	sequence_gate(&app.sequence, gate, time_us);
+}
+
+/* ---- sample interrupts ---- */
+
+void app_on_turn(void)
+{
+	acquire_turn(&app.acquire);
+}
+
 void app_on_x(int16_t s1x, int16_t s2x, bool ready)
 {
 	acquire_x(&app.acquire, (const int16_t[]){s1x, s2x}, ready);
@@ -96,11 +110,6 @@ void app_on_x(int16_t s1x, int16_t s2x, bool ready)
 void app_on_yz(int16_t s1y, int16_t s1z, int16_t s2y, int16_t s2z, bool ready)
 {
 	acquire_yz(&app.acquire, (const int16_t[]){s1y, s2y}, (const int16_t[]){s1z, s2z}, ready);
-}
-
-void app_on_gate(unsigned gate, uint32_t time_us)
-{
-	sequence_gate(&app.sequence, gate, time_us);
 }
 
 /* ---- main ---- */
@@ -140,7 +149,7 @@ static void send_status(const struct sequence *now)
 	struct frame frame;
 
 	port_lock();
-	status.checks = health_checks(&app.health, io);
+	status.checks = health_checks(&app.health, io, port_bias_high());
 	port_unlock();
 	wire_pack_status(&frame, WIRE_ID_STATUS, &status);
 	stream_send(&app.stream, &frame);

@@ -3,11 +3,14 @@
 #define DT_FIRMWARE_APP_H
 /*
  * The whole firmware behind the calls of a port. All state is one static struct app in app.c, its members the
- * modules. A port calls app_init once, then from its interrupts app_on_*, and app_poll from its main loop
- * as often as it can, at least once a millisecond.
+ * modules. A port calls app_init once, then app_on_* from interrupts of two priorities, and app_poll from its
+ * main loop as often as it can, at least once a millisecond.
  *
- * Order at a millisecond boundary: gates captured before it, app_on_tick, then the samples of index 0. The
- * first app_on_tick after app_init is tick 0. Codes are 1/32 g. The interrupts never interrupt each other.
+ * The sample interrupts come first and are short, whatever else goes on: app_on_turn where a millisecond
+ * begins, then app_on_x and app_on_yz. They never interrupt each other. The control interrupt, one of lower
+ * priority, is requested by each turn: app_on_gate for what was captured before, then app_on_tick; it should
+ * be over before the next millisecond. Where the gates have an interrupt of their own, it has control's
+ * priority. The first turn after app_init begins tick 0. Codes are 1/32 g.
  */
 #include <stdbool.h>
 #include <stdint.h>
@@ -23,7 +26,7 @@
 struct app {
 	struct parameters parameters;
 	volatile uint32_t counters[WIRE_COUNTERS]; /* each is written in one context only */
-	volatile uint32_t tick_ms;                 /* now; written by the interrupt */
+	volatile uint32_t tick_ms;                 /* now; written by control */
 	struct acquire acquire;
 	struct sequence sequence;
 	struct health health;
@@ -40,10 +43,13 @@ struct app {
 /* Interrupts off. */
 void app_init(enum port_reset cause);
 
-/* Interrupt. ready false = the converter did not deliver. gate 0 upper, 1 lower. */
-void app_on_tick(void);
+/* Sample interrupts. ready false = the converter did not deliver. */
+void app_on_turn(void);
 void app_on_x(int16_t s1x, int16_t s2x, bool ready);
 void app_on_yz(int16_t s1y, int16_t s1z, int16_t s2y, int16_t s2z, bool ready);
+
+/* Control. gate 0 upper, 1 lower. A tick without a turn since the one before does nothing. */
+void app_on_tick(void);
 void app_on_gate(unsigned gate, uint32_t time_us);
 
 /* Main. */

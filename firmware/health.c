@@ -120,7 +120,18 @@ void health_tick(struct health *health, uint32_t tick_ms)
 	}
 }
 
-uint16_t health_checks(const struct health *health, uint16_t io)
+static uint16_t cable_checks(uint16_t io, uint16_t bias_high)
+{
+	uint16_t lost = (uint16_t)~io, checks = 0;
+
+	if (lost & WIRE_IO_IEPE_S1)
+		checks |= bias_high & WIRE_IO_IEPE_S1 ? WIRE_CHECK_OPEN_S1 : WIRE_CHECK_SHORT_S1;
+	if (lost & WIRE_IO_IEPE_S2)
+		checks |= bias_high & WIRE_IO_IEPE_S2 ? WIRE_CHECK_OPEN_S2 : WIRE_CHECK_SHORT_S2;
+	return checks;
+}
+
+uint16_t health_checks(const struct health *health, uint16_t io, uint16_t bias_high)
 {
 	static const struct {
 		uint16_t input, check;
@@ -128,9 +139,8 @@ uint16_t health_checks(const struct health *health, uint16_t io)
 	        {WIRE_IO_LATCH_CLOSED, WIRE_CHECK_LATCH},      {WIRE_IO_PRODUCT_HELD, WIRE_CHECK_PRODUCT},
 	        {WIRE_IO_DAMPERS_ENGAGED, WIRE_CHECK_DAMPERS}, {WIRE_IO_DOOR_CLOSED, WIRE_CHECK_DOOR},
 	        {WIRE_IO_ESTOP_CLEAR, WIRE_CHECK_ESTOP},       {WIRE_IO_SUPPLY_GOOD, WIRE_CHECK_SUPPLY},
-	        {WIRE_IO_IEPE_S1, WIRE_CHECK_SENSOR_S1},       {WIRE_IO_IEPE_S2, WIRE_CHECK_SENSOR_S2},
 	};
-	uint16_t checks = health->sensor_checks;
+	uint16_t checks = health->sensor_checks | cable_checks(io, bias_high);
 
 	for (unsigned i = 0; i < sizeof(needed) / sizeof(needed[0]); i++)
 		if ((io & needed[i].input) == 0)

@@ -4,13 +4,13 @@
 /*
  * Is everything fit for a drop? The check bits of wire.def from the inputs, the sensors and the host.
  *
- * A sensor is fit when its supply's bias is in its window and, over the last HEALTH_WINDOW_TICKS, offset and
- * standard deviation of every axis stay within noise_counts (1/32 g) and at least half the samples were
- * taken. The trigger is fit when S2 did not reach trigger_counts in that time, or a drop would be triggered
- * by what is there before it. A channel in motion that gives one value for HEALTH_STUCK_TICKS is counted,
- * once for each such spell, and marks the ticks until it ends.
+ * A sensor's cable is open or short when its bias is not in its window. A sensor is fit when, over the last
+ * HEALTH_WINDOW_TICKS, offset and standard deviation of every axis stay within noise_counts (1/32 g) and at
+ * least half the samples were taken. The trigger is fit when S2 did not reach trigger_counts in that time, or
+ * a drop would be triggered by what is there before it. A channel in motion that gives one value for
+ * HEALTH_STUCK_TICKS is counted, once for each such spell, and marks the ticks until it ends.
  *
- * Context: health_samples main; the rest interrupt, or main between port_lock and port_unlock.
+ * Context: health_samples main; the rest control, or main between port_lock and port_unlock.
  */
 #include <stdbool.h>
 #include <stdint.h>
@@ -55,7 +55,7 @@ void health_host(struct health *health, uint32_t tick_ms, uint32_t hash);
 /* Every tick: notices that the host is gone. */
 void health_tick(struct health *health, uint32_t tick_ms);
 
-/* WIRE_CHECK_* bits that are not green. */
-uint16_t health_checks(const struct health *health, uint16_t io);
+/* WIRE_CHECK_* bits that are not green; bias_high as port_bias_high. */
+uint16_t health_checks(const struct health *health, uint16_t io, uint16_t bias_high);
 
 #endif

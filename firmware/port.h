@@ -5,8 +5,8 @@
  * The whole hardware boundary, resolved by the linker: a port is one folder that defines these functions
  * and calls the entry points of app.h.
  *
- * Contexts. "Interrupt" is everything that app_on_* runs in; those calls have one priority and never
- * interrupt each other. "Main" is app_poll. Functions marked both may be called from either.
+ * Contexts (app.h): "main" is app_poll, "control" the interrupt that app_on_tick and app_on_gate run in. The
+ * sample interrupts above it call nothing of this. Functions marked both may be called from either.
  *
  * Times are us since reset, 32 bits, wrapping; compare them by signed difference. Outputs and inputs are
  * bits of wire.def's io word. Inputs arrive debounced. While the controller is in reset the drivers hold
@@ -31,6 +31,10 @@ uint32_t port_time_us(void);
 
 /* Both: the inputs, and the outputs as they are at the pins, edges already made included. */
 uint16_t port_io(void);
+
+/* Both: of the sensors without their WIRE_IO_IEPE_* bit, those with an axis whose bias is above its window,
+ * as such bits: a cable is open. That of the others is below: a cable is short. */
+uint16_t port_bias_high(void);
 
 /* Both: energises the outputs in `on`, de-energises those in `off`, leaves the others alone. */
 void port_outputs(uint16_t on, uint16_t off);
@@ -64,7 +68,7 @@ void port_watchdog_kick(void);
 /* Main: restarts with PORT_RESET_COMMAND. May return; the restart then follows when app_poll returns. */
 void port_reset(void);
 
-/* Main: between these no app_on_* runs. Short, not nested. */
+/* Main: between these neither app_on_tick nor app_on_gate runs; samples may be taken. Short, not nested. */
 void port_lock(void);
 void port_unlock(void);
 

@@ -12,7 +12,7 @@
  * Outputs fail safe when de-energised, but for the magnet, whose release is the drop: it is energised by
  * sequence_init and by SAFE, and de-energised by nothing but the edge computed from the two light gates.
  *
- * Context: interrupt (sequence_tick, sequence_gate); everything else from main between port_lock and
+ * Context: control (sequence_tick, sequence_gate); everything else from main between port_lock and
  * port_unlock, so that no two calls overlap. Times in us wrap after 71 minutes, in ms after 49 days.
  */
 #include <stdbool.h>

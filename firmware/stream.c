@@ -148,7 +148,7 @@ static void resend_one(struct stream *stream, const struct capture *capture)
 		stream->counters[WIRE_COUNTER_blocks_resent]++;
 	}
 	request->first_tick_ms++;
-	stream->serving = --request->count > 0;
+	request->count--;
 }
 
 static bool ready_for_block(const struct stream *stream)
@@ -161,9 +161,8 @@ void stream_resend(struct stream *stream, const struct capture *capture)
 	for (unsigned i = 0; i < STREAM_RESENT_PER_TICK; i++) {
 		if (!ready_for_block(stream))
 			return;
-		if (!stream->serving && ring_get(&stream->requests, &stream->request) != 0)
+		if (stream->request.count == 0 && ring_get(&stream->requests, &stream->request) != 0)
 			return;
-		stream->serving = true;
 		resend_one(stream, capture);
 	}
 }

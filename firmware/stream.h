@@ -36,8 +36,7 @@ struct stream {
 	struct frame next;
 	struct ring queue;
 	struct frame queue_storage[STREAM_QUEUE];
-	bool serving; /* request is not finished */
-	struct wire_resend request;
+	struct wire_resend request; /* being served while its count is not 0 */
 	struct ring requests;
 	struct wire_resend requests_storage[STREAM_REQUESTS];
 };

@@ -19,11 +19,12 @@ enum event_action {
 	EVENT_BUS_BURST,   /* the next `number` live blocks are lost */
 	EVENT_HOST_SILENT, /* the host sends nothing */
 	EVENT_RESET,       /* the firmware is started anew, number is its --reset-cause */
+	EVENT_HANG,        /* the firmware's main loop hangs until the watchdog bites */
 	EVENT_ACTIONS
 };
 
 enum {
-	EVENTS_MAX = 32,
+	EVENTS_MAX = 64,
 	EVENT_AT_TIME = -1, /* instead of a state */
 };
 

@@ -149,6 +149,9 @@ static void see_status(struct observe *observe, const struct frame *frame)
 	if (wire_unpack_status(frame, &status) != 0)
 		return;
 	observe->fault = status.fault;
+	observe->was_ready |= status.state == WIRE_STATE_READY;
+	if (observe->was_ready)
+		observe->checks |= status.checks;
 	if (observe->block_s < 0 || observe->now_s - observe->block_s > STATUS_ALONE_S)
 		note_state(observe, status.state);
 }
@@ -211,7 +214,8 @@ static void see_capture_end(struct observe *observe, const struct frame *frame, 
 	if (wire_unpack_capture_end(frame, &end) != 0)
 		return;
 	observe->captures += observe->captures == 0 || end.drop_id != observe->capture.drop_id ||
-	                     end.first_tick_ms != observe->capture.first_tick_ms;
+	                     end.first_tick_ms != observe->capture.first_tick_ms ||
+	                     end.crc32 != observe->capture.crc32;
 	observe->capture = end;
 	observe->capture_first_s = tick_s + 1e-3 * end.first_tick_ms;
 }
@@ -224,14 +228,10 @@ static void add_hash(struct observe *observe, const void *bytes, size_t count)
 		observe->hash = (observe->hash ^ p[i]) * 0x100000001B3u;
 }
 
-void observe_from_firmware(struct observe *observe, const struct frame *frame, double tick_s)
+static void see_message(struct observe *observe, const struct frame *frame, double tick_s)
 {
 	int sensor = block_sensor(frame);
-	uint32_t head[3] = {(uint32_t)lrint(observe->now_s * 1e6), frame->id,
-	                    (uint32_t)frame->flags << 8 | frame->length};
 
-	add_hash(observe, head, sizeof(head));
-	add_hash(observe, frame->data, frame->length);
 	if (sensor >= 0)
 		see_block(observe, (unsigned)sensor, frame);
 	else if (frame->id == WIRE_ID_STATUS)
@@ -246,6 +246,18 @@ void observe_from_firmware(struct observe *observe, const struct frame *frame, d
 		see_counter(observe, frame);
 	else if (frame->id == WIRE_ID_CAPTURE_END)
 		see_capture_end(observe, frame, tick_s);
+}
+
+void observe_from_firmware(struct observe *observe, const struct frame *frame, double tick_s)
+{
+	const struct frame *message = segment_feed(&observe->segments, frame);
+	uint32_t head[3] = {(uint32_t)lrint(observe->now_s * 1e6), frame->id,
+	                    (uint32_t)frame->flags << 8 | frame->length};
+
+	add_hash(observe, head, sizeof(head));
+	add_hash(observe, frame->data, frame->length);
+	if (message != NULL)
+		see_message(observe, message, tick_s);
 	observe->sent++;
 }
 

@@ -7,13 +7,14 @@
  *
  * The bench calls it with what it carries; it takes nothing from the firmware's code and asks no host.
  * "From the firmware" is before the fault injector, "at the host" behind it. tower_s is the tower's own
- * time, now_us the firmware's since the run began. No heap; one thread; a struct of 300 kB.
+ * time, now_us the firmware's since the run began. No heap; one thread; a struct of 370 kB.
  */
 #include <stdbool.h>
 #include <stdint.h>
 
 #include "common/frame.h"
 #include "common/scenes/scene.h"
+#include "common/segment.h"
 #include "common/wire.h"
 #include "hil/busfault.h"
 #include "hil/scenario.h"
@@ -47,6 +48,8 @@ struct observe {
 
 	struct observe_notes path, emcy, replies, refused, aborts;
 	uint8_t state, fault;
+	bool was_ready;
+	uint16_t checks;    /* told as not green at any time since it first was READY */
 	double block_s;     /* when the last live block told the state, negative: none yet */
 	bool emcy_is_wrong; /* a code that is not its fault's */
 
@@ -60,6 +63,7 @@ struct observe {
 	int64_t blocks_error; /* of boots before the present one */
 	double gaps_before, blocks_before;
 
+	struct segment_join segments; /* of classic CAN */
 	struct wire_capture_end capture;
 	unsigned captures;
 	double capture_first_s; /* tower's time of its first tick */

@@ -16,8 +16,8 @@
 #include "hil/event.h"
 
 enum {
-	SCENARIO_MESSAGE_MAX = 512,
-	SCENARIO_LIST_MAX = 32,
+	SCENARIO_MESSAGE_MAX = SETTINGS_MESSAGE_MAX,
+	SCENARIO_LIST_MAX = 64,
 	SCENARIO_OVERRIDES_MAX = 16,
 	SCENARIO_PARAMETERS_MAX = WIRE_PARAMETERS,
 };
@@ -62,6 +62,7 @@ struct scenario {
 	struct scenario_list fault;   /* one fault, latched at the end */
 	struct scenario_list emcy;    /* faults in the order they were told, NONE for a clearing */
 	struct scenario_list path;    /* states in order */
+	struct scenario_list checks;  /* told as not green since it first was READY, any order */
 	struct scenario_list marks;   /* bits of the last capture end, any order */
 	struct scenario_list replies; /* state told in each reply, in order */
 	struct scenario_list refused; /* DT_E_* of replies in order */

@@ -73,7 +73,8 @@ static void feed_capture(struct script *script, const struct frame *frame, uint3
 	struct wire_capture_end end;
 
 	if (wire_unpack_capture_end(frame, &end) != 0 || script->phase != SCRIPT_FETCH || script->captured ||
-	    end.drop_id == script->capture.drop_id)
+	    (end.drop_id == script->capture.drop_id && end.first_tick_ms == script->capture.first_tick_ms &&
+	     end.crc32 == script->capture.crc32)) /* after a restart the tower's numbers begin anew */
 		return;
 	script->capture = end;
 	script->captured = true;
@@ -108,10 +109,12 @@ void script_feed(struct script *script, const struct frame *part, uint32_t now_m
 {
 	const struct frame *frame = segment_feed(&script->segments, part);
 
+	if (frame != part) {
+		script->classic = true;
+		script->segment_ms = now_ms;
+	}
 	if (frame == NULL)
 		return;
-	if (frame != part)
-		script->classic = true;
 	switch (frame->id) {
 	case WIRE_ID_BLOCK_S1:
 	case WIRE_ID_RESENT_S1:
@@ -261,7 +264,7 @@ static unsigned do_fetch(struct script *script, uint32_t now_ms, struct frame *o
 
 	if (!due(script->send_ms, now_ms))
 		return 0;
-	if (script->classic && !due(script->progress_ms + SETTLE_MS, now_ms))
+	if (script->classic && !due(script->segment_ms + SETTLE_MS, now_ms))
 		return 0; /* the upload goes on */
 	if (!script->captured) {
 		script->send_ms = now_ms + REPEAT_MS;

@@ -53,7 +53,8 @@ struct script {
 	uint32_t drop_ms;      /* when this drop began */
 	uint32_t heartbeat_ms; /* when the next one is due */
 	uint32_t send_ms;      /* when the phase's next command or request is due */
-	uint32_t progress_ms;  /* when a block of the capture came last */
+	uint32_t progress_ms;  /* when a block of the capture came last ... */
+	uint32_t segment_ms;   /* ... and a segment of anything */
 	uint32_t resend_at;    /* where the next round begins: S1's blocks are counted first, then S2's */
 	uint8_t sequence;
 	uint8_t accept_op;

@@ -58,8 +58,10 @@ enum tower_fault {
 	TOWER_GATE_LOWER_DEAD,
 	TOWER_LATCH_STUCK, /* does not open */
 	TOWER_MAGNET_WEAK, /* holds at rest, loses the product as soon as the frame moves */
-	TOWER_CABLE_S1,    /* open: no bias, no acceleration, no noise */
+	TOWER_CABLE_S1,    /* open: bias too high, no acceleration, no noise */
 	TOWER_CABLE_S2,
+	TOWER_SHORT_S1, /* of the cable: bias too low, and the same */
+	TOWER_SHORT_S2,
 	TOWER_FAULTS
 };
 
@@ -79,6 +81,9 @@ void tower_sample(struct tower *tower, unsigned group, int16_t codes[6]);
 
 /* WIRE_IO_* input bits now. */
 uint16_t tower_inputs(const struct tower *tower);
+
+/* Bit 0 S1, 1 S2: its bias is above its window now. */
+uint8_t tower_bias_high(const struct tower *tower);
 
 /* True once after gate 0 (upper) or 1 (lower) saw its beam broken, with the time in whole us, rounded
  * down as a timer does, modulo 2^32. */

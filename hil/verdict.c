@@ -7,7 +7,7 @@
 
 #include "common/wire_table.h"
 
-enum { TEXT_MAX = 400 };
+enum { TEXT_MAX = 800 };
 
 struct verdict {
 	FILE *out;
@@ -86,8 +86,9 @@ static void judge_one(struct verdict *verdict, const char *name, uint32_t number
 	judge_notes(verdict, name, &notes, list, name_of);
 }
 
-static void judge_marks(struct verdict *verdict, const struct observe *observe,
-                        const struct scenario_list *list)
+/* Bits in any order. */
+static void judge_bits(struct verdict *verdict, const char *name, unsigned bits,
+                       const struct scenario_list *list, const char *(*name_of)(unsigned))
 {
 	char measured[TEXT_MAX] = "", expected[TEXT_MAX] = "";
 	unsigned wanted = 0;
@@ -97,15 +98,21 @@ static void judge_marks(struct verdict *verdict, const struct observe *observe,
 	for (unsigned i = 0; i < list->count; i++)
 		wanted |= 1u << list->item[i];
 	for (unsigned bit = 0; bit < 16; bit++) {
-		if (observe->capture.marks >> bit & 1)
-			add_item(measured, bit, wire_mark_name);
+		if (bits >> bit & 1)
+			add_item(measured, bit, name_of);
 		if (wanted >> bit & 1)
-			add_item(expected, bit, wire_mark_name);
+			add_item(expected, bit, name_of);
 	}
-	if (observe->captures == 0)
-		snprintf(measured, sizeof(measured), "no capture");
-	say(verdict, observe->captures > 0 && wanted == observe->capture.marks, "marks",
-	    measured[0] ? measured : "-", expected[0] ? expected : "-");
+	say(verdict, wanted == bits, name, measured[0] ? measured : "-", expected[0] ? expected : "-");
+}
+
+static void judge_marks(struct verdict *verdict, const struct observe *observe,
+                        const struct scenario_list *list)
+{
+	if (list->given && observe->captures == 0)
+		say(verdict, false, "marks", "no capture", "a capture end");
+	else
+		judge_bits(verdict, "marks", observe->capture.marks, list, wire_mark_name);
 }
 
 static void judge_counters(struct verdict *verdict, const struct scenario *scenario,
@@ -127,6 +134,7 @@ unsigned verdict_print(const struct scenario *scenario, const struct observe *ob
 	judge_one(&verdict, "fault", observe->fault, &scenario->fault, wire_fault_name);
 	judge_notes(&verdict, "emcy", &observe->emcy, &scenario->emcy, wire_fault_name);
 	judge_notes(&verdict, "path", &observe->path, &scenario->path, wire_state_name);
+	judge_bits(&verdict, "checks", observe->checks, &scenario->checks, wire_check_name);
 	judge_marks(&verdict, observe, &scenario->marks);
 	judge_notes(&verdict, "replies", &observe->replies, &scenario->replies, wire_state_name);
 	judge_notes(&verdict, "refused", &observe->refused, &scenario->refused, error_of);

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "common/scenes/scene.h"
 
-#include <errno.h>
-#include <ini.h>
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
+#include <strings.h>
+
+#include "common/scenes/settings.h"
 
 /* Where the tower's parts stand when the scene leaves them to the height: the product leaves the frame this
  * far above the mat, the frame meets the dampers this far above it, the lower gate is this far before the
@@ -42,84 +42,53 @@ static double value_in(const struct scene *scene, const struct key *key)
 }
 
 struct reading {
+	struct settings settings;
 	struct scene scene;
-	FILE *in;
-	const char *file;
-	int line;       /* of the text inih looks at */
-	int line_begun; /* it came without its end: the next piece belongs to it */
-	char *message;
-	int result;
 	int line_of[KEYS]; /* 0 = not given */
 	int name_line;
 };
 
-/* fgets for inih that counts the lines: Debian's build does not tell the handler where it is. */
-static char *read_line(char *text, int size, void *user)
-{
-	struct reading *reading = user;
-
-	if (fgets(text, size, reading->in) == NULL)
-		return NULL;
-	if (!reading->line_begun)
-		reading->line++;
-	reading->line_begun = strchr(text, '\n') == NULL;
-	return text;
-}
-
-static int fail(struct reading *reading, int code, const char *format, const char *a, const char *b)
-{
-	int used = snprintf(reading->message, SCENE_MESSAGE_MAX, "%.300s:%d: ", reading->file, reading->line);
-
-	snprintf(reading->message + used, SCENE_MESSAGE_MAX - (size_t)used, format, a, b);
-	reading->result = code;
-	return 0; /* inih's word for "stop here" */
-}
-
 static int read_text(struct reading *reading, const char *name, const char *value)
 {
+	struct settings *settings = &reading->settings;
 	char *to = strcmp(name, "name") == 0 ? reading->scene.name : reading->scene.title;
 	size_t room = to == reading->scene.name ? sizeof(reading->scene.name) : sizeof(reading->scene.title);
 
 	if (strcmp(name, "name") != 0 && strcmp(name, "title") != 0)
-		return fail(reading, DT_E_FORMAT,
-		            "unknown key '%.60s', expected name or title before the first section%s", name,
-		            "");
+		return settings_fail(settings, DT_E_FORMAT,
+		                     "unknown key '%.60s', expected name or title before the first section",
+		                     name);
 	if (value[0] == '\0' || strlen(value) >= room)
-		return fail(reading, DT_E_FORMAT, "%.60s is empty or too long%s", name, "");
+		return settings_fail(settings, DT_E_FORMAT, "%.60s is empty or too long", name);
 	memcpy(to, value, strlen(value) + 1);
 	if (to == reading->scene.name)
-		reading->name_line = reading->line;
+		reading->name_line = settings->line;
 	return 1;
 }
 
 static int read_number(struct reading *reading, size_t index, const char *text)
 {
+	struct settings *settings = &reading->settings;
 	const struct key *key = &keys[index];
-	char limits[96];
-	char *end;
-	double value;
+	double any;
 
 	if (reading->line_of[index] != 0)
-		return fail(reading, DT_E_FORMAT, "%.60s is given twice%s", key->name, "");
-	errno = 0;
-	value = strtod(text, &end);
-	if (end == text || *end != '\0')
-		return fail(reading, DT_E_FORMAT, "%.60s = '%.60s' is not a number", key->name, text);
-	snprintf(limits, sizeof(limits), "%s, expected %g to %g", text, key->min, key->max);
-	if (!(value >= key->min && value <= key->max)) /* NaN fails too */
-		return fail(reading, DT_E_RANGE, "%.60s is %.100s", key->name, limits);
-	*value_of(&reading->scene, key) = value;
-	reading->line_of[index] = reading->line;
+		return settings_fail(settings, DT_E_FORMAT, "%.60s is given twice", key->name);
+	if (!settings_number(text, -INFINITY, INFINITY, &any) && strcasecmp(text, "nan") != 0)
+		return settings_fail(settings, DT_E_FORMAT, "%.60s = '%.60s' is not a number", key->name,
+		                     text);
+	if (!settings_number(text, key->min, key->max, value_of(&reading->scene, key)))
+		return settings_fail(settings, DT_E_RANGE, "%.60s is %.60s, expected %g to %g", key->name,
+		                     text, key->min, key->max);
+	reading->line_of[index] = settings->line;
 	return 1;
 }
 
-static int read_entry(void *user, const char *section, const char *name, const char *value)
+static int read_entry(struct settings *settings, const char *section, const char *name, const char *value)
 {
-	struct reading *reading = user;
+	struct reading *reading = (struct reading *)settings;
 	int known_section = 0;
 
-	if (reading->result != 0)
-		return 0;
 	if (section[0] == '\0')
 		return read_text(reading, name, value);
 	for (size_t i = 0; i < KEYS; i++) {
@@ -130,8 +99,8 @@ static int read_entry(void *user, const char *section, const char *name, const c
 			return read_number(reading, i, value);
 	}
 	if (!known_section)
-		return fail(reading, DT_E_FORMAT, "unknown section [%.60s]%s", section, "");
-	return fail(reading, DT_E_FORMAT, "unknown key '%.60s' in [%.60s]", name, section);
+		return settings_fail(settings, DT_E_FORMAT, "unknown section [%.60s]", section);
+	return settings_fail(settings, DT_E_FORMAT, "unknown key '%.60s' in [%.60s]", name, section);
 }
 
 static void place_tower(struct scene *scene)
@@ -148,46 +117,31 @@ static void place_tower(struct scene *scene)
 
 static int complete(struct reading *reading)
 {
+	const struct settings *settings = &reading->settings;
+
 	for (size_t i = 0; i < KEYS; i++) {
 		if (reading->line_of[i] != 0)
 			continue;
-		if (isnan(keys[i].initial)) {
-			snprintf(reading->message, SCENE_MESSAGE_MAX, "%.300s: [%s] %s is missing",
-			         reading->file, keys[i].section, keys[i].name);
-			return DT_E_FORMAT;
-		}
+		if (isnan(keys[i].initial))
+			return settings_refuse(settings, DT_E_FORMAT, "[%s] %s is missing", keys[i].section,
+			                       keys[i].name);
 		*value_of(&reading->scene, &keys[i]) = keys[i].initial;
 	}
-	if (reading->name_line == 0) {
-		snprintf(reading->message, SCENE_MESSAGE_MAX, "%.300s: name is missing", reading->file);
-		return DT_E_FORMAT;
-	}
+	if (reading->name_line == 0)
+		return settings_refuse(settings, DT_E_FORMAT, "name is missing");
 	if (reading->scene.title[0] == '\0')
 		memcpy(reading->scene.title, reading->scene.name, sizeof(reading->scene.name));
 	place_tower(&reading->scene);
-	return scene_check(&reading->scene, reading->file, reading->message);
+	return scene_check(&reading->scene, settings->file, settings->message);
 }
 
 int scene_read(struct scene *scene, const char *file, char message[SCENE_MESSAGE_MAX])
 {
-	struct reading reading = {.file = file, .message = message};
-	int result;
+	struct reading reading = {.settings = {.file = file, .message = message, .entry = read_entry}};
+	int result = settings_read(&reading.settings);
 
-	reading.in = fopen(file, "r");
-	if (reading.in == NULL) {
-		snprintf(message, SCENE_MESSAGE_MAX, "%.300s: %s", file, strerror(errno));
-		return DT_E_SYSTEM;
-	}
-	result = ini_parse_stream(read_line, &reading, read_entry, &reading);
-	fclose(reading.in);
-	if (reading.result != 0)
-		return reading.result;
-	if (result != 0) {
-		snprintf(message, SCENE_MESSAGE_MAX, "%.300s:%d: not a [section] or key = value", file,
-		         result);
-		return DT_E_FORMAT;
-	}
-	result = complete(&reading);
+	if (result == 0)
+		result = complete(&reading);
 	if (result == 0)
 		*scene = reading.scene;
 	return result;

@@ -7,8 +7,9 @@
  * plant and the host's model share none.
  */
 #include "common/error.h"
+#include "common/scenes/settings.h"
 
-enum { SCENE_MESSAGE_MAX = 512 };
+enum { SCENE_MESSAGE_MAX = SETTINGS_MESSAGE_MAX };
 
 struct scene {
 	char name[64];   /* key `name` before any section, e.g. "geometry-2A" */

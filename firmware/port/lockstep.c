@@ -37,14 +37,17 @@ static const struct instant {
 static struct machine {
 	uint32_t tick_ms, now_us;
 	uint16_t outputs, inputs;
+	uint8_t bias_high;
 	uint8_t edges;                       /* outputs that changed since the last request ... */
 	uint32_t edge_us[SENSORBUS_OUTPUTS]; /* ... and when */
 	uint8_t off_planned;                 /* outputs that port_off_at will switch ... */
 	uint32_t off_us[SENSORBUS_OUTPUTS];  /* ... and when */
-	bool first_request, reset_wanted, bus_classic;
+	bool first_request, reset_wanted, bus_classic, hung;
 	bool bus_off, tx_blocked;
 	uint32_t bus_errors, frames_lost;
 	struct sensorbus_answer answer;
+	uint8_t captures; /* gates that control has not seen yet ... */
+	uint32_t capture_us[2];
 	unsigned sent_count;
 	size_t request_bytes; /* in request[], its frames included */
 	/* As the frames are sent, so they wait: each is written once. */
@@ -66,6 +69,12 @@ uint32_t port_time_us(void)
 uint16_t port_io(void)
 {
 	return machine.inputs | machine.outputs;
+}
+
+uint16_t port_bias_high(void)
+{
+	return (uint16_t)((machine.bias_high & 1 ? WIRE_IO_IEPE_S1 : 0) |
+	                  (machine.bias_high & 2 ? WIRE_IO_IEPE_S2 : 0));
 }
 
 static void set_outputs(uint16_t outputs, uint32_t time_us)
@@ -179,6 +188,11 @@ bool lockstep_reset_wanted(void)
 	return machine.reset_wanted;
 }
 
+bool lockstep_hung(void)
+{
+	return machine.hung;
+}
+
 /* ---- an instant ---- */
 
 static unsigned at;
@@ -265,6 +279,13 @@ static int read_answer(void)
 		return result;
 	sensorbus_get_answer(bytes, answer);
 	machine.inputs = answer->inputs & (uint16_t)~WIRE_IO_OUTPUTS & (uint16_t)~WIRE_IO_OVERRUN;
+	machine.bias_high = answer->bias_high;
+	machine.hung |= answer->hang != 0;
+	for (unsigned gate = 0; gate < 2; gate++)
+		if (answer->captures & 1u << gate) {
+			machine.captures |= (uint8_t)(1u << gate);
+			machine.capture_us[gate] = answer->capture_us[gate];
+		}
 	machine.bus_errors += answer->bus_errors;
 	machine.bus_off = answer->bus_off != 0 || link_off;
 	machine.tx_blocked = answer->tx_blocked != 0;
@@ -284,20 +305,40 @@ int lockstep_exchange(unsigned instant)
 	return result == 0 ? read_answer() : result;
 }
 
-void lockstep_deliver(void)
+bool lockstep_deliver(void)
 {
 	const struct sensorbus_answer *answer = &machine.answer;
 	const int16_t *codes = answer->codes;
 
-	for (unsigned gate = 0; gate < 2; gate++)
-		if (answer->captures & 1u << gate)
-			app_on_gate(gate, answer->capture_us[gate]);
 	if (at == 0)
-		app_on_tick();
+		app_on_turn();
 	if (instants[at].group & SENSORBUS_X)
 		app_on_x(codes[0], codes[3], answer->ready & SENSORBUS_X);
 	if (instants[at].group & SENSORBUS_YZ)
 		app_on_yz(codes[1], codes[2], codes[4], codes[5], answer->ready & SENSORBUS_YZ);
+	return at == 0 || machine.captures != 0;
+}
+
+/* True once after the gate was captured. */
+static bool take_capture(unsigned gate, uint32_t *time_us)
+{
+	uint32_t before = lockstep_hold();
+	bool captured = machine.captures & 1u << gate;
+
+	machine.captures &= (uint8_t) ~(1u << gate);
+	*time_us = machine.capture_us[gate];
+	lockstep_release(before);
+	return captured;
+}
+
+void lockstep_control(void)
+{
+	uint32_t time_us;
+
+	for (unsigned gate = 0; gate < 2; gate++)
+		if (take_capture(gate, &time_us))
+			app_on_gate(gate, time_us);
+	app_on_tick();
 }
 
 void lockstep_boot(enum port_reset cause, bool bus_classic)

@@ -10,8 +10,9 @@
  * the core then does, it does at that instant, rounded up to the next whole us. An output edge that is
  * planned for a time carries that us, whenever the next request goes.
  *
- * Context: interrupt, but for lockstep_boot and lockstep_can_*, which are main's. The functions of port.h
- * exclude interrupts where they must. One instance, static.
+ * Context: lockstep_exchange and lockstep_deliver are the sample interrupts', lockstep_control the control
+ * interrupt's, the rest main's. The functions of port.h exclude interrupts where they must. One instance,
+ * static.
  */
 #include <stddef.h>
 
@@ -20,6 +21,7 @@
 enum {
 	LOCKSTEP_GONE = 1, /* the other end has ended the run */
 	LOCKSTEP_INSTANTS = 16,
+	LOCKSTEP_WATCHDOG_MS = 50,
 };
 
 /* Which samples the instant takes: SENSORBUS_X, SENSORBUS_YZ, and both where a tick begins. */
@@ -28,12 +30,17 @@ unsigned lockstep_group(unsigned instant);
 /* After a reset, interrupts off: a new machine, and app_init. */
 void lockstep_boot(enum port_reset cause, bool bus_classic);
 
-/* Request and answer; 0, LOCKSTEP_GONE or DT_E_*. Then, if 0, what the answer brought goes to the core. */
+/* Request and answer; 0, LOCKSTEP_GONE or DT_E_*. Then, if 0, the samples go to the core; true asks for the
+ * control interrupt, which brings it what else came. */
 DT_MUST_USE int lockstep_exchange(unsigned instant);
-void lockstep_deliver(void);
+DT_MUST_USE bool lockstep_deliver(void);
+void lockstep_control(void);
 
 /* The core has asked for a restart. */
 bool lockstep_reset_wanted(void);
+
+/* The bench wants to see the watchdog bite: app_poll is not to be called any more. */
+bool lockstep_hung(void);
 
 /* As port_can_send and port_can_receive: the frames ride in the exchange. What an answer brought waits until
  * it is received; what finds no place counts in port_can_errors, as with the board. */

@@ -19,7 +19,7 @@ enum {
 _Static_assert((RING_TICKS & (RING_TICKS - 1)) == 0, "ticks wrap");
 
 struct slot {
-	uint32_t tick_ms;
+	uint32_t tick_ms; /* in the ring; in the window the place tells */
 	uint16_t repeated, conflicting, reordered, resent;
 	bool held;
 	uint8_t data[WIRE_LENGTH_block];
@@ -170,7 +170,7 @@ static void open_window(struct join *join, uint32_t first_ms, uint32_t ticks)
 			const struct slot *slot = &join->ring[s][(first_ms + tick) % RING_TICKS];
 			bool held = slot->held && slot->tick_ms == first_ms + tick;
 
-			join->window[s][tick] = held ? *slot : (struct slot){.tick_ms = first_ms + tick};
+			join->window[s][tick] = held ? *slot : (struct slot){0};
 			join->missing += !held;
 			join->gaps += before && !held;
 			before = held;
@@ -260,7 +260,7 @@ bool join_next_gap(const struct join *join, unsigned sensor, uint32_t tick_ms, u
 	uint32_t first_ms = join->end.first_tick_ms;
 	uint32_t start = sensor > 0 && (int32_t)(tick_ms - first_ms) > 0 ? tick_ms - first_ms : 0;
 
-	if (!join->has_capture || limit == 0)
+	if (!join->has_capture)
 		return false;
 	for (unsigned s = sensor > 0 ? sensor - 1 : 0; s < WIRE_SENSORS; s++, start = 0) {
 		for (uint32_t tick = start; tick < join->ticks; tick++) {

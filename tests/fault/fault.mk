@@ -56,9 +56,15 @@ mutate: setup-test ## make every small mistake in the heart of the firmware and 
 
 # ---- failing port calls: the test stands between the firmware and the fake port -----------------------------
 
-WRAPPED = port_time_us port_io port_outputs port_off_at port_off_cancel port_can_setup port_can_send \
+WRAPPED = port_time_us port_io port_bias_high port_outputs port_off_at port_off_cancel port_can_setup port_can_send \
 	port_can_receive port_can_errors port_watchdog_kick command_handle
 $(BUILD)/tests/test_port_faults: LDFLAGS += $(WRAPPED:%=-Wl,--wrap=%)
+
+# ---- failing system calls: the test stands between the links and the C library -------------------------------
+
+WRAPPED_LINK = calloc malloc strdup fopen poll epoll_create1 epoll_ctl epoll_wait eventfd fstat stat lstat flock dup \
+	socket bind listen connect accept4 send recv read write tcgetattr tcsetattr tcflush open
+$(BUILD)/tests/test_link_faults: LDFLAGS += $(WRAPPED_LINK:%=-Wl,--wrap=%)
 
 # ---- canaries: what must be caught, built exactly as the unit tests are ------------------------------------
 

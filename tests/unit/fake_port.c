@@ -70,6 +70,11 @@ uint16_t port_io(void)
 	return fake.inputs | fake.outputs;
 }
 
+uint16_t port_bias_high(void)
+{
+	return fake.bias_high;
+}
+
 void port_outputs(uint16_t on, uint16_t off)
 {
 	if (on & off)

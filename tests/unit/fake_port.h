@@ -22,6 +22,7 @@ enum {
 struct fake_port {
 	uint32_t now_us;
 	uint16_t inputs, outputs;
+	uint16_t bias_high;
 	uint16_t planned;    /* outputs with an edge to come */
 	uint32_t off_us[16]; /* when it comes, or came; by bit */
 	struct frame sent[FAKE_SENT_MAX];

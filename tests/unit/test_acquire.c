@@ -22,13 +22,21 @@ static int begin(void **state)
 	memset(counters, 0, sizeof(counters));
 	parameters_init(&parameters);
 	acquire_init(&acquire, &parameters, counters);
-	return 0;
+	acquire_turn(&acquire);
+	return acquire_close(&acquire) == 1 ? 0 : -1;
 }
 
 static void open_tick(uint32_t tick_ms)
 {
 	acquire_open(&acquire,
 	             &(struct acquire_head){.tick_ms = tick_ms, .drop_id = 3, .io = 0x7234, .state = 5});
+}
+
+/* The next millisecond begins. */
+static void close_tick(void)
+{
+	acquire_turn(&acquire);
+	assert_int_equal(acquire_close(&acquire), 1);
 }
 
 static void give_x(int16_t s1, int16_t s2)
@@ -59,7 +67,7 @@ static void samples_keep_their_places(void **state)
 	open_tick(77);
 	fill_tick(7, 10);
 	assert_int_equal(acquire_take(&acquire, &tick), DT_E_EMPTY); /* not before it is closed */
-	acquire_close(&acquire);
+	close_tick();
 	assert_int_equal(acquire_take(&acquire, &tick), 0);
 	assert_int_equal(tick.tick_ms, 77);
 	assert_int_equal(tick.drop_id, 3);
@@ -87,7 +95,7 @@ static void missing_samples_are_marked_and_counted(void **state)
 	acquire_x(&acquire, (const int16_t[]){1, 2}, false);
 	acquire_yz(&acquire, (const int16_t[]){1, 2}, (const int16_t[]){3, 4}, false);
 	give_x(55, 66);
-	acquire_close(&acquire);
+	close_tick();
 	assert_int_equal(acquire_take(&acquire, &tick), 0);
 	assert_int_equal(tick.sensor[1].x[2], 402);
 	assert_int_equal(tick.sensor[1].x[3], WIRE_SAMPLE_NOT_TAKEN);
@@ -103,7 +111,7 @@ static void missing_samples_are_marked_and_counted(void **state)
 	assert_int_equal(counters[WIRE_COUNTER_samples_overrun], 3 * 2 + 6 * 4);
 	open_tick(2); /* one sample too many changes nothing */
 	fill_tick(8, 11);
-	acquire_close(&acquire);
+	close_tick();
 	assert_int_equal(acquire_take(&acquire, &tick), 0);
 	assert_int_equal(tick.sensor[0].x[6], 106);
 	assert_int_equal(tick.sensor[0].y[0], 200);
@@ -120,7 +128,7 @@ static void clipping_is_marked_per_axis_and_sensor(void **state)
 		give_x(16000, k == 3 ? -16001 : 0); /* range: 16000 itself is inside */
 	for (unsigned k = 0; k < 10; k++)
 		give_yz(k == 0 ? 32767 : 0, 0, 0, k == 9 ? -32768 : 0);
-	acquire_close(&acquire);
+	close_tick();
 	assert_int_equal(acquire_take(&acquire, &tick), 0);
 	assert_int_equal(tick.status[0], 5 | WIRE_STATUS_CLIP_Y);
 	assert_int_equal(tick.status[1], 5 | WIRE_STATUS_CLIP_X | WIRE_STATUS_CLIP_Z);
@@ -141,7 +149,7 @@ static void lost_bias_is_marked(void **state)
 	for (size_t i = 0; i < sizeof(lost) / sizeof(lost[0]); i++) {
 		acquire_open(&acquire, &(struct acquire_head){.io = (uint16_t)(0x7FFF & ~lost[i])});
 		fill_tick(7, 10);
-		acquire_close(&acquire);
+		close_tick();
 		assert_int_equal(acquire_take(&acquire, &tick), 0);
 		assert_int_equal(tick.marks, lost[i] ? WIRE_MARK_CABLE : 0);
 	}
@@ -154,7 +162,7 @@ static void channels_by_number(void **state)
 	(void)state;
 	open_tick(1);
 	fill_tick(7, 10);
-	acquire_close(&acquire);
+	close_tick();
 	assert_int_equal(acquire_take(&acquire, &tick), 0);
 	for (unsigned channel = 0; channel < 6; channel++) {
 		unsigned count = 0;
@@ -185,7 +193,7 @@ static void clocks_must_be_seven_to_ten(void **state)
 
 			open_tick(t);
 			fill_tick(last ? runs[i].x - 693 : 7, last ? runs[i].yz - 990 : 10);
-			acquire_close(&acquire);
+			close_tick();
 			assert_int_equal(acquire_take(&acquire, &tick), 0);
 		}
 		assert_int_equal(acquire.clocks_good, runs[i].good);
@@ -200,7 +208,7 @@ static void full_queue_is_counted(void **state)
 	for (unsigned t = 0; t < ACQUIRE_QUEUE + 2; t++) {
 		open_tick(t);
 		fill_tick(7, 10);
-		acquire_close(&acquire);
+		close_tick();
 	}
 	assert_int_equal(counters[WIRE_COUNTER_samples_overrun], 2 * 54);
 	for (unsigned t = 0; t < ACQUIRE_QUEUE; t++) {
@@ -208,6 +216,116 @@ static void full_queue_is_counted(void **state)
 		assert_int_equal(tick.tick_ms, t);
 	}
 	assert_int_equal(acquire_take(&acquire, &tick), DT_E_EMPTY);
+}
+
+/* The samples go on while control has the millisecond before, and a call without a turn does nothing. */
+static void pages_are_apart(void **state)
+{
+	struct acquire_tick tick;
+
+	(void)state;
+	open_tick(1);
+	fill_tick(7, 10);
+	acquire_turn(&acquire);
+	give_x(-1, -2); /* of the next, before control has looked */
+	give_yz(-3, -4, -5, -6);
+	assert_int_equal(acquire_close(&acquire), 1);
+	open_tick(2);
+	assert_int_equal(acquire_close(&acquire), 0);
+	for (unsigned k = 1; k < 10; k++) {
+		if (k < 7)
+			give_x(-1, -2);
+		give_yz(-3, -4, -5, -6);
+	}
+	close_tick();
+	assert_int_equal(acquire_take(&acquire, &tick), 0);
+	assert_int_equal(tick.tick_ms, 1);
+	assert_int_equal(tick.marks, 0);
+	assert_int_equal(tick.sensor[0].x[0], 100);
+	assert_int_equal(tick.sensor[1].z[0], 600);
+	assert_int_equal(acquire_take(&acquire, &tick), 0);
+	assert_int_equal(tick.tick_ms, 2);
+	assert_int_equal(tick.marks, 0);
+	assert_int_equal(tick.sensor[1].x[0], -2);
+	assert_int_equal(tick.sensor[0].y[9], -3);
+	assert_int_equal(acquire_take(&acquire, &tick), DT_E_EMPTY);
+	assert_int_equal(counters[WIRE_COUNTER_samples_overrun], 0);
+}
+
+/* Control comes two milliseconds late: the first is whole, the second is lost and counted, the third goes on.
+ */
+static void late_control_is_counted(void **state)
+{
+	struct acquire_tick tick;
+
+	(void)state;
+	open_tick(1);
+	fill_tick(7, 10);
+	acquire_turn(&acquire);
+	fill_tick(6, 9);
+	acquire_turn(&acquire);
+	give_x(-1, -2);
+	give_yz(-3, -4, -5, -6);
+	assert_int_equal(acquire_close(&acquire), 2);
+	assert_int_equal(counters[WIRE_COUNTER_samples_overrun], 54);
+	open_tick(3);
+	for (unsigned k = 1; k < 10; k++) {
+		if (k < 7)
+			give_x(-1, -2);
+		give_yz(-3, -4, -5, -6);
+	}
+	close_tick();
+	assert_int_equal(acquire_take(&acquire, &tick), 0);
+	assert_int_equal(tick.tick_ms, 1);
+	assert_int_equal(tick.marks, 0);
+	assert_int_equal(tick.sensor[0].x[6], 106);
+	assert_int_equal(acquire_take(&acquire, &tick), 0);
+	assert_int_equal(tick.tick_ms, 3);
+	assert_int_equal(tick.marks, 0);
+	assert_int_equal(tick.sensor[0].x[0], -1);
+	assert_int_equal(tick.sensor[1].z[9], -6);
+	assert_int_equal(acquire_take(&acquire, &tick), DT_E_EMPTY);
+	assert_int_equal(counters[WIRE_COUNTER_samples_overrun], 54);
+}
+
+/* What comes before the first millisecond belongs to none. */
+static void before_the_first_turn_nothing_counts(void **state)
+{
+	struct acquire_tick tick;
+
+	(void)state;
+	acquire_init(&acquire, &parameters, counters);
+	assert_int_equal(acquire_close(&acquire), 0);
+	fill_tick(5, 5);
+	close_tick();
+	open_tick(0);
+	assert_int_equal(acquire_take(&acquire, &tick), DT_E_EMPTY);
+	fill_tick(7, 10);
+	close_tick();
+	assert_int_equal(acquire_take(&acquire, &tick), 0);
+	assert_int_equal(tick.tick_ms, 0);
+	assert_int_equal(tick.marks, 0);
+	assert_int_equal(counters[WIRE_COUNTER_samples_overrun], 0);
+}
+
+/* With the widest range a sample at full scale is not beyond it, and told all the same. */
+static void full_scale_inside_the_range(void **state)
+{
+	struct acquire_tick tick;
+
+	(void)state;
+	parameters.value[WIRE_PARAMETER_range_counts] = 32767;
+	open_tick(1);
+	for (unsigned k = 0; k < 7; k++)
+		give_x(k == 6 ? 32767 : 32766, -32766);
+	for (unsigned k = 0; k < 10; k++)
+		give_yz(0, 0, 0, 0);
+	close_tick();
+	assert_int_equal(acquire_take(&acquire, &tick), 0);
+	assert_int_equal(tick.marks, WIRE_MARK_FULL_SCALE);
+	assert_int_equal(tick.status[0], 5);
+	assert_int_equal(counters[WIRE_COUNTER_samples_clipped], 0);
+	assert_int_equal(counters[WIRE_COUNTER_samples_full_scale], 1);
 }
 
 static void block_has_the_bytes_of_the_wire(void **state)
@@ -222,7 +340,7 @@ static void block_has_the_bytes_of_the_wire(void **state)
 		give_x(0, (int16_t)(0x1100 + k));
 	for (int k = 0; k < 10; k++)
 		give_yz(0, 0, (int16_t)(0x2200 + k), (int16_t)(-1 - k));
-	acquire_close(&acquire);
+	close_tick();
 	assert_int_equal(acquire_take(&acquire, &tick), 0);
 	acquire_pack(&tick, 1, WIRE_ID_RESENT_S2, &frame);
 	assert_int_equal(frame.id, 0x481);
@@ -251,6 +369,10 @@ int main(void)
 	        cmocka_unit_test_setup(channels_by_number, begin),
 	        cmocka_unit_test_setup(clocks_must_be_seven_to_ten, begin),
 	        cmocka_unit_test_setup(full_queue_is_counted, begin),
+	        cmocka_unit_test_setup(pages_are_apart, begin),
+	        cmocka_unit_test_setup(late_control_is_counted, begin),
+	        cmocka_unit_test_setup(before_the_first_turn_nothing_counts, begin),
+	        cmocka_unit_test_setup(full_scale_inside_the_range, begin),
 	        cmocka_unit_test_setup(block_has_the_bytes_of_the_wire, begin),
 	};
 

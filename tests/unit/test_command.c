@@ -53,6 +53,7 @@ static void run_ms(void)
 	fake_time(next_ms * 1000);
 	if (host_alive && next_ms % 100 == 10)
 		host_beat();
+	app_on_turn();
 	app_on_tick();
 	for (int k = 0; k < 10; k++) {
 		int16_t noise = (int16_t)(next_ms + (uint32_t)k) & 1;
@@ -239,6 +240,50 @@ static void boots_to_ready(void **state)
 	assert_int_equal(status().checks, 0);
 }
 
+/* Which sensor, which fault: in the status, and in the reply to the ARM that is refused for it. */
+static void a_cable_is_told_as_open_or_short(void **state)
+{
+	struct wire_reply reply;
+
+	(void)state;
+	to_ready();
+	fake.inputs &= (uint16_t)~WIRE_IO_IEPE_S1;
+	run(2);
+	assert_int_equal(status().state, WIRE_STATE_SAFE);
+	assert_int_equal(status().checks, WIRE_CHECK_SHORT_S1);
+	fake.bias_high = WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2;
+	assert_int_equal(status().checks, WIRE_CHECK_OPEN_S1);
+	reply = order(WIRE_OP_ARM, TOKEN, 0);
+	assert_int_equal(reply.result, DT_E_CHECKS);
+	assert_int_equal(reply.checks, WIRE_CHECK_OPEN_S1);
+	fake.inputs = FAKE_ALL_GOOD;
+	run(2);
+	assert_int_equal(status().checks, 0);
+}
+
+/* Control that is asked for without a millisecond, or three milliseconds late. */
+static void ticks_are_milliseconds(void **state)
+{
+	struct wire_block block;
+
+	(void)state;
+	to_ready();
+	run(1);
+	app_on_tick();
+	app_on_tick();
+	forget_frames();
+	run(2);
+	assert_int_equal(wire_unpack_block(last(WIRE_ID_BLOCK_S1), &block), 0);
+	assert_int_equal(block.tick_ms, next_ms - 2); /* the last is open */
+	for (unsigned ms = 0; ms < 2; ms++)
+		app_on_turn();
+	next_ms += 2;
+	run(2);
+	assert_int_equal(wire_unpack_block(last(WIRE_ID_BLOCK_S1), &block), 0);
+	assert_int_equal(block.tick_ms, next_ms - 2);
+	assert_int_equal(counter(WIRE_COUNTER_samples_overrun), 2 * 54);
+}
+
 static void beats_are_regular(void **state)
 {
 	struct wire_heartbeat beat;
@@ -278,8 +323,10 @@ static void sync_counter_goes_from_1_to_240(void **state)
 	power_on(PORT_RESET_POWER_ON);
 	for (unsigned second = 0; second < 242; second++) {
 		/* one poll a second is enough to see it, and counts as late */
-		for (unsigned ms = 0; ms < 1000; ms++)
+		for (unsigned ms = 0; ms < 1000; ms++) {
+			app_on_turn();
 			app_on_tick();
+		}
 		forget_frames();
 		app_poll();
 		assert_int_equal(wire_unpack_sync(last(WIRE_ID_SYNC), &sync), 0);
@@ -785,6 +832,7 @@ static void late_main_loses_nothing_in_the_capture(void **state)
 	s2x = 0;
 	for (unsigned ms = 0; ms < 40; ms++) { /* main stands still for 40 ms: the queue holds 16 */
 		fake_time(next_ms * 1000);
+		app_on_turn();
 		app_on_tick();
 		for (unsigned k = 0; k < 10; k++) {
 			if (k < 7)
@@ -1032,6 +1080,7 @@ static void window_of_a_drop_that_was_none_is_thrown_away(void **state)
 	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
 	for (int16_t ms = 0; ms < 14; ms++) {
 		fake_time(next_ms++ * 1000);
+		app_on_turn();
 		app_on_tick();
 		for (int16_t k = 0; k < 10; k++) {
 			if (k < 7)
@@ -1136,6 +1185,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(boots_to_ready),
+	        cmocka_unit_test(a_cable_is_told_as_open_or_short),
+	        cmocka_unit_test(ticks_are_milliseconds),
 	        cmocka_unit_test(beats_are_regular),
 	        cmocka_unit_test(sync_counter_goes_from_1_to_240),
 	        cmocka_unit_test(live_blocks_in_every_tick),

@@ -33,6 +33,7 @@ static void run_ms(void)
 		                    &(struct wire_heartbeat){.nmt_state = 5, .wire_hash = wire_hash()});
 		give(frame);
 	}
+	app_on_turn();
 	app_on_tick();
 	for (int k = 0; k < 10; k++) {
 		if (k < 7)

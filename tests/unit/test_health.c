@@ -45,7 +45,7 @@ static uint16_t after_window(unsigned channel, int offset, int swing)
 			*at(&tick, channel, k) = (int16_t)(offset + (n++ % 2 ? swing : -swing));
 		health_samples(&health, &tick);
 	}
-	return health_checks(&health, FAKE_ALL_GOOD) & (WIRE_CHECK_SENSOR_S1 | WIRE_CHECK_SENSOR_S2);
+	return health_checks(&health, FAKE_ALL_GOOD, 0) & (WIRE_CHECK_SENSOR_S1 | WIRE_CHECK_SENSOR_S2);
 }
 
 static void sensors_are_red_until_seen(void **state)
@@ -55,10 +55,10 @@ static void sensors_are_red_until_seen(void **state)
 	(void)state;
 	for (unsigned t = 0; t < 99; t++)
 		health_samples(&health, &tick);
-	assert_true(health_checks(&health, FAKE_ALL_GOOD) & WIRE_CHECK_SENSOR_S1);
-	assert_true(health_checks(&health, FAKE_ALL_GOOD) & WIRE_CHECK_SENSOR_S2);
+	assert_true(health_checks(&health, FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S1);
+	assert_true(health_checks(&health, FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S2);
 	health_samples(&health, &tick);
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), WIRE_CHECK_HOST);
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), WIRE_CHECK_HOST);
 }
 
 static void offset_and_noise_of_each_axis(void **state)
@@ -90,7 +90,7 @@ static void absent_samples_make_a_sensor_red(void **state)
 				*at(&tick, 5, k) = WIRE_SAMPLE_NOT_TAKEN;
 			health_samples(&health, &tick);
 		}
-		assert_int_equal((health_checks(&health, FAKE_ALL_GOOD) & WIRE_CHECK_SENSOR_S2) != 0,
+		assert_int_equal((health_checks(&health, FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S2) != 0,
 		                 missing > 5);
 	}
 }
@@ -103,7 +103,7 @@ static void each_input_has_its_check(void **state)
 	        {WIRE_IO_LATCH_CLOSED, WIRE_CHECK_LATCH},      {WIRE_IO_PRODUCT_HELD, WIRE_CHECK_PRODUCT},
 	        {WIRE_IO_DAMPERS_ENGAGED, WIRE_CHECK_DAMPERS}, {WIRE_IO_DOOR_CLOSED, WIRE_CHECK_DOOR},
 	        {WIRE_IO_ESTOP_CLEAR, WIRE_CHECK_ESTOP},       {WIRE_IO_SUPPLY_GOOD, WIRE_CHECK_SUPPLY},
-	        {WIRE_IO_IEPE_S1, WIRE_CHECK_SENSOR_S1},       {WIRE_IO_IEPE_S2, WIRE_CHECK_SENSOR_S2},
+	        {WIRE_IO_IEPE_S1, WIRE_CHECK_SHORT_S1},        {WIRE_IO_IEPE_S2, WIRE_CHECK_SHORT_S2},
 	        {WIRE_IO_GATE_UPPER, WIRE_CHECK_GATES},        {WIRE_IO_GATE_LOWER, WIRE_CHECK_GATES},
 	        {WIRE_IO_FRAME_DOWN, WIRE_CHECK_LATCH},
 	};
@@ -111,9 +111,36 @@ static void each_input_has_its_check(void **state)
 	(void)state;
 	assert_int_equal(after_window(0, 0, 0), 0);
 	health_host(&health, 0, wire_hash());
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), 0);
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), 0);
 	for (size_t i = 0; i < sizeof(pairs) / sizeof(pairs[0]); i++)
-		assert_int_equal(health_checks(&health, FAKE_ALL_GOOD ^ pairs[i].input), pairs[i].check);
+		assert_int_equal(health_checks(&health, FAKE_ALL_GOOD ^ pairs[i].input, 0), pairs[i].check);
+}
+
+/* Which sensor by the input, which fault by the level. */
+static void open_and_short_are_told_apart(void **state)
+{
+	const uint16_t s1 = WIRE_IO_IEPE_S1, s2 = WIRE_IO_IEPE_S2;
+	const struct {
+		uint16_t lost, high, checks;
+	} cables[] = {
+	        {0, 0, 0},
+	        {0, s1 | s2, 0}, /* in their windows again */
+	        {s1, 0, WIRE_CHECK_SHORT_S1},
+	        {s1, s2, WIRE_CHECK_SHORT_S1},
+	        {s1, s1, WIRE_CHECK_OPEN_S1},
+	        {s2, 0, WIRE_CHECK_SHORT_S2},
+	        {s2, s2, WIRE_CHECK_OPEN_S2},
+	        {s1 | s2, s1, WIRE_CHECK_OPEN_S1 | WIRE_CHECK_SHORT_S2},
+	        {s1 | s2, s2, WIRE_CHECK_SHORT_S1 | WIRE_CHECK_OPEN_S2},
+	};
+
+	(void)state;
+	assert_int_equal(after_window(0, 0, 0), 0);
+	health_host(&health, 0, wire_hash());
+	for (size_t i = 0; i < sizeof(cables) / sizeof(cables[0]); i++)
+		assert_int_equal(
+		        health_checks(&health, (uint16_t)(FAKE_ALL_GOOD & ~cables[i].lost), cables[i].high),
+		        cables[i].checks);
 }
 
 static void host_must_beat_and_have_our_hash(void **state)
@@ -124,15 +151,15 @@ static void host_must_beat_and_have_our_hash(void **state)
 	assert_int_equal(counters[WIRE_COUNTER_host_heartbeats_lost], 0); /* never was there */
 	health_host(&health, 5000, wire_hash());
 	health_tick(&health, 5500);
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), 0);
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), 0);
 	health_tick(&health, 5501);
 	health_tick(&health, 5502);
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), WIRE_CHECK_HOST);
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), WIRE_CHECK_HOST);
 	assert_int_equal(counters[WIRE_COUNTER_host_heartbeats_lost], 1);
 	health_host(&health, 5600, wire_hash() ^ 1);
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), WIRE_CHECK_HOST);
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), WIRE_CHECK_HOST);
 	health_host(&health, 5601, wire_hash());
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD), 0);
+	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), 0);
 }
 
 /* 100 ticks at rest with one S2 sample of a code. */
@@ -145,7 +172,7 @@ static bool trigger_is_red(unsigned channel, unsigned k, int16_t code, unsigned 
 			*at(&tick, channel, k) = code;
 		health_samples(&health, &tick);
 	}
-	return (health_checks(&health, FAKE_ALL_GOOD) & WIRE_CHECK_TRIGGER) != 0;
+	return (health_checks(&health, FAKE_ALL_GOOD, 0) & WIRE_CHECK_TRIGGER) != 0;
 }
 
 static void trigger_must_be_quiet_at_rest(void **state)
@@ -228,6 +255,7 @@ int main(void)
 	        cmocka_unit_test_setup(offset_and_noise_of_each_axis, begin),
 	        cmocka_unit_test_setup(absent_samples_make_a_sensor_red, begin),
 	        cmocka_unit_test_setup(each_input_has_its_check, begin),
+	        cmocka_unit_test_setup(open_and_short_are_told_apart, begin),
 	        cmocka_unit_test_setup(host_must_beat_and_have_our_hash, begin),
 	        cmocka_unit_test_setup(trigger_must_be_quiet_at_rest, begin),
 	        cmocka_unit_test_setup(zero_is_the_offset_of_the_last_window_at_rest, begin),

@@ -9,48 +9,7 @@
 #include <string.h>
 
 #include "host/record/join.h"
-#include "tests/unit/drop_by_hand.h"
-
-static struct hand_drop drop; /* too large for the stack */
-static struct join *join;
-
-static int setup(void **state)
-{
-	(void)state;
-	join = join_create();
-	return join ? 0 : -1;
-}
-
-static int teardown(void **state)
-{
-	(void)state;
-	join_destroy(join);
-	return 0;
-}
-
-static void feed(unsigned sensor, uint32_t tick, bool resent)
-{
-	struct frame frame;
-
-	hand_block(&drop, sensor, tick, resent, &frame);
-	assert_int_equal(join_feed(join, &frame), 0);
-}
-
-static void feed_both(uint32_t first, uint32_t last)
-{
-	for (uint32_t tick = first; tick <= last; tick++) {
-		feed(1, tick, false);
-		feed(2, tick, false);
-	}
-}
-
-static int feed_end(void)
-{
-	struct frame frame;
-
-	hand_capture_end(&drop, &frame);
-	return join_feed(join, &frame);
-}
+#include "tests/unit/join_by_hand.h"
 
 static struct record take(void)
 {
@@ -83,9 +42,9 @@ static void test_a_lossless_drop(void **state)
 	(void)state;
 	hand_fill(&drop, 5000, 500, 1);
 	assert_int_equal(join_take(join, &record), DT_E_EMPTY);
-	feed_both(0, 499);
+	join_by_hand_feed_both(0, 499);
 	assert_false(join_has_capture(join));
-	assert_int_equal(feed_end(), 1);
+	assert_int_equal(join_by_hand_feed_end(), 1);
 	assert_true(join_has_capture(join) && join_complete(join));
 	assert_int_equal(join_crc32(join), hand_drop_crc32(&drop));
 	record = take();
@@ -117,7 +76,7 @@ static int feed_segments(const struct frame *whole, unsigned lost)
 		for (unsigned k = 0; k < 7 && 7 * i + k < whole->length; k++)
 			segment.data[1 + k] = whole->data[7 * i + k];
 		if (i != lost)
-			result = join_feed(join, &segment);
+			result |= join_feed(join, &segment);
 	}
 	return result;
 }
@@ -166,8 +125,8 @@ static void test_marks_and_marked_samples(void **state)
 	drop.sample[0][4][7] = 16001;  /* S1Y beyond the range, but not 16000 */
 	drop.sample[0][4][8] = 16000;
 	drop.sample[1][19][26] = -32767; /* the last of S2Z, full scale */
-	feed_both(0, 19);
-	feed_end();
+	join_by_hand_feed_both(0, 19);
+	join_by_hand_feed_end();
 	assert_true(join_complete(join));
 	record = take();
 	hand_check_samples(&record, &drop, NULL);
@@ -320,7 +279,7 @@ static uint64_t serve_gaps(uint32_t limit)
 	while (join_next_gap(join, 0, 0, limit, &gap)) {
 		assert_true(gap.last_tick_ms - gap.first_tick_ms < limit);
 		for (uint32_t tick = gap.first_tick_ms; tick != gap.last_tick_ms + 1; tick++) {
-			feed(gap.sensor, tick - drop.first_tick_ms, true);
+			join_by_hand_feed(gap.sensor, tick - drop.first_tick_ms, true);
 			sent++;
 		}
 	}
@@ -336,7 +295,7 @@ static void test_random_losses_are_counted_and_recovered(void **state)
 
 		for (size_t i = 0; i < plan.count; i++)
 			assert_int_equal(join_feed(join, &plan.frames[i]), 0);
-		assert_int_equal(feed_end(), 1);
+		assert_int_equal(join_by_hand_feed_end(), 1);
 		assert_false(join_complete(join));
 		plan.expected.resent = serve_gaps(1 + (uint32_t)seed % 7);
 		assert_int_equal(plan.expected.resent, 1000 - plan.expected.blocks);
@@ -368,7 +327,7 @@ static void test_what_stays_missing_is_listed(void **state)
 	(void)state;
 	for (size_t i = 0; i < plan.count; i++)
 		assert_int_equal(join_feed(join, &plan.frames[i]), 0);
-	feed_end();
+	join_by_hand_feed_end();
 	record = take();
 	hand_check_samples(&record, &drop, plan.held);
 	check_counters(&record, plan.expected);
@@ -401,11 +360,11 @@ static void test_gaps_in_order_and_in_pieces(void **state)
 	assert_false(join_next_gap(join, 0, 0, 10, &gap));
 	for (uint32_t tick = 0; tick < 100; tick++) {
 		if (tick < 20 || tick > 44) /* S1 lacks 1020 to 1044 */
-			feed(1, tick, false);
+			join_by_hand_feed(1, tick, false);
 		if (tick != 0 && tick != 99) /* S2 its first and last */
-			feed(2, tick, false);
+			join_by_hand_feed(2, tick, false);
 	}
-	feed_end();
+	join_by_hand_feed_end();
 	check_next(0, 0, 100, (struct record_gap){1, 1020, 1044});
 	check_next(1, 500, 10, (struct record_gap){1, 1020, 1029});
 	check_next(1, 1030, 10, (struct record_gap){1, 1030, 1039});
@@ -425,7 +384,7 @@ static void test_forget_asks_for_everything(void **state)
 	(void)state;
 	hand_fill(&drop, 1000, 50, 4);
 	for (uint32_t tick = 0; tick < 50; tick++) {
-		feed(1, tick, false);
+		join_by_hand_feed(1, tick, false);
 		hand_block(&drop, 2, tick, false, &frame);
 		if (tick == 30) { /* slips through its CRC-8 */
 			frame.data[40] ^= 0x10;
@@ -434,7 +393,7 @@ static void test_forget_asks_for_everything(void **state)
 		if (tick != 31)
 			join_feed(join, &frame);
 	}
-	feed_end();
+	join_by_hand_feed_end();
 	assert_false(join_complete(join));
 	assert_int_equal(serve_gaps(10), 1);
 	assert_false(join_complete(join));
@@ -461,11 +420,11 @@ static void test_zeros_are_not_missing(void **state)
 	hand_fill(&drop, 1000, 50, 20);
 	memset(drop.sample[1][7], 0, sizeof(drop.sample[1][7]));
 	for (uint32_t tick = 0; tick < 50; tick++) {
-		feed(1, tick, false);
+		join_by_hand_feed(1, tick, false);
 		if (tick != 7)
-			feed(2, tick, false);
+			join_by_hand_feed(2, tick, false);
 	}
-	feed_end();
+	join_by_hand_feed_end();
 	assert_int_equal(join_crc32(join), hand_drop_crc32(&drop));
 	assert_false(join_complete(join));
 	record = take();
@@ -481,12 +440,12 @@ static void test_late_blocks(void **state)
 
 	(void)state;
 	hand_fill(&drop, 1000, 50, 5);
-	feed_both(0, 48);
-	feed(2, 49, false);
-	feed_end();
-	feed(2, 10, true);
+	join_by_hand_feed_both(0, 48);
+	join_by_hand_feed(2, 49, false);
+	join_by_hand_feed_end();
+	join_by_hand_feed(2, 10, true);
 	assert_false(join_complete(join));
-	feed(1, 49, false);
+	join_by_hand_feed(1, 49, false);
 	assert_true(join_complete(join));
 	record = take();
 	check_counters(&record,
@@ -502,12 +461,12 @@ static void test_a_capture_end_repeated_is_no_news(void **state)
 
 	(void)state;
 	hand_fill(&drop, 1000, 50, 6);
-	feed_both(0, 49);
-	assert_int_equal(feed_end(), 1);
-	assert_int_equal(feed_end(), 0);
+	join_by_hand_feed_both(0, 49);
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	assert_int_equal(join_by_hand_feed_end(), 0);
 	record = take();
 	record_free(&record);
-	assert_int_equal(feed_end(), 0); /* also after it was taken */
+	assert_int_equal(join_by_hand_feed_end(), 0); /* also after it was taken */
 	assert_false(join_has_capture(join));
 }
 
@@ -517,12 +476,12 @@ static void test_the_next_drop(void **state)
 
 	(void)state;
 	hand_fill(&drop, 1000, 50, 7);
-	feed_both(0, 40);
-	assert_int_equal(feed_end(), 1); /* incomplete, and not taken */
+	join_by_hand_feed_both(0, 40);
+	assert_int_equal(join_by_hand_feed_end(), 1); /* incomplete, and not taken */
 	hand_fill(&drop, 1100, 50, 8);
 	drop.drop_id = 4;
-	feed_both(0, 49);
-	assert_int_equal(feed_end(), 1);
+	join_by_hand_feed_both(0, 49);
+	assert_int_equal(join_by_hand_feed_end(), 1);
 	assert_true(join_complete(join));
 	record = take();
 	hand_check_samples(&record, &drop, NULL);
@@ -539,11 +498,11 @@ static void test_a_capture_outlives_the_ring(void **state)
 	(void)state;
 	hand_fill(&first, 1000, 50, 9);
 	drop = first;
-	feed_both(0, 49);
-	feed_end();
+	join_by_hand_feed_both(0, 49);
+	join_by_hand_feed_end();
 	for (uint32_t k = 0; k < 5; k++) {
 		hand_fill(&drop, 1050 + 1000 * k, 1000, 10);
-		feed_both(0, 999);
+		join_by_hand_feed_both(0, 999);
 	}
 	drop = first;
 	assert_true(join_complete(join));
@@ -563,12 +522,12 @@ static void check_restart(bool boot_message)
 
 	memcpy(heartbeat.data, boot, sizeof(boot));
 	hand_fill(&drop, first_ms, 60, 12);
-	feed_both(0, 59);
+	join_by_hand_feed_both(0, 59);
 	if (boot_message)
 		join_feed(join, &heartbeat);
 	hand_fill(&drop, 0, 40, 13);
-	feed_both(0, 39);
-	feed_end();
+	join_by_hand_feed_both(0, 39);
+	join_by_hand_feed_end();
 	assert_true(join_complete(join));
 	record = take();
 	hand_check_samples(&record, &drop, NULL);
@@ -595,12 +554,12 @@ static void test_a_restart_leaves_the_capture_alone(void **state)
 
 	(void)state;
 	hand_fill(&drop, 3000, 60, 21);
-	feed_both(0, 50);
-	feed_end();
+	join_by_hand_feed_both(0, 50);
+	join_by_hand_feed_end();
 	hand_fill(&drop, 2000, 1024, 22);
-	feed_both(0, 1023); /* goes back, and then over ticks 3000 to 3023 */
+	join_by_hand_feed_both(0, 1023); /* goes back, and then over ticks 3000 to 3023 */
 	hand_fill(&drop, 3024, 60, 23);
-	feed_both(0, 59);
+	join_by_hand_feed_both(0, 59);
 	hand_fill(&drop, 3000, 60, 21);
 	record = take();
 	assert_int_equal(record.gap_count, 2);
@@ -615,14 +574,14 @@ static void test_the_ring_does_not_confuse_ticks(void **state)
 
 	(void)state;
 	hand_fill(&drop, 1000, 50, 24);
-	feed_both(0, 49);
+	join_by_hand_feed_both(0, 49);
 	hand_fill(&drop, 1000 + 2048, 50, 25);
-	feed_both(0, 9);
-	feed_both(20, 49);
+	join_by_hand_feed_both(0, 9);
+	join_by_hand_feed_both(20, 49);
 	hand_fill(&drop, 1000, 50, 24);
-	feed(1, 30, true); /* too old for the ring: must not take the place of tick 3078 */
+	join_by_hand_feed(1, 30, true); /* too old for the ring: must not take the place of tick 3078 */
 	hand_fill(&drop, 1000 + 2048, 50, 25);
-	feed_end();
+	join_by_hand_feed_end();
 	assert_int_equal(serve_gaps(64), 20);
 	assert_true(join_complete(join));
 	record = take();
@@ -638,13 +597,13 @@ static void test_the_same_drop_after_a_restart_is_another(void **state)
 	(void)state;
 	for (uint64_t seed = 1; seed < 3; seed++) {
 		hand_fill(&drop, 400, 60, seed); /* same id, same ticks, other samples */
-		feed_both(0, 59);
-		assert_int_equal(feed_end(), 1);
+		join_by_hand_feed_both(0, 59);
+		assert_int_equal(join_by_hand_feed_end(), 1);
 		record = take();
 		hand_check_samples(&record, &drop, NULL);
 		record_free(&record);
 		hand_fill(&drop, 1000, 2, seed);
-		feed_both(0, 1);
+		join_by_hand_feed_both(0, 1);
 	}
 }
 
@@ -656,8 +615,8 @@ static void test_ticks_wrap(void **state)
 	hand_fill(&drop, UINT32_MAX - 20, 100, 14);
 	for (uint32_t tick = 0; tick < 100; tick++)
 		if (tick < 15 || tick > 30)
-			feed(1, tick, false), feed(2, tick, false);
-	assert_int_equal(feed_end(), 1);
+			join_by_hand_feed(1, tick, false), join_by_hand_feed(2, tick, false);
+	assert_int_equal(join_by_hand_feed_end(), 1);
 	check_next(0, 0, 100, (struct record_gap){1, UINT32_MAX - 5, 9});
 	assert_int_equal(serve_gaps(10), 32);
 	assert_true(join_complete(join));
@@ -677,14 +636,14 @@ static void test_without_a_capture_end(void **state)
 
 	(void)state;
 	hand_fill(&drop, 500, 10, 15); /* a shorter run, a hole, and the longer one */
-	feed_both(0, 9);
+	join_by_hand_feed_both(0, 9);
 	hand_fill(&drop, 700, 300, 16);
 	for (uint32_t tick = 0; tick < 300; tick++) {
 		held[0][tick] = tick < 100 || tick >= 150;
 		held[1][tick] = tick < 100 || tick >= 160;
 		for (unsigned s = 0; s < 2; s++)
 			if (held[s][tick])
-				feed(s + 1, tick, false);
+				join_by_hand_feed(s + 1, tick, false);
 	}
 	record = take();
 	hand_check_samples(&record, &drop, held);
@@ -706,7 +665,7 @@ static void test_other_frames(void **state)
 
 	(void)state;
 	hand_fill(&drop, 1000, 50, 17);
-	feed_both(0, 49);
+	join_by_hand_feed_both(0, 49);
 	for (unsigned flag = FRAME_EXTENDED; flag <= FRAME_ERROR; flag <<= 1) {
 		hand_block(&drop, 1, 0, false, &frame);
 		frame.flags |= (uint8_t)flag;
@@ -721,7 +680,7 @@ static void test_other_frames(void **state)
 	hand_block(&drop, 1, 0, false, &frame);
 	frame.length = 48; /* corrupt */
 	assert_int_equal(join_feed(join, &frame), 0);
-	feed_end();
+	join_by_hand_feed_end();
 	record = take();
 	check_counters(&record, (struct record_counters){.blocks = 100, .corrupt = 1});
 	record_free(&record);
@@ -734,7 +693,7 @@ static void test_impossible_windows(void **state)
 
 	(void)state;
 	hand_fill(&drop, 1000, 50, 18);
-	feed_both(0, 49);
+	join_by_hand_feed_both(0, 49);
 	hand_capture_end(&drop, &frame);
 	frame.data[9] = 0x40; /* last tick: 16 s away */
 	assert_int_equal(join_feed(join, &frame), 0);
@@ -744,7 +703,7 @@ static void test_impossible_windows(void **state)
 	frame.length = 20;
 	assert_int_equal(join_feed(join, &frame), 0);
 	assert_false(join_has_capture(join));
-	assert_int_equal(feed_end(), 1);
+	assert_int_equal(join_by_hand_feed_end(), 1);
 	record = take();
 	assert_int_equal(record.counters.corrupt, 3);
 	record_free(&record);
@@ -756,7 +715,7 @@ static void test_a_capture_without_a_block(void **state)
 
 	(void)state;
 	hand_fill(&drop, 1000, 50, 19);
-	assert_int_equal(feed_end(), 1);
+	assert_int_equal(join_by_hand_feed_end(), 1);
 	assert_int_equal(join_take(join, &record), DT_E_EMPTY);
 	assert_int_equal(serve_gaps(64), 100); /* the host came late: all of it can still be had */
 	assert_true(join_complete(join));
@@ -765,7 +724,7 @@ static void test_a_capture_without_a_block(void **state)
 	record_free(&record);
 }
 
-#define TEST(name) cmocka_unit_test_setup_teardown(name, setup, teardown)
+#define TEST(name) cmocka_unit_test_setup_teardown(name, join_by_hand_begin, join_by_hand_end)
 
 int main(void)
 {

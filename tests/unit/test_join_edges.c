@@ -11,40 +11,7 @@
 #include <string.h>
 
 #include "host/record/join.h"
-#include "tests/unit/drop_by_hand.h"
-
-static struct hand_drop drop; /* too large for the stack */
-static struct join *join;
-
-static int setup(void **state)
-{
-	(void)state;
-	join = join_create();
-	return join ? 0 : -1;
-}
-
-static int teardown(void **state)
-{
-	(void)state;
-	join_destroy(join);
-	return 0;
-}
-
-static void feed(unsigned sensor, uint32_t tick, bool resent)
-{
-	struct frame frame;
-
-	hand_block(&drop, sensor, tick, resent, &frame);
-	assert_int_equal(join_feed(join, &frame), 0);
-}
-
-static void feed_both(uint32_t first, uint32_t last)
-{
-	for (uint32_t tick = first; tick <= last; tick++) {
-		feed(1, tick, false);
-		feed(2, tick, false);
-	}
-}
+#include "tests/unit/join_by_hand.h"
 
 /* One live block of a tick that has nothing to do with the drop's samples. */
 static void feed_at(uint32_t tick_ms)
@@ -52,16 +19,8 @@ static void feed_at(uint32_t tick_ms)
 	uint32_t first_ms = drop.first_tick_ms;
 
 	drop.first_tick_ms = tick_ms;
-	feed(1, 0, false);
+	join_by_hand_feed(1, 0, false);
 	drop.first_tick_ms = first_ms;
-}
-
-static int feed_end(void)
-{
-	struct frame frame;
-
-	hand_capture_end(&drop, &frame);
-	return join_feed(join, &frame);
 }
 
 static void heartbeat(uint8_t nmt_state)
@@ -108,12 +67,12 @@ static void nothing_behind_the_data_tells_a_conflict(void **state)
 
 	(void)state;
 	hand_fill(&drop, 1000, 1, 1);
-	feed_both(0, 0);
+	join_by_hand_feed_both(0, 0);
 	hand_block(&drop, 2, 0, false, &frame);
 	memset((uint8_t *)&frame + offsetof(struct frame, data) + sizeof(frame.data), 0xA5,
 	       sizeof(frame) - offsetof(struct frame, data) - sizeof(frame.data));
 	join_feed(join, &frame);
-	feed_end();
+	join_by_hand_feed_end();
 	record = take();
 	assert_int_equal(record.counters.repeated, 1);
 	assert_int_equal(record.counters.conflicting, 0);
@@ -127,7 +86,7 @@ static void every_sample_byte_tells_a_conflict(void **state)
 
 	(void)state;
 	hand_fill(&drop, 1000, 10, 1);
-	feed_both(0, 9);
+	join_by_hand_feed_both(0, 9);
 	for (unsigned byte = 0; byte < 64; byte++) {
 		if (byte >= 2 && byte < 6)
 			continue; /* the tick: another block */
@@ -138,7 +97,7 @@ static void every_sample_byte_tells_a_conflict(void **state)
 		frame.data[9] = hand_crc8(frame.data, 64, 9);
 		join_feed(join, &frame);
 	}
-	feed_end();
+	join_by_hand_feed_end();
 	record = take();
 	assert_int_equal(record.counters.repeated, 59);
 	assert_int_equal(record.counters.conflicting, 54);
@@ -151,16 +110,16 @@ static void the_oldest_tick_of_the_ring(void **state)
 {
 	(void)state;
 	hand_fill(&drop, 5000, 1, 2);
-	feed_both(0, 0);
+	join_by_hand_feed_both(0, 0);
 	drop.first_tick_ms = 5000 - 2048;
-	feed(1, 0, true);
+	join_by_hand_feed(1, 0, true);
 	drop.first_tick_ms = 5000;
-	assert_int_equal(feed_end(), 1);
+	assert_int_equal(join_by_hand_feed_end(), 1);
 	assert_true(join_complete(join));
 	take_ticks(5000, 5000, 2);
 	drop.first_tick_ms = 5000 - 2047;
-	feed(1, 0, true);
-	assert_int_equal(feed_end(), 1);
+	join_by_hand_feed(1, 0, true);
+	assert_int_equal(join_by_hand_feed_end(), 1);
 	take_ticks(5000 - 2047, 5000 - 2047, 1);
 }
 
@@ -172,12 +131,12 @@ static void overtaken_or_started_again(void **state)
 	(void)state;
 	for (unsigned again = 0; again < 2; again++) {
 		hand_fill(&drop, 1000, 20, 3);
-		feed_both(0, 9);
-		feed(2, 10, false);
-		feed_both(11, 19);
+		join_by_hand_feed_both(0, 9);
+		join_by_hand_feed(2, 10, false);
+		join_by_hand_feed_both(11, 19);
 		feed_at(1110 + again);
-		feed(1, 10, false);
-		feed_end();
+		join_by_hand_feed(1, 10, false);
+		join_by_hand_feed_end();
 		assert_int_equal(join_complete(join), !again);
 		record = take();
 		assert_int_equal(record.counters.blocks, again ? 1 : 40);
@@ -192,11 +151,11 @@ static void a_live_block_after_the_capture_end(void **state)
 {
 	(void)state;
 	hand_fill(&drop, 1000, 20, 4);
-	feed_both(0, 18);
-	feed(1, 19, false);
-	feed_end();
+	join_by_hand_feed_both(0, 18);
+	join_by_hand_feed(1, 19, false);
+	join_by_hand_feed_end();
 	feed_at(1119);
-	feed(2, 19, false);
+	join_by_hand_feed(2, 19, false);
 	assert_true(join_complete(join));
 }
 
@@ -205,16 +164,16 @@ static void neighbours_stay_out_of_the_window(void **state)
 {
 	(void)state;
 	hand_fill(&drop, 1000, 20, 5);
-	feed_both(1, 18);
-	feed(1, 0, false);
-	feed(2, 19, false);
-	feed_end();
+	join_by_hand_feed_both(1, 18);
+	join_by_hand_feed(1, 0, false);
+	join_by_hand_feed(2, 19, false);
+	join_by_hand_feed_end();
 	feed_at(1020);
 	feed_at(1021);
 	feed_at(999);
 	first_gap(1, 1019, 1019);
-	feed(1, 19, true);
-	feed(2, 0, true);
+	join_by_hand_feed(1, 19, true);
+	join_by_hand_feed(2, 0, true);
 	assert_true(join_complete(join));
 }
 
@@ -223,17 +182,17 @@ static void ticks_come_round(void **state)
 {
 	(void)state;
 	hand_fill(&drop, 1000, 20, 6);
-	feed_both(0, 18);
-	feed_end();
+	join_by_hand_feed_both(0, 18);
+	join_by_hand_feed_end();
 	feed_at(1000 + 0x40000000);
 	feed_at(1000 + 0x80000000);
 	feed_at(1000 + 0xC0000000);
 	feed_at(990);
-	feed(1, 19, false);
-	feed(2, 19, false);
+	join_by_hand_feed(1, 19, false);
+	join_by_hand_feed(2, 19, false);
 	first_gap(1, 1019, 1019);
-	feed(1, 19, true);
-	feed(2, 19, true);
+	join_by_hand_feed(1, 19, true);
+	join_by_hand_feed(2, 19, true);
 	assert_true(join_complete(join));
 }
 
@@ -245,14 +204,14 @@ static void live_blocks_belong_to_a_window_for_100_ticks(void **state)
 	for (uint32_t after = 100; after <= 101; after++) {
 		hand_fill(&drop, 1000, 20, 7);
 		drop.drop_id = (uint16_t)after;
-		feed_both(0, 18);
-		feed(2, 19, false);
-		feed_end();
+		join_by_hand_feed_both(0, 18);
+		join_by_hand_feed(2, 19, false);
+		join_by_hand_feed_end();
 		feed_at(1019 + after);
 		feed_at(1019 + 0x80000000 + 50);
 		feed_at(1019 + 0xC0000000);
 		feed_at(990);
-		feed(1, 19, false);
+		join_by_hand_feed(1, 19, false);
 		assert_int_equal(join_complete(join), after == 100);
 		heartbeat(0);
 	}
@@ -262,13 +221,13 @@ static void a_restart_between_capture_end_and_blocks(void **state)
 {
 	(void)state;
 	hand_fill(&drop, 3000, 1, 8);
-	feed_both(0, 0);
+	join_by_hand_feed_both(0, 0);
 	heartbeat(0);
 	hand_fill(&drop, 1000, 20, 9);
-	assert_int_equal(feed_end(), 1);
-	feed_both(0, 19); /* far behind what was the newest, but that was before the restart */
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	join_by_hand_feed_both(0, 19); /* far behind what was the newest, but that was before the restart */
 	assert_true(join_complete(join));
-	assert_int_equal(feed_end(), 0);
+	assert_int_equal(join_by_hand_feed_end(), 0);
 }
 
 static void nothing_is_held_after_a_restart(void **state)
@@ -276,7 +235,7 @@ static void nothing_is_held_after_a_restart(void **state)
 	(void)state;
 	heartbeat(0);
 	hand_fill(&drop, 0x01010101 - 10, 20, 10); /* bytes that a careless clearing would leave */
-	assert_int_equal(feed_end(), 1);
+	assert_int_equal(join_by_hand_feed_end(), 1);
 	first_gap(1, drop.first_tick_ms, drop.first_tick_ms + 19);
 }
 
@@ -286,14 +245,14 @@ static void heartbeats_of_a_running_tower(void **state)
 
 	(void)state;
 	hand_fill(&drop, 1000, 20, 11);
-	feed_both(0, 9);
+	join_by_hand_feed_both(0, 9);
 	heartbeat(5);
 	heartbeat(127);
 	assert_int_equal(join_feed(join, &frame), 0); /* too short to mean anything */
 	frame = (struct frame){.id = 0x481, .length = 5};
 	assert_int_equal(join_feed(join, &frame), 0); /* a damaged block, not a boot-up */
-	feed_both(10, 19);
-	feed_end();
+	join_by_hand_feed_both(10, 19);
+	join_by_hand_feed_end();
 	assert_true(join_complete(join));
 	{
 		struct record record = take();
@@ -330,16 +289,16 @@ static void ends_that_are_news(void **state)
 	(void)state;
 	hand_fill(&drop, 1000, 20, 13);
 	drop.drop_id = 3;
-	assert_int_equal(feed_end(), 1);
-	assert_int_equal(feed_end(), 0);
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	assert_int_equal(join_by_hand_feed_end(), 0);
 	drop.drop_id = 4;
-	assert_int_equal(feed_end(), 1);
+	assert_int_equal(join_by_hand_feed_end(), 1);
 	drop.ticks = 21;
-	assert_int_equal(feed_end(), 1);
+	assert_int_equal(join_by_hand_feed_end(), 1);
 	drop.first_tick_ms = 1001;
 	drop.ticks = 20;
-	assert_int_equal(feed_end(), 1);
-	assert_int_equal(feed_end(), 0);
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	assert_int_equal(join_by_hand_feed_end(), 0);
 }
 
 static void what_was_taken_is_gone(void **state)
@@ -350,26 +309,26 @@ static void what_was_taken_is_gone(void **state)
 
 	(void)state;
 	hand_fill(&drop, 1000, 20, 14);
-	feed_both(0, 19);
+	join_by_hand_feed_both(0, 19);
 	hand_block(&drop, 1, 0, false, &frame);
 	frame.data[30] ^= 1;
 	join_feed(join, &frame);
 	frame = (struct frame){.id = 0x381, .length = 8, .data = {1}}; /* a segment without the one before */
 	join_feed(join, &frame);
-	feed_end();
+	join_by_hand_feed_end();
 	assert_true(join_complete(join));
 	record = take();
 	assert_int_equal(record.counters.corrupt, 2);
 	record_free(&record);
 	assert_false(join_complete(join));
 	drop.drop_id++;
-	feed_end();
+	join_by_hand_feed_end();
 	record = take();
 	assert_int_equal(record.counters.corrupt, 0); /* counted since the last take */
 	record_free(&record);
 	drop.first_tick_ms += 10;
 	drop.drop_id++;
-	feed_end();
+	join_by_hand_feed_end();
 	first_gap(1, 1020, 1029);
 	record = take();
 	record_free(&record);
@@ -383,7 +342,7 @@ static void the_longest_window(void **state)
 	(void)state;
 	for (uint32_t half = 0; half < 2; half++) {
 		hand_fill(&drop, 20000 + 1024 * half, 1024, 15 + half);
-		feed_both(0, 1022);
+		join_by_hand_feed_both(0, 1022);
 	}
 	drop.first_tick_ms = 20000;
 	hand_capture_end(&drop, &frame);
@@ -405,11 +364,11 @@ static void the_end_says_which_drop(void **state)
 	(void)state;
 	hand_fill(&drop, 1000, 20, 17);
 	drop.drop_id = 6;
-	feed_both(0, 19);
+	join_by_hand_feed_both(0, 19);
 	drop.drop_id = 7;
 	drop.marks = 1; /* SLOW_FRAME: the trigger stands */
 	drop.trigger_us = 5123;
-	feed_end();
+	join_by_hand_feed_end();
 	record = take();
 	assert_int_equal(record.drop_id, 7);
 	assert_int_equal(record.marks, 1);
@@ -423,7 +382,7 @@ static void a_run_of_one_tick(void **state)
 {
 	(void)state;
 	hand_fill(&drop, 3000, 1, 18);
-	feed(1, 0, false);
+	join_by_hand_feed(1, 0, false);
 	take_ticks(3000, 3000, 1);
 }
 
@@ -431,7 +390,7 @@ static void a_run_that_began_soon_after_boot(void **state)
 {
 	(void)state;
 	hand_fill(&drop, 50, 31, 19);
-	feed_both(0, 30);
+	join_by_hand_feed_both(0, 30);
 	take_ticks(50, 80, 62);
 }
 
@@ -441,7 +400,7 @@ static void a_run_of_one_sensor(void **state)
 	for (unsigned sensor = 1; sensor <= 2; sensor++) {
 		hand_fill(&drop, 4099, 31, 20);
 		for (uint32_t tick = 0; tick < 31; tick++)
-			feed(sensor, tick, false);
+			join_by_hand_feed(sensor, tick, false);
 		take_ticks(4099, 4129, 31);
 	}
 }
@@ -451,7 +410,7 @@ static void a_run_as_long_as_the_ring(void **state)
 	(void)state;
 	for (uint32_t part = 0; part < 3; part++) {
 		hand_fill(&drop, 30000 + 1000 * part, 1000, 21 + part);
-		feed_both(0, 999);
+		join_by_hand_feed_both(0, 999);
 	}
 	take_ticks(30952, 32999, 4096);
 }
@@ -465,9 +424,9 @@ static void a_run_over_old_slots(void **state)
 		for (uint32_t tick = 0; tick < 60; tick++)
 			for (unsigned s = 1; s <= 2; s++)
 				if (sensor == 0 || s == sensor)
-					feed(s, tick, false);
+					join_by_hand_feed(s, tick, false);
 		hand_fill(&drop, 3100, 41, 23);
-		feed_both(0, 40);
+		join_by_hand_feed_both(0, 40);
 		take_ticks(3100, 3140, 82);
 	}
 }
@@ -477,21 +436,21 @@ static void runs_and_holes(void **state)
 {
 	(void)state;
 	hand_fill(&drop, 1000, 200, 24);
-	feed_both(0, 30);
-	feed_both(130, 160);
+	join_by_hand_feed_both(0, 30);
+	join_by_hand_feed_both(130, 160);
 	take_ticks(1000, 1160, 124);
-	feed_both(0, 30);
-	feed_both(131, 161);
+	join_by_hand_feed_both(0, 30);
+	join_by_hand_feed_both(131, 161);
 	take_ticks(1000, 1030, 62);
-	feed_both(0, 30);
-	feed_both(131, 160);
+	join_by_hand_feed_both(0, 30);
+	join_by_hand_feed_both(131, 160);
 	take_ticks(1000, 1030, 62);
-	feed_both(0, 30);
-	feed_both(131, 162);
+	join_by_hand_feed_both(0, 30);
+	join_by_hand_feed_both(131, 162);
 	take_ticks(1131, 1162, 64);
 }
 
-#define TEST(name) cmocka_unit_test_setup_teardown(name, setup, teardown)
+#define TEST(name) cmocka_unit_test_setup_teardown(name, join_by_hand_begin, join_by_hand_end)
 
 int main(void)
 {

@@ -30,6 +30,7 @@ enum kind {
 	IO_ALL_OFF,      /* one look at inputs and outputs sees nothing */
 	IO_INVERTED,     /* or the opposite of everything */
 	IO_ONE_BIT,      /* or one bit wrong, another each time */
+	BIAS_INVERTED,   /* open for short */
 	OUTPUTS_LOST,    /* not carried out */
 	OFF_AT_LATE,     /* carried out at once */
 	OFF_AT_LOST,     /* never carried out */
@@ -56,12 +57,12 @@ enum kind {
 };
 
 static const char *const names[KINDS] = {
-        "nothing",         "time jumps",      "io all off",  "io inverted",  "io one bit",
-        "outputs lost",    "off_at late",     "off_at lost", "cancel lost",  "setup refused",
-        "send full",       "send full 20 ms", "send lost",   "receive none", "receive lost",
-        "receive garbage", "receive strange", "bus off",     "kick lost",    "gate lost",
-        "gate twice",      "gate strange",    "x not ready", "yz not ready", "x lost",
-        "yz lost",         "main late",
+        "nothing",       "time jumps",      "io all off",      "io inverted", "io one bit",
+        "bias inverted", "outputs lost",    "off_at late",     "off_at lost", "cancel lost",
+        "setup refused", "send full",       "send full 20 ms", "send lost",   "receive none",
+        "receive lost",  "receive garbage", "receive strange", "bus off",     "kick lost",
+        "gate lost",     "gate twice",      "gate strange",    "x not ready", "yz not ready",
+        "x lost",        "yz lost",         "main late",
 };
 
 enum {
@@ -127,6 +128,7 @@ static bool lasts(enum kind kind)
 
 uint32_t __real_port_time_us(void);
 uint16_t __real_port_io(void);
+uint16_t __real_port_bias_high(void);
 void __real_port_outputs(uint16_t on, uint16_t off);
 int __real_port_off_at(uint16_t output, uint32_t time_us);
 void __real_port_off_cancel(uint16_t output);
@@ -139,6 +141,7 @@ void __real_command_handle(struct app *app, const struct frame *frame);
 
 uint32_t __wrap_port_time_us(void);
 uint16_t __wrap_port_io(void);
+uint16_t __wrap_port_bias_high(void);
 void __wrap_port_outputs(uint16_t on, uint16_t off);
 int __wrap_port_off_at(uint16_t output, uint32_t time_us);
 void __wrap_port_off_cancel(uint16_t output);
@@ -165,6 +168,11 @@ uint16_t __wrap_port_io(void)
 	if (fails(IO_ONE_BIT))
 		return (uint16_t)(io ^ 1u << fault.at % 15);
 	return io;
+}
+
+uint16_t __wrap_port_bias_high(void)
+{
+	return __real_port_bias_high() ^ (fails(BIAS_INVERTED) ? WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2 : 0);
 }
 
 void __wrap_port_outputs(uint16_t on, uint16_t off)
@@ -511,6 +519,7 @@ static void one_ms(void)
 {
 	fake_time(world.now_ms * 1000);
 	move();
+	app_on_turn();
 	app_on_tick();
 	sample();
 	begin(SEND_FULL_LONG, 20);

@@ -77,6 +77,23 @@ static void says_what_the_file_says(void **state)
 	assert_true(s.emcy.given && s.emcy.count == 0);
 }
 
+/* Paths are long. */
+static void lists_go_on(void **state)
+{
+	struct scenario s;
+
+	(void)state;
+	good(&s, "[expect]\npath = BOOT SAFE\npath = READY\nchecks = TRIGGER OPEN_S1\nreplies = -\npath = "
+	         "ARMED\n");
+	assert_int_equal(s.path.count, 4);
+	for (int i = 0; i < 4; i++)
+		assert_int_equal(s.path.item[i], WIRE_STATE_BOOT + i);
+	assert_int_equal(s.checks.count, 2);
+	assert_int_equal(1 << s.checks.item[0], WIRE_CHECK_TRIGGER);
+	assert_int_equal(1 << s.checks.item[1], WIRE_CHECK_OPEN_S1);
+	assert_true(s.replies.given && s.replies.count == 0);
+}
+
 /* A file that says nothing of them expects no loss, no refusal, one complete drop. */
 static void silence_means_nominal(void **state)
 {
@@ -105,8 +122,11 @@ static void reads_events(void **state)
 	good(&s, "[at]\nfault = door_open at ARMED +0.25\nsend = release 0x1234 at 1.5\n"
 	         "send = set dropout_us 10000 at READY\nsend = frame 000#0201 at FALLING\n"
 	         "bus = off 0.2 at BRAKED\nhost = silent 3 at 0\nreset = watchdog at BOOT +0.01\n"
-	         "bus = burst 50 at BRAKED\nrepair = door_open at FAULT_HELD\nsend = abort at SAFE\n");
-	assert_int_equal(s.event_count, 10);
+	         "bus = burst 50 at BRAKED\nrepair = door_open at FAULT_HELD\nsend = abort at SAFE\n"
+	         "hang = main_loop at SAFE +0.5\n");
+	assert_int_equal(s.event_count, 11);
+	assert_int_equal(s.event[10].action, EVENT_HANG);
+	assert_true(s.event[10].time_s == 0.5);
 	assert_int_equal(s.event[0].action, EVENT_FAULT);
 	assert_int_equal(s.event[0].number, TOWER_DOOR_OPEN);
 	assert_int_equal(s.event[0].state, WIRE_STATE_ARMED);
@@ -152,10 +172,13 @@ static void names_the_line_of_a_mistake(void **state)
 	        {"[expect]\nnothing = 1\n", ":5: unknown key 'nothing' in [expect]"},
 	        {"[expect]\nimpacts = 1..\n", ":5: impacts = '1..', expected"},
 	        {"[expect]\npath = BOOT NOWHERE\n", ":5: path: no such name or number as 'NOWHERE'"},
-	        {"[expect]\npath = -\n", ":5: path has 0 entries, expected 1 to 32"},
+	        {"[expect]\npath = -\n", ":5: path has 0 entries, expected 1 to 64"},
 	        {"[expect]\nrefused =\n", ":5: refused is empty, expected - for nothing"},
 	        {"[expect]\naborts = many\n", ":5: aborts: no such name or number as 'many'"},
 	        {"[expect]\nend = SAFE READY\n", ":5: end has 2 entries, expected 1 to 1"},
+	        {"[expect]\nend = SAFE\nend = READY\n", ":6: end has 2 entries, expected 1 to 1"},
+	        {"[expect]\nchecks = LATCH NOTHING\n", ":5: checks: no such name or number as 'NOTHING'"},
+	        {"[at]\nhang = interrupt at 1\n", ":5: 'hang = interrupt at 1' is no event"},
 	        {"[at]\nfault = nothing at 1\n", ":5: 'fault = nothing at 1' is no event"},
 	        {"[at]\nfault = door_open at NOWHERE\n", ":5: 'door_open at NOWHERE', expected ... at STATE"},
 	        {"[at]\nfault = door_open\n", ":5: 'door_open', expected ... at STATE"},
@@ -227,7 +250,7 @@ static void keeps_lists_within_bounds(void **state)
 		used += (size_t)snprintf(text + used, sizeof(text) - used, "send = abort at 1\n");
 	snprintf(text + used, sizeof(text) - used, "%s", TAIL);
 	assert_true(read_text(&s, text) < 0);
-	assert_non_null(strstr(message, ":37: only 32 events"));
+	assert_non_null(strstr(message, ":69: only 64 events"));
 }
 
 static void puts_its_values_into_the_scene(void **state)
@@ -249,6 +272,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(says_what_the_file_says),
+	        cmocka_unit_test(lists_go_on),
 	        cmocka_unit_test(silence_means_nominal),
 	        cmocka_unit_test(reads_events),
 	        cmocka_unit_test(names_the_line_of_a_mistake),

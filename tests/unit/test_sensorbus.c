@@ -36,7 +36,7 @@ static void answer_bytes(void **state)
 {
 	static const uint8_t bytes[SENSORBUS_ANSWER_BYTES] = {
 	        1, 0, 0xFF, 0xFF, 0,    0x80, 4,    0, 5, 0, 6, 0, 0xF0, 0x03, 2, 1,
-	        0, 0, 0,    0,    0x40, 0xE2, 0x01, 0, 3, 1, 9, 0, 1,    1,    0, 0};
+	        0, 0, 0,    0,    0x40, 0xE2, 0x01, 0, 3, 1, 9, 0, 1,    1,    2, 1};
 	struct sensorbus_answer back;
 	uint8_t out[SENSORBUS_ANSWER_BYTES];
 
@@ -55,6 +55,8 @@ static void answer_bytes(void **state)
 	assert_int_equal(back.bus_errors, 9);
 	assert_int_equal(back.bus_off, 1);
 	assert_int_equal(back.tx_blocked, 1);
+	assert_int_equal(back.bias_high, 2);
+	assert_int_equal(back.hang, 1);
 	assert_int_equal(sensorbus_put_answer(out, &back), SENSORBUS_ANSWER_BYTES);
 	assert_memory_equal(out, bytes, sizeof(bytes));
 }

@@ -889,7 +889,7 @@ static void random_inputs(struct walk *walk)
 	clocks_good = (r >> 4) % 64 != 0;
 	health.sensor_checks = (r >> 24) % 32 ? 0 : (uint16_t)(WIRE_CHECK_SENSOR_S1 << (r >> 20) % 3);
 	health.host_here = (r >> 16) % 32 != 0;
-	checks = health_checks(&health, fake.inputs);
+	checks = health_checks(&health, fake.inputs, 0);
 }
 
 static void random_gate(struct walk *walk, uint32_t r)

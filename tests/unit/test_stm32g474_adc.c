@@ -374,15 +374,24 @@ static void bias(void **state)
 			assert_int_equal(
 			        bias_of(pair((uint32_t)(volt * per_volt), (uint32_t)(volt * per_volt)), axis),
 			        both);
+		assert_int_equal(adc_bias_high(), 0);
 		assert_int_equal(bias_of(pair(0, 20000), axis), WIRE_IO_IEPE_S2); /* short */
 		assert_int_equal(bias_of(pair((uint32_t)(5.99 * per_volt), 20000), axis), WIRE_IO_IEPE_S2);
+		assert_int_equal(adc_bias_high(), 0);
 		assert_int_equal(bias_of(pair(20000, (uint32_t)(16.01 * per_volt)), axis), WIRE_IO_IEPE_S1);
-		assert_int_equal(bias_of(pair(20000, (uint32_t)(22 * per_volt)), axis),
-		                 WIRE_IO_IEPE_S1); /* open */
+		assert_int_equal(adc_bias_high(), WIRE_IO_IEPE_S2);
+		assert_int_equal(bias_of(pair(65520, (uint32_t)(22 * per_volt)), axis), 0); /* open */
+		assert_int_equal(adc_bias_high(), both);
+		assert_int_equal(bias_of(pair(65520, 0), axis), 0);
+		assert_int_equal(adc_bias_high(), WIRE_IO_IEPE_S1);
 	}
 	assert_int_equal(bias_of(pair(20000, 20000), 0), both);
-	assert_false(adc_read(ADC_GROUP_YZ, 1, code)); /* not known is not good */
-	assert_int_equal(adc_bias(), 0);
+	assert_int_equal(adc_bias_high(), 0);
+	assert_false(
+	        adc_read(ADC_GROUP_YZ, 1, code)); /* a scan that is not there says nothing of the cable */
+	assert_int_equal(adc_bias(), both);
+	set_up();
+	assert_int_equal(adc_bias(), 0); /* nothing converted yet is not good */
 }
 
 int main(void)

@@ -402,6 +402,8 @@ static void each_fault_shows_on_its_input(void **state)
 	        {TOWER_MAGNET_WEAK, "magnet_weak", 0},
 	        {TOWER_CABLE_S1, "cable_s1", WIRE_IO_IEPE_S1},
 	        {TOWER_CABLE_S2, "cable_s2", WIRE_IO_IEPE_S2},
+	        {TOWER_SHORT_S1, "short_s1", WIRE_IO_IEPE_S1},
+	        {TOWER_SHORT_S2, "short_s2", WIRE_IO_IEPE_S2},
 	};
 	struct tower *tower = make_ideal();
 	const unsigned quiet = tower_inputs(tower);
@@ -411,6 +413,9 @@ static void each_fault_shows_on_its_input(void **state)
 	for (size_t i = 0; i < TOWER_FAULTS; i++) {
 		tower_fault(tower, known[i].fault, true);
 		assert_int_equal(tower_inputs(tower), quiet & ~known[i].clears);
+		assert_int_equal(tower_bias_high(tower), known[i].fault == TOWER_CABLE_S1   ? 1
+		                                         : known[i].fault == TOWER_CABLE_S2 ? 2
+		                                                                            : 0);
 		tower_fault(tower, known[i].fault, false);
 		assert_int_equal(tower_inputs(tower), quiet);
 		assert_string_equal(tower_fault_name(known[i].fault), known[i].name);

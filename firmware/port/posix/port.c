@@ -16,6 +16,8 @@ static struct {
 	int request_fd, answer_fd;
 	struct link *link; /* NULL: frames ride in the exchange */
 	int link_error;
+	uint32_t kicked_us; /* the watchdog */
+	bool bitten;
 } port;
 
 /* ---- what the core calls ---- */
@@ -58,7 +60,9 @@ int port_can_receive(struct frame *frame)
 
 void port_watchdog_kick(void)
 {
-	/* A process that hangs stops the virtual time with it: whoever waits for it is the watchdog. */
+	/* A process that really hangs stops the virtual time with it: whoever waits for it is its watchdog.
+	 */
+	port.kicked_us = port_time_us();
 }
 
 void port_lock(void)
@@ -124,6 +128,14 @@ int lockstep_read(void *bytes, size_t count)
 
 /* ---- time ---- */
 
+static void poll(void)
+{
+	if (!lockstep_hung())
+		app_poll();
+	else if (port_time_us() - port.kicked_us >= LOCKSTEP_WATCHDOG_MS * 1000)
+		port.bitten = true;
+}
+
 /* 0, LOCKSTEP_GONE or DT_E_*. */
 static int run_instant(unsigned instant)
 {
@@ -131,8 +143,9 @@ static int run_instant(unsigned instant)
 
 	if (result != 0)
 		return result;
-	lockstep_deliver();
-	app_poll();
+	if (lockstep_deliver())
+		lockstep_control();
+	poll();
 	return port.link_error;
 }
 
@@ -147,18 +160,26 @@ static void wait_for(struct timespec *next)
 	}
 }
 
+static void boot(enum port_reset cause, const struct posix_options *options)
+{
+	port.kicked_us = 0;
+	port.bitten = false;
+	lockstep_boot(cause, options->classic);
+}
+
 static int run(const struct posix_options *options)
 {
 	struct timespec next;
 	int result = 0;
 
 	clock_gettime(CLOCK_MONOTONIC, &next);
-	lockstep_boot(options->cause, options->classic);
+	boot(options->cause, options);
 	while (result == 0) {
-		for (unsigned i = 0; i < LOCKSTEP_INSTANTS && result == 0 && !lockstep_reset_wanted(); i++)
+		for (unsigned i = 0;
+		     i < LOCKSTEP_INSTANTS && result == 0 && !lockstep_reset_wanted() && !port.bitten; i++)
 			result = run_instant(i);
-		if (lockstep_reset_wanted())
-			lockstep_boot(PORT_RESET_COMMAND, options->classic);
+		if (port.bitten || lockstep_reset_wanted())
+			boot(port.bitten ? PORT_RESET_WATCHDOG : PORT_RESET_COMMAND, options);
 		if (options->realtime)
 			wait_for(&next);
 	}

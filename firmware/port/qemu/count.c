@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * A plugin of the emulator: counts the instructions of the core, each call of app_on_* from an interrupt and
- * each app_poll. Instructions, not cycles. What the port does for the sensor bus lies outside; the few
- * instructions that bring the codes to the next call are in.
+ * A plugin of the emulator: counts the instructions of the core, each sample interrupt as a whole, each call
+ * from the control interrupt and each app_poll. Instructions, not cycles. What the port does for the sensor
+ * bus lies outside; the few instructions that bring the codes to the calls are in. One in which both timers'
+ * samples come counts as the 10 kHz timer's.
  *
  *     -plugin count.so,out=FILE,gate=ADDRESS,...      an address in hex for each of `places`
  *
@@ -37,10 +38,12 @@ void qemu_plugin_register_vcpu_insn_exec_inline(struct qemu_plugin_insn *insn, i
 
 int qemu_plugin_version = 1;
 
-/* Where something begins; the last two only end what came before. */
-enum place { GATE, TICK, X, YZ, POLL, DELIVERED, POLLED, PLACES, KINDS = DELIVERED };
+/* Where something begins. SAMPLE begins an interrupt of which X and YZ tell the kind; the rest of the last
+ * four only end what came before. */
+enum place { GATE, TICK, X, YZ, POLL, SAMPLE, DELIVERED, CONTROLLED, POLLED, PLACES, KINDS = SAMPLE };
 
-static const char *const places[PLACES] = {"gate", "tick", "x", "yz", "poll", "delivered", "polled"};
+static const char *const places[PLACES] = {"gate",   "tick",      "x",          "yz",    "poll",
+                                           "sample", "delivered", "controlled", "polled"};
 
 static uint64_t address[PLACES];
 static uint64_t executed; /* instructions so far, the present one included */
@@ -73,9 +76,12 @@ static void on_place(unsigned cpu, void *data)
 	struct span *span = place == POLL || place == POLLED ? &poll : &interrupt;
 
 	(void)cpu;
+	if (place == X || place == YZ) {
+		span->kind = place;
+		return;
+	}
 	end_span(span);
-	if (place < KINDS)
-		*span = (struct span){executed, place};
+	*span = (struct span){executed, place < KINDS ? place : KINDS};
 }
 
 static void on_translation(uint64_t id, struct qemu_plugin_tb *tb)

@@ -29,13 +29,20 @@ struct watchdog {
 #define DUAL_TIMER ((struct dual_timer *)0x40002000u)
 #define WATCHDOG ((struct watchdog *)0x40008000u)
 #define NVIC_ENABLE (*(volatile uint32_t *)0xE000E100u)
+#define NVIC_DISABLE (*(volatile uint32_t *)0xE000E180u)
 #define NVIC_PRIORITY ((volatile uint8_t *)0xE000E400u)
+#define ICSR (*(volatile uint32_t *)0xE000ED04u)
+#define SHPR3 (*(volatile uint32_t *)0xE000ED20u)
 #define AIRCR (*(volatile uint32_t *)0xE000ED0Cu)
 
 enum {
 	IRQ_X = 8,
 	IRQ_YZ = 9,
+	IRQS = 1 << IRQ_X | 1 << IRQ_YZ,
 	PRIORITY_SAMPLES = 0x40, /* both, so that they do not nest; faults and the watchdog are above */
+	PRIORITY_CONTROL = 0x80, /* PendSV */
+	SHPR3_PENDSV = 16,
+	ICSR_PENDSVSET = 1 << 28,
 	TIMER_ENABLE = 1 << 0,
 	TIMER_INTERRUPT = 1 << 3,
 	DUAL_TIMER_ENABLE = 1 << 7,
@@ -45,7 +52,7 @@ enum {
 	CYCLES_PER_MS = 25000,
 	CYCLES_YZ = CYCLES_PER_MS / WIRE_YZ_PER_TICK,
 	CYCLES_X = CYCLES_PER_MS / WIRE_X_PER_TICK,
-	CYCLES_WATCHDOG = 50 * CYCLES_PER_MS,
+	CYCLES_WATCHDOG = LOCKSTEP_WATCHDOG_MS * CYCLES_PER_MS,
 	CLOCK_ERROR_MAX = 25, /* cycles between a tick and the dual timer: reading takes a few */
 	LINE_BYTES = 256,
 	LAST_X = LOCKSTEP_INSTANTS - 2, /* instant of a tick's last X sample */
@@ -54,9 +61,10 @@ enum {
 	EXIT_CLOCKS = 71,
 };
 
-/* What a restart by port_reset leaves; zero at power-on. */
+/* What a restart leaves; zero at power-on. */
 static struct {
 	bool restarted;
+	enum port_reset cause;
 	int request, answer;
 } kept __attribute__((section(".kept")));
 
@@ -70,7 +78,6 @@ static volatile bool poll_due;
 static unsigned next_instant;
 static uint32_t ticks, first_cycle;
 static int32_t clock_error_max; /* cycles */
-static uint32_t poll_level;     /* BASEPRI while app_poll runs */
 
 /* ---- interrupts held ---- */
 
@@ -100,14 +107,15 @@ void lockstep_release(uint32_t before)
 	set_base_priority(before);
 }
 
+/* Only control: what main shares with the samples are single words and rings. */
 void port_lock(void)
 {
-	set_base_priority(PRIORITY_SAMPLES);
+	set_base_priority(PRIORITY_CONTROL);
 }
 
 void port_unlock(void)
 {
-	set_base_priority(poll_level);
+	set_base_priority(0);
 }
 
 void port_watchdog_kick(void)
@@ -221,12 +229,15 @@ static void check_clock(void)
 	ticks++;
 }
 
-/* What follows the core's part of an interrupt; where it begins the counting of instructions stops. What is
- * held here stays held when the interrupt returns, so that no sample comes before app_poll. */
-__attribute__((noinline)) void board_delivered(void)
+/* What follows the core's part of an interrupt; where it begins the counting of instructions stops. The
+ * samples stay off when the interrupt returns, so that none comes before control and app_poll have run. */
+__attribute__((noinline)) void board_delivered(bool control)
 {
+	if (control)
+		ICSR = ICSR_PENDSVSET;
 	poll_due = true;
-	set_base_priority(poll_level);
+	if (!options.preempt)
+		NVIC_DISABLE = IRQS;
 }
 
 static void sample(unsigned group)
@@ -240,8 +251,7 @@ static void sample(unsigned group)
 	result = lockstep_exchange(instant);
 	if (result != 0)
 		end_run(result);
-	lockstep_deliver();
-	board_delivered();
+	board_delivered(lockstep_deliver());
 }
 
 void board_irq_x(void)
@@ -260,6 +270,18 @@ void board_irq_yz(void)
 		check_clock();
 	}
 	sample(SENSORBUS_YZ);
+}
+
+/* As board_delivered. */
+__attribute__((noinline)) void board_controlled(void)
+{
+	__asm__ volatile("" ::: "memory");
+}
+
+void board_pendsv(void)
+{
+	lockstep_control();
+	board_controlled();
 }
 
 /* ---- start ---- */
@@ -329,25 +351,33 @@ static void start_clocks(void)
 	DUAL_TIMER->control = DUAL_TIMER_ENABLE | DUAL_TIMER_32_BITS;
 	NVIC_PRIORITY[IRQ_X] = PRIORITY_SAMPLES;
 	NVIC_PRIORITY[IRQ_YZ] = PRIORITY_SAMPLES;
-	NVIC_ENABLE = 1u << IRQ_X | 1u << IRQ_YZ;
+	SHPR3 = (uint32_t)PRIORITY_CONTROL << SHPR3_PENDSV;
+	NVIC_ENABLE = IRQS;
 	start_timer(TIMER_YZ, CYCLES_YZ, 0);
 }
 
-static void restart(void)
+static _Noreturn void restart(enum port_reset cause)
 {
 	set_base_priority(PRIORITY_SAMPLES);
 	kept.restarted = true;
+	kept.cause = cause;
 	AIRCR = AIRCR_RESET;
 	for (;;) {
 	}
+}
+
+void board_watchdog(void)
+{
+	if (lockstep_hung())
+		restart(PORT_RESET_WATCHDOG);
 }
 
 /* As board_delivered, for app_poll. */
 __attribute__((noinline)) void board_polled(void)
 {
 	if (lockstep_reset_wanted())
-		restart();
-	set_base_priority(0);
+		restart(PORT_RESET_COMMAND);
+	NVIC_ENABLE = IRQS;
 }
 
 /* Not "wait for interrupt": the emulator then loses timer periods or invents some. */
@@ -361,10 +391,9 @@ static void wait_for_sample(void)
  * that comes meanwhile waits. With --preempt it does not. */
 _Noreturn void board_main(void)
 {
-	enum port_reset cause = PORT_RESET_COMMAND;
+	enum port_reset cause = kept.cause;
 
 	read_options();
-	poll_level = options.preempt ? 0 : PRIORITY_SAMPLES;
 	if (!kept.restarted) {
 		kept.request = open_pipe(".request", SEMIHOST_WRITE);
 		kept.answer = open_pipe(".answer", SEMIHOST_READ);
@@ -375,7 +404,8 @@ _Noreturn void board_main(void)
 	for (;;) {
 		wait_for_sample();
 		poll_due = false;
-		app_poll();
+		if (!lockstep_hung())
+			app_poll();
 		board_polled();
 	}
 }

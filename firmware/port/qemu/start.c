@@ -60,6 +60,8 @@ __attribute__((used)) static _Noreturn void fault(const uint32_t *frame)
 	uint32_t number, status = CFSR;
 
 	__asm__ volatile("mrs %0, ipsr" : "=r"(number));
+	if (number == EXCEPTION_NMI)
+		board_watchdog();
 	semihost_say("droptower-firmware-qemu: ");
 	semihost_say(number == EXCEPTION_NMI ? "watchdog" : "fault");
 	semihost_say_number(", exception ", number, 10);
@@ -113,20 +115,20 @@ _Noreturn void start(void)
 __attribute__((used, section(".vectors"))) static void (*const vectors[VECTORS])(void) = {
         (void (*)(void))link_stack_end,
         start,
+        on_fault, /* NMI: the watchdog */
+        on_fault, /* HardFault */
+        on_fault, /* MemManage */
+        on_fault, /* BusFault */
+        on_fault, /* UsageFault */
         on_fault,
         on_fault,
         on_fault,
         on_fault,
+        on_fault, /* SVCall */
+        on_fault, /* DebugMonitor */
         on_fault,
-        on_fault,
-        on_fault,
-        on_fault,
-        on_fault,
-        on_fault,
-        on_fault,
-        on_fault,
-        on_fault,
-        on_fault,
+        board_pendsv,
+        on_fault, /* SysTick */
         on_fault,
         on_fault,
         on_fault,

@@ -65,7 +65,7 @@ static const struct pair {
                           ADC_YZ_WORDS},
 };
 
-static uint16_t bias;
+static uint16_t bias, bias_high; /* WIRE_IO_IEPE_* */
 
 /* ---- start ---- */
 
@@ -130,7 +130,7 @@ int adc_setup(void)
 	register_set(RCC_AHB1ENR, RCC_AHB1ENR_DMA1 | RCC_AHB1ENR_DMAMUX);
 	register_set(RCC_AHB2ENR, RCC_AHB2ENR_ADC12 | RCC_AHB2ENR_ADC345);
 	(void)RD(RCC_AHB2ENR);
-	bias = 0;
+	bias = bias_high = 0;
 	result = set_up(&pairs[ADC_GROUP_X]);
 	return result == 0 ? set_up(&pairs[ADC_GROUP_YZ]) : result;
 }
@@ -187,10 +187,10 @@ static int16_t code_of(uint32_t word, unsigned sensor, enum axis axis)
 	return to_code(sensor == 0 ? word & 0xFFFFu : word >> 16, &calibration[sensor][axis]);
 }
 
-static uint16_t judge_bias(const volatile uint32_t *words)
+static void judge_bias(const volatile uint32_t *words)
 {
 	static const uint16_t bits[SENSORS] = {WIRE_IO_IEPE_S1, WIRE_IO_IEPE_S2};
-	uint16_t good = WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2;
+	uint16_t good = WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2, high = 0;
 
 	for (unsigned axis = 0; axis < AXES; axis++)
 		for (unsigned sensor = 0; sensor < SENSORS; sensor++) {
@@ -198,8 +198,11 @@ static uint16_t judge_bias(const volatile uint32_t *words)
 
 			if (sum < BIAS_MIN || sum > BIAS_MAX)
 				good &= (uint16_t)~bits[sensor];
+			if (sum > BIAS_MAX)
+				high |= bits[sensor];
 		}
-	return good;
+	bias = good;
+	bias_high = high;
 }
 
 bool adc_read(enum adc_group group, unsigned index, int16_t code[ADC_CODES])
@@ -210,8 +213,6 @@ bool adc_read(enum adc_group group, unsigned index, int16_t code[ADC_CODES])
 	if (index >= scans_done(pair)) {
 		for (unsigned i = 0; i < ADC_CODES; i++)
 			code[i] = 0;
-		if (group == ADC_GROUP_YZ)
-			bias = 0;
 		return false;
 	}
 	for (unsigned sensor = 0; sensor < SENSORS; sensor++)
@@ -222,7 +223,7 @@ bool adc_read(enum adc_group group, unsigned index, int16_t code[ADC_CODES])
 			code[2 * sensor + 1] = code_of(words[1], sensor, Z);
 		}
 	if (group == ADC_GROUP_YZ)
-		bias = judge_bias(words + BIAS_FIRST);
+		judge_bias(words + BIAS_FIRST);
 	return true;
 }
 
@@ -254,4 +255,9 @@ void adc_begin(enum adc_group group)
 uint16_t adc_bias(void)
 {
 	return bias;
+}
+
+uint16_t adc_bias_high(void)
+{
+	return bias_high;
 }

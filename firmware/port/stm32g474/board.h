@@ -14,9 +14,13 @@ extern struct reset_mark board_mark;
 _Noreturn void board_main(void);
 _Noreturn void board_crash(void);
 
-void board_on_tick(void);
-void board_on_gate(void);
+/* Samples. */
+void board_on_turn(void);
 void board_on_yz(void);
 void board_on_x(void);
+
+/* Below them: PendSV and the gates' timer. */
+void board_on_control(void);
+void board_on_gate(void);
 
 #endif

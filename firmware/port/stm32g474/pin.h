@@ -9,7 +9,7 @@
  * it has been the same three times; the light gates are shown as they are, and the supply is good only while
  * the controller's own is.
  *
- * Context: pin_setup at start-up, pin_tick interrupt, the rest both. Source: RM0440 9.4.
+ * Context: pin_setup at start-up, pin_tick control, the rest both. Source: RM0440 9.4.
  */
 #include <stdint.h>
 

@@ -4,18 +4,11 @@
 #include "firmware/port/stm32g474/board.h"
 #include "firmware/port/stm32g474/can.h"
 #include "firmware/port/stm32g474/clock.h"
+#include "firmware/port/stm32g474/interrupt.h"
 #include "firmware/port/stm32g474/output.h"
 #include "firmware/port/stm32g474/pin.h"
 #include "firmware/port/stm32g474/registers.h"
 #include "firmware/port/stm32g474/timer.h"
-
-enum {
-	IRQ_FDCAN1 = 21,
-	IRQ_TIM1_UP = 25,
-	IRQ_TIM2 = 28,
-	IRQ_TIM3 = 29,
-	IRQ_TIM4 = 30,
-};
 
 /* TIM1 counts of the millisecond at which a scan's interrupt, SCANNED after its trigger, is due at the
  * earliest. */
@@ -23,7 +16,6 @@ enum {
 
 static struct {
 	uint32_t can_hz;
-	uint32_t held;             /* of port_lock */
 	uint8_t taken[ADC_GROUPS]; /* scans of this millisecond handed to the core */
 	volatile int start_result; /* for the debugger: what went wrong at start-up */
 } port;
@@ -38,6 +30,11 @@ uint32_t port_time_us(void)
 uint16_t port_io(void)
 {
 	return (uint16_t)(pin_io() | adc_bias());
+}
+
+uint16_t port_bias_high(void)
+{
+	return adc_bias_high();
 }
 
 void port_outputs(uint16_t on, uint16_t off)
@@ -88,15 +85,15 @@ void port_reset(void)
 
 void port_lock(void)
 {
-	port.held = register_hold();
+	register_mask(INTERRUPT_CONTROL);
 }
 
 void port_unlock(void)
 {
-	register_release(port.held);
+	register_mask(0);
 }
 
-/* ---- interrupts: one priority, the earlier in the list the sooner when several wait ---- */
+/* ---- sample interrupts ---- */
 
 static void hand_over(enum adc_group group)
 {
@@ -116,32 +113,18 @@ static void hand_over_until(enum adc_group group, unsigned due)
 		hand_over(group);
 }
 
-static void hand_over_gates(void)
-{
-	uint32_t time_us;
-
-	for (unsigned gate = 0; gate < 2; gate++)
-		if (timer_gate(gate, &time_us))
-			app_on_gate(gate, time_us);
-}
-
-void board_on_tick(void)
+/* What is late of the millisecond that ends, then the next. */
+void board_on_turn(void)
 {
 	timer_clear_tick();
-	hand_over_gates();
 	hand_over_until(ADC_GROUP_X, ADC_X_SCANS);
 	hand_over_until(ADC_GROUP_YZ, ADC_YZ_SCANS);
 	for (enum adc_group group = ADC_GROUP_X; group < ADC_GROUPS; group++) {
 		adc_begin(group);
 		port.taken[group] = 0;
 	}
-	pin_tick();
-	app_on_tick();
-}
-
-void board_on_gate(void)
-{
-	hand_over_gates();
+	app_on_turn();
+	interrupt_control();
 }
 
 /* `rate` scans a millisecond, the first due at `first` counts of it. */
@@ -166,6 +149,24 @@ void board_on_x(void)
 {
 	timer_clear_x();
 	on_scan(ADC_GROUP_X, ADC_X_SCANS, DUE_AFTER(TIMER_X_SCANNED));
+}
+
+/* ---- control interrupts ---- */
+
+void board_on_gate(void)
+{
+	uint32_t time_us;
+
+	for (unsigned gate = 0; gate < 2; gate++)
+		if (timer_gate(gate, &time_us))
+			app_on_gate(gate, time_us);
+}
+
+void board_on_control(void)
+{
+	board_on_gate();
+	pin_tick();
+	app_on_tick();
 }
 
 /* ---- start ---- */
@@ -206,8 +207,7 @@ _Noreturn void board_main(void)
 	start_converters();
 	port.taken[ADC_GROUP_X] = ADC_X_SCANS; /* none before the first tick */
 	port.taken[ADC_GROUP_YZ] = ADC_YZ_SCANS;
-	WR(NVIC_ISER0,
-	   1u << IRQ_FDCAN1 | 1u << IRQ_TIM1_UP | 1u << IRQ_TIM2 | 1u << IRQ_TIM3 | 1u << IRQ_TIM4);
+	interrupt_setup();
 	watchdog_kick();
 	timer_start();
 	register_release(0);

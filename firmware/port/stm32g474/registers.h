@@ -36,11 +36,18 @@ static inline void register_release(uint32_t mask)
 {
 	__asm__ volatile("msr primask, %0" : : "r"(mask) : "memory");
 }
+
+/* Main: no interrupt of this priority or a lower one; 0 lets all in. */
+static inline void register_mask(uint32_t priority)
+{
+	__asm__ volatile("msr basepri, %0\n\tisb" : : "r"(priority) : "memory");
+}
 #else
 uint32_t RD(uint32_t address);
 void WR(uint32_t address, uint32_t value);
 uint32_t register_hold(void);
 void register_release(uint32_t mask);
+void register_mask(uint32_t priority);
 #endif
 
 static inline void register_change(uint32_t address, uint32_t mask, uint32_t bits)
@@ -283,8 +290,14 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 
 /* ---- Cortex-M4 ---- */
 #define NVIC_ISER0 0xE000E100u
+#define NVIC_IPR(irq) (0xE000E400u + (irq) / 4u * 4u) /* a byte each */
+#define NVIC_IPR_PRIORITY(irq, priority) ((uint32_t)(priority) << (irq) % 4u * 8u)
+#define SCB_ICSR 0xE000ED04u
+#define SCB_ICSR_PENDSVSET (1u << 28)
 #define SCB_VTOR 0xE000ED08u
 #define SCB_AIRCR 0xE000ED0Cu
+#define SCB_SHPR3 0xE000ED20u
+#define SCB_SHPR3_PENDSV(priority) ((uint32_t)(priority) << 16)
 #define SCB_AIRCR_SYSRESETREQ 0x05FA0004u /* with the key */
 
 #endif

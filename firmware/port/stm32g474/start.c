@@ -41,10 +41,10 @@ __attribute__((section(".vectors"), used)) const uintptr_t start_vectors[EXCEPTI
         (uintptr_t)board_crash, /* SVCall */
         (uintptr_t)board_crash, /* DebugMonitor */
         0,
-        (uintptr_t)board_crash, /* PendSV */
-        (uintptr_t)board_crash, /* SysTick */
+        (uintptr_t)board_on_control, /* PendSV */
+        (uintptr_t)board_crash,      /* SysTick */
         [EXCEPTIONS + 21] = (uintptr_t)can_interrupt,
-        [EXCEPTIONS + 25] = (uintptr_t)board_on_tick,
+        [EXCEPTIONS + 25] = (uintptr_t)board_on_turn,
         [EXCEPTIONS + 28] = (uintptr_t)board_on_gate,
         [EXCEPTIONS + 29] = (uintptr_t)board_on_yz,
         [EXCEPTIONS + 30] = (uintptr_t)board_on_x,

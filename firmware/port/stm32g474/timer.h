@@ -14,8 +14,8 @@
  * the mean of 16 conversions that take 2 368 clocks, and so the middle of the first channel's falls on the
  * tick.
  *
- * Context: setup and start at start-up, TIM5 runs from the setup on; timer_gate, timer_counts interrupt;
- * timer_us both. Source: RM0440 29.4, 30.4, table 291.
+ * Context: setup and start at start-up, TIM5 runs from the setup on; timer_gate control, timer_counts the
+ * samples' interrupts; timer_us both. Source: RM0440 29.4, 30.4, table 291.
  */
 #include <stdbool.h>
 #include <stdint.h>

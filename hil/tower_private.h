@@ -1,0 +1,77 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HIL_TOWER_PRIVATE_H
+#define DT_HIL_TOWER_PRIVATE_H
+/*
+ * What the tower's two files share: tower_motion.c is how frame, product and sensors go on in time, tower.c
+ * what the controller and the technician do to them and see.
+ */
+#include <gsl/gsl_rng.h>
+
+#include "common/wire.h"
+#include "hil/product.h"
+#include "hil/sensor.h"
+#include "hil/tower.h"
+
+enum { SENSORS = 2, AXES = 3, CHANNELS = SENSORS * AXES };
+
+enum frame_state { FRAME_LATCHED, FRAME_MOVING, FRAME_STOPPED };
+
+enum place { PLACE_PIN, PLACE_MAGNET, PLACE_AIR, PLACE_MAT };
+
+/* What the frame passes on its way down, in this order. */
+enum mark { MARK_GATE_UPPER, MARK_GATE_LOWER, MARK_DAMPERS, MARK_END, MARKS };
+
+enum event { EVENT_LATCH, EVENT_DROPOUT, EVENT_MARK, EVENT_STOP, EVENT_MAT, EVENTS };
+
+/* Uniformly accelerated, downwards positive; distance from where the drop began. */
+struct motion {
+	double since_s, distance_m, speed_m_s, acceleration_m_s2;
+};
+
+struct tower {
+	struct scene scene;
+	bool ideal;
+	gsl_rng *scatter, *noise; /* apart, so that how often one converts does not change the next drop */
+	double now_s;
+
+	unsigned outputs;
+	bool fault[TOWER_FAULTS];
+	double latch_opens_s, magnet_drops_s; /* INFINITY: not under way */
+
+	enum frame_state frame_state;
+	struct motion frame;
+	unsigned passed; /* marks */
+	bool captured[2];
+	uint32_t capture_us[2];
+
+	enum place place;
+	struct motion fall; /* of the lowest corner, in PLACE_AIR */
+	struct product product;
+	double mix[SENSORS][2][2]; /* this drop's gain and cross-axis errors */
+	struct sensor sensor[CHANNELS];
+
+	struct tower_truth truth;
+};
+
+static inline bool output_on(const struct tower *t, unsigned mask)
+{
+	return (t->outputs & mask) != 0;
+}
+
+double tower_motion_distance(const struct motion *m, double time_s);
+
+/* To be called when something that moves the frame or holds the product has changed. */
+void tower_motion_renew(struct tower *t);
+
+double tower_mark_travel(const struct tower *t, unsigned mark);
+
+/* Time went on by step_s; the sensors feel what the product now does. */
+void tower_sensors_feel(struct tower *t, double step_s);
+
+void tower_sensors_set_up(struct tower *t);
+
+void tower_sensors_settle(struct tower *t);
+
+bool tower_sensor_cut_off(const struct tower *t, int sensor);
+
+#endif
