@@ -10,7 +10,8 @@ JOBS ?= $(shell nproc)
 
 # ---- what must be installed ------------------------------------------------------------------------
 
-PACKAGES_RUN = gcc libc6-dev libgsl-dev liblcm-dev liblcm-bin libinih-dev libcjson-dev gnuplot-nox
+PACKAGES_RUN = gcc libc6-dev libgsl-dev liblcm-dev liblcm-bin libinih-dev libcjson-dev gnuplot-nox \
+	libsqlite3-dev nettle-dev
 PACKAGES_TEST = $(PACKAGES_RUN) libcmocka-dev clang libclang-rt-14-dev can-utils python3-canmatrix \
 	iproute2 util-linux gawk
 
@@ -26,7 +27,7 @@ endif
 CPPFLAGS = -I. -I$(BUILD)/generated
 # The posix side may use all of Linux; common/ and the firmware core get only what C11 has.
 LINUX = -D_GNU_SOURCE
-LIBRARIES = -lgsl -lgslcblas -llcm -linih -lcjson -lm -lpthread
+LIBRARIES = -lgsl -lgslcblas -llcm -linih -lcjson -lsqlite3 -lnettle -lm -lpthread
 
 VERSION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 
@@ -45,7 +46,7 @@ FIRMWARE_C = $(wildcard firmware/*.c)
 POSIX_C = $(wildcard firmware/port/posix/*.c)
 LOCKSTEP_C = firmware/port/lockstep.c
 LINK_C = $(wildcard common/link/*.c common/scenes/*.c)
-HOST_C = $(filter-out host/main.c,$(wildcard host/*.c host/*/*.c))
+HOST_C = $(filter-out host/main.c host/hdf5/%,$(wildcard host/*.c host/*/*.c))
 HIL_C = $(filter-out hil/main.c,$(wildcard hil/*.c))
 UNIT_C = $(wildcard tests/unit/test_*.c)
 UNIT_HELPER_C = $(filter-out $(UNIT_C),$(wildcard tests/unit/*.c))
@@ -131,7 +132,7 @@ $(TOOLS): $(BUILD)/tests/%: $(BUILD)/obj/tests/system/%.o $(foreach l,host link 
 	$(link)
 
 # What a port, the bench's helpers and the tests add: their own programs, targets and packages.
-include $(sort $(wildcard firmware/port/*/*.mk hil/*/*.mk tests/*/*.mk))
+include $(sort $(wildcard firmware/port/*/*.mk host/*/*.mk hil/*/*.mk tests/*/*.mk))
 
 # ---- set-up -----------------------------------------------------------------------------------------
 

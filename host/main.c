@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include <droptower_version.h>
 #include <gsl/gsl_errno.h>
 
 #include "host/command/command.h"
@@ -17,8 +16,12 @@ static const struct {
 } commands[] = {
         {"run", command_run, "arm, drop, capture, analyse and report; without --link on a simulated tower"},
         {"analyze", command_analyze, "logged drops and foreign recordings to results"},
+        {"model", command_model, "what a drop should look like: prediction, sweeps, Monte Carlo"},
+        {"srs", command_srs, "shock response spectra, against a limit curve"},
         {"replay", command_replay, "a logged drop onto CAN or LCM, in its own time"},
-        {"convert", command_convert, "candump, LCM and CSV into each other; the wire as a DBC file"},
+        {"convert", command_convert, "candump, LCM, CSV, UFF58 and HDF5 into each other; the wire as DBC"},
+        {"series", command_series, "series of drops in an archive: means, decisions, tables"},
+        {"chart", command_chart, "what the estimates cost and where they fail, in simulated drops"},
         {"ctl", command_ctl, "the operator's verbs: status, arm, release, abort, clear"},
         {"bridge", command_bridge, "CAN to LCM and commands back"},
 };
@@ -47,8 +50,7 @@ int main(int argc, char **argv)
 		return COMMAND_DONE;
 	}
 	if (strcmp(argv[1], "--version") == 0) {
-		puts("droptower " DT_VERSION);
-		return COMMAND_DONE;
+		return command_version();
 	}
 	for (int i = 0; i < COMMANDS; i++)
 		if (strcmp(argv[1], commands[i].name) == 0)

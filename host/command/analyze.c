@@ -5,6 +5,7 @@
 
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
+#include "host/estimate/cfc.h"
 #include "host/record/read.h"
 
 static const char help[] =
@@ -19,10 +20,18 @@ static const char help[] =
         "  --scene FILE     compare with the model's prediction for this scene\n"
         "  --angle DEG      contact angle, instead of the scene's\n"
         "  --lowpass HZ     zero-phase low-pass before everything else\n"
+        "  --cfc CLASS      channel frequency class 60, 180, 600 or 1000 (SAE J211, ISO 6487), zero-phase\n"
         "  --iepe S         undo the sensor supply's high-pass of this time constant (0: leave it);\n"
         "                   without it, the scene's\n"
         "  --family NAME    the contact pulse is a half-sine, haversine or sine-power (auto)\n"
         "  --tolerance PCT  standard uncertainty asked for, of the value (0.5); what it takes is done\n"
+        "  --events         list shocks, largest first, and free falls in the table too\n"
+        "  --event-level G  what leaves its rest by more than this is a shock; without it, 8 sigma of the "
+        "noise\n"
+        "  --hold-off S     a shock is over when nothing has left that level for so long (0.02)\n"
+        "  --band CSV       hold a pulse against time_s,lower_g,upper_g; time 0 is where it leaves 10 %\n"
+        "  --band-at-peak   time 0 of the band is the pulse's peak\n"
+        "  --channel NAME   the band's channel; without it, the one with the largest peak\n"
         "  --json           one JSON object per file on standard output\n"
         "  --html PAGE      write a page (one FILE only)\n"
         "  --strict         a flagged result is a failure (exit 3)\n";
@@ -32,9 +41,16 @@ enum {
 	OPTION_SCENE,
 	OPTION_ANGLE,
 	OPTION_LOWPASS,
+	OPTION_CFC,
 	OPTION_IEPE,
 	OPTION_FAMILY,
 	OPTION_TOLERANCE,
+	OPTION_EVENTS,
+	OPTION_EVENT_LEVEL,
+	OPTION_HOLD_OFF,
+	OPTION_BAND,
+	OPTION_BAND_AT_PEAK,
+	OPTION_CHANNEL,
 	OPTION_JSON,
 	OPTION_HTML,
 	OPTION_STRICT
@@ -45,9 +61,16 @@ static const struct option long_options[] = {
         {"scene", required_argument, NULL, OPTION_SCENE},
         {"angle", required_argument, NULL, OPTION_ANGLE},
         {"lowpass", required_argument, NULL, OPTION_LOWPASS},
+        {"cfc", required_argument, NULL, OPTION_CFC},
         {"iepe", required_argument, NULL, OPTION_IEPE},
         {"family", required_argument, NULL, OPTION_FAMILY},
         {"tolerance", required_argument, NULL, OPTION_TOLERANCE},
+        {"events", no_argument, NULL, OPTION_EVENTS},
+        {"event-level", required_argument, NULL, OPTION_EVENT_LEVEL},
+        {"hold-off", required_argument, NULL, OPTION_HOLD_OFF},
+        {"band", required_argument, NULL, OPTION_BAND},
+        {"band-at-peak", no_argument, NULL, OPTION_BAND_AT_PEAK},
+        {"channel", required_argument, NULL, OPTION_CHANNEL},
         {"json", no_argument, NULL, OPTION_JSON},
         {"html", required_argument, NULL, OPTION_HTML},
         {"strict", no_argument, NULL, OPTION_STRICT},
@@ -56,11 +79,51 @@ static const struct option long_options[] = {
 };
 
 struct arguments {
-	const char *columns, *scene_file;
+	const char *columns, *scene_file, *band_file;
 	double angle_deg;
 	struct evaluate_options evaluate;
 	int help;
 };
+
+static int parse_class(struct arguments *arguments, const char *text)
+{
+	double class = 0;
+	int code = command_number("analyze", "cfc", text, 60, 1000, &class);
+
+	arguments->evaluate.cfc = (unsigned)class;
+	if (code != COMMAND_DONE || (cfc_check((unsigned)class, INFINITY) == 0 && class <= floor(class)))
+		return code;
+	return command_usage("analyze", "--cfc is '%s', expected 60, 180, 600 or 1000", text);
+}
+
+/* What concerns filters, shocks and bands. */
+static int parse_shock(struct arguments *arguments, int option, const char *unknown)
+{
+	struct evaluate_options *evaluate = &arguments->evaluate;
+
+	switch (option) {
+	case OPTION_CFC:
+		return parse_class(arguments, optarg);
+	case OPTION_EVENTS:
+		evaluate->show_events = true;
+		return COMMAND_DONE;
+	case OPTION_EVENT_LEVEL:
+		return command_number("analyze", "event-level", optarg, 1e-6, 1e9, &evaluate->events.level_g);
+	case OPTION_HOLD_OFF:
+		return command_number("analyze", "hold-off", optarg, 1e-9, 1e3, &evaluate->events.hold_off_s);
+	case OPTION_BAND:
+		arguments->band_file = optarg;
+		return COMMAND_DONE;
+	case OPTION_BAND_AT_PEAK:
+		evaluate->band.at_peak = true;
+		return COMMAND_DONE;
+	case OPTION_CHANNEL:
+		evaluate->band.channel = optarg;
+		return COMMAND_DONE;
+	default:
+		return command_usage("analyze", "option '%s' is not known or lacks its value", unknown);
+	}
+}
 
 static int parse(struct arguments *arguments, int argc, char **argv)
 {
@@ -111,8 +174,7 @@ static int parse(struct arguments *arguments, int argc, char **argv)
 			arguments->help = 1;
 			return COMMAND_DONE;
 		default:
-			return command_usage("analyze", "option '%s' is not known or lacks its value",
-			                     argv[optind - 1]);
+			code = parse_shock(arguments, option, argv[optind - 1]);
 		}
 	}
 	return code;
@@ -133,35 +195,66 @@ static int analyze_file(const char *file, const struct arguments *arguments)
 	return code;
 }
 
-int command_analyze(int argc, char **argv)
+static int check(const struct arguments *arguments, int argc)
 {
-	struct arguments arguments = {.angle_deg = NAN, .evaluate = {.iepe_time_constant_s = NAN}};
-	struct scene scene;
-	int code = parse(&arguments, argc, argv);
-
-	if (code != COMMAND_DONE)
-		return code;
-	if (arguments.help) {
-		fputs(help, stdout);
-		return COMMAND_DONE;
-	}
 	if (optind == argc)
 		return command_usage("analyze", "no FILE given");
-	if (arguments.evaluate.html != NULL && optind + 1 != argc)
+	if (arguments->evaluate.html != NULL && optind + 1 != argc)
 		return command_usage("analyze", "--html takes one FILE, %d are given", argc - optind);
-	if (!isnan(arguments.angle_deg) && arguments.scene_file == NULL)
+	if (!isnan(arguments->angle_deg) && arguments->scene_file == NULL)
 		return command_usage("analyze", "--angle needs a --scene to lay it over");
-	if (arguments.scene_file != NULL) {
-		code = evaluate_read_scene(&scene, arguments.scene_file, arguments.angle_deg);
-		if (code != COMMAND_DONE)
-			return code;
-		arguments.evaluate.scene = &scene;
-	}
-	for (int i = optind; i < argc; i++) {
-		int one = analyze_file(argv[i], &arguments);
+	if (arguments->band_file == NULL &&
+	    (arguments->evaluate.band.channel != NULL || arguments->evaluate.band.at_peak))
+		return command_usage("analyze", "--channel and --band-at-peak need a --band");
+	return COMMAND_DONE;
+}
+
+static int read_band(struct limit_curve *curve, const char *file)
+{
+	char message[READ_MESSAGE_MAX];
+
+	if (limit_read(curve, file, LIMIT_BAND, message) == 0)
+		return COMMAND_DONE;
+	command_error("%s", message);
+	return COMMAND_INPUT;
+}
+
+static int analyze_files(char **files, int count, const struct arguments *arguments)
+{
+	int code = COMMAND_DONE;
+
+	for (int i = 0; i < count; i++) {
+		int one = analyze_file(files[i], arguments);
 
 		if (one != COMMAND_DONE)
 			code = one; /* the other files are still analysed */
 	}
+	return code;
+}
+
+int command_analyze(int argc, char **argv)
+{
+	struct arguments arguments = {.angle_deg = NAN, .evaluate = {.iepe_time_constant_s = NAN}};
+	struct limit_curve band = {0};
+	struct scene scene;
+	int code = parse(&arguments, argc, argv);
+
+	if (code == COMMAND_DONE && arguments.help) {
+		fputs(help, stdout);
+		return COMMAND_DONE;
+	}
+	if (code == COMMAND_DONE)
+		code = check(&arguments, argc);
+	if (code == COMMAND_DONE && arguments.scene_file != NULL) {
+		code = evaluate_read_scene(&scene, arguments.scene_file, arguments.angle_deg);
+		arguments.evaluate.scene = &scene;
+	}
+	if (code == COMMAND_DONE && arguments.band_file != NULL) {
+		code = read_band(&band, arguments.band_file);
+		arguments.evaluate.band.curve = &band;
+	}
+	if (code == COMMAND_DONE)
+		code = analyze_files(argv + optind, argc - optind, &arguments);
+	limit_free(&band);
 	return code;
 }

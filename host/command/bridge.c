@@ -9,6 +9,7 @@
 
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
+#include "host/command/notify.h"
 #include "host/command/publish.h"
 #include "host/command/session.h"
 #include "host/command/tower_setup.h"
@@ -159,7 +160,9 @@ static int serve(struct bridge *bridge)
 {
 	int result = 0;
 
+	notify("READY=1");
 	while (result == 0 && !command_interrupted()) {
+		notify_alive();
 		result = session_poll(bridge->session, 5);
 		while (result == 0 && lcm_handle_timeout(bridge->publisher->lcm, 0) > 0)
 			continue;
@@ -170,6 +173,7 @@ static int serve(struct bridge *bridge)
 		if (result == 0)
 			result = bridge->publish_error;
 	}
+	notify("STOPPING=1");
 	return result == 0 ? COMMAND_DONE : command_link_failed("bridge", result);
 }
 

@@ -16,10 +16,17 @@ enum command_exit {
 
 int command_run(int argc, char **argv);
 int command_analyze(int argc, char **argv);
+int command_srs(int argc, char **argv);
 int command_replay(int argc, char **argv);
 int command_convert(int argc, char **argv);
 int command_ctl(int argc, char **argv);
 int command_bridge(int argc, char **argv);
+int command_chart(int argc, char **argv);
+int command_model(int argc, char **argv);
+int command_series(int argc, char **argv);
+
+/* What `droptower --version` prints: this program, its wire, and the libraries that run with it. */
+int command_version(void);
 
 /* One line to stderr: "droptower: ..." */
 void command_error(const char *format, ...) __attribute__((format(printf, 1, 2)));

@@ -8,16 +8,18 @@
 #include "host/record/whole.h"
 #include "host/record/write.h"
 
-static const char help[] = "usage: droptower convert IN OUT [--columns SPEC]\n"
-                           "       droptower convert --dbc OUT\n"
-                           "\n"
-                           "Writes a logged drop in another format, chosen by OUT's ending: .log candump "
-                           "text, .lcm LCM event log,\n"
-                           ".csv. IN is recognised by its content; foreign text needs --columns (see "
-                           "'droptower analyze --help')\n"
-                           "and becomes CSV.\n"
-                           "\n"
-                           "  --dbc OUT   the wire as a DBC file for other CAN tools\n";
+static const char help[] =
+        "usage: droptower convert IN OUT [--columns SPEC]\n"
+        "       droptower convert --dbc OUT\n"
+        "\n"
+        "Writes a logged drop in another format, chosen by OUT's ending: .log candump text, .lcm LCM event "
+        "log,\n"
+        ".csv, .unv or .uff universal file (dataset 58), .h5 or .hdf5 HDF5. IN is recognised by its "
+        "content.\n"
+        "Foreign recordings become CSV, universal files or HDF5; foreign text needs --columns.\n"
+        "\n"
+        "  --columns SPEC  for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\"\n"
+        "  --dbc OUT       the wire as a DBC file for other CAN tools\n";
 
 static int write_dbc(const char *file)
 {

@@ -10,8 +10,10 @@
 
 #include "common/units.h"
 #include "host/command/command.h"
+#include "host/estimate/cfc.h"
 #include "host/record/whole.h"
 #include "host/report/report.h"
+#include "host/shock/free_fall.h"
 
 static int write_json_file(const struct report *report, const char *file, char *message, size_t size)
 {
@@ -53,6 +55,7 @@ static struct estimate_options estimate_options_of(const struct evaluate_options
 	const struct scene *scene = options->scene;
 	struct estimate_options estimate = {
 	        .lowpass_hz = options->lowpass_hz,
+	        .cfc = options->cfc,
 	        .iepe_time_constant_s = options->iepe_time_constant_s,
 	        .family = options->family,
 	        .tolerance = options->tolerance,
@@ -65,60 +68,132 @@ static struct estimate_options estimate_options_of(const struct evaluate_options
 	return estimate;
 }
 
-/* Estimates and predicts; the report points into the other two. 0 or DT_E_*. */
-static int make_report(struct report *report, struct analysis *analysis, struct model_prediction *prediction,
-                       const struct record *record, const struct evaluate_options *options)
+enum { TOLD = 1 };
+
+/* What a report points to beside the record. */
+struct findings {
+	struct analysis analysis;
+	struct model_prediction prediction, below;
+	struct events events;
+	struct free_falls falls;
+	struct band band;
+};
+
+/* Shocks, free falls and the band, when there is one. */
+static int find_shocks(struct report *report, struct findings *found, const struct evaluate_options *options,
+                       const struct estimate_options *estimate)
+{
+	int result = events_find(report->record, &options->events, &found->events);
+
+	if (result == 0)
+		result = free_fall_find(report->record, &found->falls);
+	if (result != 0)
+		return result;
+	report->events = &found->events;
+	report->falls = &found->falls;
+	report->show_events = options->show_events;
+	if (options->band.curve == NULL)
+		return 0;
+	result = band_check(report->record, report->analysis, estimate, &options->band, &found->band);
+	if (result == 0) {
+		report->band = &found->band;
+		return 0;
+	}
+	if (result == DT_E_UNKNOWN)
+		command_error("%s: no channel '%s' to lay the band on", report->record->file,
+		              options->band.channel);
+	else
+		command_error("%s: no pulse to lay the band on: %s", report->record->file,
+		              error_text(result));
+	return TOLD;
+}
+
+/* The first channel that is too slow for the class; false when there is none. */
+static bool refuses_cfc(const struct record *record, unsigned cfc)
+{
+	for (size_t i = 0; cfc > 0 && i < record->channel_count; i++) {
+		const struct channel *c = &record->channels[i];
+
+		if (cfc_check(cfc, c->rate_hz) == 0)
+			continue;
+		command_error("%s: %s at %g Hz: CFC%u needs %u Hz or more, expected CFC%u at most",
+		              record->file, c->name, c->rate_hz, cfc, 10 * cfc, cfc_highest(c->rate_hz));
+		return true;
+	}
+	return false;
+}
+
+/* Estimates and predicts; the report points into what is found. 0, with the analysis to be freed; DT_E_*; or
+ * TOLD, when why not was printed. */
+static int make_report(struct report *report, struct findings *found, const struct record *record,
+                       const struct evaluate_options *options)
 {
 	struct estimate_options estimate = estimate_options_of(options);
 	const struct scene *scene = options->scene;
-	int result = estimate_record(record, &estimate, analysis);
+	char message[MODEL_MESSAGE_MAX];
+	int result;
 
+	if (refuses_cfc(record, options->cfc))
+		return TOLD;
+	result = estimate_record(record, &estimate, &found->analysis);
 	if (result != 0)
 		return result;
 	*report = (struct report){
-	        .record = record, .analysis = analysis, .scene = scene, .version = DT_VERSION};
+	        .record = record, .analysis = &found->analysis, .scene = scene, .version = DT_VERSION};
+	result = find_shocks(report, found, options, &estimate);
+	if (result != 0) {
+		estimate_free(&found->analysis);
+		return result;
+	}
 	if (scene == NULL)
 		return 0;
-	result = model_predict(scene, MODEL_AUTO, prediction);
-	if (result == 0)
-		report->prediction = prediction;
-	else
-		command_error("%s: no prediction: %s", scene->name, error_text(result));
+	result = model_solve(scene, MODEL_AUTO, NULL, &found->prediction, message);
+	if (result != 0) {
+		command_error("%s: no prediction: %s", scene->name, message);
+		return 0;
+	}
+	report->prediction = &found->prediction;
+	if (model_below(scene, &found->prediction, &found->below) == 0)
+		report->below = &found->below;
 	return 0;
 }
 
 int evaluate(const struct record *record, const struct evaluate_options *options)
 {
-	struct model_prediction prediction;
-	struct analysis analysis;
+	struct findings found;
 	struct report report;
-	int code, result = make_report(&report, &analysis, &prediction, record, options);
+	int code, result = make_report(&report, &found, record, options);
 
+	if (result == TOLD)
+		return COMMAND_INPUT;
 	if (result != 0) {
 		command_error("%s: %s", record->file,
 		              result == DT_E_EMPTY ? "no good sample in any channel" : error_text(result));
 		return COMMAND_INPUT;
 	}
 	code = write_out(&report, options);
-	if (code == COMMAND_DONE && options->strict && any_flag(record, &analysis)) {
+	if (code == COMMAND_DONE && options->strict && report.band != NULL && !report.band->verdict.pass) {
+		command_error("%s: outside its band, and --strict was asked for", record->file);
+		code = COMMAND_INPUT;
+	}
+	if (code == COMMAND_DONE && options->strict && any_flag(record, &found.analysis)) {
 		command_error("%s: flagged, and --strict was asked for", record->file);
 		code = COMMAND_INPUT;
 	}
-	estimate_free(&analysis);
+	estimate_free(&found.analysis);
 	return code;
 }
 
 char *evaluate_json(const struct record *record, const struct scene *scene)
 {
 	struct evaluate_options options = {.scene = scene, .iepe_time_constant_s = NAN};
-	struct model_prediction prediction;
-	struct analysis analysis;
+	struct findings found;
 	struct report report;
 	char *json = NULL;
 	size_t size = 0;
 	FILE *out;
 
-	if (make_report(&report, &analysis, &prediction, record, &options) != 0)
+	if (make_report(&report, &found, record, &options) != 0)
 		return NULL;
 	out = open_memstream(&json, &size);
 	if (out != NULL) {
@@ -129,7 +204,7 @@ char *evaluate_json(const struct record *record, const struct scene *scene)
 			json = NULL;
 		}
 	}
-	estimate_free(&analysis);
+	estimate_free(&found.analysis);
 	return json;
 }
 

@@ -10,17 +10,23 @@
 #include "common/scenes/scene.h"
 #include "host/estimate/estimate.h"
 #include "host/record/record.h"
+#include "host/shock/band.h"
+#include "host/shock/events.h"
 
 struct evaluate_options {
 	const struct scene *scene;   /* NULL: no model */
 	double lowpass_hz;           /* 0 = raw */
 	double iepe_time_constant_s; /* 0 = not undone, NAN = the scene's */
+	unsigned cfc;                /* channel frequency class; 0 = none */
 	enum estimate_family family;
-	double tolerance;      /* of estimate_options */
-	bool json;             /* JSON to stdout instead of the table */
-	const char *html;      /* page to write; NULL: none */
-	const char *json_file; /* JSON beside it; NULL: none */
-	bool strict;           /* a flag is a failure */
+	double tolerance;             /* of estimate_options */
+	struct events_options events; /* how shocks are found */
+	bool show_events;             /* shocks and free falls in the table too */
+	struct band_options band;     /* its curve NULL: none */
+	bool json;                    /* JSON to stdout instead of the table */
+	const char *html;             /* page to write; NULL: none */
+	const char *json_file;        /* JSON beside it; NULL: none */
+	bool strict;                  /* a flag is a failure */
 };
 
 /* Prints and writes what was asked for. Returns a COMMAND_* exit code; errors were printed. */

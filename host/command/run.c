@@ -11,6 +11,8 @@
 #include <unistd.h>
 
 #include "common/wire_table.h"
+#include "host/command/archived.h"
+#include "host/command/beside.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
 #include "host/command/session.h"
@@ -28,9 +30,12 @@ static const char help[] =
         "\n"
         "  --link URL     unix:PATH, can:IF, slcan:DEV, or udpm://... for a running 'droptower bridge';\n"
         "                 without it a simulated tower is started\n"
-        "  --scene FILE   what is dropped (default common/scenes/geometry-2A.ini)\n"
+        "  --scene FILE   what is dropped (default geometry-2A.ini, which comes along)\n"
         "  --angle DEG    contact angle, instead of the scene's\n"
         "  --out DIR      where the files go (default .)\n"
+        "  --archive DIR  with --series NAME: the drop goes into an archive ('droptower series new' makes a\n"
+        "                 series), which knows scene and angle; without it $DROPTOWER_ARCHIVE or ./archive\n"
+        "  --operator NAME who drops ($USER)\n"
         "  --json         one JSON object on standard output instead of the table\n"
         "  --strict       a flagged result is a failure (exit 3)\n"
         "  --bench WORD   simulated tower only: a word for droptower-bench, e.g. --bench=--loss\n"
@@ -41,6 +46,9 @@ enum {
 	OPTION_SCENE,
 	OPTION_ANGLE,
 	OPTION_OUT,
+	OPTION_ARCHIVE,
+	OPTION_SERIES,
+	OPTION_OPERATOR,
 	OPTION_JSON,
 	OPTION_STRICT,
 	OPTION_BENCH,
@@ -54,6 +62,9 @@ static const struct option long_options[] = {
         {"scene", required_argument, NULL, OPTION_SCENE},
         {"angle", required_argument, NULL, OPTION_ANGLE},
         {"out", required_argument, NULL, OPTION_OUT},
+        {"archive", required_argument, NULL, OPTION_ARCHIVE},
+        {"series", required_argument, NULL, OPTION_SERIES},
+        {"operator", required_argument, NULL, OPTION_OPERATOR},
         {"json", no_argument, NULL, OPTION_JSON},
         {"strict", no_argument, NULL, OPTION_STRICT},
         {"bench", required_argument, NULL, OPTION_BENCH},
@@ -63,6 +74,7 @@ static const struct option long_options[] = {
 
 struct run {
 	const char *link, *scene_file, *out;
+	const char *archive_folder, *series, *operator_name;
 	double angle_deg;
 	bool json, strict, help;
 	const char *bench_words[BENCH_WORDS_MAX + 8];
@@ -73,8 +85,40 @@ struct run {
 	int64_t start_ms;
 	bool aborted;    /* by the operator, after the release */
 	bool earlier;    /* the drop is one that the tower still held */
+	bool released;   /* what comes now is a drop, whatever becomes of it */
 	char stem[4096]; /* OUT/drop-NNNN */
+	char log[ARCHIVE_PATH_MAX];
+	struct archive *archive; /* NULL: files in OUT */
+	struct archive_recording recording;
 };
+
+/* In the sources' folder that one, elsewhere the one that was installed with this program. */
+static const char *default_scene(void)
+{
+	static const char in_sources[] = "common/scenes/geometry-2A.ini";
+	static char installed[PATH_MAX];
+
+	if (access(in_sources, R_OK) == 0 ||
+	    beside("../share/droptower/scenes/geometry-2A.ini", installed) != 0)
+		return in_sources;
+	return installed;
+}
+
+/* A series says what is dropped, and where the files go. */
+static int check_archive(struct run *run)
+{
+	if (run->series == NULL && (run->archive_folder != NULL || run->operator_name != NULL))
+		return command_usage("run", "--archive and --operator go with --series NAME");
+	if (run->series != NULL && (run->out != NULL || run->scene_file != NULL || !isnan(run->angle_deg)))
+		return command_usage("run", "--series excludes --out, --scene and --angle");
+	run->archive_folder = archived_folder(run->archive_folder);
+	run->operator_name = archived_operator(run->operator_name);
+	if (run->out == NULL)
+		run->out = ".";
+	if (run->scene_file == NULL)
+		run->scene_file = default_scene();
+	return COMMAND_DONE;
+}
 
 static int parse(struct run *run, int argc, char **argv)
 {
@@ -94,6 +138,15 @@ static int parse(struct run *run, int argc, char **argv)
 			break;
 		case OPTION_OUT:
 			run->out = optarg;
+			break;
+		case OPTION_ARCHIVE:
+			run->archive_folder = optarg;
+			break;
+		case OPTION_SERIES:
+			run->series = optarg;
+			break;
+		case OPTION_OPERATOR:
+			run->operator_name = optarg;
 			break;
 		case OPTION_JSON:
 			run->json = true;
@@ -118,7 +171,7 @@ static int parse(struct run *run, int argc, char **argv)
 		code = command_usage("run", "'%s' is too much", argv[optind]);
 	if (code == COMMAND_DONE && run->link != NULL && run->bench_word_count > 0)
 		code = command_usage("run", "--bench is for the simulated tower, --link for another one");
-	return code;
+	return code == COMMAND_DONE && !run->help ? check_archive(run) : code;
 }
 
 static void __attribute__((format(printf, 2, 3))) progress(const struct run *run, const char *format, ...)
@@ -135,8 +188,6 @@ static void __attribute__((format(printf, 2, 3))) progress(const struct run *run
 /* Makes OUT and takes the first number for which no log is there, by making it. */
 static int choose_stem(struct run *run)
 {
-	char log[4200];
-
 	if (mkdir(run->out, 0777) != 0 && errno != EEXIST) {
 		command_error("%s: %s", run->out, strerror(errno));
 		return COMMAND_INPUT;
@@ -145,14 +196,14 @@ static int choose_stem(struct run *run)
 		int fd;
 
 		snprintf(run->stem, sizeof(run->stem), "%.4000s/drop-%04d", run->out, number);
-		snprintf(log, sizeof(log), "%s.log", run->stem);
-		fd = open(log, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+		snprintf(run->log, sizeof(run->log), "%s.log", run->stem);
+		fd = open(run->log, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
 		if (fd >= 0) {
 			close(fd);
 			return COMMAND_DONE;
 		}
 		if (errno != EEXIST) {
-			command_error("%s: %s", log, strerror(errno));
+			command_error("%s: %s", run->log, strerror(errno));
 			return COMMAND_INPUT;
 		}
 	}
@@ -164,11 +215,9 @@ static int choose_stem(struct run *run)
 static void forget_empty_log(const struct run *run)
 {
 	struct stat there;
-	char log[4200];
 
-	snprintf(log, sizeof(log), "%s.log", run->stem);
-	if (stat(log, &there) == 0 && there.st_size == 0)
-		unlink(log);
+	if (stat(run->log, &there) == 0 && there.st_size == 0)
+		unlink(run->log);
 }
 
 static void tell_checks(const struct run *run, uint16_t checks)
@@ -314,6 +363,7 @@ static int release_and_follow(struct run *run, struct record *record)
 		code = wait_until_ready(run);
 	if (code == COMMAND_DONE)
 		code = arm_and_release(run);
+	run->released = code == COMMAND_DONE;
 	return code == COMMAND_DONE ? follow(run, record) : code;
 }
 
@@ -340,6 +390,40 @@ static int drop(struct run *run, struct record *record)
 	return code;
 }
 
+/* A drop that is not what it seems ends with a word and a code of its own. */
+static int tell_oddity(const struct run *run, const struct record *record, int code)
+{
+	if (run->aborted)
+		command_error("aborted; what was recorded is kept");
+	if (run->earlier)
+		command_error("drop %u was still in the tower from an earlier run; nothing was released now",
+		              record->drop_id);
+	return code == COMMAND_DONE && (run->aborted || run->earlier) ? COMMAND_REFUSED : code;
+}
+
+/* The drop is recorded before it is looked at. */
+static int report_archived(struct run *run, struct record *record)
+{
+	struct evaluate_options options = {
+	        .scene = &run->scene, .iepe_time_constant_s = NAN, .json = run->json, .strict = run->strict};
+	const struct archive_recording *r = &run->recording;
+	const char *note = run->aborted   ? "aborted in motion"
+	                   : run->earlier ? "was still in the tower from an earlier run"
+	                                  : "";
+	int code, shown;
+
+	if (archive_finish(run->archive, &run->recording, 0, note) != 0)
+		return archived_failed(run->archive);
+	progress(run, "recorded  %s/%u", r->series, r->number);
+	code = archived_analyse(run->archive, r->series, r->number, r->raw);
+	snprintf(record->file, sizeof(record->file), "%s", r->raw);
+	shown = evaluate(record, &options);
+	if (shown == COMMAND_DONE)
+		fprintf(run->json ? stderr : stdout, "\ndrop     %s/%u\nraw log  %s\n", r->series, r->number,
+		        r->log);
+	return tell_oddity(run, record, code != COMMAND_DONE ? code : shown);
+}
+
 static int report(struct run *run, struct record *record)
 {
 	char csv[4200], json[4200], html[4200], message[READ_MESSAGE_MAX];
@@ -364,24 +448,17 @@ static int report(struct run *run, struct record *record)
 		fprintf(run->json ? stderr : stdout,
 		        "\nraw log  %s.log\ntable    %s\nJSON     %s\nreport   %s\n", run->stem, csv, json,
 		        html);
-	if (run->aborted)
-		command_error("aborted; what was recorded is kept");
-	if (run->earlier)
-		command_error("drop %u was still in the tower from an earlier run; nothing was released now",
-		              record->drop_id);
-	if (code == COMMAND_DONE && (run->aborted || run->earlier))
-		code = COMMAND_REFUSED;
-	return code;
+	return tell_oddity(run, record, code);
 }
 
 /* Drops with the log open; the log is on disk before the analysis begins. */
 static int drop_logged(struct run *run, const char *url, struct record *record)
 {
 	struct session_options options = {0};
-	char log[4200], message[SESSION_MESSAGE_MAX];
+	char log[ARCHIVE_PATH_MAX + 8], message[SESSION_MESSAGE_MAX];
 	int code = COMMAND_LINK;
 
-	snprintf(log, sizeof(log), "log:%s.log", run->stem);
+	snprintf(log, sizeof(log), "log:%s", run->log);
 	options.log = link_open(log, LINK_WRITE, message, sizeof(message));
 	if (options.log == NULL) {
 		command_error("%s", message);
@@ -394,7 +471,7 @@ static int drop_logged(struct run *run, const char *url, struct record *record)
 		command_error("%s", message);
 	session_close(run->session);
 	if (link_close(options.log) != 0) {
-		command_error("%s.log: could not be written", run->stem);
+		command_error("%s: could not be written", run->log);
 		code = COMMAND_INPUT;
 	}
 	return code;
@@ -425,14 +502,50 @@ static int run_drop(struct run *run)
 	if (run->link == NULL)
 		simulated_stop(&tower);
 	if (code == COMMAND_DONE)
-		code = report(run, &record);
+		code = run->archive != NULL ? report_archived(run, &record) : report(run, &record);
 	record_free(&record);
+	return code;
+}
+
+/* Nothing released: no drop. Else what there is of it stays, partial. */
+static void leave_recording(struct run *run)
+{
+	if (run->recording.lock < 0)
+		return;
+	if (run->released || run->earlier)
+		archive_abandon(&run->recording);
+	else
+		archive_discard(run->archive, &run->recording);
+}
+
+static int run_archived(struct run *run)
+{
+	char message[ARCHIVE_MESSAGE_MAX], file[ARCHIVED_SCENE_MAX];
+	int code = COMMAND_INPUT;
+
+	run->archive = archive_open(run->archive_folder, ARCHIVE_WRITE, message);
+	if (run->archive == NULL) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	run->scene_file = file;
+	if (archive_scene(run->archive, run->series, &run->scene) != 0 ||
+	    archive_begin(run->archive, run->series, run->operator_name, ".log", &run->recording) != 0) {
+		code = archived_failed(run->archive);
+	} else {
+		snprintf(run->log, sizeof(run->log), "%s", run->recording.log);
+		code = archived_scene_file(run->archive, run->series, file);
+		if (code == COMMAND_DONE)
+			code = run_drop(run);
+		leave_recording(run);
+	}
+	archive_close(run->archive);
 	return code;
 }
 
 int command_run(int argc, char **argv)
 {
-	struct run run = {.scene_file = "common/scenes/geometry-2A.ini", .out = ".", .angle_deg = NAN};
+	struct run run = {.angle_deg = NAN};
 	int code = parse(&run, argc, argv);
 
 	if (code != COMMAND_DONE)
@@ -441,13 +554,17 @@ int command_run(int argc, char **argv)
 		fputs(help, stdout);
 		return COMMAND_DONE;
 	}
+	run.start_ms = session_now_ms();
+	if (run.series != NULL) {
+		command_catch_signals();
+		return run_archived(&run);
+	}
 	code = evaluate_read_scene(&run.scene, run.scene_file, run.angle_deg);
 	if (code == COMMAND_DONE)
 		code = choose_stem(&run);
 	if (code != COMMAND_DONE)
 		return code;
 	command_catch_signals();
-	run.start_ms = session_now_ms();
 	code = run_drop(&run);
 	forget_empty_log(&run);
 	return code;

@@ -3,7 +3,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <limits.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -13,17 +12,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "host/command/beside.h"
+
 enum { START_MS = 5000, ARGUMENTS_MAX = 40 };
-
-static int path_of_bench(char path[PATH_MAX])
-{
-	ssize_t length = readlink("/proc/self/exe", path, PATH_MAX - sizeof("-bench"));
-
-	if (length <= 0)
-		return -1;
-	memcpy(path + length, "-bench", sizeof("-bench"));
-	return 0;
-}
 
 static void become_bench(const char *path, const char *const *arguments, const char *url, int ready_fd)
 {
@@ -60,7 +51,7 @@ int simulated_start(struct simulated *tower, const char *const *arguments, char 
 	int pipes[2], ready;
 
 	snprintf(tower->directory, sizeof(tower->directory), "/tmp/droptower-XXXXXX");
-	if (path_of_bench(path) != 0 || pipe2(pipes, O_CLOEXEC) != 0) {
+	if (beside("droptower-bench", path) != 0 || pipe2(pipes, O_CLOEXEC) != 0) {
 		snprintf(message, size, "simulated tower: %s", strerror(errno));
 		return -1;
 	}

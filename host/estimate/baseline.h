@@ -2,10 +2,18 @@
 #ifndef DT_HOST_ESTIMATE_BASELINE_H
 #define DT_HOST_ESTIMATE_BASELINE_H
 /*
- * Where zero is and how much it trembles, from the quiet part before the largest pulse of the trace's
- * event window: the last 250 ms of it that end one rise time before the pulse leaves 10 %. A record that
- * starts inside its event has no quiet part: offset 0, samples 0, and the noise from second differences
+ * Where zero is, how it moves and how much it trembles, from the quiet part before the largest pulse of the
+ * trace's event window: the last 250 ms of it that end one rise time before the pulse leaves 10 %. A record
+ * that starts inside its event has no quiet part: offset 0, samples 0, and the noise from second differences
  * over the whole trace (a smooth signal nearly vanishes in them). Noise NAN: too few samples even for that.
+ *
+ * Drift and hum are least squares over means of 2 ms, each by an F-test, and only where what is left is as
+ * white as the samples' noise asks: motion before the pulse is neither. Drift needs 40 ms, hum 80 ms, both
+ * at least four samples to the mean.
+ *
+ * Outliers are what lies beyond six standard deviations: told at first from the median and the median
+ * deviation of a few samples, then from those inside. Offset and noise are mean and deviation of all the
+ * rest, which are nearly twice as certain as medians.
  *
  * The noise is that of the samples as read. A low-pass comes later and hides noise from the eye, not
  * from an estimator whose own bandwidth is lower still.
@@ -13,10 +21,12 @@
 #include "host/estimate/estimate.h"
 #include "host/estimate/trace.h"
 
-/* scratch holds 2 * trace->count doubles. */
+/* scratch holds trace->count doubles. */
 void baseline_find(const struct trace *trace, double *scratch, struct estimate_baseline *baseline);
 
-/* Takes the offset off every sample and notes the noise in the trace. */
+/* Takes offset, drift and hum off every sample, flags them, and notes noise and hum in the trace. A drift is
+ * followed for DRIFT_REACH_S beyond the quiet part; zero stays where it is from there on. */
+#define DRIFT_REACH_S 0.5
 void baseline_remove(struct trace *trace, const struct estimate_baseline *baseline);
 
 #endif

@@ -2,12 +2,12 @@
 #ifndef DT_HOST_ESTIMATE_CHOLESKY_H
 #define DT_HOST_ESTIMATE_CHOLESKY_H
 /*
- * Normal equations of a handful of unknowns, without heap: the local polynomials and the ring-down fit.
+ * Normal equations of a handful of unknowns, without heap: every least-squares fit of the estimators.
  * Row major, at most CHOLESKY_MAX unknowns; only the lower triangle is read.
  */
 #include <stdbool.h>
 
-enum { CHOLESKY_MAX = 7 };
+enum { CHOLESKY_MAX = 11 };
 
 struct cholesky {
 	unsigned size;

@@ -9,16 +9,27 @@ enum {
 	CREST_NEWTON = 8,
 };
 
+/* Half windows of order 6 and 4, in widths. */
+#define FINE_HALF 0.455
+#define COARSE_HALF 0.35
+
 /* Windows shrink by this much where the polynomial does not fit, so many times. */
 #define SHRINK 0.75
 
 enum { SHRINKS = 12 };
 
-/* Narrowest start in samples: enough for both orders even where the foot of the pulse cuts one side. */
+/* Where the pulse itself gives too few samples, the window in samples that is tried instead: enough for both
+ * orders even where the foot of the pulse cuts one side. */
 #define NARROWEST 15.0
 
 /* A residual this small against the magnitude does no harm. */
 #define RESIDUAL_MIN 3e-4
+
+/* Newton's last move, in steps. */
+#define NEAR_ENOUGH 1e-7
+
+/* A window is around the summit when it is off by less than this part of a sample. */
+#define OFF_CENTRE 0.2
 
 /* How far from its centre a fit is believed, in half widths of its window. */
 #define REACH 0.6
@@ -42,13 +53,41 @@ static void square_at(const struct surface *surface, double time_s, double half[
 	}
 }
 
+/* Newton's way to the maximum near time_s; false where it leaves the next step_s to either side. */
+static bool newton(const struct surface *surface, double step_s, double *time_s, double half[3])
+{
+	double time = *time_s;
+
+	for (int i = 0; i < CREST_NEWTON; i++) {
+		double move;
+
+		square_at(surface, time, half);
+		if (!(half[2] < 0))
+			return false;
+		move = half[1] / half[2];
+		time -= move;
+		if (!(fabs(time - *time_s) <= step_s))
+			return false;
+		if (fabs(move) < NEAR_ENOUGH * step_s)
+			break;
+	}
+	*time_s = time;
+	return true;
+}
+
 /* The highest instant within reach of the centre: 0 inside, -1 or +1 at that end of the reach. */
 static int summit(const struct surface *surface, double *time_s)
 {
 	double centre = surface->axis[0].centre_s, reach = REACH * surface->axis[0].half_s;
-	double step = 2 * reach / CREST_STEPS, best = -1, time, half[3];
+	double step = 2 * reach / CREST_STEPS, best = -1, half[3], left[3], right[3];
 	int at = 0;
 
+	/* Most often it is where it was looked for. */
+	*time_s = centre;
+	square_at(surface, centre - reach, left);
+	square_at(surface, centre + reach, right);
+	if (newton(surface, 2 * step, time_s, half) && half[0] > fmax(left[0], right[0]))
+		return 0;
 	for (int i = 0; i <= CREST_STEPS; i++) {
 		square_at(surface, centre - reach + i * step, half);
 		if (half[0] > best) {
@@ -56,19 +95,10 @@ static int summit(const struct surface *surface, double *time_s)
 			at = i;
 		}
 	}
-	time = centre - reach + at * step;
-	*time_s = time;
+	*time_s = centre - reach + at * step;
 	if (at == 0 || at == CREST_STEPS)
 		return at == 0 ? -1 : 1;
-	for (int i = 0; i < CREST_NEWTON; i++) {
-		square_at(surface, time, half);
-		if (!(half[2] < 0))
-			break;
-		time -= half[1] / half[2];
-		if (!(fabs(time - *time_s) <= step))
-			return 0;
-	}
-	*time_s = time;
+	(void)newton(surface, step, time_s, half);
 	return 0;
 }
 
@@ -87,7 +117,7 @@ static bool climb(struct surface *surface, const struct trace *const axes[], uns
 			if (!local_fit(&surface->axis[i], axes[i], *near_s, half_s, span, order))
 				return false;
 		side = summit(surface, &top);
-		if (side == 0 && fabs(top - *near_s) * axes[0]->rate_hz < 0.5) {
+		if (side == 0 && fabs(top - *near_s) * axes[0]->rate_hz < OFF_CENTRE) {
 			*near_s = top;
 			return true;
 		}
@@ -98,6 +128,26 @@ static bool climb(struct surface *surface, const struct trace *const axes[], uns
 	return side == 0;
 }
 
+/* Whether a residual is what noise leaves: chi square within 3.3 of its standard deviations. */
+static bool is_noise(const struct local *local, const struct trace *trace)
+{
+	return local->residual_g <= trace->noise_g * sqrt(1 + 3.3 * sqrt(2.0 / local->freedom));
+}
+
+double crest_noise(const struct local *local, const struct trace *trace)
+{
+	return is_noise(local, trace) ? trace->noise_g : local->residual_g;
+}
+
+static bool follows(const struct surface *surface, const struct trace *const axes[], double value_g)
+{
+	for (unsigned i = 0; i < surface->count; i++)
+		if (!is_noise(&surface->axis[i], axes[i]) &&
+		    surface->axis[i].residual_g > RESIDUAL_MIN * value_g)
+			return false;
+	return true;
+}
+
 /* Noise through the fit: dR = sum X dX / R, dt = sum X dX' / (sum X'^2 + X X''). */
 static void propagate(const struct surface *surface, const struct trace *const axes[], struct crest *crest)
 {
@@ -105,7 +155,7 @@ static void propagate(const struct surface *surface, const struct trace *const a
 
 	square_at(surface, crest->time_s, half);
 	for (unsigned i = 0; i < surface->count; i++) {
-		double d[3], noise = fmax(axes[i]->noise_g, surface->axis[i].residual_g);
+		double d[3], noise = crest_noise(&surface->axis[i], axes[i]);
 
 		local_at(&surface->axis[i], crest->time_s, d);
 		variance += pow(d[0] * noise * local_spread(&surface->axis[i], crest->time_s, 0), 2);
@@ -114,19 +164,21 @@ static void propagate(const struct surface *surface, const struct trace *const a
 	crest->value_g = sqrt(2 * half[0]);
 	crest->sigma_g = sqrt(variance) / crest->value_g;
 	crest->sigma_time_s = sqrt(slope_variance) / fabs(half[2]);
+	/* A maximum over noise is too high by what its wandering gains. */
+	crest->value_g -= slope_variance / (2 * fabs(half[2]) * crest->value_g);
 }
 
-/* Whether the residual is what noise leaves: chi square within 3.3 of its standard deviations. */
-static bool follows(const struct surface *surface, const struct trace *const axes[], double value_g)
+static double chi_square(const struct surface *surface, const struct trace *const axes[])
 {
-	for (unsigned i = 0; i < surface->count; i++) {
-		double chi2 = 1 + 3.3 * sqrt(2.0 / surface->axis[i].freedom);
-		double limit = axes[i]->noise_g * sqrt(chi2);
+	double squares = 0, freedom = 0;
 
-		if (surface->axis[i].residual_g > fmax(limit, RESIDUAL_MIN * value_g))
-			return false;
+	for (unsigned i = 0; i < surface->count; i++) {
+		if (!(axes[i]->noise_g > 0))
+			return NAN;
+		squares += surface->axis[i].freedom * pow(surface->axis[i].residual_g / axes[i]->noise_g, 2);
+		freedom += surface->axis[i].freedom;
 	}
-	return true;
+	return squares / freedom;
 }
 
 /* Both orders at one width; *good says whether they follow the samples. */
@@ -137,17 +189,22 @@ static bool fit_pair(struct crest *crest, const struct trace *const axes[], unsi
 	struct crest six, four;
 
 	six.time_s = near_s;
-	if (!climb(&fine, axes, count, &six.time_s, 0.45 * width_s, span, 6))
+	if (!climb(&fine, axes, count, &six.time_s, FINE_HALF * width_s, span, 6))
 		return false;
 	four.time_s = six.time_s;
-	if (!climb(&coarse, axes, count, &four.time_s, 0.35 * width_s, span, 4))
+	if (!climb(&coarse, axes, count, &four.time_s, COARSE_HALF * width_s, span, 4))
 		return false;
 	propagate(&fine, axes, &six);
 	propagate(&coarse, axes, &four);
 	if (!isfinite(six.value_g) || !isfinite(six.time_s))
 		return false;
-	six.sigma_g = hypot(six.sigma_g, (six.value_g - four.value_g) / 2);
-	six.sigma_time_s = hypot(six.sigma_time_s, (six.time_s - four.time_s) / 2);
+	six.model_g = fabs(six.value_g - four.value_g) / 2;
+	six.model_s = fabs(six.time_s - four.time_s) / 2;
+	six.sigma_g = hypot(six.sigma_g, six.model_g);
+	six.sigma_time_s = hypot(six.sigma_time_s, six.model_s);
+	six.chi_square = chi_square(&fine, axes);
+	for (unsigned i = 0; i < count; i++)
+		six.axis[i] = fine.axis[i];
 	*crest = six;
 	*good = follows(&fine, axes, six.value_g);
 	return true;
@@ -156,14 +213,17 @@ static bool fit_pair(struct crest *crest, const struct trace *const axes[], unsi
 bool crest_fit(struct crest *crest, const struct trace *const axes[], unsigned count, double near_s,
                double width_s, const struct local_span *span)
 {
-	bool fitted = false, good = false;
+	bool good = false, fitted = fit_pair(crest, axes, count, near_s, width_s, span, &good);
 
-	for (unsigned i = 0; i < count; i++)
-		width_s = fmax(width_s, NARROWEST / axes[i]->rate_hz);
-	for (int i = 0; i < SHRINKS && !good; i++, width_s *= SHRINK) {
+	if (!fitted) {
+		for (unsigned i = 0; i < count; i++)
+			width_s = fmax(width_s, NARROWEST / axes[i]->rate_hz);
+		fitted = fit_pair(crest, axes, count, near_s, width_s, span, &good);
+	}
+	for (int i = 0; i < SHRINKS && fitted && !good; i++) {
+		width_s *= SHRINK;
 		if (!fit_pair(crest, axes, count, near_s, width_s, span, &good))
 			break;
-		fitted = true;
 	}
 	return fitted;
 }

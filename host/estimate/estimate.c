@@ -6,23 +6,37 @@
 #include <string.h>
 
 #include "host/estimate/baseline.h"
+#include "host/estimate/bump.h"
+#include "host/estimate/cfc.h"
+#include "host/estimate/dropout.h"
 #include "host/estimate/filter.h"
+#include "host/estimate/iepe.h"
 #include "host/estimate/lag.h"
 #include "host/estimate/peak.h"
 #include "host/estimate/pulse.h"
+#include "host/estimate/rebound.h"
 #include "host/estimate/resultant.h"
 #include "host/estimate/ringdown.h"
+#include "host/estimate/spike.h"
 #include "host/estimate/trace.h"
 
 /* Around the trigger, what belongs to the impact that fired it: the product comes back for another. */
 #define EVENT_BEFORE_S 0.02
 #define EVENT_AFTER_S 0.1
 
-/* The force fades slowly beyond the pulse's 10 % point: the decay is free this part of a width later. */
-#define TAIL_WIDTHS 0.1
+/* The force fades slowly beyond the pulse's 10 % point: the decay is surely free this part of a width later,
+ * and may have been for this part of a width. */
+#define TAIL_WIDTHS 0.3
+#define MARGIN_WIDTHS 0.35
 
-/* The next contact is where the case reads this part of its peak again. */
+/* A peak is sure of its pulse's end at this many times the noise; otherwise a bump tells, whose edges are the
+ * force's less exactly. */
+#define PEAK_SURE 8.0
+#define BUMP_TAIL_WIDTHS 0.5
+
+/* The next contact is where the case reads this part of its peak again, and so much noise at least. */
 #define NEXT_CONTACT_LEVEL 0.3
+#define NEXT_CONTACT_NOISE 6.0
 
 /* A plate rings when its decay starts at this part of its peak or more, and, where the case rings too, at
  * this many times the case's. */
@@ -98,30 +112,47 @@ int estimate_family_parse(const char *name, enum estimate_family *family)
 	return DT_E_UNKNOWN;
 }
 
-static int analyse_channel(const struct desk *desk, size_t i, const struct estimate_options *options,
-                           struct estimate_channel *out)
+/* What is wrong with single samples, and where zero is without them. */
+static void clean(struct trace *trace, double *scratch, struct estimate_baseline *baseline)
 {
-	const struct channel *channel = &desk->record->channels[i];
-	struct work *work = &desk->work[i];
-	double trigger = desk->record->is_drop ? desk->record->trigger_s : NAN;
-	double from = isfinite(trigger) ? trigger - EVENT_BEFORE_S : -INFINITY;
-	double until = isfinite(trigger) ? trigger + EVENT_AFTER_S : INFINITY;
-	int status = trace_open(&work->trace, channel, from, until);
+	bool marked;
 
-	if (status)
-		return status;
-	baseline_find(&work->trace, desk->scratch, &out->baseline);
-	baseline_remove(&work->trace, &out->baseline);
-	if (options->lowpass_hz > 0) {
-		status = filter_lowpass(&work->trace, options->lowpass_hz);
-		if (status)
-			return status;
+	baseline_find(trace, scratch, baseline);
+	marked = spike_mark(trace, baseline->noise_g);
+	marked |= dropout_mark(trace, baseline->noise_g);
+	if (!marked)
+		return;
+	trace_marked(trace);
+	baseline_find(trace, scratch, baseline);
+}
+
+static int prepare(const struct desk *desk, size_t i, const struct estimate_options *options,
+                   struct estimate_baseline *baseline)
+{
+	struct trace *trace = &desk->work[i].trace;
+
+	clean(trace, desk->scratch, baseline);
+	baseline_remove(trace, baseline);
+	if (options->iepe_time_constant_s > 0)
+		iepe_undo(trace, baseline->from_s, options->iepe_time_constant_s);
+	if (options->cfc > 0) {
+		int result = cfc_filter(trace, options->cfc);
+
+		if (result != 0)
+			return result;
 	}
-	peak_find(&work->trace, &work->peak);
-	pulse_measure(&work->trace, &work->peak, &out->baseline, &out->pulse);
+	return options->lowpass_hz > 0 ? filter_lowpass(trace, options->lowpass_hz) : 0;
+}
+
+static void analyse_channel(const struct desk *desk, size_t i, const struct estimate_options *options,
+                            struct estimate_channel *out)
+{
+	struct work *work = &desk->work[i];
+
+	peak_find(&work->trace, options, &work->peak);
+	pulse_measure(&work->trace, &work->peak, &out->baseline, options->family, &out->pulse);
 	out->peak = work->peak.result;
 	out->flags = work->trace.flags;
-	return 0;
 }
 
 /* Index of the channel of that sensor and axis; channel_count if there is none. */
@@ -138,13 +169,79 @@ static size_t find(const struct desk *desk, const char *sensor, char axis)
 	return i;
 }
 
+/* Weak axes of a sensor take the shape of its strongest one. */
+static void analyse_weak(const struct desk *desk, const struct estimate_options *options, const char *sensor,
+                         struct analysis *analysis)
+{
+	size_t strong = analysis->channel_count;
+
+	for (const char *axis = "XYZ"; *axis; axis++) {
+		size_t i = find(desk, sensor, *axis);
+
+		if (i < analysis->channel_count && isfinite(analysis->channels[i].peak.value_g) &&
+		    (strong == analysis->channel_count ||
+		     fabs(analysis->channels[i].peak.value_g) >
+		             fabs(analysis->channels[strong].peak.value_g)))
+			strong = i;
+	}
+	for (const char *axis = "XYZ"; *axis && strong < analysis->channel_count; axis++) {
+		size_t i = find(desk, sensor, *axis);
+		struct work *work = &desk->work[i];
+
+		if (i == analysis->channel_count || i == strong || !peak_is_weak(&work->trace, &work->peak) ||
+		    !peak_weak(&work->trace, options, &desk->work[strong].trace, &desk->work[strong].peak,
+		               &work->peak))
+			continue;
+		pulse_of_weak(&work->peak, &analysis->channels[strong].pulse, &analysis->channels[i].pulse);
+		analysis->channels[i].peak = work->peak.result;
+	}
+}
+
+/* Whether the trace begins or ends inside its pulse. */
+static bool cuts_pulse(const struct work *work)
+{
+	const struct trace *trace = &work->trace;
+	double time = work->peak.result.time_s, width = work->peak.width_s;
+
+	return time - trace->start_s < width || trace_time(trace, trace->count) - time < width;
+}
+
+static void flag_short(const struct desk *desk, struct analysis *analysis)
+{
+	for (size_t i = 0; i < analysis->channel_count; i++) {
+		struct estimate_channel *channel = &analysis->channels[i];
+
+		if (channel->peak.how.status == ESTIMATE_SHORT ||
+		    (channel->pulse.status == ESTIMATE_SHORT && cuts_pulse(&desk->work[i])))
+			channel->flags |= RECORD_FLAG_SHORT;
+	}
+}
+
+static void analyse_rebound(const struct desk *desk, double impact_speed_m_s, struct analysis *analysis)
+{
+	struct rebound_axes axes = {.count = 0};
+
+	for (const char *axis = "XYZ"; *axis; axis++) {
+		size_t i = find(desk, "S2", *axis);
+
+		if (i == analysis->channel_count)
+			continue;
+		axes.trace[axes.count] = &desk->work[i].trace;
+		axes.peak[axes.count] = &desk->work[i].peak;
+		axes.pulse[axes.count] = &analysis->channels[i].pulse;
+		axes.count++;
+	}
+	rebound_find(&axes, impact_speed_m_s, &analysis->rebound);
+	analysis->has_rebound = analysis->rebound.status != ESTIMATE_SHORT;
+}
+
 static bool measured(const struct analysis *analysis, size_t i)
 {
 	return i < analysis->channel_count && isfinite(analysis->channels[i].pulse.end_s);
 }
 
-/* The channel that tells when channel i's contact ends: for our sensors the stronger axis of the case, S2;
- * otherwise the channel itself. */
+/* The channel that tells when channel i's contact ends: for our sensors the stronger axis of the case, S2, or
+ * where noise hides that its X; otherwise the channel itself. */
 static size_t contact_channel(const struct desk *desk, const struct analysis *analysis, size_t i)
 {
 	const char *name = desk->record->channels[i].name;
@@ -158,33 +255,87 @@ static size_t contact_channel(const struct desk *desk, const struct analysis *an
 		               : x;
 	if (measured(analysis, x))
 		return x;
-	return measured(analysis, y) ? y : i;
+	if (measured(analysis, y))
+		return y;
+	return x < analysis->channel_count ? x : i;
 }
 
 /* When the case is hit again; INFINITY if it is not. */
-static double next_contact(const struct trace *trace, double after_s, double peak_g)
+static double next_contact(const struct trace *trace, double after_s, double level_g)
 {
 	for (size_t k = trace_index(trace, after_s); k < trace->count; k++)
-		if (trace_good(trace, k) && fabs(trace->value_g[k]) > NEXT_CONTACT_LEVEL * fabs(peak_g))
+		if (trace_good(trace, k) && fabs(trace->value_g[k]) > level_g)
 			return trace_time(trace, k);
 	return INFINITY;
 }
 
-static void analyse_ringdown(const struct desk *desk, size_t i, struct analysis *analysis)
+/* Whether a channel's peak is too near the noise to say where its pulse ends. */
+static bool doubtful(const struct desk *desk, const struct analysis *analysis, size_t i)
+{
+	return !(fabs(analysis->channels[i].peak.value_g) > PEAK_SURE * desk->work[i].trace.noise_g);
+}
+
+/* The decay's window: surely free somewhat after the contact's pulse meets 10 %, and perhaps from then on.
+ * The case's pulse, if there is one, tells of its plate too, which feels it a little later. */
+static void window_by_pulse(const struct estimate_pulse *pulse, struct ringdown_span *span)
+{
+	span->from_s = pulse->end_s + TAIL_WIDTHS * pulse->duration_s;
+	span->margin_s = MARGIN_WIDTHS * pulse->duration_s;
+}
+
+static bool window_by_bump(const struct trace *trace, struct ringdown_span *span)
+{
+	struct bump bump;
+
+	if (!bump_find(trace, &bump))
+		return false;
+	span->from_s = bump.end_s + BUMP_TAIL_WIDTHS * (bump.end_s - bump.start_s);
+	span->margin_s = TAIL_WIDTHS * (bump.end_s - bump.start_s);
+	return true;
+}
+
+/* What a contact channel says of the decay after it, and when the case is hit again. */
+struct contact {
+	size_t channel; /* record->channel_count: none looked at yet */
+	struct ringdown_span span;
+	double again_s;
+};
+
+static void look_at_contact(const struct desk *desk, const struct analysis *analysis, size_t i,
+                            struct contact *contact)
+{
+	const struct estimate_channel *hit = &analysis->channels[i];
+	const struct trace *trace = &desk->work[i].trace;
+	struct ringdown_span *span = &contact->span;
+
+	contact->channel = i;
+	*span = (struct ringdown_span){.from_s = NAN, .until_s = INFINITY};
+	if (!doubtful(desk, analysis, i) || !window_by_bump(trace, span))
+		window_by_pulse(&hit->pulse, span);
+	contact->again_s = next_contact(
+	        trace, span->from_s + span->margin_s / MARGIN_WIDTHS,
+	        fmax(NEXT_CONTACT_LEVEL * fabs(hit->peak.value_g), NEXT_CONTACT_NOISE * trace->noise_g));
+}
+
+/* contact is what the channels before had; mostly it is the same one. */
+static void analyse_ringdown(const struct desk *desk, size_t i, const struct estimate_options *options,
+                             struct contact *contact, struct analysis *analysis)
 {
 	struct estimate_channel *channel = &analysis->channels[i];
 	struct work *work = &desk->work[i];
-	size_t contact = contact_channel(desk, analysis, i);
-	const struct estimate_channel *hit = &analysis->channels[contact];
-	double from = hit->pulse.end_s + TAIL_WIDTHS * hit->pulse.duration_s, until = INFINITY;
+	size_t hit = contact_channel(desk, analysis, i);
+	struct ringdown_span span;
 
-	if (!isfinite(channel->peak.value_g))
-		from = NAN;
-	if (contact != i)
-		until = next_contact(&desk->work[contact].trace, from + hit->pulse.duration_s,
-		                     hit->peak.value_g);
-	ringdown_find(&work->trace, from, until, fabs(channel->peak.value_g), &work->ringdown);
-	if (!isfinite(channel->peak.value_g))
+	if (hit != contact->channel)
+		look_at_contact(desk, analysis, hit, contact);
+	span = contact->span;
+	span.tolerance = options->tolerance;
+	if (isfinite(channel->peak.value_g))
+		span.peak_g = fabs(channel->peak.value_g);
+	if (hit != i)
+		span.until_s = contact->again_s;
+	ringdown_find(&work->trace, &span, &work->ringdown);
+	if (!isfinite(span.from_s) && !isfinite(channel->peak.value_g))
 		work->ringdown.result.how.status = channel->peak.how.status;
 	channel->ringdown = work->ringdown.result;
 }
@@ -206,6 +357,8 @@ static void analyse_sensors(const struct desk *desk, struct analysis *analysis)
 		sensor[n].axes = (struct resultant_axes){{&desk->work[x].trace, &desk->work[y].trace},
 		                                         {&desk->work[x].peak, &desk->work[y].peak}};
 		sensor[n].resultant = &resultant[n];
+		sensor[n].ringdown[0] = &desk->work[x].ringdown;
+		sensor[n].ringdown[1] = &desk->work[y].ringdown;
 		resultant_find(&sensor[n].axes, &resultant[n]);
 		analysis->resultants[n] = resultant[n].result;
 		memcpy(analysis->resultants[n].sensor, names[i], sizeof("S1"));
@@ -255,19 +408,66 @@ static bool has_good_sample(const struct desk *desk)
 
 static int analyse(const struct desk *desk, const struct estimate_options *options, struct analysis *analysis)
 {
+	struct contact contact = {.channel = analysis->channel_count};
+
 	for (size_t i = 0; i < analysis->channel_count; i++) {
-		int status = analyse_channel(desk, i, options, &analysis->channels[i]);
+		int status = prepare(desk, i, options, &analysis->channels[i].baseline);
 
 		if (status)
 			return status;
+		analyse_channel(desk, i, options, &analysis->channels[i]);
 	}
 	if (!has_good_sample(desk))
 		return DT_E_EMPTY;
+	analyse_weak(desk, options, "S1", analysis);
+	analyse_weak(desk, options, "S2", analysis);
+	flag_short(desk, analysis);
 	for (size_t i = 0; i < analysis->channel_count; i++)
-		analyse_ringdown(desk, i, analysis);
+		analyse_ringdown(desk, i, options, &contact, analysis);
 	analyse_sensors(desk, analysis);
 	analyse_plate(desk, analysis);
+	if (options->impact_speed_m_s > 0)
+		analyse_rebound(desk, options->impact_speed_m_s, analysis);
 	return 0;
+}
+
+static bool allowed(double option)
+{
+	return option >= 0 && isfinite(option);
+}
+
+static size_t longest_of(const struct record *record)
+{
+	size_t longest = 0;
+
+	for (size_t i = 0; i < record->channel_count; i++)
+		if (record->channels[i].count > longest)
+			longest = record->channels[i].count;
+	return longest;
+}
+
+/* One piece of memory for all samples: the scratch, then the traces. */
+static void *lay_out(struct desk *desk)
+{
+	const struct record *record = desk->record;
+	double trigger = record->is_drop ? record->trigger_s : NAN;
+	double from = isfinite(trigger) ? trigger - EVENT_BEFORE_S : -INFINITY;
+	double until = isfinite(trigger) ? trigger + EVENT_AFTER_S : INFINITY;
+	size_t bytes = longest_of(record) * sizeof(*desk->scratch);
+	char *memory, *next;
+
+	for (size_t i = 0; i < record->channel_count; i++)
+		bytes += trace_bytes(&record->channels[i]);
+	memory = malloc(bytes);
+	if (!memory)
+		return NULL;
+	desk->scratch = (double *)(void *)memory;
+	next = memory + longest_of(record) * sizeof(*desk->scratch);
+	for (size_t i = 0; i < record->channel_count; i++) {
+		trace_lay(&desk->work[i].trace, &record->channels[i], from, until, next);
+		next += trace_bytes(&record->channels[i]);
+	}
+	return memory;
 }
 
 int estimate_record(const struct record *record, const struct estimate_options *options,
@@ -275,25 +475,23 @@ int estimate_record(const struct record *record, const struct estimate_options *
 {
 	struct analysis found = {.channel_count = record->channel_count};
 	struct desk desk = {.record = record};
-	size_t longest = 1;
 	int status = DT_E_MEMORY;
+	void *samples = NULL;
 
 	if (record->channel_count == 0)
 		return DT_E_EMPTY;
-	if (!(options->lowpass_hz >= 0) || isinf(options->lowpass_hz))
+	if (!allowed(options->lowpass_hz) || !allowed(options->iepe_time_constant_s) ||
+	    !allowed(options->tolerance) || !allowed(options->impact_speed_m_s) ||
+	    (unsigned)options->family >= ESTIMATE_FAMILIES)
 		return DT_E_ARGUMENT;
-	for (size_t i = 0; i < record->channel_count; i++)
-		if (record->channels[i].count > longest)
-			longest = record->channels[i].count;
 	desk.work = calloc(record->channel_count, sizeof(*desk.work));
-	desk.scratch = malloc(2 * longest * sizeof(*desk.scratch));
 	found.channels = calloc(record->channel_count, sizeof(*found.channels));
-	if (desk.work && desk.scratch && found.channels)
+	if (desk.work && found.channels)
+		samples = lay_out(&desk);
+	if (samples)
 		status = analyse(&desk, options, &found);
-	for (size_t i = 0; desk.work && i < record->channel_count; i++)
-		trace_close(&desk.work[i].trace);
+	free(samples);
 	free(desk.work);
-	free(desk.scratch);
 	if (status) {
 		free(found.channels);
 		return status;

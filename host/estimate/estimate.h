@@ -31,9 +31,11 @@ enum {
 	ESTIMATE_FLAG_HUM = 1u << 3,   /* "hum": mains terms were fitted along */
 	ESTIMATE_FLAG_TWO_MODES = 1u << 4, /* "two_modes": the value is the stronger mode's */
 	ESTIMATE_FLAG_AMPLITUDE =
-	        1u << 5, /* "amplitude_dependent": frequency follows the swing; value as it vanishes */
+	        1u
+	        << 5, /* "amplitude_dependent": frequency follows the swing; value the mean of three cycles */
 	ESTIMATE_FLAG_TOLERANCE = 1u << 6, /* "tolerance_not_met" */
-	ESTIMATE_FLAG_MODEL = 1u << 7,     /* "model_refused": the residual is no noise; sigma is widened */
+	ESTIMATE_FLAG_MODEL = 1u << 7,     /* "model_refused": the residual is no noise; sigma is widened, or
+	                                      another value stands */
 	ESTIMATE_FLAG_WEAK = 1u << 8,      /* "weak_axis": by the strong axis' shape */
 	ESTIMATE_FLAG_NOT_SEPARABLE = 1u << 9, /* "not_separable": two modes nearer than their width */
 };
@@ -66,15 +68,19 @@ enum estimate_family {
 const char *estimate_family_name(enum estimate_family family);
 DT_MUST_USE int estimate_family_parse(const char *name, enum estimate_family *family);
 
+/* offset_g + drift_g_s u + hum_g cos(2 pi hum_hz u + hum_phase), u from the middle of from_s..until_s, is
+ * what the quiet part before the pulse says of zero; all of it is taken off. */
 struct estimate_baseline {
-	double offset_g;    /* mean before the pulse; 0 when the record starts inside it (samples 0) */
-	double noise_g;     /* standard deviation per sample as read, from the median absolute deviation */
-	double deviation_g; /* plain standard deviation of the same samples: larger with spikes, drift or hum
-	                     */
+	double offset_g;    /* 0 when the record starts inside its pulse (samples 0) */
+	double noise_g;     /* standard deviation per sample as read, without what the median deviation calls
+	                       an outlier; drift and hum taken off */
+	double deviation_g; /* plain standard deviation: larger with spikes, drift or hum */
 	double drift_g_s;   /* slope, 0 unless significant */
 	double hum_g;       /* amplitude of the mains term, 0 unless significant */
 	double hum_hz;      /* 50 or 60; NAN when there is none */
-	size_t samples;     /* used for the offset */
+	double hum_phase;
+	double from_s, until_s; /* the quiet part; NAN when there is none */
+	size_t samples;         /* of it that were used */
 };
 
 struct estimate_peak {
@@ -111,6 +117,7 @@ struct estimate_ringdown {
 	double sigma_natural_hz;
 	double damping_ratio;
 	double sigma_damping;
+	double small_swing_hz;      /* damped, as the swing vanishes: "amplitude" only, else NAN */
 	double amplitude_g;         /* envelope at the start of the free decay */
 	double second_frequency_hz; /* of a second mode; NAN when there is none */
 	double second_damping_ratio;
@@ -182,6 +189,7 @@ struct analysis {
 
 struct estimate_options {
 	double lowpass_hz; /* zero-phase low-pass with this corner before everything else; 0 = raw */
+	unsigned cfc;      /* channel frequency class (cfc.h) before everything else; 0 = none */
 	double iepe_time_constant_s; /* the sensor supply's high-pass is undone; 0 = left as it is */
 	enum estimate_family family; /* of the contact pulse, when it is known */
 	double tolerance; /* standard uncertainty asked for: part of the value, for instants part of the
@@ -190,7 +198,8 @@ struct estimate_options {
 };
 
 /* Analyses a record; the record is only read. 0; DT_E_EMPTY if no channel has a single good sample;
- * DT_E_ARGUMENT for an option that is negative or not finite; DT_E_MEMORY. Uncertain results are not errors:
+ * DT_E_ARGUMENT for an option that is negative or not finite; DT_E_UNKNOWN or DT_E_RANGE for a class that
+ * does not exist or that a channel is sampled too slowly for; DT_E_MEMORY. Uncertain results are not errors:
  * they carry a status. On success free with estimate_free. */
 DT_MUST_USE int estimate_record(const struct record *record, const struct estimate_options *options,
                                 struct analysis *analysis);

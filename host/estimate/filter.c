@@ -18,39 +18,26 @@ enum { SECTIONS = 2 };
 /* Reflected length in periods of the corner; the filter has forgotten its start by then. */
 #define REFLECT_PERIODS 5.0
 
-/* Second-order section, unity at zero frequency, transposed direct form II. */
-struct section {
-	double b, a1, a2; /* numerator b (1 + 2/z + 1/z^2) */
-	double s1, s2;
-};
-
-static void design(struct section section[SECTIONS], double corner)
+struct filter_section filter_section(double corner, double damping)
 {
-	double w = ONE_PASS_CORNER * tan(UNITS_PI * corner);
+	double w = tan(UNITS_PI * corner), scale = 1 / (1 + damping * w + w * w);
 
-	for (unsigned i = 0; i < SECTIONS; i++) {
-		/* Pole pairs at 67.5 and 22.5 degrees from the real axis. */
-		double damping = 2 * cos(UNITS_PI * (1 + 2 * i) / (4 * SECTIONS));
-		double scale = 1 / (1 + damping * w + w * w);
-
-		section[i].b = w * w * scale;
-		section[i].a1 = 2 * (w * w - 1) * scale;
-		section[i].a2 = (1 - damping * w + w * w) * scale;
-	}
+	return (struct filter_section){
+	        .b = w * w * scale, .a1 = 2 * (w * w - 1) * scale, .a2 = (1 - damping * w + w * w) * scale};
 }
 
-static void settle(struct section section[SECTIONS], double value)
+static void settle(struct filter_section *section, size_t sections, double value)
 {
-	for (unsigned i = 0; i < SECTIONS; i++) {
+	for (size_t i = 0; i < sections; i++) {
 		section[i].s1 = value * (1 - section[i].b);
 		section[i].s2 = value * (section[i].b - section[i].a2);
 	}
 }
 
-static double step(struct section section[SECTIONS], double value)
+static double step(struct filter_section *section, size_t sections, double value)
 {
-	for (unsigned i = 0; i < SECTIONS; i++) {
-		struct section *s = &section[i];
+	for (size_t i = 0; i < sections; i++) {
+		struct filter_section *s = &section[i];
 		double in = s->b * value, out = in + s->s1;
 
 		s->s1 = 2 * in - s->a1 * out + s->s2;
@@ -61,8 +48,8 @@ static double step(struct section section[SECTIONS], double value)
 }
 
 /* Filters run[count] in place; padded holds count + 2 * reflect doubles. */
-static void filter_run(struct section section[SECTIONS], double *run, size_t count, size_t reflect,
-                       double *padded)
+static void filter_run(struct filter_section *section, size_t sections, double *run, size_t count,
+                       size_t reflect, double *padded)
 {
 	size_t all;
 
@@ -75,39 +62,46 @@ static void filter_run(struct section section[SECTIONS], double *run, size_t cou
 	}
 	for (size_t i = 0; i < count; i++)
 		padded[reflect + i] = run[i];
-	settle(section, padded[0]);
+	settle(section, sections, padded[0]);
 	for (size_t i = 0; i < all; i++)
-		padded[i] = step(section, padded[i]);
-	settle(section, padded[all - 1]);
+		padded[i] = step(section, sections, padded[i]);
+	settle(section, sections, padded[all - 1]);
 	for (size_t i = all; i-- > 0;)
-		padded[i] = step(section, padded[i]);
+		padded[i] = step(section, sections, padded[i]);
 	for (size_t i = 0; i < count; i++)
 		run[i] = padded[reflect + i];
 }
 
-int filter_lowpass(struct trace *trace, double lowpass_hz)
+int filter_two_pass(struct trace *trace, struct filter_section *section, size_t sections, double corner)
 {
-	double corner = lowpass_hz / trace->rate_hz, periods;
-	struct section section[SECTIONS];
-	size_t reflect, from = 0;
-	double *padded;
-
-	if (!(corner < CORNER_MAX) || trace->count == 0)
-		return 0;
 	/* No run can be reflected further than its own length. */
-	periods = fmin(ceil(REFLECT_PERIODS / corner), (double)trace->count);
-	reflect = (size_t)periods;
-	padded = malloc((trace->count + 2 * reflect) * sizeof(*padded));
+	size_t reflect = (size_t)fmin(ceil(REFLECT_PERIODS / corner), (double)trace->count), from = 0;
+	double *padded = malloc((trace->count + 2 * reflect + 1) * sizeof(*padded));
+
 	if (!padded)
 		return DT_E_MEMORY;
-	design(section, corner);
 	for (size_t k = 0; k <= trace->count; k++) {
 		if (k < trace->count && trace_good(trace, k))
 			continue;
 		if (k > from)
-			filter_run(section, trace->value_g + from, k - from, reflect, padded);
+			filter_run(section, sections, trace->value_g + from, k - from, reflect, padded);
 		from = k + 1;
 	}
 	free(padded);
 	return 0;
+}
+
+int filter_lowpass(struct trace *trace, double lowpass_hz)
+{
+	double corner = lowpass_hz / trace->rate_hz;
+	struct filter_section section[SECTIONS];
+	double one_pass;
+
+	if (!(corner < CORNER_MAX) || trace->count == 0)
+		return 0;
+	one_pass = atan(ONE_PASS_CORNER * tan(UNITS_PI * corner)) / UNITS_PI;
+	/* Pole pairs at 67.5 and 22.5 degrees from the real axis. */
+	for (unsigned i = 0; i < SECTIONS; i++)
+		section[i] = filter_section(one_pass, 2 * cos(UNITS_PI * (1 + 2 * i) / (4 * SECTIONS)));
+	return filter_two_pass(trace, section, SECTIONS, corner);
 }

@@ -4,89 +4,143 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "host/estimate/bridge.h"
+#include "host/estimate/driven.h"
+
 enum {
-	SHIFTS = 48,     /* tried to either side */
-	BRIDGE_MAX = 64, /* samples missing in a row that are bridged; more count as 0 */
+	SHIFTS = 48,     /* to either side */
+	COARSE = 8,      /* shifts left out between the first ones tried */
+	COARSE_USE = 16, /* samples used of S2's gate then */
 };
 
 /* S2's pulse is taken this many widths to either side of its peak, and S1 shifted by up to that much. */
 #define GATE_WIDTHS 1.1
 #define REACH_WIDTHS 1.5
 
-/* Sample k, or the straight line across the hole it lies in. Leaving holes out instead would favour the
- * shift at which the hole costs least. */
-static double bridged(const struct trace *trace, ptrdiff_t k)
-{
-	ptrdiff_t before = k, after = k, count = (ptrdiff_t)trace->count;
+/* Two axes further apart than this many standard deviations disagree. */
+#define AGREE 3.0
 
-	if (k < 0 || k >= count)
-		return 0;
-	if (trace_good(trace, (size_t)k))
-		return trace->value_g[k];
-	while (before >= 0 && k - before <= BRIDGE_MAX && !trace_good(trace, (size_t)before))
-		before--;
-	while (after < count && after - k <= BRIDGE_MAX && !trace_good(trace, (size_t)after))
-		after++;
-	if (before < 0 || after >= count || after - before > BRIDGE_MAX)
-		return 0;
-	return trace->value_g[before] + (trace->value_g[after] - trace->value_g[before]) *
-	                                        (double)(k - before) / (double)(after - before);
-}
-
-/* Cubic through the four samples around time_s: a straight line would favour shifts by whole samples. */
-static double smooth_at(const struct trace *trace, double time_s)
-{
-	double place = (time_s - trace->start_s) * trace->rate_hz, x;
-	ptrdiff_t k;
-
-	if (!(place >= 0) || place > (double)trace->count)
-		return 0;
-	k = (ptrdiff_t)place;
-	x = place - (double)k;
-	return -x * (x - 1) * (x - 2) / 6 * bridged(trace, k - 1) +
-	       (x + 1) * (x - 1) * (x - 2) / 2 * bridged(trace, k) -
-	       (x + 1) * x * (x - 2) / 2 * bridged(trace, k + 1) +
-	       (x + 1) * x * (x - 1) / 6 * bridged(trace, k + 2);
-}
-
-/* Of S2's gated pulse with S1 shift_s later. */
-static double correlate(const struct lag_sensor *s1, const struct lag_sensor *s2, double shift_s)
+/* Of S2's gated pulse with S1 shift_s later; about use samples of the gate, all when 0. */
+static double correlate(const struct lag_sensor *s1, const struct lag_sensor *s2, double shift_s, size_t use)
 {
 	double middle = s2->resultant->result.time_s, gate = GATE_WIDTHS * s2->resultant->width_s, sum = 0;
 
 	for (unsigned i = 0; i < 2; i++) {
 		const struct trace *trace = s2->axes.trace[i];
-		size_t last = trace_index(trace, middle + gate);
+		size_t first = trace_index(trace, middle - gate), last = trace_index(trace, middle + gate);
+		size_t stride = use ? (last - first) / use + 1 : 1;
+		double part = 0;
 
-		for (size_t k = trace_index(trace, middle - gate); k < last; k++)
-			sum += bridged(trace, (ptrdiff_t)k) *
-			       smooth_at(s1->axes.trace[i], trace_time(trace, k) + shift_s) / trace->rate_hz;
+		for (size_t k = first; k < last; k += stride)
+			part += bridge_sample(trace, (ptrdiff_t)k) *
+			        bridge_at(s1->axes.trace[i], trace_time(trace, k) + shift_s);
+		sum += part * (double)stride / trace->rate_hz;
 	}
 	return sum;
+}
+
+/* The top of a parabola through three values, in steps from the middle one; NAN unless it has one. */
+static double top_of(double before, double middle, double after)
+{
+	double bend = before - 2 * middle + after;
+
+	return bend < 0 ? (before - after) / (2 * bend) : NAN;
+}
+
+/* The coarse shift that correlates best; SHIFTS to either side stand for an end of the reach. */
+static int coarse_shift(const struct lag_sensor *s1, const struct lag_sensor *s2, double step)
+{
+	double value[2 * SHIFTS / COARSE + 1], offset;
+	int top = 0;
+
+	for (int i = 0; i <= 2 * SHIFTS / COARSE; i++) {
+		value[i] = correlate(s1, s2, (COARSE * i - SHIFTS) * step, COARSE_USE);
+		if (value[i] > value[top])
+			top = i;
+	}
+	if (top == 0 || top == 2 * SHIFTS / COARSE)
+		return COARSE * top - SHIFTS;
+	offset = top_of(value[top - 1], value[top], value[top + 1]);
+	return COARSE * top - SHIFTS + (int)lround(isnan(offset) ? 0 : COARSE * offset);
 }
 
 /* NAN when the best shift lies at the end of the reach. */
 static double cross_correlation(const struct lag_sensor *s1, const struct lag_sensor *s2)
 {
-	double step = REACH_WIDTHS * s2->resultant->width_s / SHIFTS, value[2 * SHIFTS + 1], bend;
-	int top = 0;
+	double step = REACH_WIDTHS * s2->resultant->width_s / SHIFTS, before, middle, after;
+	int at = coarse_shift(s1, s2, step);
 
-	for (int i = 0; i <= 2 * SHIFTS; i++) {
-		value[i] = correlate(s1, s2, (i - SHIFTS) * step);
-		if (value[i] > value[top])
-			top = i;
+	before = correlate(s1, s2, (at - 1) * step, 0);
+	middle = correlate(s1, s2, at * step, 0);
+	after = correlate(s1, s2, (at + 1) * step, 0);
+	while (at > -SHIFTS && before > middle) {
+		after = middle;
+		middle = before;
+		at--;
+		before = correlate(s1, s2, (at - 1) * step, 0);
 	}
-	if (top == 0 || top == 2 * SHIFTS)
+	while (at < SHIFTS && after > middle) {
+		before = middle;
+		middle = after;
+		at++;
+		after = correlate(s1, s2, (at + 1) * step, 0);
+	}
+	if (at <= -SHIFTS || at >= SHIFTS)
 		return NAN;
-	bend = value[top - 1] - 2 * value[top] + value[top + 1];
-	if (!(bend < 0))
-		return NAN;
-	return ((top - SHIFTS) + (value[top - 1] - value[top + 1]) / (2 * bend)) * step;
+	return (at + top_of(before, middle, after)) * step;
 }
 
 static bool usable(const struct resultant *resultant)
 {
 	return isfinite(resultant->result.time_s);
+}
+
+static void combine(const struct driven axis[2], struct estimate_lag *lag)
+{
+	double weight[2] = {0, 0}, sum = 0, both, apart;
+
+	for (unsigned i = 0; i < 2; i++) {
+		lag->driven_axis_s[i] = axis[i].lag_s;
+		lag->sigma_driven_axis_s[i] = axis[i].sigma_s;
+		if (axis[i].status == ESTIMATE_OK && axis[i].sigma_s > 0) {
+			weight[i] = 1 / (axis[i].sigma_s * axis[i].sigma_s);
+			sum += weight[i] * axis[i].lag_s;
+			lag->driven.flags |= axis[i].flags;
+			lag->driven.chi_square = fmax(lag->driven.chi_square, axis[i].chi_square);
+		}
+	}
+	both = weight[0] + weight[1];
+	lag->driven.status = axis[0].status;
+	if (!(both > 0))
+		return;
+	lag->driven.status = ESTIMATE_OK;
+	lag->driven.method = "driven-oscillator";
+	lag->driven_s = sum / both;
+	lag->sigma_driven_s = sqrt(1 / both);
+	apart = weight[0] > 0 && weight[1] > 0
+	                ? fabs(axis[0].lag_s - axis[1].lag_s) / hypot(axis[0].sigma_s, axis[1].sigma_s)
+	                : 0;
+	if (apart > AGREE)
+		lag->sigma_driven_s *= apart;
+}
+
+static void drive(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag)
+{
+	struct driven axis[2];
+	unsigned tried = 0;
+
+	for (unsigned i = 0; i < 2; i++) {
+		const struct driven_axis pair = {{s1->axes.trace[i], s2->axes.trace[i]},
+		                                 {s1->axes.peak[i], s2->axes.peak[i]},
+		                                 s1->ringdown[i]};
+
+		driven_find(&pair, &axis[i]);
+	}
+	if (axis[0].smooth || axis[1].smooth)
+		lag->driven.path[tried++] = "pulse";
+	if (axis[0].sampled || axis[1].sampled)
+		lag->driven.path[tried++] = "samples";
+	combine(axis, lag);
 }
 
 void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag)
@@ -109,6 +163,7 @@ void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct e
 	if (found.status == ESTIMATE_OK || !usable(r1))
 		found.status = r1->result.how.status;
 	*lag = found;
+	drive(s1, s2, lag);
 	if (!usable(r1) || !usable(r2))
 		return;
 	lag->largest_peak_s = r1->result.time_s - r2->result.time_s;
@@ -117,7 +172,7 @@ void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct e
 	/* fmax and fmin pass over a missing cross-correlation. */
 	lag->spread_s = fmax(fmax(lag->first_peak_s, lag->largest_peak_s), lag->cross_correlation_s) -
 	                fmin(fmin(lag->first_peak_s, lag->largest_peak_s), lag->cross_correlation_s);
-	lag->sigma_s = hypot(r1->sigma_time_s, r2->sigma_time_s);
+	lag->sigma_s = hypot(r1->result.sigma_time_s, r2->result.sigma_time_s);
 	if (lag->status == ESTIMATE_OK &&
 	    (lag->spread_s > LAG_SPREAD_MAX_S || isnan(lag->cross_correlation_s)))
 		lag->status = ESTIMATE_AMBIGUOUS;

@@ -8,11 +8,18 @@
 #define DAMPING_DOWN 0.1
 #define DAMPING_UP 10.0
 
+/* Less hardly changes a step: one that was taken back would be again. */
+#define DAMPING_FELT 1e-3
+
 /* Damped this much and still no better: this is the bottom, as far as rounding can tell. */
 #define DAMPING_MAX 1e6
 
-/* A step that promises less of the sum of squares than this cannot be told from rounding. */
+/* A step that promises less of the sum of squares than this part of what it was at the start cannot be told
+ * from rounding, even where the model fits to the last bit. */
 #define GAIN_MIN 1e-14
+
+/* Nor one that is this small a part of the unknowns themselves, however good the start was. */
+#define STEP_MIN 1e-13
 
 struct place {
 	double normal[CHOLESKY_MAX][CHOLESKY_MAX];
@@ -47,6 +54,17 @@ static bool step(const struct lm_problem *problem, const struct place *place, do
 	return isfinite(*promise);
 }
 
+/* The sum of squares that the unknowns themselves would make as a step. */
+static double squares_of(const struct lm_problem *problem, const struct place *place, const double *p)
+{
+	double sum = 0;
+
+	for (unsigned i = 0; i < problem->size; i++)
+		for (unsigned j = 0; j <= i; j++)
+			sum += (i == j ? 1 : 2) * p[i] * place->normal[i][j] * p[j];
+	return sum;
+}
+
 static bool finish(const struct lm_problem *problem, const struct place *place, struct lm_result *result)
 {
 	double normal[CHOLESKY_MAX][CHOLESKY_MAX];
@@ -60,30 +78,38 @@ static bool finish(const struct lm_problem *problem, const struct place *place, 
 bool lm_fit(const struct lm_problem *problem, double *p, struct lm_result *result)
 {
 	struct place here, there;
-	double damping = DAMPING_START;
+	double damping = DAMPING_START, rounding;
 
 	if (!stand(problem, p, &here))
 		return false;
+	rounding = fmax(GAIN_MIN * here.squares, STEP_MIN * STEP_MIN * squares_of(problem, &here, p));
 	result->iterations = 1;
 	while (result->iterations < LM_ITERATIONS) {
-		double change[CHOLESKY_MAX], trial[CHOLESKY_MAX], promise, variance;
+		double change[CHOLESKY_MAX], trial[CHOLESKY_MAX], promise, gain, variance;
 
 		if (!step(problem, &here, damping, change, &promise))
 			return false;
 		for (unsigned i = 0; i < problem->size; i++)
 			trial[i] = p[i] + change[i];
+		variance = here.squares / (double)(here.used - problem->size);
+		if (damping < DAMPING_FELT && promise <= LM_STEP * LM_STEP * variance) {
+			memcpy(p, trial, problem->size * sizeof(*p));
+			return finish(problem, &here, result);
+		}
 		result->iterations++;
 		if (!stand(problem, trial, &there) || there.squares > here.squares) {
-			if (promise <= GAIN_MIN * here.squares || damping > DAMPING_MAX)
+			if (promise <= rounding || damping > DAMPING_MAX)
 				return finish(problem, &here, result);
-			damping *= DAMPING_UP;
+			damping = fmax(damping * DAMPING_UP, DAMPING_FELT);
 			continue;
 		}
+		gain = here.squares - there.squares;
 		memcpy(p, trial, problem->size * sizeof(*p));
 		here = there;
 		damping *= DAMPING_DOWN;
 		variance = here.squares / (double)(here.used - problem->size);
-		if (promise <= LM_STEP * LM_STEP * variance || promise <= GAIN_MIN * here.squares)
+		if (promise <= LM_STEP * LM_STEP * variance || promise <= rounding ||
+		    (result->iterations > LM_PATIENCE && gain <= problem->kink * variance))
 			return finish(problem, &here, result);
 	}
 	return false;

@@ -7,17 +7,21 @@
  * Jacobian is ever stored. Damping scales the diagonal (Marquardt 1963); a step that does not lower the sum
  * of squares is taken back.
  *
- * Converged when the step just taken was below LM_STEP standard deviations, the residual's own: a measure
- * that asks for no scale of the unknowns. The error left is far smaller, as the steps shrink quadratically.
+ * Converged when a step is below LM_STEP standard deviations, the residual's own: a measure that asks for no
+ * scale of the unknowns. It is taken without another look at the data: the error left is far smaller, as
+ * steps shrink quadratically, and so is what it changes of the result.
  */
 #include <stdbool.h>
 #include <stddef.h>
 
 #include "host/estimate/cholesky.h"
 
-#define LM_STEP 1e-3
+#define LM_STEP 1e-2
 
-enum { LM_ITERATIONS = 40 };
+enum {
+	LM_ITERATIONS = 40,
+	LM_PATIENCE = 6, /* iterations a kinked model is given before little gain is enough */
+};
 
 struct lm_problem {
 	unsigned size;     /* unknowns, at most CHOLESKY_MAX */
@@ -26,10 +30,13 @@ struct lm_problem {
 	 * the samples used; 0 when p is no place for this model, which takes the step back. */
 	size_t (*normal)(const void *model, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
 	                 double right[CHOLESKY_MAX], double *squares);
+	/* A model whose slope jumps where a sample leaves it may have its minimum on the jump, where steps
+	 * only shuttle: a gain below this part of the variance is then the end. 0 for a smooth one. */
+	double kink;
 };
 
 struct lm_result {
-	double squares;         /* at the solution */
+	double squares;         /* at the solution, or one such step before it */
 	size_t used;            /* samples */
 	unsigned iterations;    /* normal equations made */
 	struct cholesky factor; /* of J^T J at the solution: covariance for unit noise */

@@ -3,37 +3,48 @@
 
 #include <math.h>
 
+#include "host/estimate/pair.h"
+
+/* A sample on the end of the window belongs to it, whatever rounding says. */
+#define SLACK 1e-5
+
 bool local_fit(struct local *local, const struct trace *trace, double centre_s, double half_s,
                const struct local_span *span, unsigned order)
 {
 	double from = fmax(centre_s - half_s, span->from_s), until = fmin(centre_s + half_s, span->until_s);
-	double moment[2 * CHOLESKY_MAX - 1] = {0}, normal[CHOLESKY_MAX][CHOLESKY_MAX],
-	                                 right[CHOLESKY_MAX] = {0};
-	double squares = 0;
+	/* an even power and the odd one after it */
+	PAIR moments[CHOLESKY_MAX] = {{0}}, products[CHOLESKY_MAX] = {{0}};
+	double normal[CHOLESKY_MAX][CHOLESKY_MAX], right[CHOLESKY_MAX];
+	double squares = 0, start, step;
 	unsigned terms = order + 1;
-	size_t used = 0;
+	size_t used = 0, first, last;
 
 	if (!(half_s > 0))
 		return false;
-	for (size_t k = trace_index(trace, from); k < trace->count && trace_time(trace, k) <= until; k++) {
-		double x = (trace_time(trace, k) - centre_s) / half_s, power = 1;
+	first = trace_index(trace, from);
+	last = trace_index(trace, until + SLACK / trace->rate_hz);
+	start = (trace_time(trace, first) - centre_s) / half_s;
+	step = 1 / (trace->rate_hz * half_s);
+	for (size_t k = first; k < last; k++) {
+		double x = start + (double)(k - first) * step, value = trace->value_g[k];
+		PAIR power = {1, x};
 
 		if (!trace_good(trace, k))
 			continue;
 		used++;
-		squares += trace->value_g[k] * trace->value_g[k];
-		for (unsigned i = 0; i < 2 * terms - 1; i++) {
-			moment[i] += power;
-			if (i < terms)
-				right[i] += power * trace->value_g[k];
-			power *= x;
+		squares += value * value;
+		for (unsigned i = 0; i < terms; i++, power *= x * x) {
+			moments[i] += power;
+			products[i] += power * value;
 		}
 	}
 	if (used < terms + 2)
 		return false;
-	for (unsigned i = 0; i < terms; i++)
+	for (unsigned i = 0; i < terms; i++) {
 		for (unsigned j = 0; j <= i; j++)
-			normal[i][j] = moment[i + j];
+			normal[i][j] = moments[(i + j) / 2][(i + j) % 2];
+		right[i] = products[i / 2][i % 2];
+	}
 	if (!cholesky_factor(&local->normal, terms, normal))
 		return false;
 	cholesky_solve(&local->normal, right, local->coefficient);

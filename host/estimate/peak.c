@@ -9,24 +9,69 @@
 #define FOOT_LEVEL 0.05
 
 /* A hole at the summit wider than this part of the width may hide more than the fit can know. */
-#define HOLE_MAX 0.25
+#define HOLE_MAX 0.35
 
 /* A half-sine is two thirds of its base wide at half height. */
 #define BASE_PER_HALF_WIDTH 1.5
 
-static size_t highest(const struct trace *trace, size_t *good)
-{
-	size_t at = trace->count;
+/* A family and the polynomials are of one pulse when they agree within this many sigma. */
+#define AGREE_SIGMAS 4.0
 
-	*good = 0;
-	for (size_t k = trace->first; k < trace->last; k++) {
-		if (!trace_good(trace, k))
+/* What an unasked sine-power may be off, as part of the height, on a symmetric pulse of another family before
+ * its residual shows. */
+#define UNSEEN 1e-3
+
+/* Clipped samples within so many sigma of each other tremble about a limit. */
+#define FLAT_SIGMAS 6.0
+
+/* Of what an unasked sine-power adds to a limit, or across a hole: not every pulse it fits is of its family.
+ */
+#define OTHER_FAMILY 0.05
+
+/* What readings beyond the range are trusted: this part of what they add is taken as their uncertainty. */
+#define BEYOND_RANGE 0.1
+
+/* Below this many sigma an axis is weak; the strongest must stand this many times higher than that. */
+#define WEAK_SIGMAS 10.0
+#define STRONG_OVER_WEAK 2.0
+
+/* An amplitude is there from this many of its own sigma on: chance has one number to get there, not as many
+ * as there are samples. */
+#define WEAK_SIGNIFICANT 3.5
+
+/* How far from its centre a local model is believed, in half widths of its window. */
+#define LOCAL_REACH 0.95
+
+enum { SAMPLES_MIN = 3 };
+
+static void tried(struct estimate_how *how, const char *name)
+{
+	for (int i = 0; i < ESTIMATE_PATH_MAX; i++) {
+		if (how->path[i])
 			continue;
-		if (at == trace->count || fabs(trace->value_g[k]) > fabs(trace->value_g[at]))
-			at = k;
-		(*good)++;
+		how->path[i] = name;
+		return;
 	}
-	return at;
+}
+
+/* The largest good sample; count unless there are three to look at. */
+static size_t highest(const struct trace *trace)
+{
+	size_t at = trace->count, good = 0;
+	double most = -1;
+
+	for (size_t k = trace->first; k < trace->last && good < SAMPLES_MIN; k++)
+		good += trace_good(trace, k);
+	for (size_t k = trace->first; k < trace->last; k++) {
+		double value = fabs(trace->value_g[k]);
+
+		/* The mask last: hardly ever is it asked. */
+		if (value > most && trace_good(trace, k)) {
+			most = value;
+			at = k;
+		}
+	}
+	return good < SAMPLES_MIN ? trace->count : at;
 }
 
 /* Half width and feet around the highest sample. A side cut off by the end of the trace is taken as wide
@@ -47,6 +92,8 @@ static bool measure_width(const struct trace *trace, struct peak *peak)
 	if (!has_right)
 		right = left;
 	peak->width_s = BASE_PER_HALF_WIDTH * (left + right);
+	peak->start = (struct shape_start){trace->value_g[peak->at], time + (right - left) / 2, left + right,
+	                                   INFINITY, -INFINITY};
 	trace_edge(trace, peak->at, -1, peak->sign, FOOT_LEVEL * value, &peak->span.from_s);
 	trace_edge(trace, peak->at, 1, peak->sign, FOOT_LEVEL * value, &peak->span.until_s);
 	return true;
@@ -80,26 +127,36 @@ static void take_sample(const struct trace *trace, struct peak *peak)
 	result->how.status = ESTIMATE_AMBIGUOUS;
 }
 
-/* Top of the parabola through the highest sample and its neighbours. */
-static bool take_parabola(const struct trace *trace, struct peak *peak)
+/* The parabola through the highest sample and its neighbours: its top is shift samples later and rise
+ * higher. False where it has none. */
+static bool parabola(const struct trace *trace, const struct peak *peak, double *shift, double *rise,
+                     double *bend)
 {
-	struct estimate_peak *result = &peak->result;
 	size_t k = peak->at;
-	double before, top, after, bend, shift, rise;
+	double before, after;
 
 	if (k == 0 || k + 1 >= trace->count || !trace_good(trace, k - 1) || !trace_good(trace, k + 1))
 		return false;
 	before = trace->value_g[k - 1];
-	top = trace->value_g[k];
 	after = trace->value_g[k + 1];
-	bend = before - 2 * top + after;
-	if (!(peak->sign * bend < 0))
+	*bend = before - 2 * trace->value_g[k] + after;
+	if (!(peak->sign * *bend < 0))
 		return false;
-	shift = (before - after) / (2 * bend);
-	rise = (before - after) * shift / -4;
+	*shift = (before - after) / (2 * *bend);
+	*rise = (before - after) * *shift / -4;
+	return true;
+}
+
+static bool take_parabola(const struct trace *trace, struct peak *peak)
+{
+	struct estimate_peak *result = &peak->result;
+	double shift, rise, bend;
+
+	if (!parabola(trace, peak, &shift, &rise, &bend))
+		return false;
 	result->how.method = "parabola";
-	result->value_g = top + rise;
-	result->time_s = trace_time(trace, k) + shift / trace->rate_hz;
+	result->value_g = trace->value_g[peak->at] + rise;
+	result->time_s = trace_time(trace, peak->at) + shift / trace->rate_hz;
 	result->sigma_g = hypot(trace->noise_g, fmax(fabs(rise), fabs(bend) / 8));
 	result->sigma_time_s = hypot(trace->noise_g / (sqrt(2.0) * bend), shift / 2) / trace->rate_hz;
 	return true;
@@ -109,48 +166,263 @@ static bool take_crest(const struct trace *trace, struct peak *peak)
 {
 	const struct trace *axes[1] = {trace};
 	struct estimate_peak *result = &peak->result;
+	double near = trace_time(trace, peak->at), shift, rise, bend;
 	struct crest crest;
 
-	if (!crest_fit(&crest, axes, 1, trace_time(trace, peak->at), peak->width_s, &peak->span))
+	tried(&result->how, "poly4/poly6");
+	if (parabola(trace, peak, &shift, &rise, &bend))
+		near += shift / trace->rate_hz;
+	if (!crest_fit(&crest, axes, 1, near, peak->width_s, &peak->span))
 		return false;
 	result->how.method = "poly4/poly6";
+	result->how.chi_square = crest.chi_square;
 	result->value_g = peak->sign * crest.value_g;
 	result->sigma_g = crest.sigma_g;
 	result->time_s = crest.time_s;
 	result->sigma_time_s = crest.sigma_time_s;
+	peak->model = PEAK_MODEL_LOCAL;
+	peak->local = crest.axis[0];
+	peak->noise_g = crest_noise(&peak->local, trace);
 	if (hole(trace, crest.time_s) > fmax(HOLE_MAX * peak->width_s, 1.5 / trace->rate_hz))
 		result->how.status = ESTIMATE_AMBIGUOUS;
 	return true;
 }
 
-/* Half the clipped time under the pulse; 0 if none. */
-static double clipped_half(const struct trace *trace, const struct peak *peak)
+/* Without any model: it says so in its uncertainty. */
+static void take_samples(const struct trace *trace, struct peak *peak)
 {
-	size_t k = trace_index(trace, peak->span.from_s), first = trace->count, last = 0;
+	struct estimate_how *how = &peak->result.how;
 
-	for (; k < trace->count && trace_time(trace, k) <= peak->span.until_s; k++) {
-		if (!(trace->sample[k] & SAMPLE_CLIPPED))
-			continue;
-		if (first == trace->count)
-			first = k;
-		last = k;
-	}
-	return first == trace->count ? 0 : ((double)(last - first) + 1) / (2 * trace->rate_hz);
+	if (!take_parabola(trace, peak))
+		take_sample(trace, peak);
+	tried(how, how->method);
 }
 
-void peak_find(const struct trace *trace, struct peak *peak)
+static bool fit(const struct trace *trace, enum estimate_family family, struct peak *peak)
 {
-	struct peak found = {.result = {NAN,
-	                                NAN,
-	                                NAN,
-	                                NAN,
-	                                {.method = "sample", .chi_square = NAN, .status = ESTIMATE_SHORT}}};
-	size_t good;
-	double half;
+	tried(&peak->result.how, estimate_family_name(family));
+	return shape_fit(&peak->shape, trace, family, &peak->start);
+}
 
-	found.at = highest(trace, &good);
+static void take_shape(struct peak *peak)
+{
+	struct estimate_peak *result = &peak->result;
+
+	result->how.method = estimate_family_name(peak->shape.family);
+	result->how.chi_square = peak->shape.chi_square;
+	result->value_g = peak->shape.peak_g;
+	result->sigma_g = peak->shape.sigma_peak_g;
+	result->time_s = peak->shape.peak_s;
+	result->sigma_time_s = peak->shape.sigma_peak_s;
+	peak->model = PEAK_MODEL_SHAPE;
+}
+
+static bool meets(const struct peak *peak, const struct estimate_options *options)
+{
+	double tolerance = options->tolerance > 0 ? options->tolerance : ESTIMATE_TOLERANCE;
+
+	return peak->result.sigma_g <= tolerance * fabs(peak->result.value_g) &&
+	       peak->result.sigma_time_s <= tolerance * peak->width_s;
+}
+
+/* Sine-power in place of the polynomials, if nothing speaks against it. */
+static void sharpen(const struct trace *trace, struct peak *peak)
+{
+	struct estimate_peak local = peak->result;
+	double apart_g, apart_s, sigma_g;
+
+	/* Cheap, and enough to see that no symmetric family will do. */
+	if (fit(trace, ESTIMATE_FAMILY_HALF_SINE, peak) && shape_hopeless(&peak->shape))
+		return;
+	if (!fit(trace, ESTIMATE_FAMILY_SINE_POWER, peak)) {
+		peak->shape.family = ESTIMATE_FAMILY_AUTO;
+		return;
+	}
+	apart_g = fabs(peak->shape.peak_g - local.value_g);
+	apart_s = fabs(peak->shape.peak_s - local.time_s);
+	sigma_g = hypot(peak->shape.sigma_peak_g, UNSEEN * local.value_g);
+	if (shape_judge(&peak->shape) != SHAPE_FITS || isnan(peak->shape.chi_square) ||
+	    apart_g > AGREE_SIGMAS * local.sigma_g || apart_s > AGREE_SIGMAS * local.sigma_time_s ||
+	    sigma_g > local.sigma_g)
+		return;
+	take_shape(peak);
+	peak->result.sigma_g = hypot(sigma_g, apart_g / 2);
+}
+
+/* Without polynomials: a hole over the summit, and a family that reaches across. It stays ambiguous. */
+static void reach_across(const struct trace *trace, struct peak *peak)
+{
+	double sample = fabs(trace->value_g[peak->at]);
+
+	if ((fit(trace, ESTIMATE_FAMILY_HALF_SINE, peak) && shape_hopeless(&peak->shape)) ||
+	    !fit(trace, ESTIMATE_FAMILY_SINE_POWER, peak) || shape_judge(&peak->shape) != SHAPE_FITS)
+		return;
+	take_shape(peak);
+	peak->result.sigma_g =
+	        hypot(peak->result.sigma_g, OTHER_FAMILY * (fabs(peak->shape.peak_g) - sample));
+}
+
+/* The family that is given, or the ladder. */
+static void climb(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
+{
+	struct estimate_how *how = &peak->result.how;
+	enum shape_verdict verdict = SHAPE_REFUSED;
+	struct estimate_peak *result = &peak->result;
+
+	if (options->family != ESTIMATE_FAMILY_AUTO) {
+		if (fit(trace, options->family, peak))
+			verdict = shape_judge(&peak->shape);
+		if (verdict == SHAPE_FITS) {
+			take_shape(peak);
+			return;
+		}
+		how->flags |= ESTIMATE_FLAG_MODEL;
+	}
+	if (!take_crest(trace, peak)) {
+		take_samples(trace, peak);
+		if (how->status == ESTIMATE_AMBIGUOUS && how->flags & ESTIMATE_FLAG_GAPS)
+			reach_across(trace, peak);
+		return;
+	}
+	if (verdict == SHAPE_DOUBTFUL) {
+		struct estimate_peak local = *result;
+
+		take_shape(peak);
+		result->sigma_g = hypot(result->sigma_g, (result->value_g - local.value_g) / 2);
+		result->sigma_time_s = hypot(result->sigma_time_s, (result->time_s - local.time_s) / 2);
+	} else if ((how->status == ESTIMATE_AMBIGUOUS || !meets(peak, options)) &&
+	           options->family != ESTIMATE_FAMILY_SINE_POWER) {
+		sharpen(trace, peak);
+	}
+}
+
+/* The clipped samples under the pulse. */
+struct clipped {
+	size_t first, last, n;
+	bool limit;       /* some of them stand at one */
+	double low, high; /* of their magnitudes */
+};
+
+static struct clipped clipped_under(const struct trace *trace, const struct peak *peak)
+{
+	struct clipped found = {0, 0, 0, false, INFINITY, -INFINITY};
+
+	for (size_t k = trace_index(trace, peak->span.from_s);
+	     k < trace->count && trace_time(trace, k) <= peak->span.until_s; k++) {
+		if (!trace_good(trace, k) || !(trace->sample[k] & SAMPLE_CLIPPED))
+			continue;
+		found.first = found.n == 0 ? k : found.first;
+		found.last = k;
+		found.n++;
+		found.limit = found.limit || trace->sample[k] & TRACE_LIMIT;
+		found.low = fmin(found.low, fabs(trace->value_g[k]));
+		found.high = fmax(found.high, fabs(trace->value_g[k]));
+	}
+	return found;
+}
+
+/* The flanks speak against the family, yet the truth lies beyond the limit. */
+static void take_suspect(struct peak *peak, const struct clipped *clipped)
+{
+	struct estimate_peak *result = &peak->result;
+	double half = (peak->clipped_until_s - peak->clipped_from_s) / 2;
+	double beyond = fmax(fabs(peak->shape.peak_g) - clipped->low, 0);
+
+	take_shape(peak);
+	result->sigma_g = hypot(sqrt(fmax(peak->shape.chi_square, 1)) * result->sigma_g, beyond / 2);
+	result->sigma_time_s = fmax(result->sigma_time_s, half);
+	result->how.flags |= ESTIMATE_FLAG_MODEL;
+}
+
+/* Into peak->shape the first family that fits; a doubtful one stands against those of more freedom. */
+static enum shape_verdict fit_flanks(const struct trace *trace, enum estimate_family family,
+                                     struct peak *peak)
+{
+	static const enum estimate_family ladder[] = {ESTIMATE_FAMILY_HALF_SINE, ESTIMATE_FAMILY_HAVERSINE,
+	                                              ESTIMATE_FAMILY_SINE_POWER};
+	enum shape_verdict best = SHAPE_REFUSED;
+
+	for (unsigned i = 0; i < sizeof(ladder) / sizeof(ladder[0]); i++) {
+		struct shape before = peak->shape;
+		enum shape_verdict verdict;
+
+		if (family != ESTIMATE_FAMILY_AUTO && family != ladder[i])
+			continue;
+		if (best == SHAPE_DOUBTFUL && ladder[i] == ESTIMATE_FAMILY_SINE_POWER)
+			break;
+		if (!fit(trace, ladder[i], peak)) {
+			peak->shape = before;
+			continue;
+		}
+		verdict = shape_judge(&peak->shape);
+		if (verdict > best || (verdict == best && best == SHAPE_DOUBTFUL))
+			peak->shape = before;
+		best = verdict < best ? verdict : best;
+		if (best == SHAPE_FITS)
+			break;
+	}
+	return best;
+}
+
+/* From the flanks alone. */
+static void extrapolate(const struct trace *trace, const struct estimate_options *options,
+                        const struct clipped *clipped, struct peak *peak)
+{
+	enum shape_verdict verdict = fit_flanks(trace, options->family, peak);
+
+	if (peak->shape.family == ESTIMATE_FAMILY_AUTO) {
+		take_samples(trace, peak);
+		peak->result.sigma_g = NAN;
+		peak->result.sigma_time_s = (peak->clipped_until_s - peak->clipped_from_s) / 2;
+		return;
+	}
+	if (verdict == SHAPE_FITS)
+		take_shape(peak);
+	else
+		take_suspect(peak, clipped);
+	if (options->family != peak->shape.family && peak->shape.family == ESTIMATE_FAMILY_SINE_POWER)
+		peak->result.sigma_g =
+		        hypot(peak->result.sigma_g, OTHER_FAMILY * (fabs(peak->shape.peak_g) - clipped->low));
+	peak->result.how.flags |= ESTIMATE_FLAG_EXTRAPOLATED;
+}
+
+static void find_clipped(const struct trace *trace, const struct estimate_options *options,
+                         struct clipped *clipped, struct peak *peak)
+{
+	struct estimate_peak *result = &peak->result;
+	double half = 0.5 / trace->rate_hz;
+	/* Two samples to either side of a summit are alike by chance. */
+	bool flat = clipped->n > 2 && clipped->high - clipped->low <= FLAT_SIGMAS * trace->noise_g;
+
+	/* One that trembles takes along what lies between. */
+	if (clipped->limit || flat) {
+		peak->clipped_from_s = trace_time(trace, clipped->first) - half;
+		peak->clipped_until_s = trace_time(trace, clipped->last) + half;
+	}
+	if (flat && !clipped->limit) {
+		peak->start.limit_from_s = peak->clipped_from_s;
+		peak->start.limit_until_s = peak->clipped_until_s;
+	}
+	if (clipped->limit || flat) {
+		extrapolate(trace, options, clipped, peak);
+	} else {
+		climb(trace, options, peak);
+		result->sigma_g =
+		        hypot(result->sigma_g, BEYOND_RANGE * fmax(fabs(result->value_g) - clipped->low, 0));
+	}
+	result->how.status = ESTIMATE_CLIPPED;
+}
+
+void peak_find(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
+{
+	struct peak found = {
+	        .result = {NAN, NAN, NAN, NAN, {.method = "", .chi_square = NAN, .status = ESTIMATE_SHORT}},
+	        .scale = 1};
+	struct clipped clipped;
+
+	found.at = highest(trace);
 	*peak = found;
-	if (good < 3)
+	if (found.at == trace->count)
 		return;
 	peak->sign = trace->value_g[found.at] < 0 ? -1 : 1;
 	if (!(fabs(trace->value_g[found.at]) > 0) ||
@@ -161,12 +433,117 @@ void peak_find(const struct trace *trace, struct peak *peak)
 	if (!measure_width(trace, peak))
 		return;
 	peak->result.how.status = ESTIMATE_OK;
-	if (!take_crest(trace, peak) && !take_parabola(trace, peak))
-		take_sample(trace, peak);
-	half = clipped_half(trace, peak);
-	if (half > 0) {
-		peak->result.how.status = ESTIMATE_CLIPPED;
-		peak->result.sigma_g = NAN;
-		peak->result.sigma_time_s = fmax(peak->result.sigma_time_s, half);
+	if (trace_any(trace, peak->span.from_s, peak->span.until_s, SAMPLE_LOST | SAMPLE_BAD))
+		peak->result.how.flags |= ESTIMATE_FLAG_GAPS;
+	if (trace_any(trace, peak->span.from_s, peak->span.until_s, SAMPLE_SPIKE))
+		peak->result.how.flags |= ESTIMATE_FLAG_SPIKE;
+	clipped = clipped_under(trace, peak);
+	if (clipped.n > 0)
+		find_clipped(trace, options, &clipped, peak);
+	else
+		climb(trace, options, peak);
+	if (!meets(peak, options))
+		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
+}
+
+bool peak_is_weak(const struct trace *trace, const struct peak *peak)
+{
+	if (peak->result.how.status == ESTIMATE_NO_PEAK)
+		return true;
+	return (peak->result.how.status == ESTIMATE_OK || peak->result.how.status == ESTIMATE_AMBIGUOUS) &&
+	       fabs(trace->value_g[peak->at]) < WEAK_SIGMAS * trace->noise_g;
+}
+
+/* Sums of one amplitude: the strong axis' samples, between them by straight lines, as the shape. */
+struct amplitude {
+	double value, sigma; /* by unit height of the shape */
+	double chi_square;
+};
+
+static bool fit_amplitude(const struct trace *trace, const struct trace *strong_trace,
+                          const struct peak *strong, struct amplitude *amplitude)
+{
+	double square = 0, product = 0, squares = 0, shape;
+	unsigned used = 0;
+
+	for (size_t k = trace_index(trace, strong->span.from_s);
+	     k < trace->count && trace_time(trace, k) <= strong->span.until_s; k++) {
+		if (!trace_good(trace, k) || !trace_at(strong_trace, trace_time(trace, k), &shape))
+			continue;
+		shape /= strong->result.value_g;
+		square += shape * shape;
+		product += shape * trace->value_g[k];
+		squares += trace->value_g[k] * trace->value_g[k];
+		used++;
 	}
+	if (used < 3 || !(square > 0))
+		return false;
+	amplitude->value = product / square;
+	amplitude->sigma = trace->noise_g / sqrt(square);
+	amplitude->chi_square =
+	        (squares - product * amplitude->value) / ((used - 1) * trace->noise_g * trace->noise_g);
+	return !(amplitude->chi_square > 1 + SHAPE_CHI_MAX * sqrt(2.0 / (used - 1)));
+}
+
+bool peak_weak(const struct trace *trace, const struct estimate_options *options,
+               const struct trace *strong_trace, const struct peak *strong, struct peak *peak)
+{
+	const struct estimate_peak *from = &strong->result;
+	struct estimate_peak result = {
+	        .time_s = from->time_s,
+	        .sigma_time_s = from->sigma_time_s,
+	        .how = {.method = "strong-axis",
+	                .flags =
+	                        ESTIMATE_FLAG_WEAK | (from->how.flags & ~(unsigned)ESTIMATE_FLAG_TOLERANCE)}};
+	struct amplitude amplitude;
+
+	if (from->how.status != ESTIMATE_OK || strong->model == PEAK_MODEL_NONE || !(trace->noise_g > 0) ||
+	    fabs(from->value_g) < STRONG_OVER_WEAK * WEAK_SIGMAS * trace->noise_g ||
+	    !fit_amplitude(trace, strong_trace, strong, &amplitude) ||
+	    fabs(amplitude.value) < WEAK_SIGNIFICANT * amplitude.sigma)
+		return false;
+	result.value_g = amplitude.value;
+	result.sigma_g = amplitude.sigma;
+	result.how.chi_square = amplitude.chi_square;
+	result.how.flags |= peak->result.how.flags & (ESTIMATE_FLAG_GAPS | ESTIMATE_FLAG_SPIKE);
+	for (int i = 0; i < ESTIMATE_PATH_MAX; i++)
+		result.how.path[i] = peak->result.how.path[i];
+	tried(&result.how, result.how.method);
+	*peak = *strong;
+	peak->result = result;
+	peak->at = trace_index(trace, from->time_s);
+	if (peak->at == trace->count)
+		peak->at--;
+	peak->sign = amplitude.value < 0 ? -1 : 1;
+	peak->scale = amplitude.value / from->value_g;
+	if (!meets(peak, options))
+		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
+	return true;
+}
+
+bool peak_at(const struct peak *peak, double time_s, double derivative[3], double variance[2])
+{
+	switch (peak->model) {
+	case PEAK_MODEL_LOCAL:
+		if (fabs(time_s - peak->local.centre_s) > LOCAL_REACH * peak->local.half_s)
+			return false;
+		local_at(&peak->local, time_s, derivative);
+		for (unsigned i = 0; variance && i < 2; i++)
+			variance[i] = pow(peak->noise_g * local_spread(&peak->local, time_s, i), 2);
+		break;
+	case PEAK_MODEL_SHAPE:
+		shape_at(&peak->shape, time_s, derivative, variance);
+		break;
+	default:
+		return false;
+	}
+	for (unsigned i = 0; i < 3; i++)
+		derivative[i] *= peak->scale;
+	if (variance && peak->result.how.flags & ESTIMATE_FLAG_WEAK) {
+		double part = peak->result.sigma_g / peak->result.value_g;
+
+		variance[0] = pow(part * derivative[0], 2);
+		variance[1] = pow(part * derivative[1], 2);
+	}
+	return true;
 }

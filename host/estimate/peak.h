@@ -4,18 +4,44 @@
 /*
  * The peak of one axis: the extreme of largest magnitude in the trace's event window.
  *
- * Methods, best first: "poly4/poly6" (crest.h); "parabola" through three samples when the pulse has too few
- * for that; "sample" when a neighbour is missing too. The simpler two take what they change of the raw
- * sample as their model uncertainty.
+ * Methods, cheapest first:
  *
- * Status: short below three good samples, or when the pulse falls to half on neither side; no_peak below 5
- * sigma of noise, value NAN; clipped when a clipped sample lies under the pulse: the value is then what the
- * samples as read say, the least the true one can be if the sensor was at its end, sigma_g NAN, and
- * sigma_time_s no less than half the clipped run; ambiguous when the summit may hide in a hole of missing
- * samples, or beyond the end of the trace.
+ *   "poly4/poly6"  crest.h. Where the pulse has too few samples for that "parabola" through three, "sample"
+ *                  where a neighbour is missing too: those two take what they change of the raw sample as
+ *                  their model's uncertainty.
+ *
+ *   "sine-power"   while the uncertainty is above the tolerance, or a hole may hide the summit. Stays out
+ *                  when its residual speaks against it (shape.h), and when the polynomials disagree by 4
+ *                  sigma or are as certain: its own uncertainty holds half of what they differ by and a
+ *                  thousandth of the height, as not every pulse is of this family.
+ *
+ * A family that is given is asked first, and at the statistical limit where it is the pulse's. Flagged
+ * "model_refused" when its residual speaks against it: doubtful, its value stands with half of what the
+ * polynomials differ by in its sigma; refused, it gives nothing and the ladder above does.
+ *
+ * Clipped, status clipped, is either of two things. Samples at a limit (trace.h), or marked ones no further
+ * apart than noise, say "at least this": the value follows from the flanks by the family given, otherwise
+ * the first of half-sine, haversine and sine-power that fits, flagged "extrapolated"; when none does, one of
+ * them is the value all the same, "model_refused", and half of what it adds enters sigma.
+ * Marked samples that go on above the range are readings of less trust: used as read, and a tenth of what
+ * they add to the least of them enters sigma.
+ *
+ * Weak: an axis below 10 sigma of noise, whose largest sample is mostly noise, takes the shape of its
+ * sensor's strongest axis and fits one amplitude to it, signed ("strong-axis", peak_weak).
+ *
+ * Status besides: short below three good samples, or when the pulse falls to half on neither side; no_peak
+ * below 5 sigma of noise, value NAN; ambiguous when the summit may hide in a hole, or beyond the end of the
+ * trace.
  */
 #include "host/estimate/estimate.h"
 #include "host/estimate/local.h"
+#include "host/estimate/shape.h"
+
+enum peak_model {
+	PEAK_MODEL_NONE, /* too few samples for one */
+	PEAK_MODEL_LOCAL,
+	PEAK_MODEL_SHAPE,
+};
 
 struct peak {
 	struct estimate_peak result;
@@ -23,9 +49,30 @@ struct peak {
 	double sign;            /* +1 or -1 */
 	double width_s;         /* base of the half-sine as wide at half height */
 	struct local_span span; /* around it, above 5 % of it */
+	/* for pulse_measure and resultant_find */
+	struct shape_start start;               /* of a family's fit */
+	double clipped_from_s, clipped_until_s; /* where samples only say "at least"; equal when nowhere */
+	enum peak_model model;                  /* what gave the value */
+	struct local local;
+	struct shape shape; /* the family's fit asked for last; its family is AUTO when there was none */
+	double noise_g;     /* of local */
+	double scale;       /* model to axis: 1 but for a weak axis */
 };
 
 /* Everything but result is meaningful unless the status is short or no_peak. */
-void peak_find(const struct trace *trace, struct peak *peak);
+void peak_find(const struct trace *trace, const struct estimate_options *options, struct peak *peak);
+
+/* Whether peak_weak is to be asked for it. */
+bool peak_is_weak(const struct trace *trace, const struct peak *peak);
+
+/* The amplitude of strong's shape in trace, an axis of the same sensor. Peak stays as it is when that is not
+ * significant and it has none of its own, or when the residual says that the shape is another one. True if it
+ * was replaced. */
+bool peak_weak(const struct trace *trace, const struct estimate_options *options,
+               const struct trace *strong_trace, const struct peak *strong, struct peak *peak);
+
+/* Value, slope per s and curvature per s^2 of the axis' model at an instant, and the variances of the first
+ * two unless that is NULL; false where it does not reach. */
+bool peak_at(const struct peak *peak, double time_s, double derivative[3], double variance[2]);
 
 #endif

@@ -18,22 +18,31 @@ struct edge {
 	double sigma_s;   /* at a known level */
 };
 
-/* |second difference| around sample k, 0 where a neighbour is missing. */
+/* Second difference around sample k, 0 where a neighbour is missing. */
 static double bend(const struct trace *trace, size_t k)
 {
 	if (k == 0 || k + 1 >= trace->count || !trace_good(trace, k - 1) || !trace_good(trace, k) ||
 	    !trace_good(trace, k + 1))
 		return 0;
-	return fabs(trace->value_g[k - 1] - 2 * trace->value_g[k] + trace->value_g[k + 1]);
+	return trace->value_g[k - 1] - 2 * trace->value_g[k] + trace->value_g[k + 1];
 }
 
-/* Where the pulse meets level_g on one side, and how well that is known: noise, the bend between the two
- * samples, and the hole when they are no neighbours. */
+/* The smaller of two that agree in sign: what a kink beside the interval cannot feign. */
+static double agreed(double a, double b)
+{
+	if (a * b <= 0)
+		return 0;
+	return fabs(a) < fabs(b) ? a : b;
+}
+
+/* Where the pulse meets level_g on one side, by the parabola through the two samples as bent as both their
+ * neighbourhoods say; and how well that is known: noise, the bend that they do not agree on, and the hole
+ * when they are no neighbours. */
 static bool find_edge(const struct trace *trace, const struct peak *peak, int step, double level_g,
                       struct edge *edge)
 {
 	size_t before, after;
-	double gap, rise, missing;
+	double gap, rise, missing, bend0, bend1, bent, place, noise;
 
 	if (!trace_edge(trace, peak->at, step, peak->sign, level_g, &edge->time_s))
 		return false;
@@ -46,20 +55,42 @@ static bool find_edge(const struct trace *trace, const struct peak *peak, int st
 	while (after + 1 < trace->count && !trace_good(trace, after))
 		after++;
 	gap = (double)(after - before) / trace->rate_hz;
-	rise = fabs(trace->value_g[after] - trace->value_g[before]);
+	rise = trace->value_g[after] - trace->value_g[before];
 	missing = after - before > 1 ? gap / sqrt(12.0) : 0;
-	edge->slope_g_s = rise / gap;
-	edge->sigma_s =
-	        hypot(trace->noise_g, fmax(bend(trace, before), bend(trace, after)) / 16) / edge->slope_g_s;
+	edge->slope_g_s = fabs(rise) / gap;
+	bend0 = bend(trace, before);
+	bend1 = bend(trace, after);
+	bent = after - before == 1 ? agreed(bend0, bend1) : 0;
+	place = (edge->time_s - trace_time(trace, before)) / gap;
+	/* linear + bent u (u - 1) / 2 meets the level this much of the interval later */
+	edge->time_s += gap * fmin(fmax(bent * place * (1 - place) / (2 * rise), -0.5), 0.5);
+	noise = trace->noise_g * hypot(place, 1 - place);
+	edge->sigma_s = hypot(noise, fmax(fabs(bend0 - bent), fabs(bend1 - bent)) / 16) / edge->slope_g_s;
 	edge->sigma_s = hypot(edge->sigma_s, missing);
 	return true;
 }
 
+/* A sample under the pulse; where it is missing or clipped what the peak's family says, if one gave it. */
+static bool reading(const struct trace *trace, const struct peak *peak, size_t k, double *value_g)
+{
+	double time = trace_time(trace, k), derivative[3];
+
+	*value_g = trace->value_g[k];
+	if (trace_good(trace, k) && !(time > peak->clipped_from_s && time < peak->clipped_until_s))
+		return true;
+	if (peak->model != PEAK_MODEL_SHAPE)
+		return trace_good(trace, k);
+	shape_at(&peak->shape, time, derivative, NULL);
+	*value_g = derivative[0];
+	return true;
+}
+
 /* Trapezoid sum in g s. *hole_g_s: what a parabola as sharp as the pulse would hide in the holes. */
-static double area(const struct trace *trace, double from_s, double until_s, double sharpness_g_s2,
+static double area(const struct trace *trace, const struct peak *peak, double from_s, double until_s,
                    double *hole_g_s)
 {
-	double sum = 0, time = from_s, value = 0, end = 0;
+	double sharpness = fabs(peak->result.value_g) * pow(UNITS_PI / peak->width_s, 2);
+	double sum = 0, time = from_s, value = 0, end = 0, next;
 
 	*hole_g_s = 0;
 	if (!trace_at(trace, from_s, &value))
@@ -68,40 +99,134 @@ static double area(const struct trace *trace, double from_s, double until_s, dou
 	     k++) {
 		double step = trace_time(trace, k) - time;
 
-		if (!trace_good(trace, k))
+		if (!reading(trace, peak, k, &next))
 			continue;
-		sum += step * (value + trace->value_g[k]) / 2;
+		sum += step * (value + next) / 2;
 		if (step * trace->rate_hz > 1.5)
-			*hole_g_s += step * step * step / 12 * sharpness_g_s2;
+			*hole_g_s += step * step * step / 12 * sharpness;
 		time = trace_time(trace, k);
-		value = trace->value_g[k];
+		value = next;
 	}
 	if (!trace_at(trace, until_s, &end))
 		end = 0;
 	return sum + (until_s - time) * (value + end) / 2;
 }
 
+/* How much of the pulse reading fills in. */
+static double filled(const struct trace *trace, const struct peak *peak, double from_s, double until_s)
+{
+	double step = 1 / trace->rate_hz, value;
+	size_t n = 0;
+
+	if (peak->model != PEAK_MODEL_SHAPE)
+		return 0;
+	for (size_t k = trace_index(trace, from_s); k < trace->count && trace_time(trace, k) <= until_s; k++)
+		if (reading(trace, peak, k, &value) &&
+		    (!trace_good(trace, k) || fabs(value - trace->value_g[k]) > 0))
+			n++;
+	return (double)n * step;
+}
+
 static void velocity(const struct trace *trace, const struct peak *peak,
                      const struct estimate_baseline *baseline, const struct edge edge[2],
                      struct estimate_pulse *pulse)
 {
-	double from, until, length, sharpness, hole, step = 1 / trace->rate_hz, sigma;
+	double from, until, length, hole, step = 1 / trace->rate_hz, sigma;
 
 	trace_edge(trace, peak->at, -1, peak->sign, 0, &from);
 	trace_edge(trace, peak->at, 1, peak->sign, 0, &until);
 	from = fmax(from, pulse->start_s - pulse->duration_s);
 	until = fmin(until, pulse->end_s + pulse->duration_s);
 	length = until - from;
-	sharpness = fabs(peak->result.value_g) * pow(UNITS_PI / peak->width_s, 2);
-	pulse->velocity_change_m_s = UNITS_G_M_S2 * area(trace, from, until, sharpness, &hole);
+	pulse->velocity_change_m_s = UNITS_G_M_S2 * area(trace, peak, from, until, &hole);
 	sigma = hypot(trace->noise_g * sqrt(step * length), hole);
+	sigma = hypot(sigma, filled(trace, peak, from, until) * peak->result.sigma_g);
 	sigma = hypot(sigma, KINK * step * step * (edge[0].slope_g_s + edge[1].slope_g_s));
 	sigma = hypot(sigma, trace->noise_g * length / sqrt((double)baseline->samples));
 	pulse->sigma_velocity_m_s = baseline->samples > 0 ? UNITS_G_M_S2 * sigma : NAN;
 }
 
+/* Families in the order they are asked without one being given. */
+static const enum estimate_family ladder[] = {ESTIMATE_FAMILY_HALF_SINE, ESTIMATE_FAMILY_HAVERSINE,
+                                              ESTIMATE_FAMILY_SINE_POWER};
+
+enum { LADDER = sizeof(ladder) / sizeof(ladder[0]) };
+
+/* A half-sine that is not refused and asks for no other power by this many sigma needs no second opinion. */
+#define CLEAR_SCORE 2.0
+
+/* The family's fit, the peak's own where it has that already. */
+static bool fit(const struct trace *trace, const struct peak *peak, enum estimate_family family,
+                struct shape *shape)
+{
+	if (peak->shape.family == family) {
+		*shape = peak->shape;
+		return true;
+	}
+	return shape_fit(shape, trace, family, &peak->start);
+}
+
+/* The best of those that are not refused; best stays AUTO when all are. */
+static void choose(const struct trace *trace, const struct peak *peak, enum estimate_family family,
+                   struct shape *best, struct estimate_how *how)
+{
+	unsigned tried = 0;
+
+	for (unsigned i = 0; i < LADDER; i++) {
+		enum shape_verdict verdict;
+		struct shape shape;
+
+		if (family != ESTIMATE_FAMILY_AUTO && family != ladder[i])
+			continue;
+		if (ladder[i] == ESTIMATE_FAMILY_SINE_POWER && best->family != ESTIMATE_FAMILY_AUTO)
+			return;
+		how->path[tried++] = estimate_family_name(ladder[i]);
+		if (!fit(trace, peak, ladder[i], &shape))
+			continue;
+		/* How far the best of the refused ones is off. */
+		if (best->family == ESTIMATE_FAMILY_AUTO && !(how->chi_square < shape.chi_square))
+			how->chi_square = shape.chi_square;
+		if (shape_hopeless(&shape))
+			return;
+		verdict = shape_judge(&shape);
+		/* A doubtful one is not preferred, but what was asked for is given. */
+		if (verdict > (family == ESTIMATE_FAMILY_AUTO ? SHAPE_FITS : SHAPE_DOUBTFUL) ||
+		    (best->family != ESTIMATE_FAMILY_AUTO && !(shape.chi_square < best->chi_square)))
+			continue;
+		*best = shape;
+		how->flags |= verdict == SHAPE_FITS ? 0 : ESTIMATE_FLAG_MODEL;
+		if (fabs(shape.power_z) < CLEAR_SCORE)
+			return;
+	}
+}
+
+static void contact(const struct trace *trace, const struct peak *peak, enum estimate_family family,
+                    struct estimate_pulse *pulse)
+{
+	struct estimate_how *how = &pulse->contact;
+	struct shape shape = {.family = ESTIMATE_FAMILY_AUTO};
+
+	how->status = pulse->status;
+	how->flags = peak->result.how.flags &
+	             (ESTIMATE_FLAG_GAPS | ESTIMATE_FLAG_SPIKE | ESTIMATE_FLAG_EXTRAPOLATED);
+	choose(trace, peak, family, &shape, how);
+	if (shape.family == ESTIMATE_FAMILY_AUTO) {
+		how->flags |= ESTIMATE_FLAG_MODEL;
+		return;
+	}
+	how->method = estimate_family_name(shape.family);
+	how->chi_square = shape.chi_square;
+	pulse->family = shape.family;
+	pulse->contact_time_s = shape.base_s;
+	pulse->sigma_contact_s = shape.sigma_base_s;
+	pulse->contact_start_s = shape.peak_s - shape.base_s / 2;
+	pulse->fitted_velocity_m_s = UNITS_G_M_S2 * shape.area_g_s;
+	pulse->sigma_fitted_velocity_m_s = UNITS_G_M_S2 * shape.sigma_area_g_s;
+}
+
 void pulse_measure(const struct trace *trace, const struct peak *peak,
-                   const struct estimate_baseline *baseline, struct estimate_pulse *pulse)
+                   const struct estimate_baseline *baseline, enum estimate_family family,
+                   struct estimate_pulse *pulse)
 {
 	struct estimate_pulse found = {
 	        .duration_s = NAN,
@@ -135,4 +260,20 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	pulse->sigma_duration_s =
 	        hypot(hypot(edge[0].sigma_s, edge[1].sigma_s), EDGE_LEVEL * peak->result.sigma_g * tilt);
 	velocity(trace, peak, baseline, edge, pulse);
+	if (peak->model != PEAK_MODEL_NONE)
+		contact(trace, peak, family, pulse);
+}
+
+void pulse_of_weak(const struct peak *weak, const struct estimate_pulse *strong, struct estimate_pulse *pulse)
+{
+	double part = weak->result.sigma_g / fabs(weak->result.value_g), scale = weak->scale;
+
+	*pulse = *strong;
+	pulse->velocity_change_m_s *= scale;
+	pulse->sigma_velocity_m_s =
+	        hypot(scale * pulse->sigma_velocity_m_s, part * pulse->velocity_change_m_s);
+	pulse->fitted_velocity_m_s *= scale;
+	pulse->sigma_fitted_velocity_m_s =
+	        hypot(scale * pulse->sigma_fitted_velocity_m_s, part * pulse->fitted_velocity_m_s);
+	pulse->contact.flags |= ESTIMATE_FLAG_WEAK;
 }

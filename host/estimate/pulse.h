@@ -5,7 +5,13 @@
  * Width and area of the pulse under a peak. The width is family-free: between the points where the straight
  * line through two samples meets 10 % of the peak. The velocity change is the trapezoid sum from where the
  * reading leaves zero to where it is back, at most one width beyond the 10 % points on either side, with
- * 1 g = 9.81 m/s^2; what is missing is bridged by a straight line and enters the uncertainty.
+ * 1 g = 9.81 m/s^2. What is missing or clipped follows the family that gave the peak; where none did it is
+ * bridged by a straight line, clipped samples count as read, and the gap enters the uncertainty.
+ *
+ * How long a contact is depends on its family by a fifth, so that it is given only together with one: the
+ * family asked for, otherwise the one of half-sine and haversine that fits better, otherwise sine-power; foot
+ * to foot, and the area under it. When the residual refuses them (shape.h) these are NAN, the method is ""
+ * and the flag says "model_refused": another pulse than a symmetric contact's, or no contact at all.
  *
  * The status is the peak's; short when the trace ends inside the pulse. sigma_velocity_m_s is NAN without a
  * baseline.
@@ -13,6 +19,11 @@
 #include "host/estimate/peak.h"
 
 void pulse_measure(const struct trace *trace, const struct peak *peak,
-                   const struct estimate_baseline *baseline, struct estimate_pulse *pulse);
+                   const struct estimate_baseline *baseline, enum estimate_family family,
+                   struct estimate_pulse *pulse);
+
+/* Of a weak axis (peak_weak): strong's pulse at the weak axis' height. */
+void pulse_of_weak(const struct peak *weak, const struct estimate_pulse *strong,
+                   struct estimate_pulse *pulse);
 
 #endif

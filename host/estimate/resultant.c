@@ -11,6 +11,15 @@
 #define FALL_NOISE 5.0
 #define FIRST_LEVEL 0.5
 
+/* The axes' own models are of the resultant's pulse when its largest sample lies no further from between
+ * their peaks than this part of its width. */
+#define SAME_PULSE 0.3
+
+/* Instants tried between the peaks of the axes, and Newton's steps from the best. */
+enum { STEPS = 8, NEWTON = 8 };
+
+#define RESOLUTION_S 1e-12
+
 /* Magnitude at a sample of axis i, the other axis interpolated; false where either is missing. Good enough
  * to know where to look. */
 static bool magnitude(const struct resultant_axes *axes, unsigned i, size_t k, double *value_g)
@@ -24,14 +33,39 @@ static bool magnitude(const struct resultant_axes *axes, unsigned i, size_t k, d
 	return true;
 }
 
-/* The instants of the faster axis; count when there is none that has both axes. */
-static size_t largest(const struct resultant_axes *axes, unsigned i, double *value_g)
+/* The time from the first to the last sample of either axis that reaches level_g within the event. */
+static struct local_span reaching(const struct resultant_axes *axes, double level_g)
 {
-	size_t at = axes->trace[i]->count;
-	double value;
+	struct local_span span = {INFINITY, -INFINITY};
+
+	for (unsigned i = 0; i < 2; i++) {
+		const struct trace *trace = axes->trace[i];
+		size_t k = trace->first, last = trace->last;
+
+		while (k < last && !(fabs(trace->value_g[k]) >= level_g && trace_good(trace, k)))
+			k++;
+		if (k == last)
+			continue;
+		while (!(fabs(trace->value_g[last - 1]) >= level_g && trace_good(trace, last - 1)))
+			last--;
+		span.from_s = fmin(span.from_s, trace_time(trace, k));
+		span.until_s = fmax(span.until_s, trace_time(trace, last - 1));
+	}
+	return span;
+}
+
+/* The instants of the faster axis; count when there is none that has both axes. One of the axes must reach
+ * the stronger one's peak over the square root of two there. */
+static size_t largest(const struct resultant_axes *axes, unsigned i, double strong_g, double *value_g)
+{
+	const struct trace *trace = axes->trace[i];
+	struct local_span span = reaching(axes, 0.99 * strong_g / sqrt(2.0));
+	size_t at = trace->count;
+	double value, step = 1 / trace->rate_hz;
 
 	*value_g = 0;
-	for (size_t k = axes->trace[i]->first; k < axes->trace[i]->last; k++) {
+	for (size_t k = trace_index(trace, span.from_s - step);
+	     k < trace->last && trace_time(trace, k) <= span.until_s + step; k++) {
 		if (magnitude(axes, i, k, &value) && value > *value_g) {
 			*value_g = value;
 			at = k;
@@ -45,9 +79,10 @@ static size_t first_local(const struct resultant_axes *axes, unsigned i, size_t 
 {
 	double noise = fmax(axes->trace[0]->noise_g, axes->trace[1]->noise_g);
 	double fall = fmax(FALL_LEVEL * largest_g, noise > 0 ? FALL_NOISE * noise : 0), top = 0, value;
+	struct local_span span = reaching(axes, FIRST_LEVEL * largest_g / sqrt(2.0));
 	size_t at = largest_at;
 
-	for (size_t k = axes->trace[i]->first; k < largest_at; k++) {
+	for (size_t k = trace_index(axes->trace[i], span.from_s); k < largest_at; k++) {
 		if (!magnitude(axes, i, k, &value))
 			continue;
 		if (value > top) {
@@ -85,6 +120,109 @@ static bool usable(const struct peak *peak)
 	return peak->result.how.status != ESTIMATE_SHORT && peak->result.how.status != ESTIMATE_NO_PEAK;
 }
 
+/* Half of the square's value, slope and curvature at an instant, by the axes' own models. */
+static bool square_at(const struct resultant_axes *axes, double time_s, double half[3])
+{
+	half[0] = half[1] = half[2] = 0;
+	for (unsigned i = 0; i < 2; i++) {
+		double d[3];
+
+		if (!peak_at(axes->peak[i], time_s, d, NULL))
+			return false;
+		half[0] += d[0] * d[0] / 2;
+		half[1] += d[0] * d[1];
+		half[2] += d[1] * d[1] + d[0] * d[2];
+	}
+	return true;
+}
+
+/* The highest instant between the peaks of the axes. */
+static bool summit(const struct resultant_axes *axes, double *time_s, double half[3])
+{
+	double x = axes->peak[0]->result.time_s, y = axes->peak[1]->result.time_s, best = -1;
+	double slack = fabs(y - x) / STEPS + 1e-9;
+
+	*time_s = x;
+	for (int i = 0; i <= STEPS; i++) {
+		double time = x + (y - x) * i / STEPS;
+
+		if (!square_at(axes, time, half))
+			return false;
+		if (half[0] > best) {
+			best = half[0];
+			*time_s = time;
+		}
+	}
+	for (int i = 0; i < NEWTON; i++) {
+		double step;
+
+		if (!square_at(axes, *time_s, half) || !(half[2] < 0))
+			return false;
+		step = half[1] / half[2];
+		*time_s -= step;
+		if (fabs(step) < RESOLUTION_S)
+			break;
+	}
+	return *time_s >= fmin(x, y) - slack && *time_s <= fmax(x, y) + slack;
+}
+
+/* Noise through the models, as in crest.h, and what the axes' own uncertainties hold beyond it, the models'
+ * error. Variances of half the square's value and of its slope. */
+static void spread(const struct resultant_axes *axes, double time_s, double variance[2])
+{
+	variance[0] = variance[1] = 0;
+	for (unsigned i = 0; i < 2; i++) {
+		const struct estimate_peak *own = &axes->peak[i]->result;
+		double d[3], noise[2], top[3], top_noise[2], beyond;
+
+		if (!peak_at(axes->peak[i], time_s, d, noise) ||
+		    !peak_at(axes->peak[i], own->time_s, top, top_noise))
+			continue;
+		variance[0] += d[0] * d[0] * noise[0];
+		variance[1] += d[0] * d[0] * noise[1] + d[1] * d[1] * noise[0];
+		beyond = own->sigma_g * own->sigma_g - top_noise[0];
+		variance[0] += beyond > 0 ? d[0] * d[0] * beyond : 0;
+		beyond = pow(own->sigma_time_s * top[2], 2) - top_noise[1];
+		variance[1] += beyond > 0 ? d[0] * d[0] * beyond : 0;
+	}
+}
+
+/* By the axes' own models. False when they are not of the pulse whose largest sample is at near_s. */
+static bool combine(const struct resultant_axes *axes, const struct peak *lead, double near_s,
+                    struct resultant *found)
+{
+	struct estimate_resultant *result = &found->result;
+	double x = axes->peak[0]->result.time_s, y = axes->peak[1]->result.time_s;
+	double slack = SAME_PULSE * found->width_s, time, half[3], variance[2];
+
+	if (!(near_s >= fmin(x, y) - slack && near_s <= fmax(x, y) + slack) || !summit(axes, &time, half))
+		return false;
+	spread(axes, time, variance);
+	result->how.method = lead->result.how.method;
+	result->how.chi_square = lead->result.how.chi_square;
+	result->peak_g = sqrt(2 * half[0]);
+	result->sigma_g = sqrt(variance[0]) / result->peak_g;
+	result->time_s = time;
+	result->sigma_time_s = sqrt(variance[1]) / fabs(half[2]);
+	return true;
+}
+
+/* Around the largest sample, whatever the axes' own peaks are. */
+static bool refit(const struct resultant_axes *axes, double near_s, struct resultant *found)
+{
+	struct crest crest;
+
+	if (!crest_fit(&crest, axes->trace, 2, near_s, found->width_s, &found->span))
+		return false;
+	found->result.peak_g = crest.value_g;
+	found->result.sigma_g = crest.sigma_g;
+	found->result.time_s = crest.time_s;
+	found->result.sigma_time_s = crest.sigma_time_s;
+	found->result.how.chi_square = crest.chi_square;
+	found->result.how.method = "poly4/poly6";
+	return true;
+}
+
 /* X and Y against each other, and what a hole or a limit under the pulse does to the resultant. */
 static void compare_axes(const struct resultant_axes *axes, unsigned strong, struct resultant *found)
 {
@@ -94,15 +232,30 @@ static void compare_axes(const struct resultant_axes *axes, unsigned strong, str
 	if (usable(x) && usable(y)) {
 		found->result.axes_apart_s = y->result.time_s - x->result.time_s;
 		found->result.axes_coincide = fabs(found->result.axes_apart_s) <= RESULTANT_COINCIDE_S;
+		found->result.how.flags = x->result.how.flags | y->result.how.flags;
 	}
 	if (status == ESTIMATE_OK && usable(axes->peak[1 - strong]))
 		status = axes->peak[1 - strong]->result.how.status;
 	if (trace_any(axes->trace[0], found->span.from_s, found->span.until_s, SAMPLE_CLIPPED) ||
-	    trace_any(axes->trace[1], found->span.from_s, found->span.until_s, SAMPLE_CLIPPED)) {
+	    trace_any(axes->trace[1], found->span.from_s, found->span.until_s, SAMPLE_CLIPPED))
 		status = ESTIMATE_CLIPPED;
-		found->result.sigma_g = NAN;
-	}
 	found->result.how.status = status;
+}
+
+static void find_first(const struct resultant_axes *axes, unsigned fast, unsigned strong, size_t at,
+                       double top, struct resultant *found)
+{
+	size_t first = first_local(axes, fast, at, top);
+	struct local_span span;
+	struct crest crest;
+
+	found->first_peak_s = found->result.time_s;
+	if (first == at)
+		return;
+	found->first_peak_s = trace_time(axes->trace[fast], first);
+	span = span_around(axes, strong, found->first_peak_s);
+	if (crest_fit(&crest, axes->trace, 2, found->first_peak_s, found->width_s, &span))
+		found->first_peak_s = crest.time_s;
 }
 
 void resultant_find(const struct resultant_axes *axes, struct resultant *resultant)
@@ -110,38 +263,33 @@ void resultant_find(const struct resultant_axes *axes, struct resultant *resulta
 	const struct peak *x = axes->peak[0], *y = axes->peak[1];
 	unsigned strong = !usable(x) || (usable(y) && fabs(y->result.value_g) > fabs(x->result.value_g));
 	unsigned fast = axes->trace[1]->rate_hz > axes->trace[0]->rate_hz;
-	struct resultant found = {
-	        .result = {.peak_g = NAN, .sigma_g = NAN, .time_s = NAN, .axes_apart_s = NAN},
-	        .sigma_time_s = NAN,
-	        .first_peak_s = NAN};
-	struct crest crest;
-	double top;
-	size_t at, first;
+	const struct peak *lead = axes->peak[strong];
+	struct resultant found = {.result = {.peak_g = NAN,
+	                                     .sigma_g = NAN,
+	                                     .time_s = NAN,
+	                                     .sigma_time_s = NAN,
+	                                     .axes_apart_s = NAN,
+	                                     .how = {.method = "", .chi_square = NAN}},
+	                          .first_peak_s = NAN};
+	double top, near;
+	size_t at;
 
-	found.result.how.status = axes->peak[strong]->result.how.status;
+	found.result.how.status = lead->result.how.status;
 	*resultant = found;
-	if (!usable(axes->peak[strong]))
+	if (!usable(lead))
 		return;
 	resultant->result.how.status = ESTIMATE_SHORT;
-	found.width_s = axes->peak[strong]->width_s;
-	at = largest(axes, fast, &top);
+	found.width_s = lead->width_s;
+	at = largest(axes, fast, fabs(axes->trace[strong]->value_g[lead->at]), &top);
 	if (at == axes->trace[fast]->count)
 		return;
-	found.span = span_around(axes, strong, trace_time(axes->trace[fast], at));
-	if (!crest_fit(&crest, axes->trace, 2, trace_time(axes->trace[fast], at), found.width_s, &found.span))
+	near = trace_time(axes->trace[fast], at);
+	found.span = span_around(axes, strong, near);
+	if (!(usable(axes->peak[1 - strong]) && combine(axes, lead, near, &found)) &&
+	    !refit(axes, near, &found))
 		return;
-	found.result.peak_g = crest.value_g;
-	found.result.sigma_g = crest.sigma_g;
-	found.result.time_s = found.first_peak_s = crest.time_s;
-	found.sigma_time_s = crest.sigma_time_s;
-	first = first_local(axes, fast, at, top);
-	if (first != at) {
-		struct local_span span = span_around(axes, strong, trace_time(axes->trace[fast], first));
-
-		found.first_peak_s = trace_time(axes->trace[fast], first);
-		if (crest_fit(&crest, axes->trace, 2, found.first_peak_s, found.width_s, &span))
-			found.first_peak_s = crest.time_s;
-	}
+	found.result.how.path[0] = found.result.how.method;
+	find_first(axes, fast, strong, at, top, &found);
 	compare_axes(axes, strong, &found);
 	*resultant = found;
 }

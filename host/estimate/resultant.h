@@ -2,13 +2,15 @@
 #ifndef DT_HOST_ESTIMATE_RESULTANT_H
 #define DT_HOST_ESTIMATE_RESULTANT_H
 /*
- * The resultant of a sensor's X and Y: the maximum over continuous time of hypot(X(t), Y(t)), each axis a
- * local model at its own rate (crest.h). Never the hypot of two maxima, which lie at different instants, nor
- * of nearest samples.
+ * The resultant of a sensor's X and Y: the maximum over continuous time of hypot(X(t), Y(t)), each axis by
+ * the model that gave its own peak (peak.h), a family's or a local polynomial, at its own rate. Never the
+ * hypot of two maxima, which lie at different instants, nor of nearest samples. Where the axes' own peaks are
+ * not of the resultant's pulse, or one has none, polynomials are fitted to both around the resultant's
+ * (crest.h).
  *
  * The axes coincide when their own maxima lie no further apart than RESULTANT_COINCIDE_S, about two samples.
- * Status: the stronger axis' when that is short or no_peak; short when the weaker axis has too few samples
- * under the pulse to say what it did; clipped and ambiguous as for a peak.
+ * Flags are those of both axes. Status: the stronger axis' when that is short or no_peak; short when the
+ * weaker axis has too few samples under the pulse to say what it did; clipped and ambiguous as for a peak.
  */
 #include "host/estimate/peak.h"
 
@@ -22,10 +24,9 @@ struct resultant_axes {
 
 struct resultant {
 	struct estimate_resultant result; /* sensor is left to the caller */
-	double sigma_time_s;
-	double width_s;         /* of the stronger axis */
-	struct local_span span; /* of the stronger axis */
-	double first_peak_s;    /* the first local maximum above half of the largest; NAN unless found */
+	double width_s;                   /* of the stronger axis */
+	struct local_span span;           /* of the stronger axis */
+	double first_peak_s; /* the first local maximum above half of the largest; NAN unless found */
 };
 
 void resultant_find(const struct resultant_axes *axes, struct resultant *resultant);

@@ -5,99 +5,153 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/estimate/clip.h"
+
 /* Beyond any sensor; keeps squares and sums far from overflow. */
 #define VALUE_MAX_G 1e9
 
-enum { EQUAL_EXTREMES = 3 };
-
-static void mark_bad(struct trace *trace)
+static double less(double a, double b)
 {
-	for (size_t k = 0; k < trace->count; k++) {
-		if (isfinite(trace->value_g[k]) && fabs(trace->value_g[k]) <= VALUE_MAX_G)
-			continue;
-		if (trace_good(trace, k)) {
-			trace->sample[k] |= SAMPLE_BAD;
-			trace->flags |= RECORD_FLAG_BAD;
+	return a < b ? a : b;
+}
+
+static double more(double a, double b)
+{
+	return a > b ? a : b;
+}
+
+/* Of TRACE_BLOCK good values, in strands that need not wait for each other. False, and nothing is known, when
+ * one of them is no acceleration. */
+static bool extremes(const double *v, struct trace_block *block)
+{
+	double l0 = v[0], l1 = v[1], l2 = v[2], l3 = v[3], h0 = l0, h1 = l1, h2 = l2, h3 = l3;
+	double s0 = 0, s1 = 0, sum; /* finite unless a value is not */
+
+	for (unsigned i = 0; i < TRACE_BLOCK; i += 4) {
+		l0 = less(l0, v[i]);
+		h0 = more(h0, v[i]);
+		l1 = less(l1, v[i + 1]);
+		h1 = more(h1, v[i + 1]);
+		l2 = less(l2, v[i + 2]);
+		h2 = more(h2, v[i + 2]);
+		l3 = less(l3, v[i + 3]);
+		h3 = more(h3, v[i + 3]);
+		s0 += v[i] + v[i + 2];
+		s1 += v[i + 1] + v[i + 3];
+	}
+	sum = s0 + s1;
+	block->low_g = less(less(l0, l1), less(l2, l3));
+	block->high_g = more(more(h0, h1), more(h2, h3));
+	block->whole = true;
+	return !isnan(sum) && block->low_g >= -VALUE_MAX_G && block->high_g <= VALUE_MAX_G;
+}
+
+/* Sample by sample, from sample k on, marking what is bad. */
+static void look_closely(struct trace *trace, size_t k, struct trace_block *block)
+{
+	size_t end = k + TRACE_BLOCK < trace->count ? k + TRACE_BLOCK : trace->count;
+
+	*block = (struct trace_block){INFINITY, -INFINITY, true};
+	for (; k < end; k++) {
+		double v = trace->value_g[k];
+
+		if (!(fabs(v) <= VALUE_MAX_G)) {
+			if (trace_good(trace, k)) {
+				trace->sample[k] |= SAMPLE_BAD;
+				trace->flags |= RECORD_FLAG_BAD;
+			}
+			trace->value_g[k] = NAN;
+			block->whole = false;
+		} else if (!trace_good(trace, k)) {
+			block->whole = false;
+		} else {
+			block->low_g = less(v, block->low_g);
+			block->high_g = more(v, block->high_g);
 		}
-		trace->value_g[k] = NAN;
 	}
 }
 
-/* Marks runs of EQUAL_EXTREMES or more good samples that equal the extreme. */
-static void mark_runs(struct trace *trace, double extreme_g)
+static bool all_good(const uint8_t *sample)
 {
-	size_t run = 0;
+	uint64_t word[TRACE_BLOCK / 8], any = 0;
 
-	for (size_t k = 0; k <= trace->count; k++) {
-		if (k < trace->count && trace_good(trace, k) && !(trace->value_g[k] < extreme_g) &&
-		    !(trace->value_g[k] > extreme_g)) {
-			run++;
-			continue;
-		}
-		if (run >= EQUAL_EXTREMES) {
-			trace->flags |= RECORD_FLAG_CLIPPED;
-			for (size_t i = k - run; i < k; i++)
-				trace->sample[i] |= SAMPLE_CLIPPED;
-		}
-		run = 0;
-	}
+	memcpy(word, sample, TRACE_BLOCK);
+	for (unsigned i = 0; i < TRACE_BLOCK / 8; i++)
+		any |= word[i];
+	return any == 0;
 }
 
-/* A sensor at its limit repeats its extreme. Only extremes on the outside count: half the largest
- * magnitude or more, so that the small side of a one-sided shock is not taken for one. */
-static void mark_clipped(struct trace *trace)
+static void copy(struct trace *trace, const struct channel *channel)
 {
-	double low = INFINITY, high = -INFINITY;
-
-	for (size_t k = 0; k < trace->count; k++) {
-		if (!trace_good(trace, k))
-			continue;
-		low = fmin(low, trace->value_g[k]);
-		high = fmax(high, trace->value_g[k]);
-	}
-	if (!(high > low))
+	if (trace->count == 0)
 		return;
-	if (high >= -low / 2)
-		mark_runs(trace, high);
-	if (-low >= high / 2)
-		mark_runs(trace, low);
+	memcpy(trace->value_g, channel->value_g, trace->count * sizeof(*trace->value_g));
+	memcpy(trace->sample, channel->sample, trace->count);
+	for (size_t k = 0; k < trace->count; k += TRACE_BLOCK) {
+		struct trace_block *block = &trace->block[k / TRACE_BLOCK];
+
+		if (trace->count - k < TRACE_BLOCK || !all_good(trace->sample + k) ||
+		    !extremes(trace->value_g + k, block))
+			look_closely(trace, k, block);
+	}
+}
+
+void trace_marked(struct trace *trace)
+{
+	for (size_t k = 0; k < trace->count; k += TRACE_BLOCK)
+		look_closely(trace, k, &trace->block[k / TRACE_BLOCK]);
+	clip_mark(trace);
+}
+
+/* Without a rate no sample has a time. */
+static bool has_time(const struct channel *channel)
+{
+	return isfinite(channel->rate_hz) && channel->rate_hz > 0 && isfinite(channel->start_s);
+}
+
+size_t trace_bytes(const struct channel *channel)
+{
+	size_t blocks = channel->count / TRACE_BLOCK + 1;
+
+	return blocks * (TRACE_BLOCK * sizeof(double) + sizeof(struct trace_block) + TRACE_BLOCK);
+}
+
+void trace_lay(struct trace *trace, const struct channel *channel, double from_s, double until_s,
+               void *memory)
+{
+	bool timed = has_time(channel);
+
+	*trace = (struct trace){.rate_hz = timed ? channel->rate_hz : 1,
+	                        .start_s = timed ? channel->start_s : 0,
+	                        .count = timed ? channel->count : 0,
+	                        .noise_g = NAN,
+	                        .hum_hz = NAN,
+	                        .flags = channel->flags,
+	                        .range_g = channel->range_g};
+	trace->value_g = memory;
+	trace->block = (struct trace_block *)(void *)(trace->value_g + trace->count);
+	trace->sample = (uint8_t *)(trace->block + trace_blocks(trace));
+	copy(trace, channel);
+	clip_mark(trace);
+	trace->first = trace_index(trace, from_s);
+	trace->last = trace_index(trace, until_s);
 }
 
 int trace_open(struct trace *trace, const struct channel *channel, double from_s, double until_s)
 {
-	struct trace opened = {.rate_hz = channel->rate_hz, .start_s = channel->start_s, .noise_g = NAN};
-	size_t count = channel->count;
+	void *memory = malloc(trace_bytes(channel));
 
-	/* Without a rate no sample has a time. */
-	if (!isfinite(channel->rate_hz) || channel->rate_hz <= 0 || !isfinite(channel->start_s)) {
-		count = 0;
-		opened.rate_hz = 1;
-		opened.start_s = 0;
-	}
-	opened.value_g = malloc((count + 1) * sizeof(*opened.value_g));
-	opened.sample = malloc(count + 1);
-	if (!opened.value_g || !opened.sample) {
-		trace_close(&opened);
+	if (!memory)
 		return DT_E_MEMORY;
-	}
-	if (count > 0) {
-		memcpy(opened.value_g, channel->value_g, count * sizeof(*opened.value_g));
-		memcpy(opened.sample, channel->sample, count);
-	}
-	opened.count = count;
-	opened.flags = channel->flags;
-	mark_bad(&opened);
-	mark_clipped(&opened);
-	opened.first = trace_index(&opened, from_s);
-	opened.last = trace_index(&opened, until_s);
-	*trace = opened;
+	trace_lay(trace, channel, from_s, until_s, memory);
+	trace->memory = memory;
 	return 0;
 }
 
 void trace_close(struct trace *trace)
 {
-	free(trace->value_g);
-	free(trace->sample);
+	free(trace->memory);
+	trace->memory = NULL;
 	trace->value_g = NULL;
 	trace->sample = NULL;
 }

@@ -4,33 +4,66 @@
 /*
  * A trace: the analyzer's own copy of one channel, with its own mask, so that the record stays as it was
  * read. Every estimator works on a trace and asks trace_good of each sample; time is always explicit and
- * nothing is resampled.
+ * nothing is resampled. Sample k is at start_s + k/rate_hz.
  *
- * trace_open copies and marks: a sample that is not finite, or larger than any accelerometer reads, is
- * bad; runs of equal extreme samples are clipped. trace_close frees. Sample k is at start_s + k/rate_hz.
+ * Opening copies and marks: a sample that is not finite, or larger than any accelerometer reads, is bad;
+ * groups of equal extreme samples are clipped and at the limit (clip.h). The extremes of each run of
+ * TRACE_BLOCK samples are kept, so that a search need not look at what is quiet.
+ *
+ * trace_open allocates and trace_close frees. trace_lay uses the caller's memory, aligned for a double and
+ * trace_bytes long, that must outlive the trace; such a trace is not closed.
  */
 #include <stdbool.h>
 
 #include "host/record/record.h"
+
+/* Beside the SAMPLE_* bits: the sensor or converter shows nothing beyond this value, so that the true one is
+ * at least this. SAMPLE_CLIPPED is set too. Clipped alone: a reading beyond the sensor's range. */
+enum { TRACE_LIMIT = 1u << 7 };
+
+enum { TRACE_BLOCK = 64 };
+
+/* No good sample of the block lies outside, as opened; low > high where none is good. */
+struct trace_block {
+	double low_g, high_g;
+	bool whole; /* every sample of it is good */
+};
 
 struct trace {
 	double rate_hz;
 	double start_s;
 	size_t count;
 	double *value_g;    /* [count]; meaningless where the mask says lost or bad */
-	uint8_t *sample;    /* [count], SAMPLE_* */
+	uint8_t *sample;    /* [count], SAMPLE_* and TRACE_LIMIT */
 	size_t first, last; /* the event is looked for in [first, last) */
 	double noise_g;     /* per sample, before any filter; NAN while unknown */
-	unsigned flags;     /* RECORD_FLAG_* */
+	double hum_g;   /* amplitude of the mains term that was taken off, 0 if none: a little may be left */
+	double hum_hz;  /* its frequency; NAN if none */
+	unsigned flags; /* RECORD_FLAG_* */
+	double range_g; /* the channel's */
+	struct trace_block *block; /* [trace_blocks] of the values as opened */
+	void *memory;              /* of trace_open */
 };
 
 /* The event is looked for from from_s until until_s. DT_E_MEMORY. */
 DT_MUST_USE int trace_open(struct trace *trace, const struct channel *channel, double from_s, double until_s);
 void trace_close(struct trace *trace);
 
+size_t trace_bytes(const struct channel *channel); /* a multiple of a double's size */
+void trace_lay(struct trace *trace, const struct channel *channel, double from_s, double until_s,
+               void *memory);
+
+/* After good samples were marked bad: blocks and limits anew. */
+void trace_marked(struct trace *trace);
+
+static inline size_t trace_blocks(const struct trace *trace)
+{
+	return (trace->count + TRACE_BLOCK - 1) / TRACE_BLOCK;
+}
+
 static inline bool trace_good(const struct trace *trace, size_t k)
 {
-	return !(trace->sample[k] & (SAMPLE_LOST | SAMPLE_BAD));
+	return !(trace->sample[k] & (SAMPLE_LOST | SAMPLE_BAD | SAMPLE_SPIKE));
 }
 
 static inline double trace_time(const struct trace *trace, size_t k)

@@ -3,163 +3,266 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "common/units.h"
-#include "host/model/sdof.h"
+#include "host/model/auto.h"
+#include "host/model/drop.h"
+#include "host/model/rung.h"
 
-/* A scene in the terms of the sdof rung. The box is accelerated by one half-sine; each axis of each sensor
- * takes a share of it that does not change during the contact. */
-struct drop {
-	double impact_speed_m_s;
-	double velocity_change_m_s;
-	double pulse_s;
-	double amplitude_g;       /* of the half-sine at the centre of gravity */
-	double share[MODEL_AXES]; /* of S1 before, of S2 after the mounts' response */
-	bool has_plate;
-	struct sdof plate; /* valid with has_plate; answers to amplitude_g */
+const struct model_options model_defaults = {
+        .tolerance = MODEL_TOLERANCE, .refinements = MODEL_OF_RUNG, .ring = true};
+
+static const struct rung *const rungs[MODEL_FIDELITIES] = {
+        [MODEL_PAPER] = &rung_paper,     [MODEL_STEADY] = &rung_steady, [MODEL_SDOF] = &rung_sdof,
+        [MODEL_COUPLED] = &rung_coupled, [MODEL_PLANAR] = &rung_planar,
 };
+
+const char *model_fidelity_name(enum model_fidelity fidelity)
+{
+	return fidelity == MODEL_AUTO ? "auto" : rungs[fidelity]->name;
+}
 
 int model_fidelity_parse(const char *name, enum model_fidelity *fidelity)
 {
-	if (!strcmp(name, "auto"))
-		*fidelity = MODEL_AUTO;
-	else if (!strcmp(name, "sdof"))
-		*fidelity = MODEL_SDOF;
-	else
+	for (enum model_fidelity f = MODEL_AUTO; f < MODEL_FIDELITIES; f++)
+		if (!strcmp(name, model_fidelity_name(f))) {
+			*fidelity = f;
+			return 0;
+		}
+	return DT_E_UNKNOWN;
+}
+
+int model_refinement_parse(const char *name, enum model_refinement *refinement)
+{
+	static const struct {
+		const char *name;
+		enum model_refinement refinement;
+	} names[] = {{"stiffness", MODEL_STIFFNESS},
+	             {"wedge", MODEL_WEDGE},
+	             {"grip", MODEL_GRIP},
+	             {"mounts", MODEL_MOUNTS}};
+
+	for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
+		if (!strcmp(name, names[i].name)) {
+			*refinement = names[i].refinement;
+			return 0;
+		}
+	return DT_E_UNKNOWN;
+}
+
+int model_question_parse(const char *name, enum model_question *question)
+{
+	static const char *const names[] = {"plate", "axes", "box", "lag", "s2", "direction"};
+
+	for (unsigned i = 0; i < sizeof(names) / sizeof(names[0]); i++)
+		if (!strcmp(name, names[i])) {
+			*question = (enum model_question)(1u << i);
+			return 0;
+		}
+	return DT_E_UNKNOWN;
+}
+
+/* Nothing said yet. */
+static struct model_prediction blank(const struct drop *drop)
+{
+	const double none = (double)NAN;
+	struct model_prediction p = {
+	        .has_plate = drop->has_plate,
+	        .impact_speed_m_s = drop->speed_m_s,
+	        .velocity_change_m_s = none,
+	        .contact_time_s = none,
+	        .restitution = none,
+	        .stiffness_n_m15 = none,
+	        .dent_m = none,
+	        .dent_share = none,
+	        .plate_travel_m = none,
+	        .plate_frequency_hz = drop->has_plate ? none : 0.0,
+	        .plate_damping_ratio = drop->has_plate ? none : 0.0,
+	        .spin_rad_s = none,
+	        .box = {none, none},
+	        .direction_deg = {none, none},
+	        .lag_s = none,
+	        .difference = none,
+	        .next_change = none,
+	};
+
+	for (int i = 0; i < MODEL_AXES; i++)
+		p.peak[i] = (struct model_peak){none, none};
+	p.resultant[0] = p.resultant[1] = p.box;
+	return p;
+}
+
+static void to_g(struct model_peak *peak)
+{
+	peak->value_g /= UNITS_G_M_S2;
+}
+
+static int check_options(const struct model_options *o, char *message)
+{
+	if (!(o->tolerance == 0.0 || (o->tolerance >= MODEL_TOLERANCE_MIN && o->tolerance <= 0.01)))
+		return drop_refuse(message, DT_E_ARGUMENT, "tolerance is %g, expected %g to 0.01",
+		                   o->tolerance, MODEL_TOLERANCE_MIN);
+	if (!(o->accuracy >= 0.0 && o->accuracy <= 1.0))
+		return drop_refuse(message, DT_E_ARGUMENT, "accuracy is %g, expected 0 to 1", o->accuracy);
+	return 0;
+}
+
+/* The rung's prediction, finished: g, dent against mat, direction and lag from what it said. */
+static int solve_rung(const struct drop *drop, enum model_fidelity fidelity,
+                      const struct model_options *options, struct model_prediction *prediction, char *message)
+{
+	struct model_prediction p = blank(drop);
+	double mat_m = drop->scene->contact_mat_thickness_m;
+	int error = rungs[fidelity]->predict(drop, options, &p, message);
+
+	if (error)
+		return error;
+	p.rung = fidelity;
+	p.fidelity = rungs[fidelity]->name;
+	p.dent_share = p.dent_m / mat_m;
+	switch (isfinite(p.dent_m) ? contact_validity(p.dent_m, mat_m) : CONTACT_SOUND) {
+	case CONTACT_THROUGH:
+		return drop_refuse(message, DT_E_RANGE,
+		                   "mat_thickness_m is %g, but the corner would sink in by %.2g m", mat_m,
+		                   p.dent_m);
+	case CONTACT_DEEP:
+		p.notes |= MODEL_NOTE_DEEP;
+		break;
+	case CONTACT_SOUND:
+		break;
+	}
+	p.lag_s = p.resultant[0].time_s - p.resultant[1].time_s;
+	for (int i = 0; i < MODEL_AXES; i++)
+		to_g(&p.peak[i]);
+	to_g(&p.resultant[0]);
+	to_g(&p.resultant[1]);
+	to_g(&p.box);
+	*prediction = p;
+	return 0;
+}
+
+/* "why: says", without printf, which a million predictions would notice. */
+static void give_reason(struct model_prediction *p, const char *why, const char *says)
+{
+	const char *const parts[] = {why, ": ", says};
+	size_t at = 0;
+
+	for (size_t i = 0; i < sizeof(parts) / sizeof(parts[0]); i++) {
+		size_t length = strlen(parts[i]), room = sizeof(p->reason) - 1 - at;
+
+		length = length < room ? length : room;
+		memcpy(p->reason + at, parts[i], length);
+		at += length;
+	}
+	p->reason[at] = '\0';
+}
+
+int rung_solve(const struct drop *drop, enum model_fidelity fidelity, const struct model_options *options,
+               const char *why, struct model_prediction *prediction, char *message)
+{
+	struct model_prediction p;
+	int error = solve_rung(drop, fidelity, options, &p, message);
+
+	if (error)
+		return error;
+	give_reason(&p, why, drop->has_plate ? rungs[fidelity]->says : rungs[fidelity]->says_without_plate);
+	*prediction = p;
+	return 0;
+}
+
+int model_solve(const struct scene *scene, enum model_fidelity fidelity, const struct model_options *options,
+                struct model_prediction *prediction, char message[MODEL_MESSAGE_MAX])
+{
+	const struct model_options *o = options ? options : &model_defaults;
+	struct drop drop;
+	int error = check_options(o, message);
+
+	if (!error)
+		error = drop_of_scene(scene, &drop, message);
+	if (!error && fidelity == MODEL_AUTO)
+		return auto_solve(&drop, o, prediction, message);
+	return error ? error : rung_solve(&drop, fidelity, o, "asked for", prediction, message);
+}
+
+int model_below(const struct scene *scene, const struct model_prediction *prediction,
+                struct model_prediction *below)
+{
+	struct model_options options = model_defaults;
+
+	options.refinements = MODEL_STIFFNESS | MODEL_WEDGE;
+	if (prediction->rung != MODEL_PLANAR && prediction->rung != MODEL_COUPLED)
 		return DT_E_UNKNOWN;
-	return 0;
-}
-
-/* What S2, off the centre of gravity along X, reads less in Y because the box begins to turn: its offset
- * times the lever of the contact force over the squared radius of gyration. The lever follows from the
- * balance angle, at which it is zero. */
-static double turning_share(const struct scene *scene)
-{
-	double angle = UNITS_RAD(scene->drop_angle_deg);
-	double ly = scene->product_width_m / 2.0;
-	double lx = ly / tan(UNITS_RAD(scene->product_balance_angle_deg));
-	double lever = lx * sin(angle) - ly * cos(angle);
-	double gyration2 = scene->product_inertia_ratio *
-	                   (scene->product_length_m * scene->product_length_m +
-	                    scene->product_width_m * scene->product_width_m) /
-	                   12.0;
-
-	return scene->sensor_s2_offset_m * lever / gyration2;
-}
-
-/* The plate against the box, both free: the mounts see the reduced mass. */
-static double plate_frequency_hz(const struct scene *scene)
-{
-	double per_mass = 1.0 / scene->mount_plate_mass_kg + 1.0 / scene->product_case_mass_kg;
-
-	return sqrt(scene->mount_stiffness_n_m * per_mass) / (2.0 * UNITS_PI);
-}
-
-static int drop_of_scene(const struct scene *scene, struct drop *drop)
-{
-	double angle = UNITS_RAD(scene->drop_angle_deg);
-	double s1_angle = angle + UNITS_RAD(scene->sensor_s1_yaw_deg);
-	struct drop d = {.has_plate = scene->mount_plate_mass_kg > 0.0, .pulse_s = scene->contact_duration_s};
-
-	d.impact_speed_m_s = sqrt(2.0 * UNITS_G_M_S2 * scene->drop_height_m);
-	d.velocity_change_m_s = (1.0 + scene->contact_restitution) * d.impact_speed_m_s;
-	d.amplitude_g = UNITS_PI * d.velocity_change_m_s / (2.0 * d.pulse_s) / UNITS_G_M_S2;
-	d.share[MODEL_S1X] = cos(s1_angle);
-	d.share[MODEL_S1Y] = sin(s1_angle);
-	d.share[MODEL_S2X] = cos(angle);
-	d.share[MODEL_S2Y] = sin(angle) - turning_share(scene);
-	for (enum model_axis axis = 0; axis < MODEL_AXES; axis++)
-		if (!isfinite(d.share[axis]))
-			return DT_E_NUMERIC;
-	if (!isfinite(d.amplitude_g) || !(d.amplitude_g > 0.0) || !(d.pulse_s > 0.0))
-		return DT_E_NUMERIC;
-	if (d.has_plate && sdof_init(&d.plate, plate_frequency_hz(scene), scene->mount_damping_ratio,
-	                             d.amplitude_g, d.pulse_s) < 0)
-		return DT_E_NUMERIC;
-	*drop = d;
-	return 0;
-}
-
-static double pulse_g(const struct drop *drop, double time_s)
-{
-	if (!(time_s > 0.0) || time_s >= drop->pulse_s)
-		return 0.0;
-	return drop->amplitude_g * sin(UNITS_PI * time_s / drop->pulse_s);
-}
-
-static bool axis_on_plate(const struct drop *drop, enum model_axis axis)
-{
-	return drop->has_plate && (axis == MODEL_S1X || axis == MODEL_S1Y);
-}
-
-static void give_reason(const struct drop *drop, enum model_fidelity fidelity, char *reason, size_t size)
-{
-	const char *why = fidelity == MODEL_AUTO ? "the least rung, and today the only one" : "asked for";
-
-	if (drop->has_plate)
-		snprintf(reason, size,
-		         "%s: explains the plate's peak, frequency and damping; understates the box's peak, "
-		         "whose real pulse is no half-sine",
-		         why);
-	else
-		snprintf(reason, size,
-		         "%s: explains velocity change and direction; understates the box's peak, whose real "
-		         "pulse is no half-sine",
-		         why);
+	return model_solve(scene, prediction->rung - 1, &options, below, NULL);
 }
 
 int model_predict(const struct scene *scene, enum model_fidelity fidelity,
                   struct model_prediction *prediction)
 {
-	struct model_prediction p = {.fidelity = "sdof"};
-	struct model_peak box, s1;
+	return model_solve(scene, fidelity, NULL, prediction, NULL);
+}
+
+int model_hertz(const struct scene *scene, struct contact_hertz *hertz, char message[MODEL_MESSAGE_MAX])
+{
+	struct contact_hertz_input in = {
+	        .mass_kg = scene->product_case_mass_kg,
+	        .radius_m = scene->contact_corner_radius_m,
+	        .case_modulus_pa = scene->contact_case_modulus_pa,
+	        .case_poisson = scene->contact_case_poisson,
+	        .mat_modulus_pa = scene->contact_mat_modulus_pa,
+	        .mat_poisson = scene->contact_mat_poisson,
+	        .mat_thickness_m = scene->contact_mat_thickness_m,
+	};
 	struct drop drop;
-	int error = drop_of_scene(scene, &drop);
+	int error = drop_of_scene(scene, &drop, message);
 
 	if (error)
 		return error;
-	box = (struct model_peak){.value_g = drop.amplitude_g, .time_s = drop.pulse_s / 2.0};
-	s1 = box;
-	if (drop.has_plate) {
-		error = sdof_peak(&drop.plate, &s1.value_g, &s1.time_s);
-		if (error)
-			return error;
-		p.plate_frequency_hz = drop.plate.omega_d / (2.0 * UNITS_PI);
-		p.plate_damping_ratio = drop.plate.zeta;
-	}
-	p.has_plate = drop.has_plate;
-	p.impact_speed_m_s = drop.impact_speed_m_s;
-	p.velocity_change_m_s = drop.velocity_change_m_s;
-	p.contact_time_s = drop.pulse_s;
-	for (enum model_axis axis = 0; axis < MODEL_AXES; axis++) {
-		p.peak[axis] = axis_on_plate(&drop, axis) ? s1 : box;
-		p.peak[axis].value_g *= drop.share[axis];
-	}
-	p.resultant[0] = (struct model_peak){fabs(s1.value_g), s1.time_s};
-	p.resultant[1] = box;
-	p.resultant[1].value_g *= hypot(drop.share[MODEL_S2X], drop.share[MODEL_S2Y]);
-	p.lag_s = p.resultant[0].time_s - p.resultant[1].time_s;
-	give_reason(&drop, fidelity, p.reason, sizeof(p.reason));
-	*prediction = p;
+	in.speed_m_s = drop.speed_m_s;
+	error = contact_hertz(&in, hertz);
+	if (error)
+		return drop_refuse(
+		        message, error,
+		        "corner_radius_m, mat_thickness_m and the moduli must be above 0, Poisson's "
+		        "ratios within 0 to 0.5");
+	return 0;
+}
+
+int model_histories(const struct scene *scene, enum model_fidelity fidelity,
+                    const struct model_options *options, double start_s, double step_s,
+                    double (*value_g)[MODEL_AXES], size_t count, char message[MODEL_MESSAGE_MAX])
+{
+	enum model_fidelity taken = fidelity == MODEL_AUTO ? MODEL_PLANAR : fidelity;
+	struct drop drop;
+	int error = check_options(options ? options : &model_defaults, message);
+
+	if (!error && (!isfinite(start_s) || !(step_s > 0.0) || !isfinite(step_s)))
+		error = drop_refuse(message, DT_E_ARGUMENT, "times from %g in steps of %g", start_s, step_s);
+	if (!error)
+		error = drop_of_scene(scene, &drop, message);
+	if (!error)
+		error = rungs[taken]->history(&drop, options ? options : &model_defaults, start_s, step_s,
+		                              value_g, count, message);
+	if (error)
+		return error;
+	for (size_t k = 0; k < count; k++)
+		for (int axis = 0; axis < MODEL_AXES; axis++)
+			value_g[k][axis] /= UNITS_G_M_S2;
 	return 0;
 }
 
 int model_history(const struct scene *scene, enum model_fidelity fidelity, enum model_axis axis,
                   double start_s, double step_s, double *value_g, size_t count)
 {
-	struct drop drop;
-	int error = drop_of_scene(scene, &drop);
+	double(*all)[MODEL_AXES] = malloc((count ? count : 1) * sizeof(*all));
+	int error;
 
-	(void)fidelity; /* one rung so far: every name gives it */
-	if (error)
-		return error;
-	for (size_t k = 0; k < count; k++) {
-		double t = start_s + (double)k * step_s;
-		double whole = axis_on_plate(&drop, axis) ? sdof_motion(&drop.plate, t).acceleration
-		                                          : pulse_g(&drop, t);
-
-		value_g[k] = drop.share[axis] * whole;
-	}
-	return 0;
+	if (!all)
+		return DT_E_MEMORY;
+	error = model_histories(scene, fidelity, NULL, start_s, step_s, all, count, NULL);
+	for (size_t k = 0; k < count && !error; k++)
+		value_g[k] = all[k][axis];
+	free(all);
+	return error;
 }

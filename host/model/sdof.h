@@ -7,20 +7,20 @@
  *     z'' + 2 zeta omega z' + omega^2 z = -w'',   w'' = a0 sin(pi t/T) for 0 <= t <= T, else 0
  *
  * z is the mass's place relative to the base, u'' = z'' + w'' its absolute acceleration. Solved in closed
- * form, transient and free decay included, for 0 <= zeta < 1: the two convolution integrals are divided
- * differences of the exponential, which stay exact where pulse and oscillator have the same frequency
- * (a difference of quotients, the usual form, cancels there).
+ * form, transient and free decay included, for any zeta >= 0. Within the pulse z is the divided difference of
+ * the exponential over the oscillator's two rates and the pulse's i pi/T: it has a value, and keeps its
+ * digits, where two or all three of them meet (resonance, critical damping), where the usual quotients
+ * cancel.
  *
  * No state beyond the struct, no memory, any thread. SI units; a0 may be in any unit of acceleration, z,
  * z' and u'' follow it. Times count from the start of the pulse.
  */
 #include "common/error.h"
+#include "host/model/oscillator.h"
 
 /* Filled by sdof_init; read only. */
 struct sdof {
-	double omega;   /* undamped, rad/s */
-	double omega_d; /* damped, rad/s */
-	double zeta;
+	struct oscillator mount;
 	double pulse_omega;  /* pi/T */
 	double pulse_s;      /* T */
 	double amplitude;    /* a0 */
@@ -33,7 +33,7 @@ struct sdof_motion {
 	double acceleration; /* u'' */
 };
 
-/* 0, or DT_E_ARGUMENT: frequency and duration must be positive, 0 <= damping_ratio < 1, all finite. */
+/* 0, or DT_E_ARGUMENT: frequency and duration must be positive, damping_ratio >= 0, all finite. */
 DT_MUST_USE int sdof_init(struct sdof *sdof, double frequency_hz, double damping_ratio, double amplitude,
                           double pulse_s);
 

@@ -112,6 +112,21 @@ static uint32_t samples_crc32(const struct record *record)
 	return crc;
 }
 
+int drop_check(const struct record *record)
+{
+	bool equal = record->channel_count == DROP_CHANNELS;
+	struct record drop;
+	int error = drop_open(&drop, record->first_tick_ms, record->last_tick_ms);
+
+	if (error)
+		return error;
+	for (size_t i = 0; i < DROP_CHANNELS && equal; i++)
+		equal = strcmp(record->channels[i].name, drop.channels[i].name) == 0 &&
+		        record->channels[i].count == drop.channels[i].count;
+	record_free(&drop);
+	return equal ? 0 : DT_E_FORMAT;
+}
+
 int drop_close(struct record *record)
 {
 	uint32_t ticks = drop_ticks(record);

@@ -31,6 +31,10 @@ bool drop_get(const struct record *record, unsigned sensor, uint32_t tick, int16
  * DT_E_MEMORY the record is freed. */
 DT_MUST_USE int drop_close(struct record *record);
 
+/* Whether the channels are those of a drop of its ticks, whole blocks of them: 0, DT_E_RANGE for the ticks,
+ * DT_E_FORMAT for the channels, DT_E_MEMORY. */
+DT_MUST_USE int drop_check(const struct record *record);
+
 /* Ticks of the window; the record must be a drop. */
 uint32_t drop_ticks(const struct record *record);
 

@@ -2,6 +2,7 @@
 #include "host/record/number.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -28,4 +29,13 @@ bool number_parse(const char *text, size_t length, char decimal, double *value)
 		return false;
 	*value = parsed;
 	return true;
+}
+
+void number_format(char text[NUMBER_CHARS], double value)
+{
+	for (int digits = 15; digits <= 17; digits++) {
+		snprintf(text, NUMBER_CHARS, "%.*g", digits, value);
+		if (strtod(text, NULL) == value)
+			return;
+	}
 }

@@ -3,8 +3,10 @@
 
 #include <string.h>
 
+#include "host/record/hdf5.h"
 #include "host/record/lcm_log.h"
 #include "host/record/source.h"
+#include "host/record/uff58.h"
 
 static bool is_csv(const struct source *source)
 {
@@ -31,15 +33,19 @@ static int dispatch(struct record *record, const struct source *source, const ch
 
 	if (lcm_log_is(source))
 		reader = read_lcm;
+	else if (hdf5_is(source))
+		reader = read_hdf5;
 	else if (is_csv(source))
 		reader = read_csv;
+	else if (uff58_is(source))
+		reader = read_uff58;
 	else if (is_candump(source))
 		reader = read_candump;
 	if (!reader)
 		return read_delimited(record, source, columns, message);
 	if (columns)
 		return source_refuse(message, DT_E_ARGUMENT, source->file, 0,
-		                     "a log of ours names its channels itself, expected no --columns");
+		                     "this format names its channels itself, expected no --columns");
 	return reader(record, source, message);
 }
 

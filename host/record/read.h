@@ -2,8 +2,9 @@
 #ifndef DT_HOST_RECORD_READ_H
 #define DT_HOST_RECORD_READ_H
 /*
- * A file to a record, whatever its format: candump text, LCM event log, our CSV, or delimited text with
- * the columns named by the user. The format is found from the content, not from the file's name.
+ * A file to a record, whatever its format: candump text, LCM event log, our CSV, a universal file (dataset
+ * 58), HDF5 of ours, or delimited text with the columns named by the user. The format is found from the
+ * content, not from the file's name.
  *
  * columns, as on the command line: "time:ms,fixture:g,board:-g,-" names one entry per column: name:unit;
  * '-' in front of the unit flips the sign; a lone '-' skips. Units: s ms us for time; g m/s2 for channels.

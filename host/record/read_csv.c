@@ -2,13 +2,13 @@
  *
  * Our own CSV, read as strictly as it was written. README.md describes it.
  */
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "host/record/drop.h"
+#include "host/record/fields.h"
 #include "host/record/number.h"
 #include "host/record/source.h"
 
@@ -67,83 +67,19 @@ static int read_channel(struct reading *reading, const char *text)
 	return 0;
 }
 
-/* Where the value of a key goes. */
-struct target {
-	const char *key;
-	double *real;
-	uint64_t *u64;
-	uint32_t *u32;
-	uint16_t *u16;
-	int16_t *i16;
-	bool *seen;
-};
-
-static int read_signed(struct reading *reading, const struct target *target, const char *text)
-{
-	char *end;
-	long value = strtol(text, &end, 10);
-
-	if (end == text || *end || value < INT16_MIN || value > INT16_MAX)
-		return REFUSE(reading, DT_E_FORMAT, "%s \"%.80s\", expected a number that is whole and fits",
-		              target->key, text);
-	*target->i16 = (int16_t)value;
-	return 0;
-}
-
-static int read_value(struct reading *reading, const struct target *target, const char *text)
-{
-	uint64_t max = target->u64 ? UINT64_MAX : target->u32 ? UINT32_MAX : UINT16_MAX;
-	unsigned long long value;
-	char *end;
-
-	if (target->real && number_parse(text, strlen(text), '.', target->real))
-		return 0;
-	if (target->i16)
-		return read_signed(reading, target, text);
-	errno = 0;
-	value = strtoull(text, &end, 10);
-	if (target->real || text[0] < '0' || text[0] > '9' || *end || errno || value > max)
-		return REFUSE(reading, DT_E_FORMAT, "%s \"%.80s\", expected a number%s", target->key, text,
-		              target->real ? "" : " that is whole and fits");
-	if (target->u64)
-		*target->u64 = value;
-	if (target->u32)
-		*target->u32 = (uint32_t)value;
-	if (target->u16)
-		*target->u16 = (uint16_t)value;
-	if (target->seen)
-		*target->seen = true;
-	return 0;
-}
-
 static int read_key(struct reading *reading, const char *key, const char *text)
 {
-	struct record *record = reading->record;
-	struct record_counters *counters = &record->counters;
-	const struct target targets[] = {
-	        {.key = "drop_id", .u16 = &record->drop_id, .seen = &record->is_drop},
-	        {.key = "marks", .u16 = &record->marks},
-	        {.key = "first_tick_ms", .u32 = &record->first_tick_ms},
-	        {.key = "last_tick_ms", .u32 = &record->last_tick_ms},
-	        {.key = "trigger_s", .real = &record->trigger_s},
-	        {.key = "frame_speed_m_s", .real = &record->frame_speed_m_s},
-	        {.key = "crc32", .u32 = &record->crc32, .seen = &record->crc_known},
-	        {.key = "camera_frame", .i16 = &record->camera_frame},
-	        {.key = "blocks", .u64 = &counters->blocks},
-	        {.key = "repeated", .u64 = &counters->repeated},
-	        {.key = "reordered", .u64 = &counters->reordered},
-	        {.key = "corrupt", .u64 = &counters->corrupt},
-	        {.key = "gaps", .u64 = &counters->gaps},
-	        {.key = "resent", .u64 = &counters->resent},
-	        {.key = "conflicting", .u64 = &counters->conflicting},
-	};
+	const struct fields_entry *entry = fields_find(key);
+	double value;
 
 	if (strcmp(key, "channel") == 0)
 		return read_channel(reading, text);
-	for (size_t i = 0; i < sizeof(targets) / sizeof(targets[0]); i++)
-		if (strcmp(key, targets[i].key) == 0)
-			return read_value(reading, &targets[i], text);
-	return REFUSE(reading, DT_E_FORMAT, "unknown key \"%.80s\"", key);
+	if (!entry)
+		return REFUSE(reading, DT_E_FORMAT, "unknown key \"%.80s\"", key);
+	if (!number_parse(text, strlen(text), '.', &value) || fields_set(reading->record, entry, value) != 0)
+		return REFUSE(reading, DT_E_FORMAT, "%s \"%.80s\", expected a number%s", key, text,
+		              entry->kind == FIELDS_REAL ? "" : " that is whole and fits");
+	return 0;
 }
 
 /* "# key value" lines up to the line of column names, on which it ends. */
@@ -175,27 +111,20 @@ static int read_header(struct reading *reading)
 	return REFUSE(reading, DT_E_FORMAT, "ends in the header, expected a line of column names");
 }
 
-/* A drop has the channels of a drop, whole blocks of them. */
 static int check_drop(struct reading *reading)
 {
 	const struct record *record = reading->record;
-	struct record drop;
-	bool equal = record->channel_count == DROP_CHANNELS;
-	int error = drop_open(&drop, record->first_tick_ms, record->last_tick_ms);
+	int error = drop_check(record);
 
-	if (error)
+	if (error == DT_E_RANGE)
 		return REFUSE(reading, error, "drop of ticks %lu to %lu, expected 1 to %d ticks",
 		              (unsigned long)record->first_tick_ms, (unsigned long)record->last_tick_ms,
 		              DROP_TICKS_MAX);
-	for (size_t i = 0; i < DROP_CHANNELS && equal; i++)
-		equal = strcmp(record->channels[i].name, drop.channels[i].name) == 0 &&
-		        record->channels[i].count == drop.channels[i].count;
-	record_free(&drop);
-	if (!equal)
-		return REFUSE(reading, DT_E_FORMAT,
+	if (error == DT_E_FORMAT)
+		return REFUSE(reading, error,
 		              "channels are not those of a drop of these ticks, expected "
 		              "S1X S1Y S1Z S2X S2Y S2Z with 7 and 10 samples a tick");
-	return 0;
+	return error ? REFUSE(reading, error, "%s", error_text(error)) : 0;
 }
 
 static int check_names(struct reading *reading)

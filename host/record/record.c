@@ -120,9 +120,10 @@ void record_finish(struct record *record)
 const char *record_flag_name(unsigned flags)
 {
 	static const char *const names[] = {
-	        "lost_samples", "bad_samples", "clipped", "incomplete",      "crc_unknown",
-	        "slow_frame",   "no_impact",   "fault",   "uneven_sampling", "full_scale",
-	        "overrun",      "zero_shift",  "cable",   "stuck",
+	        "lost_samples", "bad_samples", "clipped",         "incomplete", "crc_unknown", "slow_frame",
+	        "no_impact",    "fault",       "uneven_sampling", "full_scale", "overrun",     "zero_shift",
+	        "cable",        "stuck",       "spike",           "zeroed",     "offset",      "drift",
+	        "hum",          "too_short",
 	};
 
 	for (size_t bit = 0; bit < sizeof(names) / sizeof(names[0]); bit++)

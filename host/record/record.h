@@ -19,7 +19,7 @@ enum {
 	SAMPLE_BAD =
 	        1u << 1, /* the firmware marked it not taken, or the file holds no number; value is NAN */
 	SAMPLE_CLIPPED = 1u << 2, /* beyond the sensor's range or at full scale; value as read */
-	SAMPLE_SPIKE = 1u << 3,   /* set by the analysis */
+	SAMPLE_SPIKE = 1u << 3,   /* an outlier of one or two samples: set by the analysis */
 };
 
 /* What is remarkable about a channel or a record. Bits; names by record_flag_name. */
@@ -38,6 +38,13 @@ enum {
 	RECORD_FLAG_ZERO_SHIFT = 1u << 11, /* "zero_shift": offset after the drop not the one before */
 	RECORD_FLAG_CABLE = 1u << 12,      /* "cable": a sensor's bias was lost */
 	RECORD_FLAG_STUCK = 1u << 13,      /* "stuck": a channel gave one value for 20 ms */
+	/* found by the analysis, and cured where it says so */
+	RECORD_FLAG_SPIKE = 1u << 14,  /* "spike": outliers of one or two samples, left out */
+	RECORD_FLAG_ZEROED = 1u << 15, /* "zeroed": a run of exact zeros in a signal that is not; left out */
+	RECORD_FLAG_OFFSET = 1u << 16, /* "offset": zero is far from zero before the pulse; taken off */
+	RECORD_FLAG_DRIFT = 1u << 17,  /* "drift": zero moves before the pulse; taken off */
+	RECORD_FLAG_HUM = 1u << 18,    /* "hum": the mains shows before the pulse; taken off */
+	RECORD_FLAG_SHORT = 1u << 19,  /* "too_short": ends inside its pulse, or has hardly a sample */
 };
 
 struct channel {
@@ -72,7 +79,7 @@ struct record_counters {
 
 struct record {
 	char file[4096]; /* as given on the command line, or the link's URL */
-	char format[16]; /* "live" "candump" "lcm" "csv" "delimited" "lvm" */
+	char format[16]; /* "live" "candump" "lcm" "csv" "uff58" "hdf5" "delimited" "lvm" */
 	struct channel *channels;
 	size_t channel_count;
 

@@ -10,8 +10,12 @@
 #include "common/link/candump.h"
 #include "common/wire.h"
 #include "host/record/drop.h"
+#include "host/record/fields.h"
+#include "host/record/hdf5.h"
 #include "host/record/lcm_codec.h"
+#include "host/record/number.h"
 #include "host/record/source.h"
+#include "host/record/uff58.h"
 #include "host/record/whole.h"
 
 /* ---- frames ---- */
@@ -103,44 +107,28 @@ int write_frames(const struct record *record, int (*send)(void *context, const s
 
 /* ---- CSV ---- */
 
-/* The fewest digits that read back equal. */
 static void put_number(FILE *out, double value)
 {
-	char text[32];
+	char text[NUMBER_CHARS];
 
-	for (int digits = 15; digits <= 17; digits++) {
-		snprintf(text, sizeof(text), "%.*g", digits, value);
-		if (strtod(text, NULL) == value)
-			break;
-	}
+	number_format(text, value);
 	fputs(text, out);
 }
 
 static void put_drop(const struct record *record, FILE *out)
 {
-	const struct record_counters *counters = &record->counters;
+	const struct fields_entry *entry;
 
-	fprintf(out, "# drop_id %u\n# marks %u\n", record->drop_id, record->marks);
-	fprintf(out, "# first_tick_ms %" PRIu32 "\n# last_tick_ms %" PRIu32 "\n", record->first_tick_ms,
-	        record->last_tick_ms);
-	if (!isnan(record->trigger_s)) {
-		fputs("# trigger_s ", out);
-		put_number(out, record->trigger_s);
+	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++) {
+		if (!fields_known(record, entry))
+			continue;
+		fprintf(out, "# %s ", entry->name);
+		if (entry->kind == FIELDS_REAL)
+			put_number(out, fields_real(record, entry));
+		else
+			fprintf(out, "%" PRId64, fields_whole(record, entry));
 		fputc('\n', out);
 	}
-	if (!isnan(record->frame_speed_m_s)) {
-		fputs("# frame_speed_m_s ", out);
-		put_number(out, record->frame_speed_m_s);
-		fputc('\n', out);
-	}
-	if (record->crc_known)
-		fprintf(out, "# crc32 %" PRIu32 "\n# camera_frame %d\n", record->crc32, record->camera_frame);
-	fprintf(out,
-	        "# blocks %" PRIu64 "\n# repeated %" PRIu64 "\n# reordered %" PRIu64 "\n# corrupt %" PRIu64
-	        "\n",
-	        counters->blocks, counters->repeated, counters->reordered, counters->corrupt);
-	fprintf(out, "# gaps %" PRIu64 "\n# resent %" PRIu64 "\n# conflicting %" PRIu64 "\n", counters->gaps,
-	        counters->resent, counters->conflicting);
 }
 
 static void put_channel(const struct channel *channel, FILE *out)
@@ -285,37 +273,57 @@ static int write_lcm(const struct record *record, FILE *out)
 	return error;
 }
 
-static int (*writer_of(const char *file))(const struct record *, FILE *)
+/* With a message of its own, which tells more than the code. */
+static int write_whole_hdf5(const struct record *record, struct whole *whole, char message[READ_MESSAGE_MAX])
 {
-	static const struct {
-		const char *ending;
-		int (*write)(const struct record *, FILE *);
-	} table[] = {
-	        {".csv", write_csv},
-	        {".lcm", write_lcm},
-	        {".log", write_candump},
-	        {".candump", write_candump},
-	};
+	char why[READ_MESSAGE_MAX];
+	int result = write_hdf5(record, whole->out, whole->file, why);
+	int closed = whole_close(whole, result, message, READ_MESSAGE_MAX);
+
+	if (result != 0)
+		strcpy(message, why);
+	return closed;
+}
+
+/* What the endings mean; write is NULL for HDF5. */
+static const struct format {
+	const char *ending;
+	int (*write)(const struct record *, FILE *);
+	bool drops_only;
+} formats[] = {
+        {".csv", write_csv, false},    {".lcm", write_lcm, true},
+        {".log", write_candump, true}, {".candump", write_candump, true},
+        {".unv", write_uff58, false},  {".uff", write_uff58, false},
+        {".h5", NULL, false},          {".hdf5", NULL, false},
+};
+
+static const struct format *format_of(const char *file)
+{
 	const char *ending = strrchr(file, '.');
 
-	for (size_t i = 0; ending && i < sizeof(table) / sizeof(table[0]); i++)
-		if (strcmp(ending, table[i].ending) == 0)
-			return table[i].write;
+	for (size_t i = 0; ending && i < sizeof(formats) / sizeof(formats[0]); i++)
+		if (strcmp(ending, formats[i].ending) == 0)
+			return &formats[i];
 	return NULL;
 }
 
 int write_record(const struct record *record, const char *file, char message[READ_MESSAGE_MAX])
 {
-	int (*write)(const struct record *, FILE *) = writer_of(file);
+	const struct format *format = format_of(file);
 	struct whole whole;
 	int error;
 
-	if (!write)
+	if (!format)
+		return source_refuse(
+		        message, DT_E_ARGUMENT, file, 0,
+		        "unknown ending, expected .csv, .lcm, .log, .candump, .unv, .uff, .h5 or .hdf5");
+	if (format->drops_only && !record->is_drop)
 		return source_refuse(message, DT_E_ARGUMENT, file, 0,
-		                     "unknown ending, expected .csv, .lcm, .log or .candump");
-	if (write != write_csv && !record->is_drop)
-		return source_refuse(message, DT_E_ARGUMENT, file, 0,
-		                     "not a drop of a tower, which only .csv can hold");
+		                     "not a drop of a tower, which only .csv, .unv and .h5 can hold");
 	error = whole_open(&whole, file, message, READ_MESSAGE_MAX);
-	return error ? error : whole_close(&whole, write(record, whole.out), message, READ_MESSAGE_MAX);
+	if (error)
+		return error;
+	if (!format->write)
+		return write_whole_hdf5(record, &whole, message);
+	return whole_close(&whole, format->write(record, whole.out), message, READ_MESSAGE_MAX);
 }

@@ -2,8 +2,9 @@
 #ifndef DT_HOST_RECORD_WRITE_H
 #define DT_HOST_RECORD_WRITE_H
 /*
- * A record to a file that read_record reads back equal: our CSV takes any record, candump text and LCM
- * event logs take drops. README.md describes the CSV.
+ * A record to a file that read_record reads back equal: our CSV, universal files and HDF5 take any record,
+ * candump text and LCM event logs take drops. README.md describes the CSV and what is ours of a universal
+ * file.
  *
  * Times in candump text and LCM logs are the tower's clock: a record does not know the time of day. What a
  * record does not keep of its blocks is written as state CAPTURED, inputs and outputs 0.
@@ -13,7 +14,8 @@
 #include "common/frame.h"
 #include "host/record/read.h"
 
-/* Writes file in the format its name ends in: .csv, .lcm, or .log and .candump. 0 or DT_E_* with one line in
+/* Writes file in the format its name ends in: .csv, .lcm, .log or .candump, .unv or .uff,
+ * .h5 or .hdf5. 0 or DT_E_* with one line in
  * message. */
 DT_MUST_USE int write_record(const struct record *record, const char *file, char message[READ_MESSAGE_MAX]);
 

@@ -133,6 +133,18 @@ const char *report_flag_words(unsigned flag)
 		return "a sensor lost its supply during the drop: check its cable";
 	case RECORD_FLAG_STUCK:
 		return "a channel gave one value for 20 ms: check sensor and converter";
+	case RECORD_FLAG_SPIKE:
+		return "outliers of one or two samples were left out: look for a loose contact";
+	case RECORD_FLAG_ZEROED:
+		return "runs of exact zeros in the signal were left out: data were lost on the way";
+	case RECORD_FLAG_OFFSET:
+		return "zero was far from zero before the pulse; it was taken off";
+	case RECORD_FLAG_DRIFT:
+		return "zero moved before the pulse; its straight line was taken off";
+	case RECORD_FLAG_HUM:
+		return "the mains shows before the pulse; it was taken off: check screen and earth";
+	case RECORD_FLAG_SHORT:
+		return "the record begins or ends inside its pulse, or has hardly a sample";
 	default:
 		return record_flag_name(flag);
 	}
@@ -152,7 +164,7 @@ const char *report_note_words(unsigned flag)
 	case ESTIMATE_FLAG_TWO_MODES:
 		return "two modes; the value is the stronger one's";
 	case ESTIMATE_FLAG_AMPLITUDE:
-		return "the frequency follows the swing; the value is that of a vanishing one";
+		return "the frequency follows the swing; the value is the mean of the first three cycles";
 	case ESTIMATE_FLAG_TOLERANCE:
 		return "less certain than asked for";
 	case ESTIMATE_FLAG_MODEL:
@@ -316,7 +328,8 @@ bool report_driven(const struct report *report)
 	       !(lag->driven.flags & ESTIMATE_FLAG_MODEL) && isfinite(lag->driven_s);
 }
 
-size_t report_compare(const struct report *report, struct report_row rows[REPORT_ROWS_MAX])
+/* Rows of one prediction, with what was measured. */
+static size_t compare(const struct report *report, struct report_row rows[REPORT_ROWS_MAX])
 {
 	const struct analysis *a = report->analysis;
 	const struct model_prediction *p = report->prediction;
@@ -355,5 +368,20 @@ size_t report_compare(const struct report *report, struct report_row rows[REPORT
 		add_row(rows, &count, frequency, a->has_plate ? a->plate.how.status : ESTIMATE_SHORT);
 		add_row(rows, &count, damping, a->has_plate ? a->plate.how.status : ESTIMATE_SHORT);
 	}
+	return count;
+}
+
+size_t report_compare(const struct report *report, struct report_row rows[REPORT_ROWS_MAX])
+{
+	struct report_row below[REPORT_ROWS_MAX];
+	struct report lower = *report;
+	size_t count = compare(report, rows);
+
+	lower.prediction = report->prediction ? report->below : NULL;
+	for (size_t i = 0; i < count; i++)
+		rows[i].rungs_apart = (double)NAN;
+	if (compare(&lower, below) == count)
+		for (size_t i = 0; i < count; i++)
+			rows[i].rungs_apart = fabs(below[i].predicted - rows[i].predicted);
 	return count;
 }

@@ -71,7 +71,8 @@ struct report_row {
 	double scale;      /* value times scale is in unit */
 	int decimals;      /* in unit */
 	double predicted, measured;
-	double sigma;              /* standard uncertainty of measured */
+	double rungs_apart; /* the rung below from predicted: how much the model itself may be off; or NAN */
+	double sigma;       /* standard uncertainty of measured */
 	double difference_percent; /* (predicted - measured)/measured */
 };
 

@@ -6,123 +6,8 @@
 #include <cjson/cJSON.h>
 
 #include "host/report/facts.h"
-
-/* Objects under construction. Out of memory anywhere, and failed is set: checked once, at the end. */
-struct builder {
-	bool failed;
-};
-
-static void attach(struct builder *b, cJSON *object, const char *key, cJSON *item)
-{
-	if (!item || !cJSON_AddItemToObject(object, key, item)) {
-		cJSON_Delete(item);
-		b->failed = true;
-	}
-}
-
-/* cJSON's own numbers may lose the last digit. */
-static void put_number(struct builder *b, cJSON *object, const char *key, double value)
-{
-	char text[32];
-
-	if (!isfinite(value)) {
-		attach(b, object, key, cJSON_CreateNull());
-		return;
-	}
-	for (int digits = 15; digits <= 17; digits++) {
-		snprintf(text, sizeof(text), "%.*g", digits, value);
-		if (strtod(text, NULL) == value)
-			break;
-	}
-	attach(b, object, key, cJSON_CreateRaw(text));
-}
-
-static void put_bool(struct builder *b, cJSON *object, const char *key, bool value)
-{
-	attach(b, object, key, cJSON_CreateBool(value));
-}
-
-/* Length of the UTF-8 character at s, 0 where there is none. (RFC 3629: neither longer than it need be, nor
- * half of a UTF-16 pair, nor beyond U+10FFFF) */
-static size_t utf8_length(const unsigned char *s)
-{
-	static const struct {
-		unsigned char first, last, second_low, second_high, length;
-	} table[] = {
-	        {0x01, 0x7F, 0x00, 0xFF, 1}, {0xC2, 0xDF, 0x80, 0xBF, 2}, {0xE0, 0xE0, 0xA0, 0xBF, 3},
-	        {0xE1, 0xEC, 0x80, 0xBF, 3}, {0xED, 0xED, 0x80, 0x9F, 3}, {0xEE, 0xEF, 0x80, 0xBF, 3},
-	        {0xF0, 0xF0, 0x90, 0xBF, 4}, {0xF1, 0xF3, 0x80, 0xBF, 4}, {0xF4, 0xF4, 0x80, 0x8F, 4},
-	};
-	size_t row = 0, count = sizeof(table) / sizeof(table[0]);
-
-	while (row < count && (s[0] < table[row].first || s[0] > table[row].last))
-		row++;
-	if (row == count || s[1] < table[row].second_low || s[1] > table[row].second_high)
-		return 0;
-	for (size_t i = 2; i < table[row].length; i++)
-		if ((s[i] & 0xC0) != 0x80)
-			return 0;
-	return table[row].length;
-}
-
-/* File names are bytes, JSON is UTF-8: what is no UTF-8 becomes a question mark. */
-static void put_text(struct builder *b, cJSON *object, const char *key, const char *value)
-{
-	char *copy = strdup(value);
-
-	for (char *s = copy; s && *s;) {
-		size_t length = utf8_length((const unsigned char *)s);
-
-		if (!length)
-			*s = '?';
-		s += length ? length : 1;
-	}
-	attach(b, object, key, copy ? cJSON_CreateString(copy) : NULL);
-	free(copy);
-}
-
-static cJSON *put_object(struct builder *b, cJSON *object, const char *key)
-{
-	cJSON *item = cJSON_AddObjectToObject(object, key);
-
-	b->failed |= !item;
-	return item;
-}
-
-static cJSON *put_array(struct builder *b, cJSON *object, const char *key)
-{
-	cJSON *item = cJSON_AddArrayToObject(object, key);
-
-	b->failed |= !item;
-	return item;
-}
-
-static cJSON *append_object(struct builder *b, cJSON *array)
-{
-	cJSON *item = cJSON_CreateObject();
-
-	if (!item || !cJSON_AddItemToArray(array, item)) {
-		cJSON_Delete(item);
-		b->failed = true;
-		return NULL;
-	}
-	return item;
-}
-
-/* Names of the bits in flags, by the function that knows the lowest. */
-static void put_flags(struct builder *b, cJSON *object, unsigned flags, const char *(*name_of)(unsigned))
-{
-	cJSON *array = put_array(b, object, "flags");
-
-	for (; flags; flags &= flags - 1) {
-		cJSON *name = cJSON_CreateString(name_of(flags));
-
-		if (!name || !cJSON_AddItemToArray(array, name)) {
-			cJSON_Delete(name);
-			b->failed = true;
-		}
-	}
-}
+#include "host/report/put.h"
+#include "host/report/shock.h"
 
 static void put_status(struct builder *b, cJSON *object, enum estimate_status status)
 {
@@ -160,6 +45,7 @@ static void put_ringdown(struct builder *b, cJSON *object, const char *key, cons
 	put_number(b, item, "three_cycle_frequency_hz", r->three_cycle_frequency_hz);
 	put_number(b, item, "damping_ratio", r->damping_ratio);
 	put_number(b, item, "sigma_damping", r->sigma_damping);
+	put_number(b, item, "small_swing_hz", r->small_swing_hz);
 	put_number(b, item, "amplitude_g", r->amplitude_g);
 	put_number(b, item, "second_frequency_hz", r->second_frequency_hz);
 	put_number(b, item, "second_damping_ratio", r->second_damping_ratio);
@@ -215,7 +101,7 @@ static void put_baseline(struct builder *b, cJSON *object, const struct estimate
 static void put_channel(struct builder *b, cJSON *array, const struct channel *channel,
                         const struct estimate_channel *e)
 {
-	cJSON *item = append_object(b, array);
+	cJSON *item = put_append(b, array);
 
 	put_text(b, item, "name", channel->name);
 	put_number(b, item, "rate_hz", channel->rate_hz);
@@ -234,7 +120,7 @@ static void put_drop(struct builder *b, cJSON *root, const struct record *r)
 	cJSON *drop, *counters, *gaps;
 
 	if (!r->is_drop) {
-		attach(b, root, "drop", cJSON_CreateNull());
+		put_item(b, root, "drop", cJSON_CreateNull());
 		return;
 	}
 	drop = put_object(b, root, "drop");
@@ -256,7 +142,7 @@ static void put_drop(struct builder *b, cJSON *root, const struct record *r)
 	put_number(b, counters, "conflicting", (double)r->counters.conflicting);
 	gaps = put_array(b, drop, "gaps");
 	for (size_t i = 0; i < r->gap_count; i++) {
-		cJSON *gap = append_object(b, gaps);
+		cJSON *gap = put_append(b, gaps);
 
 		put_number(b, gap, "sensor", r->gaps[i].sensor);
 		put_number(b, gap, "first_tick_ms", r->gaps[i].first_tick_ms);
@@ -269,7 +155,7 @@ static void put_resultants(struct builder *b, cJSON *root, const struct analysis
 	cJSON *array = put_array(b, root, "resultants");
 
 	for (size_t i = 0; i < a->resultant_count; i++) {
-		cJSON *item = append_object(b, array);
+		cJSON *item = put_append(b, array);
 
 		put_text(b, item, "sensor", a->resultants[i].sensor);
 		put_number(b, item, "peak_g", a->resultants[i].peak_g);
@@ -287,7 +173,7 @@ static void put_lag(struct builder *b, cJSON *root, const struct analysis *a)
 	cJSON *item, *driven;
 
 	if (!a->has_lag) {
-		attach(b, root, "lag", cJSON_CreateNull());
+		put_item(b, root, "lag", cJSON_CreateNull());
 		return;
 	}
 	item = put_object(b, root, "lag");
@@ -312,7 +198,7 @@ static void put_rebound(struct builder *b, cJSON *root, const struct analysis *a
 	cJSON *item;
 
 	if (!a->has_rebound) {
-		attach(b, root, "rebound", cJSON_CreateNull());
+		put_item(b, root, "rebound", cJSON_CreateNull());
 		return;
 	}
 	item = put_object(b, root, "rebound");
@@ -329,7 +215,7 @@ static void put_scene(struct builder *b, cJSON *root, const struct scene *scene)
 	cJSON *item;
 
 	if (!scene) {
-		attach(b, root, "scene", cJSON_CreateNull());
+		put_item(b, root, "scene", cJSON_CreateNull());
 		return;
 	}
 	item = put_object(b, root, "scene");
@@ -345,15 +231,21 @@ static void put_model(struct builder *b, cJSON *root, const struct report *repor
 	const struct model_prediction *p = report->prediction;
 	struct report_row rows[REPORT_ROWS_MAX];
 	size_t count = report_compare(report, rows);
-	cJSON *model, *predicted, *difference;
+	cJSON *model, *cost, *predicted, *difference, *apart;
 
 	if (!p) {
-		attach(b, root, "model", cJSON_CreateNull());
+		put_item(b, root, "model", cJSON_CreateNull());
 		return;
 	}
 	model = put_object(b, root, "model");
 	put_text(b, model, "fidelity", p->fidelity);
 	put_text(b, model, "reason", p->reason);
+	cost = put_object(b, model, "cost");
+	put_number(b, cost, "evaluations", p->evaluations);
+	if (p->next != MODEL_AUTO)
+		put_text(b, model, "next_rung", model_fidelity_name(p->next));
+	else
+		put_item(b, model, "next_rung", cJSON_CreateNull());
 	predicted = put_object(b, model, "predicted");
 	put_number(b, predicted, "impact_speed_m_s", p->impact_speed_m_s);
 	put_number(b, predicted, "velocity_change_m_s", p->velocity_change_m_s);
@@ -365,6 +257,12 @@ static void put_model(struct builder *b, cJSON *root, const struct report *repor
 	difference = put_object(b, model, "difference_percent");
 	for (size_t i = 0; i < count; i++)
 		put_number(b, difference, rows[i].key, rows[i].difference_percent);
+	if (!report->below)
+		return;
+	put_text(b, model, "rung_below", report->below->fidelity);
+	apart = put_object(b, model, "rung_below_percent");
+	for (size_t i = 0; i < count; i++)
+		put_number(b, apart, rows[i].key, 100.0 * rows[i].rungs_apart / fabs(rows[i].predicted));
 }
 
 static cJSON *build(struct builder *b, const struct report *report)
@@ -388,22 +286,16 @@ static cJSON *build(struct builder *b, const struct report *report)
 	if (a->has_plate)
 		put_ringdown(b, root, "plate", &a->plate);
 	else
-		attach(b, root, "plate", cJSON_CreateNull());
+		put_item(b, root, "plate", cJSON_CreateNull());
 	put_rebound(b, root, a);
 	put_model(b, root, report);
+	shock_put(b, root, report);
 	return root;
 }
 
 int report_json(const struct report *report, FILE *out)
 {
 	struct builder b;
-	cJSON *root = build(&b, report);
-	char *text = b.failed ? NULL : cJSON_PrintUnformatted(root);
 
-	cJSON_Delete(root);
-	if (!text)
-		return DT_E_MEMORY;
-	fprintf(out, "%s\n", text);
-	cJSON_free(text);
-	return fflush(out) != 0 || ferror(out) ? DT_E_SYSTEM : 0;
+	return put_out(&b, build(&b, report), out);
 }

@@ -136,7 +136,8 @@ static void model(struct page *page)
 	for (size_t i = 0; i < count; i++) {
 		fprintf(out, "<tr><td>%s%s%s</td><td>", rows[i].label, rows[i].unit[0] ? ", " : "",
 		        rows[i].unit);
-		page_number(out, rows[i].decimals, rows[i].predicted * rows[i].scale);
+		page_with_sigma(out, rows[i].decimals, rows[i].predicted * rows[i].scale,
+		                rows[i].rungs_apart * rows[i].scale);
 		fputs("</td><td>", out);
 		page_with_sigma(out, rows[i].decimals, rows[i].measured * rows[i].scale,
 		                rows[i].sigma * rows[i].scale);
@@ -145,8 +146,14 @@ static void model(struct page *page)
 		fputs(isfinite(rows[i].difference_percent) ? " %</td></tr>\n" : "</td></tr>\n", out);
 	}
 	fputs("</table></div>\n<p class=\"note\">Difference: model less measured, over measured. A dash: not "
-	      "known well enough to compare.</p>\n",
+	      "known well enough to compare.",
 	      out);
+	if (page->report->below)
+		fprintf(out,
+		        " Behind the model's value, &plusmn;: how far the next simpler model, %s, is from "
+		        "it.",
+		        page->report->below->fidelity);
+	fputs("</p>\n", out);
 }
 
 static void gaps(struct page *page)

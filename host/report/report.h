@@ -11,12 +11,20 @@
 #include "host/estimate/estimate.h"
 #include "host/model/model.h"
 #include "host/record/record.h"
+#include "host/shock/band.h"
+#include "host/shock/events.h"
+#include "host/shock/free_fall.h"
 
 struct report {
 	const struct record *record;
 	const struct analysis *analysis;
 	const struct scene *scene;                 /* NULL: none was given */
 	const struct model_prediction *prediction; /* NULL: no scene */
+	const struct model_prediction *below;      /* by the rung below; NULL: none */
+	const struct events *events;               /* NULL: none were looked for */
+	const struct free_falls *falls;            /* as events */
+	const struct band *band;                   /* NULL: no band was given */
+	bool show_events;                          /* in the table too */
 	const char *version;                       /* of the program, for the page's foot; NULL: not said */
 };
 

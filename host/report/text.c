@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "host/report/facts.h"
+#include "host/report/shock.h"
 
 enum { TEXT_GAPS_MAX = 8, TEXT_WIDTH = 90 };
 
@@ -128,6 +129,11 @@ static void write_plate(const struct estimate_ringdown *plate, FILE *out)
 	cell(out, 1, 2, plate->three_cycle_frequency_hz);
 	fprintf(out, " over three cycles\n  damping");
 	with_sigma(out, 4, plate->damping_ratio, plate->sigma_damping);
+	if (isfinite(plate->small_swing_hz)) {
+		fprintf(out, ";");
+		cell(out, 1, 2, plate->small_swing_hz);
+		fprintf(out, " Hz as the swing vanishes");
+	}
 	if (isfinite(plate->second_frequency_hz)) {
 		fprintf(out, "; second mode");
 		cell(out, 1, 2, plate->second_frequency_hz);
@@ -246,6 +252,7 @@ int report_text(const struct report *report, FILE *out)
 	write_joint(report, out);
 	write_notes(report, out);
 	write_model(report, out);
+	shock_write(report, zero.time_s, out);
 	write_frames(report->record, out);
 	return fflush(out) != 0 || ferror(out) ? DT_E_SYSTEM : 0;
 }

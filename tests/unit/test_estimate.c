@@ -456,10 +456,13 @@ static void board(void **state)
 		a = analyse(&record, 0);
 		assert_int_equal(a.channels[0].peak.how.status, ESTIMATE_CLIPPED);
 		assert_true(a.channels[0].flags & RECORD_FLAG_CLIPPED);
-		assert_near_part(fabs(a.channels[0].peak.value_g), 546.5, 0.02);
+		printf("%s: %.1f +- %.1f g\n", path, a.channels[0].peak.value_g, a.channels[0].peak.sigma_g);
+		assert_true(a.channels[0].peak.how.flags & ESTIMATE_FLAG_EXTRAPOLATED);
+		assert_true(fabs(a.channels[0].peak.value_g) > 546 && fabs(a.channels[0].peak.value_g) < 800);
+		assert_true(a.channels[0].peak.sigma_g > 1 && a.channels[0].peak.sigma_g < 150);
 		assert_int_equal(a.channels[0].ringdown.how.status, ESTIMATE_OK);
-		assert_near(a.channels[0].ringdown.frequency_hz, 801, 4);
-		assert_near(a.channels[0].ringdown.damping_ratio, 0.01, 0.005);
+		assert_near(a.channels[0].ringdown.frequency_hz, 801.3, 2);
+		assert_near(a.channels[0].ringdown.damping_ratio, 0.01, 0.001);
 		estimate_free(&a);
 		synth_free(&channel);
 

@@ -53,8 +53,10 @@ static struct channel make(enum synth_shape shape, double rate_hz, double phase,
 	return channel;
 }
 
-static struct estimate_pulse measure(const struct channel *channel, struct estimate_baseline *baseline)
+static struct estimate_pulse measure_by(const struct channel *channel, struct estimate_baseline *baseline,
+                                        enum estimate_family family)
 {
+	struct estimate_options options = {.family = family};
 	static double scratch[100000];
 	struct estimate_pulse pulse;
 	struct trace trace;
@@ -63,10 +65,15 @@ static struct estimate_pulse measure(const struct channel *channel, struct estim
 	assert_int_equal(trace_open(&trace, channel, -INFINITY, INFINITY), 0);
 	baseline_find(&trace, scratch, baseline);
 	baseline_remove(&trace, baseline);
-	peak_find(&trace, &peak);
-	pulse_measure(&trace, &peak, baseline, &pulse);
+	peak_find(&trace, &options, &peak);
+	pulse_measure(&trace, &peak, baseline, family, &pulse);
 	trace_close(&trace);
 	return pulse;
+}
+
+static struct estimate_pulse measure(const struct channel *channel, struct estimate_baseline *baseline)
+{
+	return measure_by(channel, baseline, ESTIMATE_FAMILY_AUTO);
 }
 
 static void reference(void **state)
@@ -150,6 +157,127 @@ static void hole(void **state)
 	synth_free(&channel);
 }
 
+struct contact {
+	int family[ESTIMATE_FAMILIES];
+	double base_rmse_s, base_covered, velocity_rmse_m_s, velocity_covered;
+};
+
+static void off_by(struct contact *c, int n)
+{
+	c->base_rmse_s = sqrt(c->base_rmse_s / n);
+	c->velocity_rmse_m_s = sqrt(c->velocity_rmse_m_s / n);
+	c->base_covered *= 100.0 / n;
+	c->velocity_covered *= 100.0 / n;
+}
+
+static struct contact contacts(enum synth_shape shape, double noise_g, enum estimate_family family,
+                               uint64_t seed)
+{
+	enum { TIMES = 200 };
+	double truth = 9.81 * HEIGHT_G * BASE_S * synth_pulse_area(shape);
+	struct synth_random random = {seed};
+	struct contact c = {{0}, 0, 0, 0, 0};
+
+	for (int i = 0; i < TIMES; i++) {
+		double phase = synth_uniform(&random), off, area;
+		struct channel channel = make(shape, 7000, phase, 0, noise_g, &random);
+		struct estimate_baseline baseline;
+		struct estimate_pulse pulse = measure_by(&channel, &baseline, family);
+
+		c.family[pulse.family]++;
+		assert_int_equal(isfinite(pulse.contact_time_s) != 0, pulse.family != ESTIMATE_FAMILY_AUTO);
+		assert_int_equal(isfinite(pulse.fitted_velocity_m_s) != 0,
+		                 pulse.family != ESTIMATE_FAMILY_AUTO);
+		if (pulse.family == ESTIMATE_FAMILY_AUTO) {
+			assert_string_equal(pulse.contact.method, "");
+			assert_true(pulse.contact.flags & ESTIMATE_FLAG_MODEL);
+		} else {
+			assert_string_equal(pulse.contact.method, estimate_family_name(pulse.family));
+			off = pulse.contact_time_s - BASE_S;
+			area = pulse.fitted_velocity_m_s - truth;
+			c.base_rmse_s += off * off;
+			c.base_covered += fabs(off) <= 2 * pulse.sigma_contact_s;
+			c.velocity_rmse_m_s += area * area;
+			c.velocity_covered += fabs(area) <= 2 * pulse.sigma_fitted_velocity_m_s;
+			assert_near(pulse.contact_start_s, ONSET_S + phase / 7000, 10 * noise_g * 5e-6);
+		}
+		synth_free(&channel);
+	}
+	off_by(&c, TIMES - c.family[ESTIMATE_FAMILY_AUTO]);
+	printf("seed %u, shape %d, %g g: families %d %d %d %d; base %.2f us, covered %.1f %%; velocity %.2f "
+	       "mm/s, "
+	       "covered %.1f %%\n",
+	       (unsigned)seed, (int)shape, noise_g, c.family[0], c.family[1], c.family[2], c.family[3],
+	       c.base_rmse_s * 1e6, c.base_covered, c.velocity_rmse_m_s * 1e3, c.velocity_covered);
+	return c;
+}
+
+/* Bounds at 1 g: base 1.855 us half-sine, velocity 6.43 mm/s. */
+static void families(void **state)
+{
+	struct contact c;
+
+	(void)state;
+	for (unsigned i = 0; i < 2; i++) {
+		double noise = i == 0 ? 1 : 10;
+
+		c = contacts(SYNTH_HALF_SINE, noise, ESTIMATE_FAMILY_AUTO, 50 + i);
+		assert_true(c.family[ESTIMATE_FAMILY_HALF_SINE] >= 194);
+		/* The few that only sine-power fits are known less well. */
+		assert_true(c.base_rmse_s > 1.5e-6 * noise && c.base_rmse_s < 3.2e-6 * noise);
+		assert_true(c.velocity_rmse_m_s > 5.6e-3 * noise && c.velocity_rmse_m_s < 7.6e-3 * noise);
+		assert_true(c.base_covered > 91 && c.velocity_covered > 91 && c.velocity_covered < 99.5);
+		c = contacts(SYNTH_HAVERSINE, noise, ESTIMATE_FAMILY_AUTO, 52 + i);
+		assert_true(c.family[ESTIMATE_FAMILY_HAVERSINE] >= 194);
+		assert_true(c.base_covered > 91 && c.velocity_covered > 91);
+	}
+	c = contacts(SYNTH_HUNT_CROSSLEY, 1, ESTIMATE_FAMILY_AUTO, 54);
+	assert_int_equal(c.family[ESTIMATE_FAMILY_AUTO], 200);
+	c = contacts(SYNTH_HAVERSINE, 1, ESTIMATE_FAMILY_HALF_SINE, 55);
+	assert_int_equal(c.family[ESTIMATE_FAMILY_AUTO], 200);
+	c = contacts(SYNTH_HALF_SINE, 1, ESTIMATE_FAMILY_HALF_SINE, 56);
+	assert_int_equal(c.family[ESTIMATE_FAMILY_HALF_SINE], 200);
+}
+
+/* What the sensor cut off is in the velocity change all the same, and in its uncertainty. */
+static void clipped(void **state)
+{
+	struct synth_random random = {60};
+	struct channel channel = make(SYNTH_HALF_SINE, 7000, 0.4, 0, 1, &random);
+	double truth = 9.81 * HEIGHT_G * BASE_S * 2 / PI;
+	struct estimate_baseline baseline;
+	struct estimate_pulse pulse;
+
+	(void)state;
+	for (size_t k = 0; k < channel.count; k++)
+		channel.value_g[k] = fmin(channel.value_g[k], 380);
+	pulse = measure(&channel, &baseline);
+	assert_int_equal(pulse.status, ESTIMATE_CLIPPED);
+	assert_true(pulse.contact.flags & ESTIMATE_FLAG_EXTRAPOLATED);
+	assert_near(pulse.velocity_change_m_s, truth, 3 * pulse.sigma_velocity_m_s);
+	assert_near(pulse.fitted_velocity_m_s, truth, 3 * pulse.sigma_fitted_velocity_m_s);
+	assert_true(pulse.sigma_velocity_m_s < 0.01 * truth);
+	assert_near(pulse.duration_s, width(SYNTH_HALF_SINE), 3 * pulse.sigma_duration_s);
+	synth_free(&channel);
+}
+
+static void of_weak(void **state)
+{
+	struct estimate_pulse strong = {.duration_s = 2e-3,
+	                                .velocity_change_m_s = 8,
+	                                .sigma_velocity_m_s = 0.01,
+	                                .fitted_velocity_m_s = NAN},
+	                      pulse;
+	struct peak weak = {.result = {.value_g = -20, .sigma_g = 0.5}, .scale = -0.05};
+
+	(void)state;
+	pulse_of_weak(&weak, &strong, &pulse);
+	assert_near(pulse.duration_s, 2e-3, 0);
+	assert_near(pulse.velocity_change_m_s, -0.4, 1e-12);
+	assert_near(pulse.sigma_velocity_m_s, hypot(0.0005, 0.01), 1e-12);
+	assert_true(isnan(pulse.fitted_velocity_m_s));
+}
+
 static void cut(void **state)
 {
 	struct channel channel = make(SYNTH_HALF_SINE, 10000, 0, 0, 0, NULL);
@@ -191,8 +319,9 @@ static void starts_inside(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(reference), cmocka_unit_test(shapes), cmocka_unit_test(noise),
-	        cmocka_unit_test(hole),      cmocka_unit_test(cut),    cmocka_unit_test(starts_inside),
+	        cmocka_unit_test(families),  cmocka_unit_test(clipped), cmocka_unit_test(of_weak),
+	        cmocka_unit_test(reference), cmocka_unit_test(shapes),  cmocka_unit_test(noise),
+	        cmocka_unit_test(hole),      cmocka_unit_test(cut),     cmocka_unit_test(starts_inside),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

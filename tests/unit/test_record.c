@@ -118,6 +118,12 @@ static void test_names(void **state)
 	        {RECORD_FLAG_ZERO_SHIFT, "zero_shift"},
 	        {RECORD_FLAG_CABLE, "cable"},
 	        {RECORD_FLAG_STUCK, "stuck"},
+	        {RECORD_FLAG_SPIKE, "spike"},
+	        {RECORD_FLAG_ZEROED, "zeroed"},
+	        {RECORD_FLAG_OFFSET, "offset"},
+	        {RECORD_FLAG_DRIFT, "drift"},
+	        {RECORD_FLAG_HUM, "hum"},
+	        {RECORD_FLAG_SHORT, "too_short"},
 	        {0, ""},
 	        {1u << 31, ""},
 	};

@@ -40,6 +40,8 @@ static const struct estimate_ringdown ring = {
         .natural_frequency_hz = 130.02,
         .damping_ratio = 0.1,
         .sigma_damping = 1.0 / 7.0,
+        .small_swing_hz = (double)NAN,
+        .second_frequency_hz = (double)NAN,
         .three_cycle_frequency_hz = 128.125,
         .how = {.method = "least_squares", .status = ESTIMATE_OK},
 };
@@ -160,7 +162,11 @@ static int set_up(void **state)
 	        .plate = ring,
 	};
 	make_scene(f);
-	f->report = (struct report){&f->record, &f->analysis, &f->scene, &f->prediction, "test <version>"};
+	f->report = (struct report){.record = &f->record,
+	                            .analysis = &f->analysis,
+	                            .scene = &f->scene,
+	                            .prediction = &f->prediction,
+	                            .version = "test <version>"};
 	*state = f;
 	return 0;
 }

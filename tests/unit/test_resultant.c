@@ -43,8 +43,9 @@ static void make(struct scene *s, double phase, double apart_s, double noise_g, 
 		s->y.value_g[k] += noise_g * synth_normal(random);
 }
 
-static struct resultant find(struct scene *s, double noise_g)
+static struct resultant find_by(struct scene *s, double noise_g, enum estimate_family family)
 {
+	struct estimate_options options = {.family = family};
 	struct resultant_axes axes = {{&s->trace[0], &s->trace[1]}, {&s->peak[0], &s->peak[1]}};
 	struct resultant resultant;
 
@@ -52,12 +53,17 @@ static struct resultant find(struct scene *s, double noise_g)
 	assert_int_equal(trace_open(&s->trace[1], &s->y, -INFINITY, INFINITY), 0);
 	for (int i = 0; i < 2; i++) {
 		s->trace[i].noise_g = noise_g;
-		peak_find(&s->trace[i], &s->peak[i]);
+		peak_find(&s->trace[i], &options, &s->peak[i]);
 	}
 	resultant_find(&axes, &resultant);
 	trace_close(&s->trace[0]);
 	trace_close(&s->trace[1]);
 	return resultant;
+}
+
+static struct resultant find(struct scene *s, double noise_g)
+{
+	return find_by(s, noise_g, ESTIMATE_FAMILY_AUTO);
 }
 
 static void drop(struct scene *s)
@@ -66,12 +72,22 @@ static void drop(struct scene *s)
 	synth_free(&s->y);
 }
 
-/* The truth by looking at every tenth of a microsecond. */
+static double resultant_at(double t, double apart_s)
+{
+	return hypot(X_G * half_sine(t), Y_G * half_sine(t - apart_s));
+}
+
+/* The truth by looking: every 10 us, then every tenth of a microsecond around the highest. */
 static void truth(double phase, double apart_s, double *peak_g, double *time_s)
 {
+	double near = 0;
+
 	*peak_g = 0;
-	for (int i = 0; i < 60000; i++) {
-		double t = i * 1e-7, value = hypot(X_G * half_sine(t), Y_G * half_sine(t - apart_s));
+	for (int i = 0; i < 600; i++)
+		if (resultant_at(i * 1e-5, apart_s) > resultant_at(near, apart_s))
+			near = i * 1e-5;
+	for (int i = -150; i <= 150; i++) {
+		double t = near + i * 1e-7, value = resultant_at(t, apart_s);
 
 		if (value > *peak_g) {
 			*peak_g = value;
@@ -108,42 +124,48 @@ static void continuous_time(void **state)
 	}
 }
 
-/* The statistical study has 0.48 g and 1.9 us at 1 g for order 4, 1.41-1.47 times the bound of 0.3345 g. */
+/* The bound is 0.3345 g at 1 g, by the statistical study; polynomials have 1.42-1.47 times that. A fitted
+ * family reaches it, whatever lies between the axes' peaks. */
 static void noise(void **state)
 {
-	enum { TIMES = 300 };
+	enum { TIMES = 400 };
 	static const double apart[] = {0, 0.2e-3, 0.5e-3};
 
 	(void)state;
-	for (size_t a = 0; a < 3; a++) {
-		struct synth_random random = {40 + a};
-		double square = 0, mean = 0, time_square = 0;
+	for (size_t i = 0; i < 6; i++) {
+		enum estimate_family family = i < 3 ? ESTIMATE_FAMILY_AUTO : ESTIMATE_FAMILY_HALF_SINE;
+		struct synth_random random = {40 + i};
+		double square = 0, mean = 0, time_square = 0, ratio;
 		int covered = 0, time_covered = 0;
 
-		for (int i = 0; i < TIMES; i++) {
+		for (int j = 0; j < TIMES; j++) {
 			double phase = synth_uniform(&random), peak, time;
 			struct resultant r;
 			struct scene s;
 
-			make(&s, phase, apart[a], 1, &random);
-			r = find(&s, 1);
-			truth(phase, apart[a], &peak, &time);
+			make(&s, phase, apart[i % 3], 1, &random);
+			r = find_by(&s, 1, family);
+			truth(phase, apart[i % 3], &peak, &time);
+			assert_string_equal(r.result.how.method, i < 3 ? "poly4/poly6" : "half-sine");
 			mean += (r.result.peak_g - peak) / TIMES;
 			square += pow(r.result.peak_g - peak, 2) / TIMES;
 			time_square += pow(r.result.time_s - time, 2) / TIMES;
 			covered += fabs(r.result.peak_g - peak) < 2 * r.result.sigma_g;
-			time_covered += fabs(r.result.time_s - time) < 2 * r.sigma_time_s;
+			time_covered += fabs(r.result.time_s - time) < 2 * r.result.sigma_time_s;
 			drop(&s);
 		}
-		printf("seed %zu, %.1f ms apart: bias %+.3f, rmse %.3f g %.2f us, covered %d %d of %d\n",
-		       40 + a, apart[a] * 1e3, mean, sqrt(square), sqrt(time_square) * 1e6, covered,
-		       time_covered, TIMES);
-		/* With 0.5 ms between them the kink at Y's start lies in the window of X. */
-		assert_true(sqrt(square) > 0.8 * 0.48 && sqrt(square) < (a < 2 ? 1.15 : 1.3) * 0.5);
-		assert_true(fabs(mean) < 0.1);
-		assert_true(sqrt(time_square) > 1e-6 && sqrt(time_square) < (a < 2 ? 3e-6 : 5e-6));
-		assert_true(covered > 0.91 * TIMES && covered < TIMES);
-		assert_true(time_covered > 0.9 * TIMES && time_covered <= TIMES);
+		ratio = sqrt(square) / 0.3345;
+		printf("seed %zu, %.1f ms apart, %s: bias %+.3f, rmse %.3f g, ratio %.3f, %.2f us, covered "
+		       "%d "
+		       "%d of %d\n",
+		       40 + i, apart[i % 3] * 1e3, estimate_family_name(family), mean, sqrt(square), ratio,
+		       sqrt(time_square) * 1e6, covered, time_covered, TIMES);
+		assert_true(i < 3 ? ratio > 1.3 && ratio < 1.58 : ratio > 0.91 && ratio < 1.09);
+		assert_true(fabs(mean) < 0.08);
+		assert_true(sqrt(time_square) > (i < 3 ? 1.8e-6 : 0.45e-6));
+		assert_true(sqrt(time_square) < (i < 3 ? 3.2e-6 : 0.75e-6));
+		assert_true(covered > 0.92 * TIMES && covered < 0.985 * TIMES);
+		assert_true(time_covered > 0.92 * TIMES && time_covered < 0.985 * TIMES);
 	}
 }
 
@@ -170,6 +192,37 @@ static void first_peak(void **state)
 		s.x.value_g[k] += 0.4 * X_G * half_sine((double)k / 7000 - ONSET_S + 4.2e-3);
 	r = find(&s, 1);
 	assert_near(r.first_peak_s, r.result.time_s, 0);
+	drop(&s);
+}
+
+/* A weak axis counts with the strong one's shape. */
+static void weak_axis(void **state)
+{
+	struct synth_random random = {70};
+	struct resultant_axes axes;
+	struct resultant r;
+	struct scene s;
+
+	(void)state;
+	make(&s, 0.3, 0, 1, &random);
+	for (size_t k = 0; k < s.y.count; k++)
+		s.y.value_g[k] = 8.0 / Y_G * (s.y.value_g[k]) + synth_normal(&random);
+	assert_int_equal(trace_open(&s.trace[0], &s.x, -INFINITY, INFINITY), 0);
+	assert_int_equal(trace_open(&s.trace[1], &s.y, -INFINITY, INFINITY), 0);
+	for (int i = 0; i < 2; i++) {
+		s.trace[i].noise_g = 1;
+		peak_find(&s.trace[i], &(struct estimate_options){0}, &s.peak[i]);
+	}
+	assert_true(
+	        peak_weak(&s.trace[1], &(struct estimate_options){0}, &s.trace[0], &s.peak[0], &s.peak[1]));
+	axes = (struct resultant_axes){{&s.trace[0], &s.trace[1]}, {&s.peak[0], &s.peak[1]}};
+	resultant_find(&axes, &r);
+	assert_int_equal(r.result.how.status, ESTIMATE_OK);
+	assert_true(r.result.how.flags & ESTIMATE_FLAG_WEAK);
+	assert_near(r.result.peak_g, hypot(X_G, 8), 3 * r.result.sigma_g);
+	assert_near(r.result.sigma_g, s.peak[0].result.sigma_g, 0.1);
+	trace_close(&s.trace[0]);
+	trace_close(&s.trace[1]);
 	drop(&s);
 }
 
@@ -203,7 +256,9 @@ static void flawed(void **state)
 		s.x.value_g[k] = fmin(s.x.value_g[k], 460);
 	r = find(&s, 0.3);
 	assert_int_equal(r.result.how.status, ESTIMATE_CLIPPED);
-	assert_true(isnan(r.result.sigma_g) && r.result.peak_g > 500 && r.result.peak_g < 532);
+	assert_true(r.result.how.flags & ESTIMATE_FLAG_EXTRAPOLATED);
+	assert_near(r.result.peak_g, hypot(X_G, Y_G), 3 * r.result.sigma_g);
+	assert_true(r.result.sigma_g > 0.01 && r.result.sigma_g < 1);
 	drop(&s);
 	/* A few samples missing at the summit of X. */
 	make(&s, 0.3, 0, 0, NULL);
@@ -217,10 +272,8 @@ static void flawed(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(continuous_time),
-	        cmocka_unit_test(noise),
-	        cmocka_unit_test(first_peak),
-	        cmocka_unit_test(flawed),
+	        cmocka_unit_test(continuous_time), cmocka_unit_test(noise),  cmocka_unit_test(first_peak),
+	        cmocka_unit_test(weak_axis),       cmocka_unit_test(flawed),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -10,6 +10,7 @@
 
 #include <gsl/gsl_blas.h>
 #include <gsl/gsl_errno.h>
+#include <gsl/gsl_linalg.h>
 #include <gsl/gsl_multifit_nlinear.h>
 
 #include "host/estimate/ringdown.h"
@@ -47,7 +48,7 @@ static struct ringdown find(const struct channel *channel, double noise_g, doubl
 
 	assert_int_equal(trace_open(&trace, channel, -INFINITY, INFINITY), 0);
 	trace.noise_g = noise_g;
-	ringdown_find(&trace, 0, until_s, 400, &ringdown);
+	ringdown_find(&trace, &(struct ringdown_span){.until_s = until_s, .peak_g = 400}, &ringdown);
 	trace_close(&trace);
 	return ringdown;
 }
@@ -83,47 +84,191 @@ static void exact(void **state)
 	}
 }
 
-/* The bound, for 45 ms and no offset: 0.01886 Hz and 1.36e-4 at 1 g; the offset and five cycles cost little.
- * The study's fits lie within 1.1 of it. */
+/* Cramer-Rao bounds of damped frequency and damping ratio for 45 ms of the decay: the inverse of the Fisher
+ * matrix of a, w, c, s by GSL, summed over the samples. */
+static void bound(const struct decay *d, double *hz, double *damping)
+{
+	double w = 2 * PI * d->hz, a = w * d->damping / sqrt(1 - d->damping * d->damping);
+	double natural = hypot(a, w), cube = natural * natural * natural;
+	double by[4] = {w * w / cube, -a * w / cube, 0, 0};
+	gsl_matrix *fisher = gsl_matrix_calloc(4, 4);
+
+	for (size_t k = 0; k < (size_t)(0.045 * d->rate_hz); k++) {
+		double t = (double)k / d->rate_hz, e = exp(-a * t), angle = w * t + d->phase;
+		double row[4] = {-t * d->amplitude_g * e * cos(angle), -t * d->amplitude_g * e * sin(angle),
+		                 e * cos(angle), e * sin(angle)};
+		gsl_vector_view view = gsl_vector_view_array(row, 4);
+
+		gsl_blas_dger(1 / (d->noise_g * d->noise_g), &view.vector, &view.vector, fisher);
+	}
+	assert_int_equal(gsl_linalg_cholesky_decomp1(fisher), GSL_SUCCESS);
+	assert_int_equal(gsl_linalg_cholesky_invert(fisher), GSL_SUCCESS);
+	*hz = sqrt(gsl_matrix_get(fisher, 1, 1)) / (2 * PI);
+	*damping = 0;
+	for (size_t i = 0; i < 4; i++)
+		for (size_t k = 0; k < 4; k++)
+			*damping += by[i] * gsl_matrix_get(fisher, i, k) * by[k];
+	*damping = sqrt(*damping);
+	gsl_matrix_free(fisher);
+}
+
+/* What is done to a clean decay. */
+enum trouble { CLEAN, HUM, SPIKES, MISSING, GAP, SECOND_MODE, TROUBLES };
+
+static const char *const trouble_name[TROUBLES] = {"clean",        "5 g hum",   "three spikes of 300 g",
+                                                   "20 % missing", "gap of 20", "second mode +20 Hz, 10 %"};
+
+static void disturb(struct channel *channel, enum trouble trouble, struct synth_random *random)
+{
+	double w = 2 * PI * 149, phase = 2 * PI * synth_uniform(random);
+
+	if (trouble == GAP)
+		synth_lose(channel, (size_t)(140 * synth_uniform(random)), 20);
+	for (size_t k = 0; k < channel->count; k++) {
+		double t = (double)k / channel->rate_hz;
+
+		if (trouble == HUM)
+			channel->value_g[k] += 5 * sin(2 * PI * 50 * t + phase);
+		if (trouble == SECOND_MODE)
+			channel->value_g[k] += 31.4 * exp(-0.1 * w * t) * cos(w * t + phase);
+		if (trouble == MISSING && synth_uniform(random) < 0.2)
+			synth_lose(channel, k, 1);
+	}
+	for (int i = 0; trouble == SPIKES && i < 3; i++)
+		channel->value_g[(size_t)(300 * synth_uniform(random))] +=
+		        synth_uniform(random) < 0.5 ? 300 : -300;
+}
+
+struct score {
+	double hz, damping, bias; /* root mean squares over the bounds, mean over it */
+	int covered, damping_covered, gross, flagged, ok;
+	int method[5];
+};
+
+enum { TIMES = 300 };
+
+static const char *const methods[] = {"block", "full", "full+hum", "amplitude", "two-modes"};
+
+static struct score play(double noise_g, enum trouble trouble, unsigned seed)
+{
+	struct synth_random random = {seed};
+	struct score score = {.hz = 0};
+
+	for (int i = 0; i < TIMES; i++) {
+		struct decay d = plain;
+		double hz, damping, off, damping_off;
+		struct channel channel;
+		struct ringdown r;
+
+		d.phase = 2 * PI * synth_uniform(&random);
+		d.offset_g = -3;
+		d.noise_g = noise_g;
+		channel = make(&d, &random);
+		disturb(&channel, trouble, &random);
+		r = find(&channel, noise_g, INFINITY);
+		synth_free(&channel);
+		if (r.result.how.status != ESTIMATE_OK)
+			continue;
+		bound(&d, &hz, &damping);
+		off = r.result.frequency_hz - d.hz;
+		damping_off = r.result.damping_ratio - d.damping;
+		score.ok++;
+		score.hz += off * off / (hz * hz);
+		score.damping += damping_off * damping_off / (damping * damping);
+		score.bias += off / hz;
+		score.covered += fabs(off) < 2 * r.result.sigma_hz;
+		score.damping_covered += fabs(damping_off) < 2 * r.result.sigma_damping;
+		score.gross += fabs(off) > 0.15 * d.hz;
+		score.flagged += (r.result.how.flags & ESTIMATE_FLAG_MODEL) != 0;
+		for (size_t m = 0; m < 5; m++)
+			score.method[m] += strcmp(r.result.how.method, methods[m]) == 0;
+	}
+	score.hz = sqrt(score.hz / score.ok);
+	score.damping = sqrt(score.damping / score.ok);
+	score.bias /= score.ok;
+	printf("seed %u, %g g, %s: %.3f and %.3f of the bounds, bias %+.3f, covered %d and %d of %d, %d "
+	       "gross, "
+	       "methods %d %d %d %d %d\n",
+	       seed, noise_g, trouble_name[trouble], score.hz, score.damping, score.bias, score.covered,
+	       score.damping_covered, score.ok, score.gross, score.method[0], score.method[1],
+	       score.method[2], score.method[3], score.method[4]);
+	return score;
+}
+
+/* A root mean square of 300 is good to 4 %: the 1.05 that long runs show, and two of these. */
 static void noise(void **state)
 {
-	static const double level[] = {0.3, 1, 3, 10};
-	enum { TIMES = 300 };
+	static const double level[] = {0.3, 1, 3, 10, 30, 100};
 
 	(void)state;
-	for (size_t l = 0; l < sizeof(level) / sizeof(level[0]); l++) {
-		double hz = 0, damping = 0, mean = 0;
-		int covered = 0, damping_covered = 0;
-		struct synth_random random = {500 + l};
+	for (unsigned l = 0; l < sizeof(level) / sizeof(level[0]); l++) {
+		struct score score = play(level[l], CLEAN, 500 + l);
 
-		for (int i = 0; i < TIMES; i++) {
-			struct decay d = plain;
-			struct channel channel;
-			struct ringdown r;
-
-			d.phase = 2 * PI * synth_uniform(&random);
-			d.offset_g = -3;
-			d.noise_g = level[l];
-			channel = make(&d, &random);
-			r = find(&channel, level[l], INFINITY);
-			assert_int_equal(r.result.how.status, ESTIMATE_OK);
-			mean += (r.result.frequency_hz - 129) / TIMES;
-			hz += pow(r.result.frequency_hz - 129, 2) / TIMES;
-			damping += pow(r.result.damping_ratio - 0.1, 2) / TIMES;
-			covered += fabs(r.result.frequency_hz - 129) < 2 * r.result.sigma_hz;
-			damping_covered += fabs(r.result.damping_ratio - 0.1) < 2 * r.result.sigma_damping;
-			synth_free(&channel);
-		}
-		hz = sqrt(hz) / (0.01886 * level[l]);
-		damping = sqrt(damping) / (1.36e-4 * level[l]);
-		printf("seed %zu, %g g: %.3f and %.3f of the bounds, bias %+.4f Hz, covered %d and %d of "
-		       "%d\n",
-		       500 + l, level[l], hz, damping, mean, covered, damping_covered, TIMES);
-		assert_true(hz > 0.85 && hz < 1.15 && damping > 0.85 && damping < 1.15);
-		assert_true(fabs(mean) < 0.2 * 0.01886 * level[l]);
-		assert_true(covered > 0.9 * TIMES && covered < 0.99 * TIMES);
-		assert_true(damping_covered > 0.9 * TIMES && damping_covered < 0.99 * TIMES);
+		assert_int_equal(score.ok, TIMES);
+		assert_true(score.hz > 0.88 && score.hz < 1.13 && score.damping > 0.88 &&
+		            score.damping < 1.13);
+		assert_true(fabs(score.bias) < 0.2);
+		assert_in_range(score.covered, 0.92 * TIMES, 0.99 * TIMES);
+		assert_in_range(score.damping_covered, 0.92 * TIMES, 0.99 * TIMES);
+		assert_int_equal(score.gross, 0);
+		/* The tolerance sends what is too noisy on to every sample, nothing further. */
+		assert_int_equal(score.method[0] + score.method[1], TIMES);
+		assert_true(level[l] > 1 || score.method[0] >= 0.99 * TIMES);
+		assert_true(score.flagged <= 2);
 	}
+}
+
+/* Each trouble is cured by its own method, and costs no more than 1.15 of the clean bound. The second mode's
+ * own bound is about four times the clean one: 0.069 against 0.0189 Hz. */
+static void troubles(void **state)
+{
+	static const struct {
+		enum trouble trouble;
+		size_t method;
+		double least, most;
+	} cases[] = {{HUM, 2, 0.88, 1.15},
+	             {SPIKES, 1, 0.88, 1.15},
+	             {MISSING, 1, 0.95, 1.25},
+	             {GAP, 1, 0.9, 1.2},
+	             {SECOND_MODE, 4, 1.5, 4.3}};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+		for (unsigned l = 0; l < 2; l++) {
+			struct score score = play(l ? 1 : 0.3, cases[i].trouble, (unsigned)(510 + 2 * i) + l);
+
+			assert_int_equal(score.ok, TIMES);
+			assert_true(score.hz > cases[i].least && score.hz < cases[i].most);
+			assert_true(score.damping > cases[i].least / 2 && score.damping < cases[i].most);
+			assert_in_range(score.covered, 0.92 * TIMES, 0.99 * TIMES);
+			assert_in_range(score.method[cases[i].method], 0.99 * TIMES, TIMES);
+			assert_true(score.flagged <= 3);
+		}
+	}
+}
+
+/* Modes 5 Hz apart, half as far as a resonance is wide: not two, and not a clean one either. */
+static void not_separable(void **state)
+{
+	double a = 2 * PI * 129 * 0.1;
+	struct synth_random random = {745};
+	struct channel channel = make(&plain, NULL);
+	struct ringdown r;
+
+	(void)state;
+	for (size_t k = 0; k < channel.count; k++) {
+		double t = (double)k / channel.rate_hz;
+
+		channel.value_g[k] +=
+		        200 * exp(-0.8 * a * t) * cos(2 * PI * 134 * t + 2.5) + 0.1 * synth_normal(&random);
+	}
+	r = find(&channel, 0.1, INFINITY);
+	assert_int_equal(r.result.how.status, ESTIMATE_OK);
+	assert_true(r.result.how.flags & ESTIMATE_FLAG_NOT_SEPARABLE);
+	assert_true(r.result.how.flags & ESTIMATE_FLAG_MODEL);
+	assert_true(isnan(r.result.second_frequency_hz));
+	assert_true(r.result.sigma_hz > 4 * 0.0019);
+	synth_free(&channel);
 }
 
 /* 3 g of offset moves neither value. */
@@ -174,13 +319,14 @@ static void holes(void **state)
 	assert_int_equal(r.result.how.status, ESTIMATE_OK);
 	assert_near(r.result.frequency_hz, 129, 3 * r.result.sigma_hz);
 	assert_near(r.result.damping_ratio, 0.1, 3 * r.result.sigma_damping);
-	assert_true(r.result.sigma_hz > 0.02 && r.result.sigma_hz < 0.08);
+	/* More than 0.0189 Hz, the whole decay's bound. */
+	assert_true(r.result.sigma_hz > 0.0191 && r.result.sigma_hz < 0.08);
 	synth_free(&channel);
 }
 
-/* Mounts that stiffen by 5 % as the swing dies away: no single frequency is right, and the bar must say so.
- */
-static void stiffening(void **state)
+/* A frequency that follows the swing quadratically, 130 - 6 (A / A0)^2: the value is the vanishing swing's,
+ * and a bar as wide as the law's bound allows, about twice the plain one's. */
+static void follows_swing(void **state)
 {
 	struct synth_random random = {750};
 	struct decay d = plain;
@@ -190,18 +336,174 @@ static void stiffening(void **state)
 
 	(void)state;
 	for (size_t k = 0; k < channel.count; k++) {
-		double swing = exp(-a * (double)k * step);
+		double t = (double)k * step;
 
-		channel.value_g[k] = 314 * swing * cos(angle) + 0.3 * synth_normal(&random);
-		angle += 2 * PI * 129 * step * (1.05 - 0.05 * swing);
+		/* The integral of v = e^{-2 a t} is (1 - v) / 2a. */
+		angle = 0.7 + 2 * PI * (130 * t - 6 * (1 - exp(-2 * a * t)) / (2 * a));
+		channel.value_g[k] = 314 * exp(-a * t) * cos(angle) + 0.3 * synth_normal(&random);
 	}
 	r = find(&channel, 0.3, INFINITY);
+	assert_string_equal(r.result.how.method, "amplitude");
+	assert_true(r.result.how.flags & ESTIMATE_FLAG_AMPLITUDE &&
+	            !(r.result.how.flags & ESTIMATE_FLAG_MODEL));
+	assert_near(r.result.small_swing_hz, 130, 3 * r.result.sigma_hz);
+	assert_near(r.result.frequency_hz, 128.457,
+	            3 * r.result.sigma_hz); /* three turns of the angle above */
+	assert_true(r.result.sigma_hz > 0.0057 && r.result.sigma_hz < 4 * 0.0057);
+	assert_true(r.result.three_cycle_frequency_hz > 125 && r.result.three_cycle_frequency_hz < 130);
+	synth_free(&channel);
+}
+
+/* x'' = -2 a x' - w0^2 x (1 + B / (1 + (x/s)^2)) / (1 + B) by fine Runge-Kutta of the test's own; x in m. */
+static void soften(double *reading, size_t count, double rate_hz, double natural_hz, double damping)
+{
+	enum { FINE = 40 };
+	double w = 2 * PI * natural_hz, x = 0, v = -3.5, h = 1 / rate_hz / FINE;
+
+	for (size_t i = 0; i < count * FINE; i++) {
+		double k[5], l[5] = {0};
+
+		k[0] = 0;
+		for (int stage = 1; stage <= 4; stage++) {
+			double part = stage == 1 ? 0 : stage == 4 ? h : h / 2;
+			double xs = x + part * l[stage - 1], vs = v + part * k[stage - 1];
+			double u = xs / 2.4e-3;
+
+			l[stage] = vs;
+			k[stage] = -2 * damping * w * vs -
+			           w * w * xs * (1 + (1.0 / 3) / (1 + u * u)) / (4.0 / 3);
+			if (stage == 1 && i % FINE == 0)
+				reading[i / FINE] = k[1] / 9.81;
+		}
+		x += h / 6 * (l[1] + 2 * l[2] + 2 * l[3] + l[4]);
+		v += h / 6 * (k[1] + 2 * k[2] + 2 * k[3] + k[4]);
+	}
+}
+
+/* Rubber that softens by a quarter at a large swing: the small swing's frequency comes out all the same,
+ * beside the mean. */
+static void softening_mount(void **state)
+{
+	struct synth_random random = {760};
+	struct channel channel = make(&plain, NULL);
+	struct ringdown r;
+
+	(void)state;
+	soften(channel.value_g, channel.count, channel.rate_hz, 140, 0.09);
+	for (size_t k = 0; k < channel.count; k++)
+		channel.value_g[k] += synth_normal(&random);
+	r = find(&channel, 1, INFINITY);
 	assert_int_equal(r.result.how.status, ESTIMATE_OK);
-	assert_true(r.result.frequency_hz > 129 && r.result.frequency_hz < 129 * 1.05);
-	/* Four times what noise alone would leave, 0.0057 Hz. */
-	assert_true(r.result.sigma_hz > 4 * 0.0057 && r.result.sigma_hz < 1);
-	assert_true(r.result.three_cycle_frequency_hz > 129 &&
-	            r.result.three_cycle_frequency_hz < 129 * 1.05);
+	assert_string_equal(r.result.how.method, "amplitude");
+	assert_false(r.result.how.flags & ESTIMATE_FLAG_MODEL);
+	assert_near(r.result.small_swing_hz, 140 * sqrt(1 - 0.09 * 0.09), 3 * r.result.sigma_hz);
+	assert_near(r.result.damping_ratio * r.result.natural_frequency_hz, 0.09 * 140, 0.05);
+	assert_near(r.result.frequency_hz, r.result.three_cycle_frequency_hz, 1.5);
+	assert_true(r.result.sigma_natural_hz < 0.3);
+	assert_true(r.result.three_cycle_frequency_hz < 137);
+	synth_free(&channel);
+}
+
+/* A law that nothing here follows: flagged, and the bar is wide. */
+static void refused(void **state)
+{
+	struct channel channel = make(&plain, NULL);
+	struct synth_random random = {770};
+	struct ringdown r;
+
+	(void)state;
+	/* Friction: the swing falls by the same amount every cycle. */
+	for (size_t k = 0; k < channel.count; k++) {
+		double t = (double)k / channel.rate_hz;
+
+		channel.value_g[k] =
+		        314 * fmax(0, 1 - t / 0.03) * cos(2 * PI * 129 * t) + synth_normal(&random);
+	}
+	r = find(&channel, 1, INFINITY);
+	assert_int_equal(r.result.how.status, ESTIMATE_OK);
+	assert_true(r.result.how.flags & ESTIMATE_FLAG_MODEL);
+	assert_true(r.result.how.chi_square > 5);
+	assert_near(r.result.frequency_hz, 129, 3);
+	assert_true(r.result.sigma_hz > 0.04);
+	synth_free(&channel);
+}
+
+/* Samples before from_s are taken in as far as they belong to the decay, and no further. Sample 9 is 30 g
+ * off, and the one after it is left out for its neighbour's sake; chance may stop it early. */
+static void reaches_back(void **state)
+{
+	int there = 0;
+
+	(void)state;
+	for (unsigned seed = 780; seed < 800; seed++) {
+		struct synth_random random = {seed};
+		struct ringdown_span span = {.from_s = 0.0025, .until_s = INFINITY, .peak_g = 600};
+		struct decay d = plain;
+		struct ringdown late, back;
+		struct channel channel;
+		struct trace trace;
+
+		d.noise_g = 1;
+		channel = make(&d, &random);
+		for (size_t k = 0; k < 10; k++)
+			channel.value_g[k] += 30.0 * (double)(10 - k);
+		assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+		trace.noise_g = 1;
+		ringdown_find(&trace, &span, &late);
+		span.margin_s = 0.0025;
+		ringdown_find(&trace, &span, &back);
+		assert_near(late.start_s, 18.0 / 7000, 1e-9);
+		assert_true(back.start_s > 10.5 / 7000 && back.start_s < 18.5 / 7000);
+		assert_near(back.result.frequency_hz, 129, 4 * back.result.sigma_hz);
+		assert_near_part(back.amplitude_g, 314 * exp(-81.46 * back.start_s), 0.01);
+		if (back.start_s < 11.5 / 7000) {
+			there++;
+			assert_true(back.result.sigma_hz < 0.97 * late.result.sigma_hz);
+		}
+		trace_close(&trace);
+		synth_free(&channel);
+	}
+	printf("seeds 780 to 799: all the way back in %d of 20\n", there);
+	assert_true(there >= 12);
+}
+
+/* Tolerance decides only where the residual does not: every sample, and a flag when that is no help. */
+static void tolerance(void **state)
+{
+	struct synth_random random = {790};
+	struct decay d = plain;
+	struct channel channel;
+	struct ringdown r;
+	struct trace trace;
+
+	(void)state;
+	d.noise_g = 3;
+	channel = make(&d, &random);
+	assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+	trace.noise_g = 3;
+	ringdown_find(&trace, &(struct ringdown_span){.until_s = INFINITY, .peak_g = 400, .tolerance = 0.01},
+	              &r);
+	assert_string_equal(r.result.how.method, "block");
+	assert_string_equal(r.result.how.path[0], "block");
+	assert_null(r.result.how.path[1]);
+	assert_int_equal(r.result.how.flags, 0);
+	/* Every sample would not be enough. */
+	ringdown_find(&trace, &(struct ringdown_span){.until_s = INFINITY, .peak_g = 400, .tolerance = 1e-3},
+	              &r);
+	assert_string_equal(r.result.how.method, "block");
+	assert_null(r.result.how.path[1]);
+	assert_int_equal(r.result.how.flags, ESTIMATE_FLAG_TOLERANCE);
+	/* It might. */
+	ringdown_find(
+	        &trace,
+	        &(struct ringdown_span){.until_s = INFINITY,
+	                                .peak_g = 400,
+	                                .tolerance = 0.97 * r.result.sigma_damping / r.result.damping_ratio},
+	        &r);
+	assert_string_equal(r.result.how.method, "full");
+	assert_string_equal(r.result.how.path[1], "full");
+	assert_null(r.result.how.path[2]);
+	trace_close(&trace);
 	synth_free(&channel);
 }
 
@@ -244,11 +546,12 @@ static void against_gsl(void **state)
 	(void)state;
 	gsl_set_error_handler_off();
 	d.noise_g = 2;
+	/* So few samples per cycle that no block is longer than one; a noise of none known: the residual
+	 * alone tells; an end before the window's own. */
+	d.rate_hz = 1400;
 	channel = make(&d, &random);
-	/* A noise of 0 known: the residual alone tells. Five cycles of the start frequency, which the zero
-	 * crossings give to a few parts in a thousand: end between two samples, for both the same. */
-	r = find(&channel, 0, 0.0385);
-	data = (struct gsl_data){&channel, (size_t)ceil(0.0385 * 7000)};
+	r = find(&channel, NAN, 0.0385);
+	data = (struct gsl_data){&channel, (size_t)ceil(0.0385 * 1400)};
 	system = (gsl_multifit_nlinear_fdf){.f = gsl_residual, .n = data.count, .p = 5, .params = &data};
 	work = gsl_multifit_nlinear_alloc(gsl_multifit_nlinear_trust, &how, data.count, 5);
 	assert_int_equal(gsl_multifit_nlinear_init(&view.vector, &system, work), GSL_SUCCESS);
@@ -259,8 +562,8 @@ static void against_gsl(void **state)
 	sigma = sqrt(squares / (double)(data.count - 5) * gsl_matrix_get(covariance, 1, 1)) / (2 * PI);
 	w = gsl_vector_get(gsl_multifit_nlinear_position(work), 1) / (2 * PI);
 	assert_int_equal(r.result.how.status, ESTIMATE_OK);
-	assert_near(r.result.frequency_hz, w, 1e-5);
-	assert_near_part(r.result.sigma_hz, sigma, 1e-3);
+	assert_near_part(r.result.frequency_hz, w, 1e-6);
+	assert_near_part(r.result.sigma_hz, sigma, 1e-4);
 	gsl_multifit_nlinear_free(work);
 	gsl_matrix_free(covariance);
 	synth_free(&channel);
@@ -325,7 +628,7 @@ static void combined(void **state)
 	                                .damping_ratio = 0.1,
 	                                .sigma_damping = 1e-4,
 	                                .three_cycle_frequency_hz = 128,
-	                                .how = {.method = "least_squares", .status = ESTIMATE_OK}}},
+	                                .how = {.method = "block", .status = ESTIMATE_OK}}},
 	                y = x;
 	struct estimate_ringdown both;
 
@@ -353,9 +656,14 @@ static void combined(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(exact),   cmocka_unit_test(noise),      cmocka_unit_test(offset),
-	        cmocka_unit_test(holes),   cmocka_unit_test(stiffening), cmocka_unit_test(against_gsl),
-	        cmocka_unit_test(nothing), cmocka_unit_test(too_short),  cmocka_unit_test(combined),
+	        cmocka_unit_test(exact),         cmocka_unit_test(noise),
+	        cmocka_unit_test(troubles),      cmocka_unit_test(not_separable),
+	        cmocka_unit_test(offset),        cmocka_unit_test(holes),
+	        cmocka_unit_test(follows_swing), cmocka_unit_test(softening_mount),
+	        cmocka_unit_test(refused),       cmocka_unit_test(reaches_back),
+	        cmocka_unit_test(tolerance),     cmocka_unit_test(against_gsl),
+	        cmocka_unit_test(nothing),       cmocka_unit_test(too_short),
+	        cmocka_unit_test(combined),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -89,23 +89,23 @@ static void mistakes_are_named_by_line(void **state)
 		int result, at; /* at: line of the file, 0 = none */
 		const char *says;
 	} cases[] = {
-	        {"cube_m", "cubes_m = 0.003", DT_E_FORMAT, 30, "unknown key 'cubes_m' in [mount]"},
-	        {"[mount]", "[mounts]", DT_E_FORMAT, 26, "unknown section [mounts]"},
-	        {"restitution", "restitution = 1.5", DT_E_RANGE, 19,
-	         "restitution is 1.5, expected 0.01 to 0.999"},
-	        {"restitution", "restitution = nan", DT_E_RANGE, 19, "expected 0.01 to 0.999"},
-	        {"restitution", "restitution = inf", DT_E_RANGE, 19, "expected 0.01 to 0.999"},
-	        {"restitution", "restitution = half", DT_E_FORMAT, 19, "'half' is not a number"},
-	        {"restitution", "restitution = 0.5 m", DT_E_FORMAT, 19, "is not a number"},
-	        {"restitution", "restitution", DT_E_FORMAT, 19, "not a [section] or key = value"},
-	        {"restitution", "duration_s = 0.002", DT_E_FORMAT, 19, "duration_s is given twice"},
+	        {"cube_m", "cubes_m = 0.003", DT_E_FORMAT, 37, "unknown key 'cubes_m' in [mount]"},
+	        {"[mount]", "[mounts]", DT_E_FORMAT, 33, "unknown section [mounts]"},
+	        {"restitution", "restitution = 1.5", DT_E_RANGE, 21,
+	         "restitution is 1.5, expected 1e-06 to 1"},
+	        {"restitution", "restitution = nan", DT_E_RANGE, 21, "expected 1e-06 to 1"},
+	        {"restitution", "restitution = inf", DT_E_RANGE, 21, "expected 1e-06 to 1"},
+	        {"restitution", "restitution = half", DT_E_FORMAT, 21, "'half' is not a number"},
+	        {"restitution", "restitution = 0.5 m", DT_E_FORMAT, 21, "is not a number"},
+	        {"restitution", "restitution", DT_E_FORMAT, 21, "not a [section] or key = value"},
+	        {"restitution", "duration_s = 0.002", DT_E_FORMAT, 21, "duration_s is given twice"},
 	        {"height_m", "", DT_E_FORMAT, 0, "[drop] height_m is missing"},
 	        {"height_m", "height_m = 0.1", DT_E_RANGE, 0, "upper gate"},
 	        {"angle_deg", "angle_deg = 95", DT_E_RANGE, 8, "angle_deg is 95, expected 10 to 80"},
 	        {"name", "title = again", DT_E_FORMAT, 0, "name is missing"},
 	        {"name", "colour = red", DT_E_FORMAT, 3, "unknown key 'colour'"},
 	        {"stiffness_n_m ", "stiffness_n_m = 0", DT_E_RANGE, 0, "a plate needs mounts"},
-	        {"range_g", "range_g = 2000", DT_E_RANGE, 38, "range_g"},
+	        {"range_g", "range_g = 2000", DT_E_RANGE, 45, "range_g"},
 	};
 
 	(void)state;
@@ -116,6 +116,33 @@ static void mistakes_are_named_by_line(void **state)
 		snprintf(where, sizeof(where), cases[i].at > 0 ? "%s:%d: " : "%s: ", name, cases[i].at);
 		if (strncmp(message, where, strlen(where)) != 0 || strstr(message, cases[i].says) == NULL)
 			fail_msg("'%s' does not begin with '%s' and say '%s'", message, where, cases[i].says);
+	}
+}
+
+/* What would make a model divide by zero or take a root of nothing is refused on reading, by the key's name.
+ */
+static void degenerate_values_are_refused(void **state)
+{
+	static const char *const lines[] = {
+	        "height_m = 0",          "height_m = nan",         "angle_deg = 0",
+	        "angle_deg = 90",        "angle_deg = inf",        "case_mass_kg = 0",
+	        "case_mass_kg = -1",     "length_m = 0",           "width_m = 0",
+	        "balance_angle_deg = 0", "case_damping_ratio = 1", "duration_s = 0",
+	        "duration_s = nan",      "mass_kg = -1",           "restitution = 0",
+	        "restitution = -0.5",    "restitution = 1.01",     "stiffness_n_m15 = 0",
+	        "friction = -0.1",       "mat_thickness_m = 0",    "corner_radius_m = 0",
+	        "case_modulus_pa = 0",   "case_poisson = 0.51",    "mat_modulus_pa = inf",
+	        "mat_poisson = -0.1",    "plate_mass_kg = -1",     "damping_ratio = -0.1",
+	        "damping_n_s_m = nan",   "softening_strain = 0",   "s2_offset_m = nan",
+	};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(lines) / sizeof(lines[0]); i++) {
+		char name[64], key[64];
+
+		snprintf(key, sizeof(key), "%.*s ", (int)strcspn(lines[i], " "), lines[i]);
+		if (read_changed(key, lines[i], name) != DT_E_RANGE || strstr(message, key) == NULL)
+			fail_msg("'%s': '%s'", lines[i], message);
 	}
 }
 
@@ -147,6 +174,7 @@ int main(void)
 	        cmocka_unit_test(the_products_of_the_study),
 	        cmocka_unit_test(the_tower_follows_the_height),
 	        cmocka_unit_test(mistakes_are_named_by_line),
+	        cmocka_unit_test(degenerate_values_are_refused),
 	        cmocka_unit_test(a_file_that_is_not_there),
 	        cmocka_unit_test(values_changed_after_reading_are_checked_too),
 	};

@@ -130,7 +130,7 @@ static void check_against_integration(double cycles, double zeta)
 static void test_against_integration(void **state)
 {
 	const double cycles[] = {0.1, 0.363, 0.5, 0.531, 1.0, 2.7},
-	             zetas[] = {0.0, 1e-8, 0.01, 0.1, 0.4, 0.99};
+	             zetas[] = {0.0, 1e-8, 0.01, 0.1, 0.4, 0.99, 1.0, 1.5, 4.0};
 
 	(void)state;
 	for (size_t c = 0; c < sizeof(cycles) / sizeof(cycles[0]); c++)
@@ -164,6 +164,66 @@ static void test_undamped_resonance(void **state)
 			check_close("u\"", sdof_motion(&sdof, t).acceleration, (sin(x) - x * cos(x)) / 2,
 			            1e-13);
 	}
+}
+
+/* z, z' and u" at t = 2/3 T of a pulse of 3 ms, r = omega T/pi: 50-digit divided differences. */
+static const struct {
+	double zeta, r, z, v, acceleration;
+} corner[] = {
+        {0, 1, -8.7232506466666374e-7, -0.00086602540378443865, 0.9566114774905182},
+        {0, 1.00000000000001, -8.7232506466665931e-7, -0.00086602540378442909, 0.95661147749053247},
+        {1e-12, 1, -8.7232506466575024e-7, -0.000866025403783075, 0.95661147749133023},
+        {1e-12, 1.00000000000001, -8.7232506466574582e-7, -0.00086602540378306544, 0.9566114774913445},
+        {0.1, 1.00000000000001, -7.8829518703762141e-7, -0.00074421058525354553, 1.0203295057508907},
+        {0.9, 1, -4.2601003138417295e-7, -0.0003132111711640998, 1.0575614242394402},
+        {1 - 1e-6, 1, -4.0171468534413526e-7, -0.00029035217299235807, 1.0486410083561035},
+        {1 - 1e-6, 1.3, -3.0729845712518055e-7, -0.00018213761446822256, 1.0654219596914293},
+        {1 - 1e-8, 1, -4.0171445786972776e-7, -0.0002903519626211709, 1.0486409203331697},
+        {1 - 1e-8, 1.3, -3.0729827658182222e-7, -0.00018213749691727068, 1.065421795983703},
+        {1 - 1e-12, 1, -4.0171445557223748e-7, -0.00029035196049642339, 1.0486409194441381},
+        {1 - 1e-12, 1.00000000000001, -4.0171445557223377e-7, -0.00029035196049641887, 1.0486409194441395},
+        {1 - 1e-12, 1.3, -3.0729827475833537e-7, -0.00018213749573000692, 1.0654217943302561},
+        {1, 1, -4.0171445557200771e-7, -0.0002903519604962109, 1.0486409194440492},
+        {1, 1.3, -3.07298274758153e-7, -0.00018213749572988819, 1.0654217943300907},
+        {1 + 1e-12, 1, -4.0171445557177792e-7, -0.00029035196049599839, 1.0486409194439603},
+        {1 + 1e-12, 1.3, -3.0729827475797062e-7, -0.00018213749572976944, 1.0654217943299253},
+        {1 + 1e-8, 1, -4.0171445327428771e-7, -0.00029035195837125096, 1.0486409185549288},
+        {1.1, 1, -3.7992767142944469e-7, -0.00027051461358089846, 1.0398582431056592},
+        {3, 1, -1.8531295135314792e-7, -0.00011819038912851721, 0.94583050756145801},
+        {3, 1.3, -1.4092657692695988e-7, -8.2535103935080667e-5, 0.93533650952045289},
+};
+
+/* Resonance, no damping, critical damping and all of them at once: no digit is lost. */
+static void test_where_the_rates_meet(void **state)
+{
+	(void)state;
+	for (size_t i = 0; i < sizeof(corner) / sizeof(corner[0]); i++) {
+		struct sdof sdof = make(corner[i].r / 0.006, corner[i].zeta, 1.0, 0.003);
+		struct sdof_motion m = sdof_motion(&sdof, 0.002);
+
+		check_close("z", m.z, corner[i].z, 2e-15);
+		check_close("z'", m.v, corner[i].v, 5e-15);
+		check_close("u\"", m.acceleration, corner[i].acceleration, 2e-15);
+	}
+}
+
+/* The peak goes smoothly through critical damping: its slope over zeta, -0.0642, is that of a wider step. */
+static void test_peak_through_critical_damping(void **state)
+{
+	double value, time_s, base, at_base;
+	struct sdof sdof = make(1.0 / 0.006, 1.0, 1.0, 0.003);
+
+	(void)state;
+	assert_int_equal(sdof_peak(&sdof, &base, &at_base), 0);
+	for (double off = 1e-14; off < 1e-3; off *= 10.0)
+		for (int side = -1; side <= 1; side += 2) {
+			sdof = make(1.0 / 0.006, 1.0 + side * off, 1.0, 0.003);
+			assert_int_equal(sdof_peak(&sdof, &value, &time_s), 0);
+			if (!(fabs(value - (base - 0.0651 * side * off)) < 2e-3 * off + 1e-15) ||
+			    !(fabs(time_s / at_base - 1.0) < 0.3 * off + 1e-13))
+				fail_msg("zeta 1 %+g: %.16g at %.16g, at 1: %.16g at %.16g", side * off,
+				         value, time_s, base, at_base);
+		}
 }
 
 /* For an undamped oscillator slower than the pulse the peak is a quarter period after the pulse's middle. */
@@ -217,7 +277,7 @@ static void test_limits(void **state)
 static void test_peak_against_scan(void **state)
 {
 	const double cycles[] = {0.05, 0.2, 0.4, 0.7, 1.3, 2.5, 10.0, 40.0},
-	             zetas[] = {0.0, 0.03, 0.3, 0.7, 0.99};
+	             zetas[] = {0.0, 0.03, 0.3, 0.7, 0.99, 1.0, 1.01, 3.0};
 
 	(void)state;
 	for (size_t c = 0; c < sizeof(cycles) / sizeof(cycles[0]); c++)
@@ -236,13 +296,73 @@ static void test_peak_against_scan(void **state)
 		}
 }
 
+/* Two extremes of the same height: whichever is larger by a hair is the peak. */
+static void test_rivals(void **state)
+{
+	double low = 0.0, high = 0.0, value, time_s, before = 0.0;
+
+	(void)state;
+	for (double cycles = 1.2; cycles < 4.0 && high == 0.0; cycles += 0.01) {
+		struct sdof sdof = make(cycles / 0.003, 0.01, 1.0, 0.003);
+
+		assert_int_equal(sdof_peak(&sdof, &value, &time_s), 0);
+		if (before > 0.0 && fabs(time_s - before) > 0.0003) {
+			low = cycles - 0.01;
+			high = cycles;
+		}
+		before = time_s;
+	}
+	assert_true(high > 0.0);
+	for (int k = 0; k <= 2000; k++) {
+		double cycles = low + (high - low) * k / 2000;
+		struct sdof sdof = make(cycles / 0.003, 0.01, 1.0, 0.003);
+		double left = 0.0;
+
+		assert_int_equal(sdof_peak(&sdof, &value, &time_s), 0);
+		for (int i = 1; i < 600; i++)
+			left = fmax(left, fabs(sdof_motion(&sdof, 0.003 * i / 600).acceleration));
+		assert_true(fabs(value) >= left && fabs(value) < left * (1 + 2e-4));
+		if (k > 0 && !(fabs(value - before) < 3e-6))
+			fail_msg("peak %.12g after %.12g at %.9g cycles", value, before, cycles);
+		before = value;
+	}
+}
+
+/* Left to itself the mass turns round where its speed is zero, and nowhere further out. */
+static void test_turning_round(void **state)
+{
+	const double zetas[] = {0.0, 0.3, 0.99, 1 - 1e-9, 1.0, 1 + 1e-9, 1.01, 2.0, 20.0};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(zetas) / sizeof(zetas[0]); i++)
+		for (double v0 = -300.0; v0 < 310.0; v0 += 50.0) {
+			struct oscillator o;
+			double z = 0.7, v = v0, far = 0.7, at;
+
+			assert_int_equal(oscillator_init(&o, 200.0, zetas[i]), 0);
+			at = oscillator_turn(&o, z, v);
+			for (int k = 0; k < 2000; k++) {
+				double z1 = 0.7, v1 = v0;
+
+				oscillator_move(&o, 0.06 * k / 2000, &z1, &v1);
+				far = fmax(far, fabs(z1));
+			}
+			oscillator_move(&o, at, &z, &v);
+			assert_true(at >= 0.0);
+			if (at > 0.0 && !(fabs(v) < 1e-9))
+				fail_msg("zeta %.12g from %g: speed %g at %g", zetas[i], v0, v, at);
+			if (v0 > 0.0 && !(at > 0.0 && z >= far * (1 - 1e-12) && z < far * (1 + 1e-3)))
+				fail_msg("zeta %.12g from %g: turns at %.12g, reaches %.12g", zetas[i], v0, z,
+				         far);
+		}
+}
+
 static void test_refusals(void **state)
 {
 	struct sdof sdof = make(129.0, 0.1, 1.0, 0.003), before = sdof;
 	double value = -1.0, time_s = -1.0;
 
 	(void)state;
-	assert_int_equal(sdof_init(&sdof, 129.0, 1.0, 1.0, 0.003), DT_E_ARGUMENT);
 	assert_int_equal(sdof_init(&sdof, 129.0, -0.1, 1.0, 0.003), DT_E_ARGUMENT);
 	assert_int_equal(sdof_init(&sdof, 0.0, 0.1, 1.0, 0.003), DT_E_ARGUMENT);
 	assert_int_equal(sdof_init(&sdof, 129.0, 0.1, 1.0, 0.0), DT_E_ARGUMENT);
@@ -265,10 +385,14 @@ int main(void)
 	        cmocka_unit_test(test_against_integration),
 	        cmocka_unit_test(test_through_resonance),
 	        cmocka_unit_test(test_undamped_resonance),
+	        cmocka_unit_test(test_where_the_rates_meet),
+	        cmocka_unit_test(test_peak_through_critical_damping),
 	        cmocka_unit_test(test_undamped_peak_time),
 	        cmocka_unit_test(test_continuous_at_the_end_of_the_pulse),
 	        cmocka_unit_test(test_limits),
 	        cmocka_unit_test(test_peak_against_scan),
+	        cmocka_unit_test(test_rivals),
+	        cmocka_unit_test(test_turning_round),
 	        cmocka_unit_test(test_refusals),
 	};
 

@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "hil/study/study.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cjson/cJSON.h>
+
+#include "hil/study/contact.h"
+#include "host/record/read.h"
+
+struct reading {
+	struct study *study;
+	struct archive *archive;
+	const char *folder;
+	char *message;
+};
+
+/* The study's series that a drop belongs to; NULL when it is of no interest. */
+static struct study_series *place(struct reading *reading, const struct archive_drop *drop, size_t *geometry)
+{
+	for (size_t g = 0; g < STUDY_GEOMETRIES; g++)
+		for (size_t a = 0; a < STUDY_ANGLES; a++)
+			if (strcmp(drop->series.scene_name, reading->study->scene[g].name) == 0 &&
+			    drop->series.angle_deg == study_angle_deg[a]) {
+				*geometry = g;
+				return &reading->study->series[g][a];
+			}
+	return NULL;
+}
+
+static double number(const cJSON *object, const char *name)
+{
+	const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
+
+	return cJSON_IsNumber(item) ? item->valuedouble : (double)NAN;
+}
+
+/* What stands in the full result only. */
+static int take_result(struct reading *reading, struct study_series *series, const char *name)
+{
+	char *text = archive_json(reading->archive, name, NULL);
+	cJSON *json = text != NULL ? cJSON_Parse(text) : NULL;
+	const cJSON *resultants = cJSON_GetObjectItemCaseSensitive(json, "resultants");
+
+	free(text);
+	if (json == NULL) {
+		snprintf(reading->message, STUDY_MESSAGE_MAX, "%s: no result", name);
+		return DT_E_FORMAT;
+	}
+	series->s2_peak_s = number(cJSON_GetArrayItem(resultants, 1), "time_s");
+	series->rebound[series->cell.drops] =
+	        number(cJSON_GetObjectItemCaseSensitive(json, "rebound"), "velocity_ratio");
+	cJSON_Delete(json);
+	return 0;
+}
+
+static int take_log(struct reading *reading, struct study_series *series, double tau_s)
+{
+	struct record record;
+	int status = read_record(&record, series->log, NULL, reading->message);
+
+	if (status != 0)
+		return status;
+	series->contact_s[series->cell.drops] = contact_time(&record, tau_s, series->s2_peak_s);
+	record_free(&record);
+	return 0;
+}
+
+static int take(void *context, const struct archive_drop *drop)
+{
+	struct reading *reading = context;
+	size_t g = 0;
+	struct study_series *series = place(reading, drop, &g);
+	char name[ARCHIVE_NAME_MAX + 16];
+	int status;
+
+	if (series == NULL || !archive_counts(drop, true))
+		return 0;
+	if (series->cell.drops == STUDY_DROPS_MAX) {
+		snprintf(reading->message, STUDY_MESSAGE_MAX, "%s: more than %d drops", drop->series.name,
+		         STUDY_DROPS_MAX);
+		return DT_E_RANGE;
+	}
+	snprintf(name, sizeof(name), "%s/%u", drop->series.name, drop->number);
+	snprintf(series->log, sizeof(series->log), "%.4000s/%s", reading->folder, drop->raw);
+	status = take_result(reading, series, name);
+	series->contact_s[series->cell.drops] = NAN;
+	if (status == 0 && g == 0)
+		status = take_log(reading, series, reading->study->scene[g].sensor_iepe_time_constant_s);
+	if (status == 0)
+		archive_cell_add(&series->cell, drop);
+	return status;
+}
+
+/* All three are compared, so that each must have a drop. */
+static int need_all(const struct study *study, const char *folder, char *message)
+{
+	for (size_t g = 0; g < STUDY_GEOMETRIES; g++) {
+		unsigned drops = 0;
+
+		for (size_t a = 0; a < STUDY_ANGLES; a++)
+			drops += study->series[g][a].cell.drops;
+		if (drops > 0)
+			continue;
+		snprintf(message, STUDY_MESSAGE_MAX, "%.400s: no drop of %s at an angle of the study", folder,
+		         study->scene[g].name);
+		return DT_E_EMPTY;
+	}
+	return 0;
+}
+
+int study_read(struct study *study, const char *folder, char message[STUDY_MESSAGE_MAX])
+{
+	struct archive_filter filter = archive_filter_none();
+	struct reading reading = {.study = study, .folder = folder, .message = message};
+	int status;
+
+	reading.archive = archive_open(folder, ARCHIVE_READ, message);
+	if (reading.archive == NULL)
+		return DT_E_SYSTEM;
+	message[0] = '\0';
+	status = archive_each_drop(reading.archive, &filter, take, &reading);
+	if (status != 0 && message[0] == '\0')
+		snprintf(message, STUDY_MESSAGE_MAX, "%s", archive_message(reading.archive));
+	archive_close(reading.archive);
+	return status != 0 ? status : need_all(study, folder, message);
+}

@@ -1,0 +1,207 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ARCHIVE_ARCHIVE_H
+#define DT_HOST_ARCHIVE_ARCHIVE_H
+/*
+ * An archive of drops: a folder with an SQLite index and the raw files it speaks of. README.md shows both.
+ *
+ * A drop is either fully recorded or visibly partial, whatever moment the power fails:
+ *
+ *     archive_begin    row "recording" and a sidecar are on disk; the caller writes the log it names
+ *     archive_finish   the log and its folder are on disk, then its hash and sidecar, then row "recorded"
+ *     archive_result   what an analysis said of it, once for each version of the program
+ *
+ * Only what archive_finish returned 0 for may be called recorded. A recorder that dies leaves a drop that is
+ * listed as interrupted. The index holds nothing that the raw files do not: archive_rebuild makes it again.
+ *
+ * One thread per archive; any number of processes. Every function returns 0 or DT_E_*, and then
+ * archive_message tells why in one line. Texts are UTF-8 of one line. Angles in degrees, accelerations in g.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "common/scenes/scene.h"
+
+struct archive;
+
+enum archive_mode {
+	ARCHIVE_READ,   /* there must be one; nothing is written, but an old schema is brought up to date */
+	ARCHIVE_WRITE,  /* there must be one */
+	ARCHIVE_CREATE, /* made when there is none */
+};
+
+enum { ARCHIVE_MESSAGE_MAX = 640, ARCHIVE_PATH_MAX = 4300, ARCHIVE_NAME_MAX = 60, ARCHIVE_TEXT_MAX = 400 };
+
+/* NULL, and one line in message. */
+struct archive *archive_open(const char *folder, enum archive_mode mode, char message[ARCHIVE_MESSAGE_MAX]);
+void archive_close(struct archive *archive);
+const char *archive_message(const struct archive *archive);
+const char *archive_folder(const struct archive *archive);
+
+/* ---- series ---- */
+
+struct archive_series {
+	const char *name, *campaign;
+	const char *scene_name;
+	const char *scene; /* the whole file */
+	double angle_deg, height_m, plate_mass_kg;
+	unsigned planned;
+	const char *created; /* UTC, ISO 8601 */
+	/* of its drops */
+	unsigned recorded, accepted, rejected, partial;
+	const char *last; /* time of the last drop; "" when there is none */
+};
+
+/* Name: letters, digits, and . _ - within; its name must be new. The scene is read from scene_file. */
+DT_MUST_USE int archive_new_series(struct archive *archive, const char *name, const char *campaign,
+                                   const char *scene_file, double angle_deg, unsigned planned);
+
+/* The scene of a series, at its angle. */
+DT_MUST_USE int archive_scene(struct archive *archive, const char *series, struct scene *scene);
+
+/* ---- recording ---- */
+
+struct archive_recording {
+	int64_t drop; /* row */
+	char series[ARCHIVE_NAME_MAX + 1];
+	unsigned number;
+	char raw[ARCHIVE_NAME_MAX + 64]; /* the log's place in the archive's folder */
+	char log[ARCHIVE_PATH_MAX];      /* the same with the folder in front */
+	int lock;                        /* held while it is being recorded */
+};
+
+/* Makes the next drop of series, its empty log included. ending: ".log". DT_E_UNKNOWN: no such series. */
+DT_MUST_USE int archive_begin(struct archive *archive, const char *series, const char *operator_name,
+                              const char *ending, struct archive_recording *recording);
+
+/* The log is complete and closed. time_s: of the drop, since the epoch; 0 = when it was begun. note: may be
+ * "". On an error the drop stays partial. Ends the recording in any case. */
+DT_MUST_USE int archive_finish(struct archive *archive, struct archive_recording *recording, int64_t time_s,
+                               const char *note);
+
+/* Nothing came of it: takes drop and files away again. */
+void archive_discard(struct archive *archive, struct archive_recording *recording);
+
+/* Leaves it as it is, partial. */
+void archive_abandon(struct archive_recording *recording);
+
+/* ---- results, decisions ---- */
+
+/* json: as `analyze --json` gives it. Kept in the index and beside the log; the result of the same version is
+ * replaced, others stay. Drops are named SERIES/NUMBER. */
+DT_MUST_USE int archive_result(struct archive *archive, const char *drop, const char *version,
+                               const char *json);
+
+enum archive_decision { ARCHIVE_OPEN, ARCHIVE_ACCEPTED, ARCHIVE_REJECTED };
+
+/* text: the reason; may be "" for ACCEPTED only. Logged with its time. DT_E_STATE: not recorded. */
+DT_MUST_USE int archive_decide(struct archive *archive, const char *drop, enum archive_decision decision,
+                               const char *operator_name, const char *text);
+DT_MUST_USE int archive_note(struct archive *archive, const char *drop, const char *operator_name,
+                             const char *text);
+
+/* date: YYYY-MM-DD. */
+DT_MUST_USE int archive_calibrate(struct archive *archive, const char *sensor, double gain, const char *date,
+                                  const char *note);
+
+/* ---- looking ---- */
+
+/* What a result says in numbers; names by archive_value_name. Instants and frequencies as the JSON has them;
+ * NAN where there is none. */
+#define ARCHIVE_VALUES(V)                                             \
+	V(S1_X, "s1_x", "g") /* signed peaks */                       \
+	V(S1_Y, "s1_y", "g")                                          \
+	V(S1_R, "s1_r", "g") /* resultant of X and Y */               \
+	V(S1_Z, "s1_z", "g")                                          \
+	V(S2_X, "s2_x", "g")                                          \
+	V(S2_Y, "s2_y", "g")                                          \
+	V(S2_R, "s2_r", "g")                                          \
+	V(S2_Z, "s2_z", "g")                                          \
+	V(LAG, "lag_largest_peak", "s") /* S1 after S2 */             \
+	V(LAG_FIRST, "lag_first_peak", "s")                           \
+	V(LAG_DRIVEN, "lag_driven", "s") /* as an oscillator on S2 */ \
+	V(FREQUENCY, "frequency", "hz")  /* of the plate, damped */   \
+	V(THREE_CYCLE, "three_cycle_frequency", "hz")                 \
+	V(DAMPING, "damping", "ratio")
+
+enum archive_value {
+#define ARCHIVE_VALUE(name, text, unit) ARCHIVE_##name,
+	ARCHIVE_VALUES(ARCHIVE_VALUE)
+#undef ARCHIVE_VALUE
+	        ARCHIVE_VALUE_COUNT
+};
+const char *archive_value_name(enum archive_value value); /* "s1_x" */
+const char *archive_value_unit(enum archive_value value); /* "g" */
+
+struct archive_drop {
+	struct archive_series series; /* without the counts */
+	unsigned number;
+	const char *state;    /* "recording" "interrupted" "recorded" "missing" */
+	const char *decision; /* "open" "accepted" "rejected" */
+	const char *reason, *operator_name, *note;
+	const char *raw, *sha256, *time;
+	int64_t bytes;
+	const char *version;               /* of the result; NULL: there is none */
+	double value[ARCHIVE_VALUE_COUNT]; /* NAN: none */
+	double sigma[ARCHIVE_VALUE_COUNT];
+	unsigned not_ok;   /* bit for each value whose status is not ok */
+	const char *flags; /* "clipped incomplete", sorted; "" */
+};
+
+/* NULL, NAN and 0 take anything. */
+struct archive_filter {
+	const char *series, *campaign, *scene_name;
+	double angle_deg;
+	const char *from, *to; /* times of drops, or the beginnings of them: "2026-11" */
+	const char *version;   /* of the results; NULL: the newest of each drop */
+	unsigned number;       /* within the series */
+};
+struct archive_filter archive_filter_none(void);
+
+/* Calls each for what passes, in the order of names and numbers, until it returns other than 0, which is
+ * then returned. Texts are valid during the call. from and to take series that have a drop in between. */
+DT_MUST_USE int archive_each_series(struct archive *archive, const struct archive_filter *filter,
+                                    int (*each)(void *context, const struct archive_series *series),
+                                    void *context);
+DT_MUST_USE int archive_each_drop(struct archive *archive, const struct archive_filter *filter,
+                                  int (*each)(void *context, const struct archive_drop *drop), void *context);
+
+struct archive_event {
+	const char *time, *what, *operator_name, *text;
+};
+
+/* What was decided and noted of a drop, in its order. */
+DT_MUST_USE int archive_each_event(struct archive *archive, const char *drop,
+                                   int (*each)(void *context, const struct archive_event *event),
+                                   void *context);
+
+struct archive_calibration {
+	const char *sensor, *date, *note;
+	double gain;
+};
+DT_MUST_USE int archive_each_calibration(struct archive *archive,
+                                         int (*each)(void *context,
+                                                     const struct archive_calibration *calibration),
+                                         void *context);
+
+/* The JSON of a drop's result, to be freed; version NULL: the newest. NULL with a message if there is none.
+ */
+char *archive_json(struct archive *archive, const char *drop, const char *version);
+
+/* Where a log with these bytes is: 1 and "SERIES/NUMBER" in drop, 0 when there is none, or DT_E_*. */
+DT_MUST_USE int archive_find(struct archive *archive, const char *file, char drop[ARCHIVE_NAME_MAX + 16]);
+
+/* ---- care ---- */
+
+/* Calls wrong for each raw file that is gone or not what was recorded, and marks those that are gone. Returns
+ * how many there were, or DT_E_*. */
+DT_MUST_USE int archive_verify(struct archive *archive, void (*wrong)(void *context, const char *text),
+                               void *context);
+
+/* Makes the index again from the raw files; what is there of it stays beside it, under another name. wrong
+ * is called for each file that could not be used. Needs no open archive, and that nobody else writes. */
+DT_MUST_USE int archive_rebuild(const char *folder, void (*wrong)(void *context, const char *text),
+                                void *context, char message[ARCHIVE_MESSAGE_MAX]);
+
+#endif

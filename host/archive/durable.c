@@ -1,0 +1,161 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/archive/durable.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <nettle/sha2.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { FILE_MAX_BYTES = 1 << 28 };
+
+/* Closes and keeps the errno of what failed before. */
+static int shut(int fd, int result)
+{
+	int before = errno;
+
+	if (close(fd) != 0 && result == 0)
+		return DT_E_SYSTEM;
+	errno = before;
+	return result;
+}
+
+static char *folder_of(const char *path)
+{
+	const char *slash = strrchr(path, '/');
+
+	if (slash == NULL)
+		return strdup(".");
+	return slash == path ? strdup("/") : strndup(path, (size_t)(slash - path));
+}
+
+static int sync_one(const char *path, int flags)
+{
+	int fd = open(path, flags | O_CLOEXEC);
+
+	if (fd < 0)
+		return DT_E_SYSTEM;
+	return shut(fd, fsync(fd) == 0 ? 0 : DT_E_SYSTEM);
+}
+
+int durable_sync_folder(const char *path)
+{
+	char *folder = folder_of(path);
+	int result = folder != NULL ? sync_one(folder, O_RDONLY | O_DIRECTORY) : DT_E_MEMORY;
+
+	free(folder);
+	return result;
+}
+
+int durable_sync(const char *path)
+{
+	int result = sync_one(path, O_RDONLY);
+
+	return result != 0 ? result : durable_sync_folder(path);
+}
+
+int durable_folders(const char *path)
+{
+	char *part = strdup(path);
+	int result = part != NULL ? 0 : DT_E_MEMORY;
+
+	for (char *slash = part != NULL ? strchr(part + 1, '/') : NULL; slash != NULL && result == 0;
+	     slash = strchr(slash + 1, '/')) {
+		*slash = '\0';
+		if (mkdir(part, 0777) == 0)
+			result = durable_sync_folder(part);
+		else if (errno != EEXIST)
+			result = DT_E_SYSTEM;
+		*slash = '/';
+	}
+	free(part);
+	return result;
+}
+
+static int write_all(int fd, const char *bytes, size_t size)
+{
+	while (size > 0) {
+		ssize_t n = write(fd, bytes, size);
+
+		if (n < 0 && errno == EINTR)
+			continue;
+		if (n < 0)
+			return DT_E_SYSTEM;
+		bytes += n;
+		size -= (size_t)n;
+	}
+	return fsync(fd) == 0 ? 0 : DT_E_SYSTEM;
+}
+
+int durable_write(const char *path, const void *bytes, size_t size)
+{
+	char *beside;
+	int fd, result;
+
+	if (asprintf(&beside, "%s.part", path) < 0)
+		return DT_E_MEMORY;
+	fd = open(beside, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+	result = fd < 0 ? DT_E_SYSTEM : shut(fd, write_all(fd, bytes, size));
+	if (result == 0 && rename(beside, path) != 0)
+		result = DT_E_SYSTEM;
+	if (result != 0 && fd >= 0) {
+		int before = errno;
+
+		unlink(beside);
+		errno = before;
+	}
+	free(beside);
+	return result != 0 ? result : durable_sync_folder(path);
+}
+
+int durable_hash(const char *path, char hash[DURABLE_HASH_CHARS], int64_t *bytes)
+{
+	struct sha256_ctx context;
+	uint8_t block[32768], digest[SHA256_DIGEST_SIZE];
+	int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
+	int64_t total = 0;
+	ssize_t n;
+
+	if (fd < 0)
+		return DT_E_SYSTEM;
+	sha256_init(&context);
+	while ((n = read(fd, block, sizeof(block))) > 0 || (n < 0 && errno == EINTR)) {
+		if (n < 0)
+			continue;
+		sha256_update(&context, (size_t)n, block);
+		total += n;
+	}
+	if (shut(fd, n == 0 ? 0 : DT_E_SYSTEM) != 0)
+		return DT_E_SYSTEM;
+	sha256_digest(&context, sizeof(digest), digest);
+	for (size_t i = 0; i < sizeof(digest); i++)
+		snprintf(hash + 2 * i, 3, "%02x", digest[i]);
+	*bytes = total;
+	return 0;
+}
+
+char *durable_read(const char *path, size_t *size)
+{
+	FILE *in = fopen(path, "re");
+	char *text = NULL;
+	struct stat status;
+	size_t length = 0;
+
+	if (in == NULL)
+		return NULL;
+	if (fstat(fileno(in), &status) == 0 && S_ISREG(status.st_mode) && status.st_size <= FILE_MAX_BYTES)
+		text = malloc((size_t)status.st_size + 1);
+	else
+		errno = EINVAL;
+	if (text != NULL) {
+		length = fread(text, 1, (size_t)status.st_size, in);
+		text[length] = '\0';
+	}
+	fclose(in);
+	if (size != NULL)
+		*size = length;
+	return text;
+}

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ARCHIVE_DURABLE_H
+#define DT_HOST_ARCHIVE_DURABLE_H
+/*
+ * Files that stay: on success they are on the disk, and so are the folders that name them. 0 or DT_E_SYSTEM
+ * with errno set, DT_E_MEMORY.
+ */
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+
+enum { DURABLE_HASH_CHARS = 65 };
+
+/* Makes the folders of path, up to its last slash. */
+DT_MUST_USE int durable_folders(const char *path);
+
+/* Replaces path by these bytes: the old ones or the new ones are there at any moment. */
+DT_MUST_USE int durable_write(const char *path, const void *bytes, size_t size);
+
+/* Somebody else wrote path: file and folder to the disk. */
+DT_MUST_USE int durable_sync(const char *path);
+
+/* The folder that holds path to the disk. */
+DT_MUST_USE int durable_sync_folder(const char *path);
+
+/* SHA-256 (FIPS 180-4) in hexadecimal digits, and the size. */
+DT_MUST_USE int durable_hash(const char *path, char hash[DURABLE_HASH_CHARS], int64_t *bytes);
+
+/* The whole file with a NUL behind, to be freed; NULL with errno set. size may be NULL. */
+char *durable_read(const char *path, size_t *size);
+
+#endif

@@ -1,0 +1,333 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Looking into an archive.
+ */
+#include <fcntl.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "host/archive/durable.h"
+#include "host/archive/private.h"
+
+struct archive_filter archive_filter_none(void)
+{
+	return (struct archive_filter){.angle_deg = NAN};
+}
+
+/* ---- a statement with the conditions that were asked for ---- */
+
+enum { QUERY_MAX = 4096, VALUES_MAX = 12 };
+
+struct query {
+	char text[QUERY_MAX];
+	const char *value[VALUES_MAX]; /* all are bound as text; numbers are compared as numbers */
+	char number[2][32];
+	int count;
+};
+
+static void add(struct query *q, const char *text, const char *value)
+{
+	size_t at = strlen(q->text);
+
+	snprintf(q->text + at, sizeof(q->text) - at, "%s", text);
+	if (value != NULL)
+		q->value[q->count++] = value;
+}
+
+static void add_number(struct query *q, char to[32], const char *text, double value)
+{
+	snprintf(to, 32, "%.17g", value);
+	add(q, text, to);
+}
+
+/* Whatever begins with `to` is not later than it: '~' is behind every character of a time. */
+static void add_dates(struct query *q, const struct archive_filter *filter)
+{
+	if (filter->from != NULL)
+		add(q, " AND d.time >= ?", filter->from);
+	if (filter->to != NULL)
+		add(q, " AND d.time < ? || '~'", filter->to);
+}
+
+static void add_conditions(struct query *q, const struct archive_filter *filter)
+{
+	add(q, " WHERE 1", NULL);
+	if (filter->series != NULL)
+		add(q, " AND s.name = ?", filter->series);
+	if (filter->campaign != NULL)
+		add(q, " AND c.name = ?", filter->campaign);
+	if (filter->scene_name != NULL)
+		add(q, " AND s.scene_name = ?", filter->scene_name);
+	if (!isnan(filter->angle_deg))
+		add_number(q, q->number[0], " AND ABS(s.angle_deg - CAST(? AS REAL)) < 1e-9",
+		           filter->angle_deg);
+	if (filter->number != 0)
+		add_number(q, q->number[1], " AND d.number = CAST(? AS INTEGER)", filter->number);
+}
+
+static int start(struct archive *archive, const struct query *q, sqlite3_stmt **s)
+{
+	int result = sql_query(archive, s, q->text, "");
+
+	for (int i = 0; result == 0 && i < q->count; i++)
+		sqlite3_bind_text(*s, i + 1, q->value[i], -1, SQLITE_TRANSIENT);
+	return result;
+}
+
+/* ---- series ---- */
+
+#define SERIES_COLUMNS \
+	"s.name, c.name, s.scene_name, s.angle_deg, s.height_m, s.plate_mass_kg, s.planned, s.created"
+enum { SERIES_COLUMN_COUNT = 8 };
+
+static struct archive_series series_of(sqlite3_stmt *s)
+{
+	return (struct archive_series){
+	        .name = sql_text(s, 0),
+	        .campaign = sql_text(s, 1),
+	        .scene_name = sql_text(s, 2),
+	        .scene = "",
+	        .angle_deg = sqlite3_column_double(s, 3),
+	        .height_m = sqlite3_column_double(s, 4),
+	        .plate_mass_kg = sqlite3_column_double(s, 5),
+	        .planned = (unsigned)sqlite3_column_int(s, 6),
+	        .created = sql_text(s, 7),
+	        .last = "",
+	};
+}
+
+int archive_each_series(struct archive *archive, const struct archive_filter *filter,
+                        int (*each)(void *context, const struct archive_series *series), void *context)
+{
+	struct query q = {.count = 0};
+	sqlite3_stmt *s;
+	int result;
+
+	add(&q,
+	    "SELECT " SERIES_COLUMNS ", s.scene, SUM(d.state <> 'recording'), SUM(d.decision = 'accepted'),"
+	    " SUM(d.decision = 'rejected'), SUM(d.state = 'recording'), MAX(d.time)"
+	    " FROM series s JOIN campaigns c ON c.id = s.campaign_id LEFT JOIN drops d ON d.series_id = s.id",
+	    NULL);
+	add_conditions(&q, filter);
+	if (filter->from != NULL || filter->to != NULL) {
+		add(&q, " AND s.id IN (SELECT d.series_id FROM drops d WHERE 1", NULL);
+		add_dates(&q, filter);
+		add(&q, ")", NULL);
+	}
+	add(&q, " GROUP BY s.id ORDER BY c.name, s.scene_name, s.angle_deg, s.name", NULL);
+	result = start(archive, &q, &s);
+	if (result != 0)
+		return result;
+	while ((result = sql_step(archive, s)) > 0) {
+		struct archive_series series = series_of(s);
+
+		series.scene = sql_text(s, SERIES_COLUMN_COUNT);
+		series.recorded = (unsigned)sqlite3_column_int(s, SERIES_COLUMN_COUNT + 1);
+		series.accepted = (unsigned)sqlite3_column_int(s, SERIES_COLUMN_COUNT + 2);
+		series.rejected = (unsigned)sqlite3_column_int(s, SERIES_COLUMN_COUNT + 3);
+		series.partial = (unsigned)sqlite3_column_int(s, SERIES_COLUMN_COUNT + 4);
+		series.last = sql_text(s, SERIES_COLUMN_COUNT + 5);
+		result = each(context, &series);
+		if (result != 0)
+			break;
+	}
+	sqlite3_finalize(s);
+	return result;
+}
+
+/* ---- drops ---- */
+
+/* A recorder holds a lock on its log as long as it lives. */
+static bool is_being_recorded(const struct archive *archive, const char *raw)
+{
+	char path[ARCHIVE_PATH_MAX];
+	bool held;
+	int fd;
+
+	snprintf(path, sizeof(path), "%s/%.200s", archive->folder, raw);
+	fd = open(path, O_RDONLY | O_CLOEXEC);
+	if (fd < 0)
+		return false;
+	held = flock(fd, LOCK_SH | LOCK_NB) != 0;
+	close(fd);
+	return held;
+}
+
+static double number_or_nan(sqlite3_stmt *s, int column)
+{
+	return sqlite3_column_type(s, column) == SQLITE_NULL ? (double)NAN : sqlite3_column_double(s, column);
+}
+
+#define VALUE_COLUMNS(name, text, unit) ", r." text "_" unit ", r." text "_sigma_" unit
+#define DROP_COLUMNS                                                                                     \
+	SERIES_COLUMNS ", d.number, d.state, d.decision, d.reason, d.operator, d.note, d.raw, d.sha256," \
+	               " d.time, d.bytes, v.name, r.not_ok, r.flags" ARCHIVE_VALUES(VALUE_COLUMNS)
+
+static void drop_of(const struct archive *archive, sqlite3_stmt *s, struct archive_drop *drop)
+{
+	enum { N = SERIES_COLUMN_COUNT, VALUES = N + 13 };
+
+	*drop = (struct archive_drop){
+	        .series = series_of(s),
+	        .number = (unsigned)sqlite3_column_int(s, N),
+	        .state = sql_text(s, N + 1),
+	        .decision = sql_text(s, N + 2),
+	        .reason = sql_text(s, N + 3),
+	        .operator_name = sql_text(s, N + 4),
+	        .note = sql_text(s, N + 5),
+	        .raw = sql_text(s, N + 6),
+	        .sha256 = sql_text(s, N + 7),
+	        .time = sql_text(s, N + 8),
+	        .bytes = sqlite3_column_int64(s, N + 9),
+	        .version = (const char *)sqlite3_column_text(s, N + 10),
+	        .not_ok = (unsigned)sqlite3_column_int(s, N + 11),
+	        .flags = sql_text(s, N + 12),
+	};
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		drop->value[i] = number_or_nan(s, VALUES + 2 * i);
+		drop->sigma[i] = number_or_nan(s, VALUES + 2 * i + 1);
+	}
+	if (strcmp(drop->state, "recording") == 0 && !is_being_recorded(archive, drop->raw))
+		drop->state = "interrupted";
+}
+
+static void ask_for_drops(struct query *q, const struct archive_filter *filter)
+{
+	add(q,
+	    "SELECT " DROP_COLUMNS " FROM drops d JOIN series s ON s.id = d.series_id"
+	    " JOIN campaigns c ON c.id = s.campaign_id LEFT JOIN results r ON r.id = ",
+	    NULL);
+	if (filter->version != NULL)
+		add(q,
+		    "(SELECT id FROM results WHERE drop_id = d.id AND version_id ="
+		    " (SELECT id FROM versions WHERE name = ?))",
+		    filter->version);
+	else
+		add(q, "(SELECT MAX(id) FROM results WHERE drop_id = d.id)", NULL);
+	add(q, " LEFT JOIN versions v ON v.id = r.version_id", NULL);
+	add_conditions(q, filter);
+	add_dates(q, filter);
+	add(q, " ORDER BY c.name, s.scene_name, s.angle_deg, s.name, d.number", NULL);
+}
+
+int archive_each_drop(struct archive *archive, const struct archive_filter *filter,
+                      int (*each)(void *context, const struct archive_drop *drop), void *context)
+{
+	struct query q = {.count = 0};
+	struct archive_drop drop;
+	sqlite3_stmt *s;
+	int result;
+
+	ask_for_drops(&q, filter);
+	result = start(archive, &q, &s);
+	if (result != 0)
+		return result;
+	while ((result = sql_step(archive, s)) > 0) {
+		drop_of(archive, s, &drop);
+		result = each(context, &drop);
+		if (result != 0)
+			break;
+	}
+	sqlite3_finalize(s);
+	return result;
+}
+
+/* ---- the rest ---- */
+
+int archive_each_event(struct archive *archive, const char *drop,
+                       int (*each)(void *context, const struct archive_event *event), void *context)
+{
+	struct archive_place place;
+	sqlite3_stmt *s;
+	int result = archive_locate(archive, drop, &place);
+
+	if (result == 0)
+		result = sql_query(
+		        archive, &s,
+		        "SELECT time, what, operator, text FROM events WHERE drop_id = ? ORDER BY id", "i",
+		        place.drop);
+	if (result != 0)
+		return result;
+	while ((result = sql_step(archive, s)) > 0) {
+		struct archive_event event = {sql_text(s, 0), sql_text(s, 1), sql_text(s, 2), sql_text(s, 3)};
+
+		result = each(context, &event);
+		if (result != 0)
+			break;
+	}
+	sqlite3_finalize(s);
+	return result;
+}
+
+int archive_each_calibration(struct archive *archive,
+                             int (*each)(void *context, const struct archive_calibration *calibration),
+                             void *context)
+{
+	sqlite3_stmt *s;
+	int result = sql_query(archive, &s,
+	                       "SELECT sensor, date, note, gain FROM calibrations ORDER BY sensor, date", "");
+
+	if (result != 0)
+		return result;
+	while ((result = sql_step(archive, s)) > 0) {
+		struct archive_calibration c = {sql_text(s, 0), sql_text(s, 1), sql_text(s, 2),
+		                                sqlite3_column_double(s, 3)};
+
+		result = each(context, &c);
+		if (result != 0)
+			break;
+	}
+	sqlite3_finalize(s);
+	return result;
+}
+
+char *archive_json(struct archive *archive, const char *drop, const char *version)
+{
+	struct archive_place place;
+	sqlite3_stmt *s;
+	char *json = NULL;
+	int result = archive_locate(archive, drop, &place);
+
+	if (result == 0)
+		result = sql_query(archive, &s,
+		                   "SELECT t.json FROM results r JOIN versions v ON v.id = r.version_id"
+		                   " JOIN texts t ON t.result_id = r.id"
+		                   " WHERE r.drop_id = ?1 AND (?2 IS NULL OR v.name = ?2)"
+		                   " ORDER BY r.id DESC LIMIT 1",
+		                   "is", place.drop, version);
+	if (result != 0)
+		return NULL;
+	result = sql_step(archive, s);
+	if (result > 0)
+		json = strdup(sql_text(s, 0));
+	sqlite3_finalize(s);
+	if (json == NULL && result >= 0)
+		archive_refuse(archive, DT_E_EMPTY, "%.100s: no result%s%.60s", drop,
+		               version != NULL ? " by version " : "", version != NULL ? version : "");
+	return json;
+}
+
+int archive_find(struct archive *archive, const char *file, char drop[ARCHIVE_NAME_MAX + 16])
+{
+	char hash[DURABLE_HASH_CHARS];
+	sqlite3_stmt *s;
+	int64_t bytes;
+	int result;
+
+	if (durable_hash(file, hash, &bytes) != 0)
+		return archive_refuse(archive, DT_E_SYSTEM, "%.500s: cannot be read", file);
+	result = sql_query(archive, &s,
+	                   "SELECT s.name || '/' || d.number FROM drops d JOIN series s ON s.id = d.series_id"
+	                   " WHERE d.sha256 = ? LIMIT 1",
+	                   "s", hash);
+	if (result != 0)
+		return result;
+	result = sql_step(archive, s);
+	if (result > 0)
+		snprintf(drop, ARCHIVE_NAME_MAX + 16, "%s", sql_text(s, 0));
+	sqlite3_finalize(s);
+	return result;
+}

@@ -1,0 +1,270 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <string.h>
+
+#include "host/archive/print_private.h"
+
+/* ---- JSON ---- */
+
+static int event_json(void *context, const struct archive_event *event)
+{
+	struct print *p = context;
+	cJSON *item = put_append(&p->builder, p->array);
+
+	put_text(&p->builder, item, "time", event->time);
+	put_text(&p->builder, item, "what", event->what);
+	put_text(&p->builder, item, "operator", event->operator_name);
+	put_text(&p->builder, item, "text", event->text);
+	return 0;
+}
+
+static int put_events(struct print *p, cJSON *item, const struct archive_drop *drop)
+{
+	struct print events = {.builder = p->builder};
+	char name[ARCHIVE_NAME_MAX + 16];
+	int result;
+
+	snprintf(name, sizeof(name), "%s/%u", drop->series.name, drop->number);
+	events.array = put_array(&events.builder, item, "events");
+	result = archive_each_event(p->archive, name, event_json, &events);
+	p->builder = events.builder;
+	return result;
+}
+
+static void put_values(struct builder *b, cJSON *item, const struct archive_drop *drop)
+{
+	char key[PRINT_KEY_MAX];
+	cJSON *not_ok;
+
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		print_key(key, (enum archive_value)i, "");
+		put_number(b, item, key, drop->value[i]);
+		print_key(key, (enum archive_value)i, "sigma_");
+		put_number(b, item, key, drop->sigma[i]);
+	}
+	not_ok = put_array(b, item, "not_ok");
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
+		if ((drop->not_ok >> i & 1u) != 0 && !isnan(drop->value[i]))
+			cJSON_AddItemToArray(not_ok,
+			                     cJSON_CreateString(archive_value_name((enum archive_value)i)));
+}
+
+static int drop_json(void *context, const struct archive_drop *drop)
+{
+	struct print *p = context;
+	struct builder *b = &p->builder;
+	cJSON *item = put_append(b, p->array);
+
+	if (archive_counts(drop, p->undecided))
+		archive_cell_add(&p->total, drop);
+	put_text(b, item, "series", drop->series.name);
+	put_number(b, item, "number", drop->number);
+	put_text(b, item, "campaign", drop->series.campaign);
+	put_text(b, item, "scene", drop->series.scene_name);
+	put_number(b, item, "angle_deg", drop->series.angle_deg);
+	put_text(b, item, "time", drop->time);
+	put_text(b, item, "state", drop->state);
+	put_text(b, item, "decision", drop->decision);
+	put_text(b, item, "reason", drop->reason);
+	put_text(b, item, "operator", drop->operator_name);
+	put_text(b, item, "note", drop->note);
+	put_text(b, item, "raw", drop->raw);
+	put_number(b, item, "bytes", (double)drop->bytes);
+	put_text(b, item, "sha256", drop->sha256);
+	if (drop->version != NULL)
+		put_text(b, item, "version", drop->version);
+	else
+		put_item(b, item, "version", cJSON_CreateNull());
+	put_text(b, item, "flags", drop->flags);
+	put_values(b, item, drop);
+	return p->with_events ? put_events(p, item, drop) : 0;
+}
+
+static int series_of_drops(void *context, const struct archive_series *series)
+{
+	struct print *p = context;
+
+	put_series_keys(&p->builder, p->array, series);
+	put_text(&p->builder, p->array, "scene_text", series->scene);
+	return 0;
+}
+
+static int drops_json(struct print *p, const struct archive_filter *filter)
+{
+	struct print head = {.builder = {false}};
+	cJSON *root = cJSON_CreateObject(), *means;
+	int result = 0;
+
+	if (filter->series != NULL) {
+		head.array = put_object(&head.builder, root, "series");
+		result = archive_each_series(p->archive, filter, series_of_drops, &head);
+		p->builder = head.builder;
+	}
+	p->with_events = filter->series != NULL;
+	p->array = put_array(&p->builder, root, "drops");
+	if (result == 0)
+		result = archive_each_drop(p->archive, filter, drop_json, p);
+	means = put_object(&p->builder, root, "means");
+	put_number(&p->builder, means, "drops", p->total.drops);
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT && p->total.drops > 0; i++)
+		put_mean(&p->builder, means, archive_value_name((enum archive_value)i), (enum archive_value)i,
+		         &p->total.value[i]);
+	if (result == 0)
+		return put_out(&p->builder, root, p->out);
+	cJSON_Delete(root);
+	return result;
+}
+
+/* ---- CSV ---- */
+
+static int drop_csv(void *context, const struct archive_drop *drop)
+{
+	struct print *p = context;
+
+	csv_text(p->out, drop->series.name);
+	fprintf(p->out, "%u,", drop->number);
+	csv_text(p->out, drop->series.campaign);
+	csv_text(p->out, drop->series.scene_name);
+	csv_number(p->out, drop->series.angle_deg);
+	csv_text(p->out, drop->time);
+	csv_text(p->out, drop->state);
+	csv_text(p->out, drop->decision);
+	csv_text(p->out, drop->reason);
+	csv_text(p->out, drop->operator_name);
+	csv_text(p->out, drop->note);
+	csv_text(p->out, drop->version != NULL ? drop->version : "");
+	csv_text(p->out, drop->flags);
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		csv_number(p->out, drop->value[i]);
+		csv_number(p->out, drop->sigma[i]);
+	}
+	fprintf(p->out, "%s,%s\n", drop->raw, drop->sha256);
+	return 0;
+}
+
+static int drops_csv(struct print *p, const struct archive_filter *filter)
+{
+	char key[PRINT_KEY_MAX];
+
+	fputs("series,number,campaign,scene,angle_deg,time,state,decision,reason,operator,note,version,"
+	      "flags,",
+	      p->out);
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		print_key(key, (enum archive_value)i, "");
+		fprintf(p->out, "%s,", key);
+		print_key(key, (enum archive_value)i, "sigma_");
+		fprintf(p->out, "%s,", key);
+	}
+	fputs("raw,sha256\n", p->out);
+	return archive_each_drop(p->archive, filter, drop_csv, p);
+}
+
+/* ---- text ---- */
+
+/* The columns of the table: a value times scale. */
+static const struct column {
+	enum archive_value value;
+	const char *title;
+	double scale;
+	int decimals;
+} columns[] = {
+        {ARCHIVE_S1_X, "S1 X", 1, 1},       {ARCHIVE_S1_Y, "S1 Y", 1, 1},
+        {ARCHIVE_S1_R, "S1 XY", 1, 1},      {ARCHIVE_S1_Z, "S1 Z", 1, 1},
+        {ARCHIVE_S2_X, "S2 X", 1, 1},       {ARCHIVE_S2_Y, "S2 Y", 1, 1},
+        {ARCHIVE_S2_R, "S2 XY", 1, 1},      {ARCHIVE_S2_Z, "S2 Z", 1, 1},
+        {ARCHIVE_LAG, "lag ms", 1000, 2},   {ARCHIVE_FREQUENCY, "plate Hz", 1, 1},
+        {ARCHIVE_DAMPING, "damping", 1, 3},
+};
+enum { COLUMNS = sizeof(columns) / sizeof(columns[0]) };
+
+static void put_cell(FILE *out, double value, const struct column *column, char mark)
+{
+	if (isnan(value))
+		fprintf(out, "%8s ", "-");
+	else
+		fprintf(out, "%8.*f%c", column->decimals, value * column->scale, mark);
+}
+
+static int drop_text(void *context, const struct archive_drop *drop)
+{
+	struct print *p = context;
+	bool partial = drop->sha256[0] == '\0';
+	char name[ARCHIVE_NAME_MAX + 16];
+
+	if (archive_counts(drop, p->undecided))
+		archive_cell_add(&p->total, drop);
+	if (p->lines++ == 0) {
+		fprintf(p->out, "%-20s %-16s %-11s", "drop", "time (UTC)", "decision");
+		for (int i = 0; i < COLUMNS; i++)
+			fprintf(p->out, "%8s ", columns[i].title);
+		fputc('\n', p->out);
+	}
+	snprintf(name, sizeof(name), "%s/%u", drop->series.name, drop->number);
+	fprintf(p->out, "%-20s %-16.16s %-11s", name, drop->time, partial ? drop->state : drop->decision);
+	for (int i = 0; i < COLUMNS; i++)
+		put_cell(p->out, drop->value[columns[i].value], &columns[i],
+		         (drop->not_ok >> columns[i].value & 1u) != 0 ? '*' : ' ');
+	if (strcmp(drop->state, "missing") == 0)
+		fputs(" raw log missing", p->out);
+	fprintf(p->out, "%s%s%s%s%s%s\n", drop->flags[0] != '\0' ? " " : "", drop->flags,
+	        drop->reason[0] != '\0' ? "; " : "", drop->reason, drop->note[0] != '\0' ? "; " : "",
+	        drop->note);
+	return 0;
+}
+
+static void total_text(const struct print *p)
+{
+	FILE *out = p->out;
+
+	fprintf(out, "\n%-49s", "mean");
+	for (int i = 0; i < COLUMNS; i++)
+		put_cell(out, p->total.value[columns[i].value].mean, &columns[i], ' ');
+	fprintf(out, "\n%-49s", "SD");
+	for (int i = 0; i < COLUMNS; i++)
+		put_cell(out, p->total.value[columns[i].value].sd, &columns[i], ' ');
+	fprintf(out, "\n%-49s", p->undecided ? "n, accepted and undecided" : "n, accepted");
+	for (int i = 0; i < COLUMNS; i++)
+		fprintf(out, "%8u ", p->total.value[columns[i].value].n);
+	fputs("\n* look at its status: 'droptower analyze' on the log says what is the matter\n", out);
+}
+
+static int head_text(void *context, const struct archive_series *series)
+{
+	struct print *p = context;
+
+	fprintf(p->out, "%s, campaign %s: %s at %g deg from %g m, %u of %u drops recorded\n\n", series->name,
+	        series->campaign, series->scene_name, series->angle_deg, series->height_m, series->recorded,
+	        series->planned);
+	return 0;
+}
+
+static int drops_text(struct print *p, const struct archive_filter *filter)
+{
+	int result = 0;
+
+	if (filter->series != NULL)
+		result = archive_each_series(p->archive, filter, head_text, p);
+	if (result == 0)
+		result = archive_each_drop(p->archive, filter, drop_text, p);
+	if (result != 0)
+		return result;
+	if (p->lines == 0)
+		fputs("no drops\n", p->out);
+	else if (filter->series != NULL && p->total.drops > 0)
+		total_text(p);
+	else if (filter->series != NULL)
+		fputs("\nnone accepted yet: no mean\n", p->out);
+	return 0;
+}
+
+int print_drops(struct archive *archive, const struct archive_filter *filter, bool undecided,
+                enum print_format format, FILE *out)
+{
+	struct print p = {.out = out, .archive = archive, .undecided = undecided};
+	int result;
+
+	if (format == PRINT_JSON)
+		return drops_json(&p, filter);
+	result = format == PRINT_CSV ? drops_csv(&p, filter) : drops_text(&p, filter);
+	return result != 0 ? result : print_done(out);
+}

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ARCHIVE_PRINT_PRIVATE_H
+#define DT_HOST_ARCHIVE_PRINT_PRIVATE_H
+/*
+ * What the printers share.
+ */
+#include "host/archive/print.h"
+#include "host/report/put.h"
+
+/* What is being printed, as the context of the archive_each_* calls. */
+struct print {
+	FILE *out;
+	struct archive *archive;
+	bool undecided, with_events;
+	struct builder builder;
+	cJSON *array; /* of what is printed as JSON */
+	size_t lines;
+	struct archive_cell total; /* of the drops that count */
+};
+
+/* "name_unit", or "name_sigma_unit". */
+enum { PRINT_KEY_MAX = 48 };
+void print_key(char key[PRINT_KEY_MAX], enum archive_value value, const char *part);
+
+void put_mean(struct builder *b, cJSON *object, const char *key, enum archive_value value,
+              const struct archive_mean *mean);
+void put_series_keys(struct builder *b, cJSON *object, const struct archive_series *series);
+
+void csv_text(FILE *out, const char *text); /* quoted where it must be; then a comma */
+void csv_number(FILE *out, double value);   /* nothing when NAN; then a comma */
+void csv_mean(FILE *out, const struct archive_mean *mean);
+int print_done(FILE *out);
+
+/* mean a / mean b; NAN where there is none. */
+double print_ratio(const struct archive_mean *a, const struct archive_mean *b);
+
+#endif

@@ -1,0 +1,98 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ARCHIVE_PRIVATE_H
+#define DT_HOST_ARCHIVE_PRIVATE_H
+/*
+ * What the files of this folder share: the open archive, statements, and sidecars. Every function that fails
+ * has written archive->message.
+ */
+#include <sqlite3.h>
+#include <stdio.h>
+
+#include "host/archive/archive.h"
+
+struct archive {
+	char *folder;
+	sqlite3 *index;
+	int lock; /* shared by writers, exclusive to who rebuilds; -1: reading */
+	char message[ARCHIVE_MESSAGE_MAX];
+};
+
+/* Writes the message and returns code. */
+__attribute__((format(printf, 3, 4))) int archive_refuse(struct archive *archive, int code,
+                                                         const char *format, ...);
+
+/* ---- statements: types is one letter for each value, s text (NULL allowed), i int64_t, d double (NAN: null)
+ * ---- */
+
+/* Prepares and binds; to be finalized after success. */
+DT_MUST_USE int sql_query(struct archive *archive, sqlite3_stmt **statement, const char *text,
+                          const char *types, ...);
+
+/* 1 with a row, 0 after the last, DT_E_*. */
+DT_MUST_USE int sql_step(struct archive *archive, sqlite3_stmt *statement);
+
+/* Runs one statement to its end. */
+DT_MUST_USE int sql_run(struct archive *archive, const char *text, const char *types, ...);
+
+/* Runs a script. */
+DT_MUST_USE int sql_script(struct archive *archive, const char *text);
+
+/* The first value of the first row; DT_E_EMPTY without a message when there is no row. */
+DT_MUST_USE int sql_number(struct archive *archive, int64_t *number, const char *text, const char *types,
+                           ...);
+
+/* Never NULL. */
+const char *sql_text(sqlite3_stmt *statement, int column);
+
+/* A damaged or unreachable index, in words. */
+int sql_refuse(struct archive *archive);
+
+DT_MUST_USE int archive_start(struct archive *archive); /* a transaction for writing */
+/* Commits when result is 0, else takes everything back; returns result or what committing said. */
+DT_MUST_USE int archive_end(struct archive *archive, int result);
+
+/* Opens FOLDER/NAME and makes or migrates the schema. */
+DT_MUST_USE int index_open(struct archive *archive, const char *name, enum archive_mode mode);
+DT_MUST_USE int schema_upgrade(struct archive *archive);
+
+/* An archive without an index yet, with its folder locked. */
+DT_MUST_USE int archive_lock(struct archive *archive, bool exclusive);
+
+/* ---- names ---- */
+
+enum { ARCHIVE_TIME_CHARS = 24 };
+void archive_time(char text[ARCHIVE_TIME_CHARS], int64_t time_s);
+DT_MUST_USE int archive_check_name(struct archive *archive, const char *what, const char *name);
+DT_MUST_USE int archive_check_text(struct archive *archive, const char *what, const char *text);
+
+struct archive_place {
+	int64_t drop, series;
+	char name[ARCHIVE_NAME_MAX + 1];
+	unsigned number;
+	char raw[ARCHIVE_NAME_MAX + 64];
+	bool recorded;
+};
+/* "SERIES/NUMBER" to its row. */
+DT_MUST_USE int archive_locate(struct archive *archive, const char *drop, struct archive_place *place);
+
+/* ---- sidecars: the scene as it was given, then what the index knows ---- */
+
+#define SIDECAR_SECTION "[archive]"
+
+/* Writes FOLDER/raw/.../NNNN.ini of a drop, or .../SERIES.ini, from the index; within a transaction. */
+DT_MUST_USE int sidecar_write_drop(struct archive *archive, int64_t drop);
+DT_MUST_USE int sidecar_write_series(struct archive *archive, int64_t series);
+
+/* Puts what file (in the folder) says into the index. 1: all but a result that could not be used, message
+ * says why. */
+DT_MUST_USE int sidecar_read(struct archive *archive, const char *file);
+
+/* Puts a result into the index alone. DT_E_FORMAT: json is none of ours. */
+DT_MUST_USE int result_insert(struct archive *archive, int64_t drop, const char *when, const char *version,
+                              const char *json);
+
+/* A scene from its text. */
+DT_MUST_USE int scene_of_text(struct archive *archive, const char *name, const char *text, double angle_deg,
+                              struct scene *scene);
+
+#endif

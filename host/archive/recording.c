@@ -1,0 +1,337 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Everything that changes an archive. The sidecar is written within the transaction that it tells of, so that
+ * nothing is acknowledged that is not in both; a sidecar may be ahead of the index by what was never
+ * acknowledged.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "host/archive/durable.h"
+#include "host/archive/private.h"
+
+enum { SCENE_MAX_BYTES = 65536, NUMBER_MAX = 1000000 };
+
+static int refuse_file(struct archive *archive, const char *file)
+{
+	return archive_refuse(archive, DT_E_SYSTEM, "%.500s: %s", file, strerror(errno));
+}
+
+/* ---- series ---- */
+
+static int read_scene_text(struct archive *archive, const char *file, char **text)
+{
+	size_t size;
+
+	*text = durable_read(file, &size);
+	if (*text == NULL)
+		return refuse_file(archive, file);
+	if (size <= SCENE_MAX_BYTES && strlen(*text) == size && strstr(*text, SIDECAR_SECTION) == NULL)
+		return 0;
+	free(*text);
+	return archive_refuse(archive, DT_E_FORMAT, "%.400s: expected a scene of at most %d bytes of text",
+	                      file, SCENE_MAX_BYTES);
+}
+
+static int insert_series(struct archive *archive, const char *name, const char *campaign, const char *text,
+                         const struct scene *scene, unsigned planned)
+{
+	char now[ARCHIVE_TIME_CHARS];
+	int64_t known, row;
+	int result = sql_number(archive, &known, "SELECT id FROM series WHERE name = ?", "s", name);
+
+	if (result == 0)
+		return archive_refuse(archive, DT_E_STATE,
+		                      "series '%s' is there already, expected a new name", name);
+	if (result != DT_E_EMPTY)
+		return result;
+	archive_time(now, time(NULL));
+	result = sql_run(archive, "INSERT OR IGNORE INTO campaigns (name, created) VALUES (?, ?)", "ss",
+	                 campaign, now);
+	if (result == 0)
+		result = sql_run(
+		        archive,
+		        "INSERT INTO series (name, campaign_id, scene_name, scene, angle_deg, height_m,"
+		        " plate_mass_kg, planned, created)"
+		        " SELECT ?, id, ?, ?, ?, ?, ?, ?, ? FROM campaigns WHERE name = ?",
+		        "sssdddiss", name, scene->name, text, scene->drop_angle_deg, scene->drop_height_m,
+		        scene->mount_plate_mass_kg, (int64_t)planned, now, campaign);
+	row = sqlite3_last_insert_rowid(archive->index);
+	return result != 0 ? result : sidecar_write_series(archive, row);
+}
+
+int archive_new_series(struct archive *archive, const char *name, const char *campaign,
+                       const char *scene_file, double angle_deg, unsigned planned)
+{
+	char message[SCENE_MESSAGE_MAX], *text;
+	struct scene scene;
+	int result = archive_check_name(archive, "series", name);
+
+	if (result == 0)
+		result = archive_check_name(archive, "campaign", campaign);
+	if (result != 0)
+		return result;
+	if (scene_read(&scene, scene_file, message) != 0)
+		return archive_refuse(archive, DT_E_FORMAT, "%s", message);
+	if (isnan(angle_deg))
+		angle_deg = scene.drop_angle_deg;
+	result = read_scene_text(archive, scene_file, &text);
+	if (result != 0)
+		return result;
+	result = scene_of_text(archive, name, text, angle_deg, &scene);
+	if (result == 0)
+		result = archive_start(archive);
+	if (result == 0)
+		result = archive_end(archive, insert_series(archive, name, campaign, text, &scene, planned));
+	free(text);
+	return result;
+}
+
+/* ---- recording ---- */
+
+/* The next number whose log is not there; its log is made, and locked. */
+static int take_number(struct archive *archive, const char *year, const char *ending,
+                       struct archive_recording *r)
+{
+	for (; r->number < NUMBER_MAX; r->number++) {
+		snprintf(r->raw, sizeof(r->raw), "raw/%.4s/%s/%04u%.8s", year, r->series, r->number, ending);
+		snprintf(r->log, sizeof(r->log), "%s/%s", archive->folder, r->raw);
+		if (durable_folders(r->log) != 0)
+			return refuse_file(archive, r->log);
+		r->lock = open(r->log, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+		if (r->lock >= 0 && flock(r->lock, LOCK_EX | LOCK_NB) == 0)
+			return 0;
+		if (r->lock >= 0 || errno != EEXIST)
+			return refuse_file(archive, r->log);
+	}
+	return archive_refuse(archive, DT_E_FULL, "series '%s' has %d drops already", r->series, NUMBER_MAX);
+}
+
+static int insert_drop(struct archive *archive, const char *operator_name, const char *ending,
+                       struct archive_recording *r)
+{
+	char now[ARCHIVE_TIME_CHARS];
+	int64_t series = 0, last = 0;
+	int result = sql_number(archive, &series, "SELECT id FROM series WHERE name = ?", "s", r->series);
+
+	if (result == DT_E_EMPTY)
+		return archive_refuse(archive, DT_E_UNKNOWN,
+		                      "no series '%.80s' in %.300s; 'droptower series new' makes one",
+		                      r->series, archive->folder);
+	if (result == 0)
+		result = sql_number(archive, &last,
+		                    "SELECT COALESCE(MAX(number), 0) FROM drops WHERE series_id = ?", "i",
+		                    series);
+	if (result != 0)
+		return result;
+	archive_time(now, time(NULL));
+	r->number = (unsigned)last + 1;
+	result = take_number(archive, now, ending, r);
+	if (result == 0)
+		result = sql_run(archive,
+		                 "INSERT INTO drops (series_id, number, state, operator, raw, time)"
+		                 " VALUES (?, ?, 'recording', ?, ?, ?)",
+		                 "iisss", series, (int64_t)r->number, operator_name, r->raw, now);
+	r->drop = sqlite3_last_insert_rowid(archive->index);
+	return result != 0 ? result : sidecar_write_drop(archive, r->drop);
+}
+
+static void remove_files(const struct archive *archive, const char *raw)
+{
+	char path[ARCHIVE_PATH_MAX];
+
+	snprintf(path, sizeof(path), "%s/%s", archive->folder, raw);
+	unlink(path);
+	strcpy(strrchr(path, '.'), ".ini");
+	unlink(path);
+}
+
+int archive_begin(struct archive *archive, const char *series, const char *operator_name, const char *ending,
+                  struct archive_recording *recording)
+{
+	struct archive_recording r = {.lock = -1};
+	int result = archive_check_name(archive, "series", series);
+
+	if (result == 0)
+		result = archive_check_text(archive, "operator's name", operator_name);
+	if (result != 0)
+		return result;
+	strcpy(r.series, series);
+	result = archive_start(archive);
+	if (result != 0)
+		return result;
+	result = archive_end(archive, insert_drop(archive, operator_name, ending, &r));
+	if (result == 0) {
+		*recording = r;
+		return 0;
+	}
+	if (r.lock >= 0) {
+		remove_files(archive, r.raw);
+		archive_abandon(&r);
+	}
+	return result;
+}
+
+void archive_abandon(struct archive_recording *recording)
+{
+	close(recording->lock);
+	recording->lock = -1;
+}
+
+void archive_discard(struct archive *archive, struct archive_recording *recording)
+{
+	if (sql_run(archive, "DELETE FROM drops WHERE id = ?", "i", recording->drop) == 0)
+		remove_files(archive, recording->raw);
+	archive_abandon(recording);
+}
+
+static int add_event(struct archive *archive, int64_t drop, const char *what, const char *operator_name,
+                     const char *text)
+{
+	char now[ARCHIVE_TIME_CHARS];
+
+	archive_time(now, time(NULL));
+	return sql_run(archive,
+	               "INSERT INTO events (drop_id, time, what, operator, text) VALUES (?, ?, ?, ?, ?)",
+	               "issss", drop, now, what, operator_name, text);
+}
+
+static int acknowledge(struct archive *archive, const struct archive_recording *r, const char *when,
+                       const char *note, const char *hash, int64_t bytes)
+{
+	int result = sql_run(archive,
+	                     "UPDATE drops SET state = 'recorded', bytes = ?, sha256 = ?, note = ?,"
+	                     " time = COALESCE(?, time) WHERE id = ?",
+	                     "isssi", bytes, hash, note, when, r->drop);
+
+	return result != 0 ? result : sidecar_write_drop(archive, r->drop);
+}
+
+int archive_finish(struct archive *archive, struct archive_recording *recording, int64_t time_s,
+                   const char *note)
+{
+	char hash[DURABLE_HASH_CHARS], when[ARCHIVE_TIME_CHARS];
+	int64_t bytes;
+	int result = archive_check_text(archive, "note", note);
+
+	archive_time(when, time_s);
+	if (result == 0 &&
+	    (durable_sync(recording->log) != 0 || durable_hash(recording->log, hash, &bytes) != 0))
+		result = refuse_file(archive, recording->log);
+	if (result == 0)
+		result = archive_start(archive);
+	if (result == 0)
+		result = archive_end(archive, acknowledge(archive, recording, time_s != 0 ? when : NULL, note,
+		                                          hash, bytes));
+	archive_abandon(recording);
+	return result;
+}
+
+/* ---- decisions, notes, calibrations ---- */
+
+static int start_change(struct archive *archive, const char *drop, const char *operator_name,
+                        const char *text, struct archive_place *place)
+{
+	int result = archive_check_text(archive, "text", text);
+
+	if (result == 0)
+		result = archive_check_text(archive, "operator's name", operator_name);
+	if (result == 0)
+		result = archive_start(archive);
+	if (result != 0)
+		return result;
+	result = archive_locate(archive, drop, place);
+	return result == 0 ? 0 : archive_end(archive, result);
+}
+
+static int end_change(struct archive *archive, const struct archive_place *place, int result)
+{
+	if (result == 0)
+		result = sidecar_write_drop(archive, place->drop);
+	return archive_end(archive, result);
+}
+
+int archive_decide(struct archive *archive, const char *drop, enum archive_decision decision,
+                   const char *operator_name, const char *text)
+{
+	static const char *const names[] = {"open", "accepted", "rejected"};
+	struct archive_place place;
+	int result;
+
+	if (decision != ARCHIVE_ACCEPTED && strspn(text, " ") == strlen(text))
+		return archive_refuse(archive, DT_E_ARGUMENT, "%s: expected a reason", drop);
+	result = start_change(archive, drop, operator_name, text, &place);
+	if (result != 0)
+		return result;
+	if (!place.recorded)
+		result = archive_refuse(archive, DT_E_STATE,
+		                        "%s was never completely recorded: it counts nowhere", drop);
+	if (result == 0)
+		result = sql_run(archive, "UPDATE drops SET decision = ?, reason = ? WHERE id = ?", "ssi",
+		                 names[decision], text, place.drop);
+	if (result == 0)
+		result = add_event(archive, place.drop, names[decision], operator_name, text);
+	return end_change(archive, &place, result);
+}
+
+int archive_note(struct archive *archive, const char *drop, const char *operator_name, const char *text)
+{
+	struct archive_place place;
+	int result = start_change(archive, drop, operator_name, text, &place);
+
+	if (result != 0)
+		return result;
+	result = sql_run(archive, "UPDATE drops SET note = ? WHERE id = ?", "si", text, place.drop);
+	if (result == 0)
+		result = add_event(archive, place.drop, "note", operator_name, text);
+	return end_change(archive, &place, result);
+}
+
+static int write_calibration(struct archive *archive, const char *sensor, double gain, const char *date,
+                             const char *note)
+{
+	char path[ARCHIVE_PATH_MAX], text[ARCHIVE_TEXT_MAX + 400];
+
+	snprintf(path, sizeof(path), "%s/raw/%.4s/calibration-%s-%s.ini", archive->folder, date, sensor,
+	         date);
+	snprintf(text, sizeof(text),
+	         SIDECAR_SECTION "\nformat = 1\ncalibration = %s\ngain = %.17g\ndate = %s\nnote = %s\n",
+	         sensor, gain, date, note);
+	if (durable_folders(path) != 0 || durable_write(path, text, strlen(text)) != 0)
+		return refuse_file(archive, path);
+	return 0;
+}
+
+int archive_calibrate(struct archive *archive, const char *sensor, double gain, const char *date,
+                      const char *note)
+{
+	struct tm day;
+	const char *end = strptime(date, "%Y-%m-%d", &day);
+	int result = archive_check_name(archive, "sensor", sensor);
+
+	if (result == 0)
+		result = archive_check_text(archive, "note", note);
+	if (result != 0)
+		return result;
+	if (end == NULL || *end != '\0' || strlen(date) != 10)
+		return archive_refuse(archive, DT_E_ARGUMENT, "'%.40s' is no date, expected YYYY-MM-DD",
+		                      date);
+	if (!(gain > 0.1 && gain < 10))
+		return archive_refuse(archive, DT_E_RANGE, "a gain of %g, expected 0.1 to 10", gain);
+	result = archive_start(archive);
+	if (result != 0)
+		return result;
+	result = sql_run(archive,
+	                 "INSERT OR REPLACE INTO calibrations (sensor, gain, date, note) VALUES (?, ?, ?, ?)",
+	                 "sdss", sensor, gain, date, note);
+	if (result == 0)
+		result = write_calibration(archive, sensor, gain, date, note);
+	return archive_end(archive, result);
+}

@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/archive/table.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void mean_add(struct archive_mean *m, double value, bool not_ok)
+{
+	double before = m->n > 0 ? value - m->mean : value;
+
+	if (!isfinite(value))
+		return;
+	m->n++;
+	m->not_ok += not_ok;
+	m->mean = m->n > 1 ? m->mean + before / m->n : value;
+	m->squares += m->n > 1 ? before * (value - m->mean) : 0;
+	m->sd = m->n > 1 ? sqrt(m->squares / (m->n - 1)) : (double)NAN;
+}
+
+void archive_cell_add(struct archive_cell *cell, const struct archive_drop *drop)
+{
+	if (cell->drops++ == 0) {
+		snprintf(cell->campaign, sizeof(cell->campaign), "%s", drop->series.campaign);
+		snprintf(cell->scene_name, sizeof(cell->scene_name), "%s", drop->series.scene_name);
+		cell->angle_deg = drop->series.angle_deg;
+		cell->plate_mass_kg = drop->series.plate_mass_kg;
+		for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
+			cell->value[i].mean = cell->value[i].sd = NAN;
+	}
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
+		mean_add(&cell->value[i], drop->value[i], (drop->not_ok >> i & 1u) != 0);
+}
+
+bool archive_counts(const struct archive_drop *drop, bool undecided)
+{
+	return strcmp(drop->decision, "accepted") == 0 ||
+	       (undecided && strcmp(drop->decision, "open") == 0 && drop->sha256[0] != '\0');
+}
+
+struct growing {
+	struct archive_table table;
+	size_t room;
+	bool undecided;
+};
+
+static bool belongs(const struct archive_cell *cell, const struct archive_series *series)
+{
+	return cell->angle_deg >= series->angle_deg && cell->angle_deg <= series->angle_deg &&
+	       strcmp(cell->scene_name, series->scene_name) == 0 &&
+	       strcmp(cell->campaign, series->campaign) == 0;
+}
+
+static int add_drop(void *context, const struct archive_drop *drop)
+{
+	struct growing *g = context;
+	struct archive_table *t = &g->table;
+
+	if (!archive_counts(drop, g->undecided))
+		return 0;
+	if (t->count == 0 || !belongs(&t->cell[t->count - 1], &drop->series)) {
+		if (t->count == g->room) {
+			size_t room = 2 * g->room + 16;
+			struct archive_cell *cell = realloc(t->cell, room * sizeof(*cell));
+
+			if (cell == NULL)
+				return DT_E_MEMORY;
+			t->cell = cell;
+			g->room = room;
+		}
+		memset(&t->cell[t->count++], 0, sizeof(*t->cell));
+	}
+	archive_cell_add(&t->cell[t->count - 1], drop);
+	return 0;
+}
+
+int archive_table(struct archive *archive, const struct archive_filter *filter, bool undecided,
+                  struct archive_table *table)
+{
+	struct growing g = {.undecided = undecided};
+	int result = archive_each_drop(archive, filter, add_drop, &g);
+
+	if (result == 0)
+		*table = g.table;
+	else
+		free(g.table.cell);
+	return result;
+}
+
+void archive_table_free(struct archive_table *table)
+{
+	free(table->cell);
+}
+
+static bool same_place(const struct archive_cell *a, const struct archive_cell *b)
+{
+	return fabs(a->angle_deg - b->angle_deg) < 1e-9 && strcmp(a->campaign, b->campaign) == 0;
+}
+
+const struct archive_cell *archive_table_find(const struct archive_table *table,
+                                              const struct archive_cell *cell, const char *scene_name)
+{
+	for (size_t i = 0; i < table->count; i++)
+		if (same_place(&table->cell[i], cell) && strcmp(table->cell[i].scene_name, scene_name) == 0)
+			return &table->cell[i];
+	return NULL;
+}
+
+const struct archive_cell *archive_table_reference(const struct archive_table *table,
+                                                   const struct archive_cell *cell)
+{
+	const struct archive_cell *found = NULL;
+
+	for (size_t i = 0; i < table->count; i++) {
+		if (!same_place(&table->cell[i], cell) || table->cell[i].plate_mass_kg > 0)
+			continue;
+		if (found != NULL)
+			return NULL;
+		found = &table->cell[i];
+	}
+	return found == cell ? NULL : found;
+}

@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ARCHIVE_TABLE_H
+#define DT_HOST_ARCHIVE_TABLE_H
+/*
+ * Means and standard deviations of drops, by campaign, scene and angle.
+ */
+#include "host/archive/archive.h"
+
+struct archive_mean {
+	unsigned n;      /* drops that have the value */
+	unsigned not_ok; /* of them, those whose status says to look */
+	double mean;     /* NAN without any */
+	double sd;       /* of a single drop, over n - 1; NAN below two */
+	double squares;  /* while it grows: sum of squared deviations */
+};
+
+struct archive_cell {
+	char campaign[ARCHIVE_NAME_MAX + 1];
+	char scene_name[64];
+	double angle_deg, plate_mass_kg;
+	unsigned drops;
+	struct archive_mean value[ARCHIVE_VALUE_COUNT];
+};
+
+struct archive_table {
+	struct archive_cell *cell; /* in the order of campaign, scene and angle */
+	size_t count;
+};
+
+/* Adds a drop; a cell is begun zeroed. (Welford 1962) */
+void archive_cell_add(struct archive_cell *cell, const struct archive_drop *drop);
+
+/* Whether a drop counts: accepted, or with undecided, also recorded and not yet decided. */
+bool archive_counts(const struct archive_drop *drop, bool undecided);
+
+/* Of the drops that pass and count. To be freed by archive_table_free after 0. */
+DT_MUST_USE int archive_table(struct archive *archive, const struct archive_filter *filter, bool undecided,
+                              struct archive_table *table);
+void archive_table_free(struct archive_table *table);
+
+/* The cell of that scene in cell's campaign and at its angle; NULL when there is none. */
+const struct archive_cell *archive_table_find(const struct archive_table *table,
+                                              const struct archive_cell *cell, const char *scene_name);
+
+/* The scene that others are compared with: the only one of cell's campaign and angle without a plate. NULL
+ * when there is none or more than one, or it is cell's own. */
+const struct archive_cell *archive_table_reference(const struct archive_table *table,
+                                                   const struct archive_cell *cell);
+
+#endif

@@ -1,0 +1,479 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/chart/method.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/chart/product.h"
+
+#define GROSS 0.15
+
+static const struct quantity_text texts[QUANTITIES] = {
+        [QUANTITY_PEAK] = {"peak", "Peak of one axis (S2 X)", "g", 1, 3},
+        /* without a family an instant costs four times the bound: that is no failure */
+        [QUANTITY_PEAK_TIME] = {"peak-time", "Instant of one axis' peak (S2 X)", "us", 1e6, 6},
+        [QUANTITY_RESULTANT] = {"resultant", "Resultant of X and Y (S2)", "g", 1, 3},
+        [QUANTITY_LAG] = {"lag", "Time from S2's peak to S1's (X)", "us", 1e6, 3},
+        [QUANTITY_FREQUENCY] = {"frequency", "Damped frequency of the plate (S1)", "Hz", 1, 3},
+        [QUANTITY_DAMPING] = {"damping", "Damping ratio of the plate (S1)", "%", 100, 3},
+        [QUANTITY_CONTACT] = {"contact", "Contact time (S2 X)", "us", 1e6, 3},
+        [QUANTITY_VELOCITY] = {"velocity", "Velocity change (S2 X)", "mm/s", 1e3, 3},
+};
+
+const struct quantity_text *quantity_text(enum quantity quantity)
+{
+	return &texts[quantity];
+}
+
+/* ---- a trial ------------------------------------------------------------------------------------------- */
+
+/* Pre-trigger mean off, holes bridged; what is missing at an end repeats the last that is there. */
+static void bridge(const struct channel *channel, size_t quiet, double *y)
+{
+	double sum = 0, last = NAN;
+	size_t n = 0, from = 0;
+
+	for (size_t k = 0; k < quiet; k++)
+		if (!channel->sample[k]) {
+			sum += channel->value_g[k];
+			n++;
+		}
+	for (size_t k = 0; k < channel->count; k++) {
+		double value = channel->value_g[k] - (n > 0 ? sum / (double)n : 0);
+
+		if (channel->sample[k])
+			continue;
+		for (size_t i = from; i <= k; i++)
+			y[i] = isnan(last) ? value
+			                   : last + (value - last) * (double)(i + 1 - from) /
+			                                     (double)(k + 1 - from);
+		last = value;
+		from = k + 1;
+	}
+	for (size_t i = from; i < channel->count; i++)
+		y[i] = isnan(last) ? 0 : last;
+}
+
+static double contact_end(const struct synthetic *synthetic)
+{
+	const struct synthetic_axis *axis = &synthetic->signal[0].axis;
+
+	return synthetic->onset_s + axis->onset_s + axis->contact_s + fmax(0, axis->delay_s);
+}
+
+static int make_series(struct trial *trial)
+{
+	const struct synthetic *synthetic = trial->synthetic;
+	size_t total = 0, from;
+	double *next;
+
+	for (int i = 0; i < SYNTHETIC_CHANNELS; i++)
+		total += synthetic->record.channels[i].count;
+	next = trial->memory = malloc(total * sizeof(*next));
+	if (!next)
+		return DT_E_MEMORY;
+	for (int i = 0; i < SYNTHETIC_CHANNELS; i++) {
+		const struct channel *channel = &synthetic->record.channels[i];
+
+		bridge(channel, (size_t)((synthetic->scene.pre_s - 5e-3) * channel->rate_hz), next);
+		trial->series[i] = (struct reference_series){next, channel->count, channel->rate_hz};
+		next += channel->count;
+	}
+	trial->decay = trial->series[SYNTHETIC_S1X];
+	from = (size_t)ceil(contact_end(synthetic) * trial->decay.rate_hz);
+	from = from < trial->decay.count ? from : trial->decay.count;
+	trial->decay.y += from;
+	trial->decay.count -= from;
+	return 0;
+}
+
+int trial_open(struct trial *trial, const struct synthetic *synthetic)
+{
+	static const struct estimate_options options[TELLINGS] = {
+	        [TELL_HALF_SINE] = {.family = ESTIMATE_FAMILY_HALF_SINE},
+	        [TELL_SINE_POWER] = {.family = ESTIMATE_FAMILY_SINE_POWER},
+	};
+	int status;
+
+	*trial = (struct trial){.synthetic = synthetic, .truth = synthetic_truth(synthetic)};
+	status = make_series(trial);
+	for (int i = 0; i < TELLINGS && !status; i++)
+		status = estimate_record(&synthetic->record, &options[i], &trial->analysis[i]);
+	if (!status) {
+		trial->product = product_open(&synthetic->record, contact_end(synthetic));
+		status = trial->product ? 0 : DT_E_MEMORY;
+	}
+	if (status)
+		trial_close(trial);
+	return status;
+}
+
+void trial_close(struct trial *trial)
+{
+	free(trial->memory);
+	for (int i = 0; i < TELLINGS; i++)
+		estimate_free(&trial->analysis[i]);
+	product_close(trial->product);
+	memset(trial, 0, sizeof(*trial));
+}
+
+/* ---- others' methods ----------------------------------------------------------------------------------- */
+
+static double largest(const struct trial *t)
+{
+	return reference_maximum(&t->series[SYNTHETIC_S2X]).value;
+}
+
+static double largest_time(const struct trial *t)
+{
+	return reference_maximum(&t->series[SYNTHETIC_S2X]).time_s;
+}
+
+static double parabola(const struct trial *t)
+{
+	return reference_parabola(&t->series[SYNTHETIC_S2X]).value;
+}
+
+static double parabola_time(const struct trial *t)
+{
+	return reference_parabola(&t->series[SYNTHETIC_S2X]).time_s;
+}
+
+static struct reference_pulse gsl_pulse(const struct trial *t)
+{
+	struct reference_pulse pulse;
+
+	if (!reference_fit_pulse(&t->series[SYNTHETIC_S2X], &pulse))
+		return (struct reference_pulse){NAN, NAN, NAN};
+	return pulse;
+}
+
+static double gsl_peak(const struct trial *t)
+{
+	return gsl_pulse(t).value;
+}
+
+static double gsl_peak_time(const struct trial *t)
+{
+	return gsl_pulse(t).time_s;
+}
+
+static double gsl_contact(const struct trial *t)
+{
+	return gsl_pulse(t).base_s;
+}
+
+static double two_maxima(const struct trial *t)
+{
+	return hypot(reference_maximum(&t->series[SYNTHETIC_S2X]).value,
+	             reference_maximum(&t->series[SYNTHETIC_S2Y]).value);
+}
+
+static double drawn(const struct trial *t)
+{
+	return reference_resultant(&t->series[SYNTHETIC_S2X], &t->series[SYNTHETIC_S2Y]);
+}
+
+static double maxima_apart(const struct trial *t)
+{
+	return reference_maximum(&t->series[SYNTHETIC_S1X]).time_s -
+	       reference_maximum(&t->series[SYNTHETIC_S2X]).time_s;
+}
+
+static double parabolas_apart(const struct trial *t)
+{
+	return reference_parabola(&t->series[SYNTHETIC_S1X]).time_s -
+	       reference_parabola(&t->series[SYNTHETIC_S2X]).time_s;
+}
+
+static double correlation(const struct trial *t)
+{
+	return reference_correlation(&t->series[SYNTHETIC_S2X], &t->series[SYNTHETIC_S1X]);
+}
+
+static double crossings(const struct trial *t)
+{
+	return reference_crossings(&t->decay).hz;
+}
+
+static double spectrum_hz(const struct trial *t)
+{
+	return reference_spectrum(&t->decay).hz;
+}
+
+static double spectrum_damping(const struct trial *t)
+{
+	return reference_spectrum(&t->decay).damping;
+}
+
+static double decrement(const struct trial *t)
+{
+	return reference_decrement(&t->decay).damping;
+}
+
+static double pencil_hz(const struct trial *t)
+{
+	return reference_pencil(&t->decay).hz;
+}
+
+static double pencil_damping(const struct trial *t)
+{
+	return reference_pencil(&t->decay).damping;
+}
+
+static double gsl_hz(const struct trial *t)
+{
+	return reference_fit_decay(&t->decay).hz;
+}
+
+static double gsl_damping(const struct trial *t)
+{
+	return reference_fit_decay(&t->decay).damping;
+}
+
+static double width(const struct trial *t)
+{
+	return reference_width(&t->series[SYNTHETIC_S2X]);
+}
+
+static double area_width(const struct trial *t)
+{
+	return reference_area_width(&t->series[SYNTHETIC_S2X]);
+}
+
+static double long_sum(const struct trial *t)
+{
+	return reference_velocity(&t->series[SYNTHETIC_S2X], t->truth.contact_s);
+}
+
+/* ---- the product's --------------------------------------------------------------------------------------
+ */
+
+static const struct estimate_channel *x_of(const struct trial *t, enum telling telling)
+{
+	return &t->analysis[telling].channels[SYNTHETIC_S2X];
+}
+
+/* Value, doubt and cost of a quantity that depends on what the product is told. */
+#define TOLD(name, telling, family, field, doubt, job)                      \
+	static double name(const struct trial *t)                           \
+	{                                                                   \
+		return x_of(t, telling)->field;                             \
+	}                                                                   \
+	static const struct estimate_how *name##_how(const struct trial *t) \
+	{                                                                   \
+		return &x_of(t, telling)->doubt;                            \
+	}                                                                   \
+	static void name##_work(const struct trial *t)                      \
+	{                                                                   \
+		job(t->product, family);                                    \
+	}
+
+TOLD(our_peak, TELL_NOTHING, ESTIMATE_FAMILY_AUTO, peak.value_g, peak.how, product_peak)
+TOLD(our_power_peak, TELL_SINE_POWER, ESTIMATE_FAMILY_SINE_POWER, peak.value_g, peak.how, product_peak)
+TOLD(our_told_peak, TELL_HALF_SINE, ESTIMATE_FAMILY_HALF_SINE, peak.value_g, peak.how, product_peak)
+TOLD(our_time, TELL_NOTHING, ESTIMATE_FAMILY_AUTO, peak.time_s, peak.how, product_peak)
+TOLD(our_power_time, TELL_SINE_POWER, ESTIMATE_FAMILY_SINE_POWER, peak.time_s, peak.how, product_peak)
+TOLD(our_told_time, TELL_HALF_SINE, ESTIMATE_FAMILY_HALF_SINE, peak.time_s, peak.how, product_peak)
+TOLD(our_contact, TELL_NOTHING, ESTIMATE_FAMILY_AUTO, pulse.contact_time_s, pulse.contact, product_pulse)
+TOLD(our_told_contact, TELL_HALF_SINE, ESTIMATE_FAMILY_HALF_SINE, pulse.contact_time_s, pulse.contact,
+     product_pulse)
+TOLD(our_sum, TELL_NOTHING, ESTIMATE_FAMILY_AUTO, pulse.velocity_change_m_s, peak.how, product_pulse)
+TOLD(our_area, TELL_NOTHING, ESTIMATE_FAMILY_AUTO, pulse.fitted_velocity_m_s, pulse.contact, product_pulse)
+TOLD(our_told_area, TELL_HALF_SINE, ESTIMATE_FAMILY_HALF_SINE, pulse.fitted_velocity_m_s, pulse.contact,
+     product_pulse)
+
+static double our_resultant(const struct trial *t)
+{
+	return t->analysis[TELL_NOTHING].resultants[1].peak_g;
+}
+
+static double our_told_resultant(const struct trial *t)
+{
+	return t->analysis[TELL_HALF_SINE].resultants[1].peak_g;
+}
+
+static const struct estimate_how *our_resultant_how(const struct trial *t)
+{
+	return &t->analysis[TELL_NOTHING].resultants[1].how;
+}
+
+static const struct estimate_how *our_told_resultant_how(const struct trial *t)
+{
+	return &t->analysis[TELL_HALF_SINE].resultants[1].how;
+}
+
+/* Both axes' peaks are part of it. */
+static void our_resultant_work(const struct trial *t)
+{
+	product_peak(t->product, ESTIMATE_FAMILY_AUTO);
+	product_peak(t->product, ESTIMATE_FAMILY_AUTO);
+	product_resultant(t->product);
+}
+
+static void our_told_resultant_work(const struct trial *t)
+{
+	product_peak(t->product, ESTIMATE_FAMILY_HALF_SINE);
+	product_peak(t->product, ESTIMATE_FAMILY_HALF_SINE);
+	product_resultant(t->product);
+}
+
+static double our_peaks_apart(const struct trial *t)
+{
+	return t->analysis[TELL_NOTHING].lag.largest_peak_s;
+}
+
+static double our_driven(const struct trial *t)
+{
+	return t->analysis[TELL_NOTHING].lag.driven_axis_s[0];
+}
+
+static const struct estimate_how *our_driven_how(const struct trial *t)
+{
+	return &t->analysis[TELL_NOTHING].lag.driven;
+}
+
+static void our_lag_work(const struct trial *t)
+{
+	product_lag(t->product);
+}
+
+static const struct estimate_ringdown *decay_of(const struct trial *t)
+{
+	return &t->analysis[TELL_NOTHING].channels[SYNTHETIC_S1X].ringdown;
+}
+
+static double our_hz(const struct trial *t)
+{
+	return decay_of(t)->frequency_hz;
+}
+
+static double our_damping(const struct trial *t)
+{
+	return decay_of(t)->damping_ratio;
+}
+
+static const struct estimate_how *our_decay_how(const struct trial *t)
+{
+	return &decay_of(t)->how;
+}
+
+static void our_decay_work(const struct trial *t)
+{
+	product_decay(t->product);
+}
+
+static double our_plate_hz(const struct trial *t)
+{
+	return t->analysis[TELL_NOTHING].has_plate ? t->analysis[TELL_NOTHING].plate.frequency_hz
+	                                           : (double)NAN;
+}
+
+static double our_plate_damping(const struct trial *t)
+{
+	return t->analysis[TELL_NOTHING].has_plate ? t->analysis[TELL_NOTHING].plate.damping_ratio
+	                                           : (double)NAN;
+}
+
+static const struct estimate_how *our_plate_how(const struct trial *t)
+{
+	return t->analysis[TELL_NOTHING].has_plate ? &t->analysis[TELL_NOTHING].plate.how : our_decay_how(t);
+}
+
+static void our_plate_work(const struct trial *t)
+{
+	product_decays(t->product);
+}
+
+/* ---- all -------------------------------------------------------------------------------------------------
+ */
+
+#define BOUND(field) offsetof(struct bound, field)
+#define OTHERS(name, quantity, bound, value)                                  \
+	{                                                                     \
+		name, quantity, false, false, BOUND(bound), value, NULL, NULL \
+	}
+#define OURS(name, quantity, bound, value, as)                                        \
+	{                                                                             \
+		name, quantity, true, false, BOUND(bound), value, as##_work, as##_how \
+	}
+#define OURS_TOLD(name, quantity, bound, value, as)                                  \
+	{                                                                            \
+		name, quantity, true, true, BOUND(bound), value, as##_work, as##_how \
+	}
+
+static const struct method methods[] = {
+        OTHERS("largest sample", QUANTITY_PEAK, peak_g, largest),
+        OTHERS("parabola", QUANTITY_PEAK, peak_g, parabola),
+        {"GSL fit, half-sine", QUANTITY_PEAK, false, true, BOUND(peak_g), gsl_peak, NULL, NULL},
+        OURS("default", QUANTITY_PEAK, peak_g, our_peak, our_peak),
+        OURS("sine-power", QUANTITY_PEAK, peak_g, our_power_peak, our_power_peak),
+        OURS_TOLD("half-sine", QUANTITY_PEAK, peak_g, our_told_peak, our_told_peak),
+
+        OTHERS("largest sample", QUANTITY_PEAK_TIME, peak_s, largest_time),
+        OTHERS("parabola", QUANTITY_PEAK_TIME, peak_s, parabola_time),
+        {"GSL fit, half-sine", QUANTITY_PEAK_TIME, false, true, BOUND(peak_s), gsl_peak_time, NULL, NULL},
+        OURS("default", QUANTITY_PEAK_TIME, peak_s, our_time, our_time),
+        OURS("sine-power", QUANTITY_PEAK_TIME, peak_s, our_power_time, our_power_time),
+        OURS_TOLD("half-sine", QUANTITY_PEAK_TIME, peak_s, our_told_time, our_told_time),
+
+        OTHERS("hypot of the maxima", QUANTITY_RESULTANT, resultant_g, two_maxima),
+        OTHERS("X drawn to Y's instants", QUANTITY_RESULTANT, resultant_g, drawn),
+        OURS("default", QUANTITY_RESULTANT, resultant_g, our_resultant, our_resultant),
+        OURS_TOLD("half-sine", QUANTITY_RESULTANT, resultant_g, our_told_resultant, our_told_resultant),
+
+        OTHERS("largest samples", QUANTITY_LAG, lag_s, maxima_apart),
+        OTHERS("parabolas", QUANTITY_LAG, lag_s, parabolas_apart),
+        OTHERS("cross-correlation", QUANTITY_LAG, lag_s, correlation),
+        {"resultants' peaks", QUANTITY_LAG, true, false, BOUND(lag_s), our_peaks_apart, our_lag_work, NULL},
+        {"driven oscillator", QUANTITY_LAG, true, false, BOUND(lag_s), our_driven, our_lag_work,
+         our_driven_how},
+
+        OTHERS("zero crossings", QUANTITY_FREQUENCY, damped_hz, crossings),
+        OTHERS("FFT peak", QUANTITY_FREQUENCY, damped_hz, spectrum_hz),
+        OTHERS("matrix pencil", QUANTITY_FREQUENCY, damped_hz, pencil_hz),
+        OTHERS("GSL fit", QUANTITY_FREQUENCY, damped_hz, gsl_hz),
+        OURS("X", QUANTITY_FREQUENCY, damped_hz, our_hz, our_decay),
+        OURS("X and Y", QUANTITY_FREQUENCY, pair_hz, our_plate_hz, our_plate),
+
+        OTHERS("log decrement", QUANTITY_DAMPING, damping, decrement),
+        OTHERS("half-power width", QUANTITY_DAMPING, damping, spectrum_damping),
+        OTHERS("matrix pencil", QUANTITY_DAMPING, damping, pencil_damping),
+        OTHERS("GSL fit", QUANTITY_DAMPING, damping, gsl_damping),
+        OURS("X", QUANTITY_DAMPING, damping, our_damping, our_decay),
+        OURS("X and Y", QUANTITY_DAMPING, pair_damping, our_plate_damping, our_plate),
+
+        {"10 % width x 1.068", QUANTITY_CONTACT, false, true, BOUND(contact_s), width, NULL, NULL},
+        {"pi dv / 2 A", QUANTITY_CONTACT, false, true, BOUND(contact_s), area_width, NULL, NULL},
+        {"GSL fit, half-sine", QUANTITY_CONTACT, false, true, BOUND(contact_s), gsl_contact, NULL, NULL},
+        OURS("best family", QUANTITY_CONTACT, contact_s, our_contact, our_contact),
+        OURS_TOLD("half-sine", QUANTITY_CONTACT, contact_s, our_told_contact, our_told_contact),
+
+        OTHERS("sum over +-3 contacts", QUANTITY_VELOCITY, velocity_m_s, long_sum),
+        OURS("sum over the pulse", QUANTITY_VELOCITY, velocity_m_s, our_sum, our_sum),
+        OURS("best family", QUANTITY_VELOCITY, velocity_m_s, our_area, our_area),
+        OURS_TOLD("half-sine", QUANTITY_VELOCITY, velocity_m_s, our_told_area, our_told_area),
+};
+
+const struct method *method_table(size_t *count)
+{
+	*count = sizeof(methods) / sizeof(methods[0]);
+	return methods;
+}
+
+double method_truth(const struct method *method, const struct trial *trial)
+{
+	const struct synthetic_truth *truth = &trial->truth;
+	const double values[QUANTITIES] = {truth->peak_g,    truth->peak_s,      truth->resultant_g,
+	                                   truth->lag_s,     truth->damped_hz,   truth->damping,
+	                                   truth->contact_s, truth->velocity_m_s};
+
+	return values[method->quantity];
+}
+
+double method_gross(const struct method *method, const struct trial *trial)
+{
+	return GROSS * (method->quantity == QUANTITY_PEAK_TIME ? trial->truth.contact_s
+	                                                       : fabs(method_truth(method, trial)));
+}

@@ -1,0 +1,453 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <string.h>
+
+#include "host/chart/campaign.h"
+#include "host/chart/chart.h"
+#include "host/chart/file.h"
+
+/* A failing method: so far above the bound (struct quantity_text), or gross errors in more than this. */
+#define GROSS_MOST 0.01
+
+enum { VALUES_MAX = 7, ROW = 36, COLUMN = 15, LEFT = 235, TOP = 150, BOTTOM = 120, RIGHT = 20 };
+
+/* What grows from left to right. */
+struct sweep {
+	const char *name, *unit;
+	void (*apply)(struct synthetic_scene *scene, double value);
+	double value[VALUES_MAX];
+	size_t count;
+};
+
+static void noise(struct synthetic_scene *scene, double value)
+{
+	scene->noise_g = value;
+}
+
+static void damping(struct synthetic_scene *scene, double value)
+{
+	scene->damping = value / 100;
+}
+
+static void length(struct synthetic_scene *scene, double value)
+{
+	scene->decay_s = value / scene->damped_hz;
+}
+
+static void rate(struct synthetic_scene *scene, double value)
+{
+	scene->rate_hz[0] = value * 1e3;
+	scene->rate_hz[1] = value * 1e3 * 10 / 7;
+}
+
+static void family(struct synthetic_scene *scene, double value)
+{
+	scene->family = (enum synthetic_family)value;
+}
+
+static void clipping(struct synthetic_scene *scene, double value)
+{
+	scene->clip_g = scene->peak_g[0] * (1 - value / 100);
+}
+
+static void missing(struct synthetic_scene *scene, double value)
+{
+	scene->missing = value / 100;
+}
+
+static void lost(struct synthetic_scene *scene, double value)
+{
+	scene->lost = (unsigned)value;
+}
+
+static void offset(struct synthetic_scene *scene, double value)
+{
+	scene->offset_g = value;
+}
+
+static void hum(struct synthetic_scene *scene, double value)
+{
+	scene->hum_g = value;
+}
+
+static void spikes(struct synthetic_scene *scene, double value)
+{
+	scene->spikes = (unsigned)value;
+}
+
+static void second(struct synthetic_scene *scene, double value)
+{
+	scene->second_part = value / 100;
+	scene->second_apart_hz = 20;
+}
+
+static void jitter(struct synthetic_scene *scene, double value)
+{
+	scene->jitter_s = value * 1e-6;
+}
+
+static void skew(struct synthetic_scene *scene, double value)
+{
+	scene->skew_s = value * 1e-3;
+}
+
+static const struct sweep sweeps[] = {
+        {"noise", "g", noise, {0.1, 0.3, 1, 3, 10, 30, 100}, 7},
+        {"pulse", "", family, {0, 1, 2, 3}, 4},
+        {"Y after X", "ms", skew, {0.1, 0.2, 0.5, 1}, 4},
+        {"rate", "kHz", rate, {28, 14, 7, 3.5, 2}, 5},
+        {"clipped", "% of peak", clipping, {1, 3, 10, 20, 30, 50}, 6},
+        {"missing", "%", missing, {1, 5, 10, 20, 40}, 5},
+        {"run lost", "samples", lost, {1, 2, 4, 8, 20}, 5},
+        {"jitter", "us", jitter, {1, 2, 5, 10, 20, 50}, 6},
+        {"damping", "%", damping, {1, 3, 10, 20, 30, 50}, 6},
+        {"record", "cycles", length, {5, 3, 2, 1.5, 1, 0.5}, 6},
+        {"offset left", "g", offset, {0.3, 1, 3, 10, 30}, 5},
+        {"50 Hz hum", "g", hum, {0.3, 1, 3, 5, 10}, 5},
+        {"300 g spikes", "", spikes, {1, 2, 3, 5, 10}, 5},
+        {"2nd mode", "%, +20 Hz", second, {2, 5, 10, 20, 30, 50}, 6},
+};
+
+enum { SWEEPS = sizeof(sweeps) / sizeof(sweeps[0]), CELLS_MAX = SWEEPS * VALUES_MAX };
+
+/* The cell that changes nothing: noise of 1 g. */
+enum { CLEAN = 2 };
+
+struct map {
+	const struct campaign *campaign;
+	enum quantity quantity;
+	const struct method *method;
+	size_t methods;
+};
+
+static const char *value_text(const struct sweep *sweep, size_t i, char text[32])
+{
+	if (sweep->apply == family)
+		return synthetic_family_name((enum synthetic_family)sweep->value[i]);
+	snprintf(text, 32, "%g", sweep->value[i]);
+	return text;
+}
+
+static bool fails(const struct map *map, const struct campaign_tally *t)
+{
+	return !(campaign_ratio(t) <= quantity_text(map->quantity)->fails) ||
+	       t->gross > GROSS_MOST * map->campaign->drops;
+}
+
+static int write_csv(const struct chart_options *options, const struct map *map, char *message)
+{
+	struct file_text text;
+	int status = file_begin(&text, message);
+
+	if (status)
+		return status;
+	fprintf(text.stream, "# %s, SI units; seed %lu; fails: ratio above %g, or gross in more than %g %%\n",
+	        quantity_text(map->quantity)->title, options->seed, quantity_text(map->quantity)->fails,
+	        100 * GROSS_MOST);
+	fputs("method,of,family_told,sweep,value,unit,drops,values,gross,doubted,bias,rmse,bound,ratio,"
+	      "fails\n",
+	      text.stream);
+	for (size_t m = 0; m < map->methods; m++) {
+		const struct campaign_cell *cell = map->campaign->cells;
+
+		for (size_t s = 0; s < SWEEPS && map->method[m].quantity == map->quantity; s++)
+			for (size_t i = 0; i < sweeps[s].count; i++, cell++) {
+				const struct campaign_tally *t = &cell->tally[m];
+				char value[32];
+
+				fprintf(text.stream,
+				        "\"%s\",%s,%d,%s,%s,\"%s\",%u,%u,%u,%u,%.9g,%.9g,%.9g,%.6g,%d\n",
+				        map->method[m].name, map->method[m].ours ? "droptower" : "others",
+				        map->method[m].told, sweeps[s].name, value_text(&sweeps[s], i, value),
+				        sweeps[s].unit, map->campaign->drops, t->values, t->gross, t->doubted,
+				        campaign_bias(t), campaign_rms(t), t->bound, campaign_ratio(t),
+				        fails(map, t));
+			}
+	}
+	status = file_write(&text, options->folder, "stability", quantity_text(map->quantity)->name, "csv",
+	                    message);
+	file_drop(&text);
+	return status;
+}
+
+/* ---- the map: a row for each method, a column for each value; one unit of x is one column
+ * ------------------ */
+
+/* From the bound, pale, to a hundred times it, dark; the colour-blind tell by lightness. */
+static const struct {
+	double ratio;
+	const char *colour;
+} shades[] = {{1.15, "#f7fbff"}, {1.6, "#deebf7"}, {3, "#b5d1e8"},
+              {10, "#6baed6"},   {30, "#3182bd"},  {INFINITY, "#08519c"}};
+enum { SHADES = sizeof(shades) / sizeof(shades[0]) };
+
+#define NO_VALUE "#c8c8c8"
+#define CROSS "#d55e00"
+
+/* Index of the cell's shade; SHADES: no value at all. */
+static int shade_of(const struct campaign_tally *t)
+{
+	double ratio = campaign_ratio(t);
+	int i = 0;
+
+	while (i < SHADES && !(ratio <= shades[i].ratio))
+		i++;
+	return i;
+}
+
+/* x of a sweep's first column: half a column between sweeps. */
+static double column(size_t s)
+{
+	double x = 0;
+
+	for (size_t i = 0; i < s; i++)
+		x += (double)sweeps[i].count + 0.6;
+	return x;
+}
+
+/* What a data block holds of each cell. */
+enum layer { LAYER_FAILS = SHADES + 1, LAYER_SAYS_SO, LAYERS };
+
+static bool in_layer(const struct map *map, const struct campaign_tally *t, int layer)
+{
+	if (layer == LAYER_FAILS)
+		return fails(map, t);
+	if (layer == LAYER_SAYS_SO)
+		return fails(map, t) && 2 * t->doubted >= map->campaign->drops;
+	return shade_of(t) == layer;
+}
+
+static void write_cells(FILE *out, const struct map *map, size_t m, double row, int layer)
+{
+	const struct campaign_cell *cell = map->campaign->cells;
+
+	for (size_t s = 0; s < SWEEPS; s++)
+		for (size_t i = 0; i < sweeps[s].count; i++, cell++)
+			if (in_layer(map, &cell->tally[m], layer))
+				fprintf(out, "%.1f %.1f\n", column(s) + (double)i, row);
+}
+
+/* Ours above the others', in the table's order. */
+static double row_of(const struct map *map, size_t m)
+{
+	double row = 0;
+
+	for (size_t i = 0; i < map->methods; i++) {
+		if (map->method[i].quantity != map->quantity)
+			continue;
+		if (map->method[m].ours ? !map->method[i].ours || i > m : !map->method[i].ours && i > m)
+			row += 1;
+	}
+	return row + (map->method[m].ours ? 0.2 : 0);
+}
+
+static void draw_heads(FILE *out, double rows)
+{
+	for (size_t s = 0; s < SWEEPS; s++) {
+		fprintf(out, "set label \"%s\" at %.2f,%g font ',12' left rotate by 35\n", sweeps[s].name,
+		        column(s) + 0.3 * (double)sweeps[s].count, rows + 0.15);
+		fprintf(out, "set label '%s' at %.2f,-1.75 font ',10' center\n", sweeps[s].unit,
+		        column(s) + (double)sweeps[s].count / 2);
+		for (size_t i = 0; i < sweeps[s].count; i++) {
+			char text[32];
+			const char *value = value_text(&sweeps[s], i, text);
+
+			fprintf(out, "set label '%.9s' at %.2f,-0.12 font ',10' right rotate by 90\n", value,
+			        column(s) + (double)i + 0.5);
+		}
+	}
+}
+
+/* Below the map, in units of its own: shades, the cross, the dot. */
+static void draw_legend(FILE *out, const struct map *map, double height)
+{
+	double y = 30 / height;
+
+	for (int i = 0; i < SHADES; i++) {
+		double x = 0.15 + 0.062 * i;
+
+		fprintf(out,
+		        "set object rectangle from screen %.3f,%.4f to screen %.3f,%.4f fc rgb '%s' fs solid "
+		        "border "
+		        "lc rgb '#888888' lw 1\n",
+		        x, y - 8 / height, x + 0.02, y + 8 / height, shades[i].colour);
+		if (i + 1 < SHADES)
+			fprintf(out, "set label 'to %g' at screen %.3f,%.4f font ',11'\n", shades[i].ratio,
+			        x + 0.023, y);
+		else
+			fprintf(out, "set label 'more' at screen %.3f,%.4f font ',11'\n", x + 0.023, y);
+	}
+	fprintf(out, "set label 'error / bound' at screen 0.01,%.4f font ',12'\n", y);
+	fprintf(out,
+	        "set object rectangle from screen 0.53,%.4f to screen 0.55,%.4f fc rgb '" NO_VALUE
+	        "' fs solid "
+	        "border lc "
+	        "rgb '#888888' lw 1\nset label 'no value' at screen 0.553,%.4f font ',11'\n",
+	        y - 8 / height, y + 8 / height, y);
+	fprintf(out,
+	        "set arrow from screen 0.622,%.4f to screen 0.634,%.4f nohead lw 1.6 lc rgb '" CROSS "'\n",
+	        y - 7 / height, y + 7 / height);
+	fprintf(out,
+	        "set arrow from screen 0.622,%.4f to screen 0.634,%.4f nohead lw 1.6 lc rgb '" CROSS "'\n",
+	        y + 7 / height, y - 7 / height);
+	fprintf(out,
+	        "set label 'fails: above %g, or gross errors in over 1 %%' at screen 0.639,%.4f font ',11'\n",
+	        quantity_text(map->quantity)->fails, y);
+	fprintf(out,
+	        "set label 'it says so itself' at screen 0.873,%.4f font ',11' point pt 7 ps 0.75 lc rgb "
+	        "'#000000' "
+	        "offset 0.6,0\n",
+	        y);
+}
+
+static void draw_names(FILE *out, const struct map *map)
+{
+	for (size_t m = 0; m < map->methods; m++)
+		if (map->method[m].quantity == map->quantity)
+			fprintf(out, "set label \"%s%s%s\" at -0.6,%g right\n",
+			        map->method[m].ours ? "droptower: " : "", map->method[m].name,
+			        map->method[m].told ? " *" : "", row_of(map, m) + 0.5);
+}
+
+/* A data block for each layer, with one point out of sight so that none is empty. */
+static void draw_cells(FILE *out, const struct map *map)
+{
+	for (int layer = 0; layer < LAYERS; layer++) {
+		fprintf(out, "$layer%d << EOD\n-9 -9\n", layer);
+		for (size_t m = 0; m < map->methods; m++)
+			if (map->method[m].quantity == map->quantity)
+				write_cells(out, map, m, row_of(map, m), layer);
+		fputs("EOD\n", out);
+	}
+	fputs("plot ", out);
+	for (int i = 0; i <= SHADES; i++)
+		fprintf(out,
+		        "$layer%d using ($1+0.5):($2+0.5):($1+0.03):($1+0.97):($2+0.04):($2+0.96) with "
+		        "boxxyerror "
+		        "fs solid noborder lc rgb '%s' notitle, \\\n",
+		        i, i < SHADES ? shades[i].colour : NO_VALUE);
+	fprintf(out,
+	        "$layer%d using ($1+0.12):($2+0.12):(0.76):(0.76) with vectors nohead lw 1.6 lc rgb '" CROSS
+	        "' notitle, \\\n"
+	        "$layer%d using ($1+0.12):($2+0.88):(0.76):(-0.76) with vectors nohead lw 1.6 lc rgb '" CROSS
+	        "' notitle, \\\n"
+	        "$layer%d using ($1+0.5):($2+0.5) with points pt 7 ps 0.75 lc rgb '#000000' notitle\n",
+	        LAYER_FAILS, LAYER_FAILS, LAYER_SAYS_SO);
+}
+
+static int draw(const struct chart_options *options, const struct map *map, char *message)
+{
+	const struct quantity_text *text = quantity_text(map->quantity);
+	double columns = column(SWEEPS), rows = 0, width, height;
+	struct file_text script;
+	int status = file_begin(&script, message);
+	FILE *out = script.stream;
+
+	if (status)
+		return status;
+	for (size_t m = 0; m < map->methods; m++)
+		if (map->method[m].quantity == map->quantity)
+			rows = fmax(rows, row_of(map, m) + 1);
+	width = LEFT + RIGHT + columns * COLUMN;
+	height = TOP + BOTTOM + rows * ROW;
+	fprintf(out,
+	        "set terminal svg size %.0f,%.0f dynamic noenhanced font 'sans-serif,13' background "
+	        "'#ffffff'\n"
+	        "unset border\nunset tics\nunset key\nset lmargin at screen %.4f\nset rmargin at screen "
+	        "%.4f\n"
+	        "set tmargin at screen %.4f\nset bmargin at screen %.4f\nset xrange [0:%g]\nset yrange "
+	        "[0:%g]\n",
+	        width, height, LEFT / width, 1 - RIGHT / width, 1 - TOP / height, BOTTOM / height, columns,
+	        rows);
+	fprintf(out, "set label \"%s: where methods fail\" at screen 0.01,%.4f font ',18'\n", text->title,
+	        1 - 24 / height);
+	fprintf(out,
+	        "set label 'One trouble at a time on a drop of 485 g, 3 ms half-sine, 7 kHz, noise 1 g, "
+	        "plate 129 Hz; "
+	        "%u drops a cell. * is told that it is a half-sine.' at screen 0.01,%.4f "
+	        "font ',12'\n",
+	        map->campaign->drops, 1 - 50 / height);
+	draw_names(out, map);
+	draw_heads(out, rows);
+	draw_legend(out, map, height);
+	draw_cells(out, map);
+	status = file_draw(&script, options->folder, "stability", text->name, message);
+	file_drop(&script);
+	return status;
+}
+
+/* Of each method, what it does not survive: the first value of each sweep from which on it fails. */
+static void print_table(FILE *out, const struct map *map)
+{
+	fprintf(out, "\n%s\n", quantity_text(map->quantity)->title);
+	for (size_t m = 0; m < map->methods; m++) {
+		const struct campaign_cell *cell = map->campaign->cells;
+		unsigned failing = 0;
+
+		if (map->method[m].quantity != map->quantity)
+			continue;
+		fprintf(out, "  %-10s %-24s %-5s", map->method[m].ours ? "droptower" : "others",
+		        map->method[m].name, map->method[m].told ? "told" : "");
+		if (fails(map, &cell[CLEAN].tally[m])) {
+			fputs("a drop with nothing wrong\n", out);
+			continue;
+		}
+		for (size_t s = 0; s < SWEEPS; s++) {
+			bool said = false;
+
+			for (size_t i = 0; i < sweeps[s].count; i++, cell++) {
+				char value[32];
+
+				if (said || !fails(map, &cell->tally[m]))
+					continue;
+				said = true;
+				fprintf(out, "%s%s %s%s%s", failing++ ? ", " : "", sweeps[s].name,
+				        value_text(&sweeps[s], i, value), sweeps[s].unit[0] ? " " : "",
+				        sweeps[s].unit);
+			}
+		}
+		fprintf(out, "%s\n", failing ? "" : "nothing");
+	}
+}
+
+static size_t make_scenes(struct campaign_cell *cells)
+{
+	size_t n = 0;
+
+	for (size_t s = 0; s < SWEEPS; s++)
+		for (size_t i = 0; i < sweeps[s].count; i++) {
+			cells[n].scene = synthetic_scene();
+			sweeps[s].apply(&cells[n++].scene, sweeps[s].value[i]);
+		}
+	return n;
+}
+
+int chart_stability(const struct chart_options *options, FILE *out, char *message)
+{
+	struct campaign campaign = {.drops = options->drops, .seed = options->seed};
+	struct map map = {.campaign = &campaign};
+	int status;
+
+	map.method = method_table(&map.methods);
+	campaign.cells = campaign_cells(CELLS_MAX);
+	if (!campaign.cells) {
+		snprintf(message, CHART_MESSAGE_MAX, "%s", error_text(DT_E_MEMORY));
+		return DT_E_MEMORY;
+	}
+	campaign.count = make_scenes(campaign.cells);
+	status = campaign_run(&campaign);
+	if (status)
+		snprintf(message, CHART_MESSAGE_MAX, "the simulated drops failed: %s", error_text(status));
+	else
+		fprintf(out, "What each method fails at first; %u drops of known truth a cell, seed %lu\n",
+		        options->drops, options->seed);
+	for (int q = 0; q < QUANTITIES && !status; q++) {
+		map.quantity = (enum quantity)q;
+		print_table(out, &map);
+		status = write_csv(options, &map, message);
+		if (!status)
+			status = draw(options, &map, message);
+	}
+	campaign_free(campaign.cells, CELLS_MAX);
+	return status;
+}

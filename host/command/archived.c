@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/command/archived.h"
+
+#include <droptower_version.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "host/command/command.h"
+#include "host/command/evaluate.h"
+#include "host/record/read.h"
+
+const char *archived_folder(const char *given)
+{
+	const char *named = getenv("DROPTOWER_ARCHIVE");
+
+	if (given != NULL)
+		return given;
+	return named != NULL && named[0] != '\0' ? named : "archive";
+}
+
+const char *archived_operator(const char *given)
+{
+	const char *user = getenv("USER");
+
+	if (given != NULL)
+		return given;
+	return user != NULL ? user : "";
+}
+
+int archived_failed(const struct archive *archive)
+{
+	command_error("%s", archive_message(archive));
+	return COMMAND_INPUT;
+}
+
+static int write_scene(void *context, const struct archive_series *series)
+{
+	const int *fd = context;
+	size_t length = strlen(series->scene);
+
+	return write(*fd, series->scene, length) == (ssize_t)length ? 0 : DT_E_SYSTEM;
+}
+
+int archived_scene_file(struct archive *archive, const char *series, char file[ARCHIVED_SCENE_MAX])
+{
+	struct archive_filter filter = archive_filter_none();
+	int fd = memfd_create("scene", MFD_CLOEXEC);
+
+	filter.series = series;
+	if (fd < 0 || archive_each_series(archive, &filter, write_scene, &fd) != 0) {
+		command_error("the scene of %s: %s", series, strerror(errno));
+		return COMMAND_INPUT;
+	}
+	snprintf(file, ARCHIVED_SCENE_MAX, "/proc/%ld/fd/%d", (long)getpid(), fd);
+	return COMMAND_DONE;
+}
+
+/* The result does not depend on where the archive stands. */
+static char *analyse(struct archive *archive, const struct scene *scene, const char *raw)
+{
+	char path[ARCHIVE_PATH_MAX], message[READ_MESSAGE_MAX], *json;
+	struct record record;
+
+	snprintf(path, sizeof(path), "%s/%.100s", archive_folder(archive), raw);
+	if (read_record(&record, path, NULL, message) != 0) {
+		command_error("%s", message);
+		return NULL;
+	}
+	snprintf(record.file, sizeof(record.file), "%.200s", raw);
+	json = evaluate_json(&record, scene);
+	record_free(&record);
+	if (json == NULL)
+		command_error("%s: cannot be analysed; kept without a result", path);
+	return json;
+}
+
+int archived_analyse(struct archive *archive, const char *series, unsigned number, const char *raw)
+{
+	char drop[ARCHIVE_NAME_MAX + 16], *json;
+	struct scene scene;
+	int result;
+
+	if (archive_scene(archive, series, &scene) != 0)
+		return archived_failed(archive);
+	json = analyse(archive, &scene, raw);
+	if (json == NULL)
+		return COMMAND_INPUT;
+	snprintf(drop, sizeof(drop), "%s/%u", series, number);
+	result = archive_result(archive, drop, DT_VERSION, json);
+	free(json);
+	return result == 0 ? COMMAND_DONE : archived_failed(archive);
+}

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_COMMAND_ARCHIVED_H
+#define DT_HOST_COMMAND_ARCHIVED_H
+/*
+ * What commands do with drops in an archive. Errors are printed; returns are COMMAND_* exit codes.
+ */
+#include "host/archive/archive.h"
+
+/* --archive, else $DROPTOWER_ARCHIVE, else ./archive. */
+const char *archived_folder(const char *given);
+
+/* Who sits at it, when nobody says so: $USER or "". */
+const char *archived_operator(const char *given);
+
+/* Prints the archive's message; returns COMMAND_INPUT. */
+int archived_failed(const struct archive *archive);
+
+enum { ARCHIVED_SCENE_MAX = 48 };
+
+/* A name under which this program and its children can read the scene of a series as a file. */
+int archived_scene_file(struct archive *archive, const char *series, char file[ARCHIVED_SCENE_MAX]);
+
+/* Analyses SERIES/NUMBER from its log, raw in the archive's folder, and keeps the result under this program's
+ * version. A log that cannot be analysed stays, without a result. */
+int archived_analyse(struct archive *archive, const char *series, unsigned number, const char *raw);
+
+#endif

@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_COMMAND_BESIDE_H
+#define DT_HOST_COMMAND_BESIDE_H
+/*
+ * Where what was installed together is found: seen from the folder of this program, wherever that was put.
+ */
+#include <limits.h>
+
+/* Folder of this program, then relative. 0, or -1 with errno where it is too long or unknown. Whether there
+ * is something is not looked at. */
+int beside(const char *relative, char path[PATH_MAX]);
+
+#endif

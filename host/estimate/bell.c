@@ -1,0 +1,185 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/estimate/bell.h"
+
+#include <math.h>
+
+#include "common/units.h"
+#include "host/estimate/gram.h"
+#include "host/estimate/lm.h"
+
+/* Samples this many bases to either side of the peak take part: beyond the feet zero is fitted. */
+#define REACH_BASES 0.8
+
+#define BULGE_PRIOR 0.05
+
+/* A pulse whose middles at half and at a tenth of its height lie further apart than this part of its width,
+ * and this many times the noise's part of its height, is not worth a fit. */
+#define SKEW_MAX 0.06
+#define SKEW_NOISE 2.0
+
+#define POWER_MIN 0.3
+#define POWER_MAX 8.0
+
+/* Reduced chi-square of a right model stays below 1 + this times sqrt(2 / freedom). Generous: what is left of
+ * a wrong shape then is less than the samples' noise, as input, would do. */
+#define REFUSE 7.0
+
+/* The shape is no better than this part of the height: less noise is taken for as much. */
+#define MISFIT 3e-4
+
+/* Nor does this many standard deviations of lopsidedness: one degree of freedom, sharper than chi-square. */
+#define LOPSIDED_MAX 4.5
+
+/* Samples at the feet come and go with the base. */
+#define KINK 0.1
+
+enum { HEIGHT, CENTRE, BASE, POWER, BULGE, PARAMETERS, RESIDUAL = PARAMETERS, COLUMNS };
+
+struct scene {
+	const struct trace *trace;
+	size_t first, last;
+	double noise_g;
+};
+
+static bool usable(const struct trace *trace, size_t k)
+{
+	return trace_good(trace, k) && !(trace->sample[k] & SAMPLE_CLIPPED);
+}
+
+/* The pulse of height 1 at the angle whose cosine is c, and its derivative by the angle; row gets those by
+ * height, power and bulge. */
+static double shape(const double p[PARAMETERS], double c, double sine, double row[PARAMETERS])
+{
+	double logarithm = log(c), flank = exp(p[POWER] * logarithm), rise = 1 - c * c;
+	double value = flank * (1 + p[BULGE] * rise);
+
+	row[HEIGHT] = value;
+	row[POWER] = p[HEIGHT] * value * logarithm;
+	row[BULGE] = p[HEIGHT] * flank * rise;
+	return p[HEIGHT] * sine * (2 * p[BULGE] * flank * c - p[POWER] * value / c);
+}
+
+static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
+                     double right[CHOLESKY_MAX], double *squares)
+{
+	const struct scene *scene = model;
+	double per_s = UNITS_PI / p[BASE], step = per_s / scene->trace->rate_hz, angle, c, s, turn_c, turn_s;
+	double prior = scene->noise_g / BULGE_PRIOR;
+	size_t used = 0;
+	struct gram gram;
+
+	if (!(p[POWER] > POWER_MIN && p[POWER] < POWER_MAX) || !(p[BASE] > 0))
+		return 0;
+	angle = (trace_time(scene->trace, scene->first) - p[CENTRE]) * per_s;
+	c = cos(angle);
+	s = sin(angle);
+	turn_c = cos(step);
+	turn_s = sin(step);
+	gram_start(&gram, PARAMETERS);
+	for (size_t k = scene->first; k < scene->last; k++, angle += step) {
+		double row[COLUMNS], residual = scene->trace->value_g[k], cosine = c, sine = s;
+
+		c = cosine * turn_c - sine * turn_s;
+		s = sine * turn_c + cosine * turn_s;
+		if (!usable(scene->trace, k))
+			continue;
+		used++;
+		if (fabs(angle) >= UNITS_PI / 2 || !(cosine > 0)) {
+			*squares += residual * residual;
+			continue;
+		}
+		row[CENTRE] = shape(p, cosine, sine, row);
+		row[BASE] = -row[CENTRE] * angle / p[BASE];
+		row[CENTRE] *= -per_s;
+		row[RESIDUAL] = residual - p[HEIGHT] * row[HEIGHT];
+		gram_add(&gram, row);
+	}
+	gram_finish(&gram, matrix, right, squares);
+	matrix[BULGE][BULGE] += prior * prior;
+	right[BULGE] -= prior * prior * p[BULGE];
+	*squares += prior * prior * p[BULGE] * p[BULGE];
+	return used;
+}
+
+/* From the widths at half and at a tenth of the height: of a half-sine 2/3 and 0.9362 of the base, of a
+ * haversine 1/2 and 0.7952. */
+static bool start(const struct trace *trace, const struct peak *peak, double noise_g, double p[PARAMETERS])
+{
+	double height = fabs(peak->result.value_g), from[2], until[2], width, ratio;
+	static const double level[] = {0.5, 0.1};
+
+	for (unsigned i = 0; i < 2; i++)
+		if (!trace_edge(trace, peak->at, -1, peak->sign, level[i] * height, &from[i]) ||
+		    !trace_edge(trace, peak->at, 1, peak->sign, level[i] * height, &until[i]))
+			return false;
+	width = until[1] - from[1];
+	if (fabs(until[1] + from[1] - until[0] - from[0]) / 2 >
+	    (SKEW_MAX + SKEW_NOISE * noise_g / height) * width)
+		return false;
+	ratio = width / (until[0] - from[0]);
+	p[HEIGHT] = peak->result.value_g;
+	p[CENTRE] = (until[0] + from[0]) / 2;
+	p[POWER] = fmin(fmax(1 + (ratio - 1.404) / 0.186, 0.5), 3);
+	p[BASE] = (until[0] - from[0]) * UNITS_PI / (2 * acos(pow(0.5, 1 / p[POWER])));
+	p[BULGE] = 0;
+	return p[BASE] > 0;
+}
+
+/* How much the residual asks for a summit moved against the feet, in standard deviations: the score (Rao
+ * 1948) of an odd part, less what the centre can take up of it. */
+static double lopsided(const struct scene *scene, const double p[PARAMETERS])
+{
+	double odd_odd = 0, odd_centre = 0, centre_centre = 0, odd_residual = 0;
+
+	for (size_t k = scene->first; k < scene->last; k++) {
+		double angle = UNITS_PI * (trace_time(scene->trace, k) - p[CENTRE]) / p[BASE];
+		double cosine = cos(angle), row[PARAMETERS], value, odd, centre;
+
+		if (!usable(scene->trace, k) || fabs(angle) >= UNITS_PI / 2 || !(cosine > 0))
+			continue;
+		centre = shape(p, cosine, sin(angle), row);
+		value = p[HEIGHT] * row[HEIGHT];
+		odd = value * sin(angle);
+		odd_odd += odd * odd;
+		odd_centre += odd * centre;
+		centre_centre += centre * centre;
+		odd_residual += odd * (scene->trace->value_g[k] - value);
+	}
+	return odd_residual / (scene->noise_g * sqrt(odd_odd - odd_centre * odd_centre / centre_centre));
+}
+
+bool bell_fit(const struct trace *trace, const struct peak *peak, struct bell *bell)
+{
+	static const double centre_row[PARAMETERS] = {[CENTRE] = 1};
+	double noise = fmax(trace->noise_g, MISFIT * fabs(peak->result.value_g));
+	struct scene scene = {.trace = trace, .noise_g = noise};
+	struct lm_problem problem = {.size = PARAMETERS, .model = &scene, .normal = normal, .kink = KINK};
+	struct lm_result result;
+	double p[PARAMETERS], freedom;
+
+	if (!start(trace, peak, noise, p))
+		return false;
+	scene.first = trace_index(trace, p[CENTRE] - REACH_BASES * p[BASE]);
+	scene.last = trace_index(trace, p[CENTRE] + REACH_BASES * p[BASE]);
+	if (!lm_fit(&problem, p, &result))
+		return false;
+	freedom = (double)(result.used - PARAMETERS + 1);
+	bell->chi_square = result.squares / freedom / (noise * noise);
+	bell->height_g = p[HEIGHT];
+	bell->centre_s = p[CENTRE];
+	bell->base_s = p[BASE];
+	bell->power = p[POWER];
+	bell->bulge = p[BULGE];
+	bell->sigma_centre_s = noise * sqrt(cholesky_variance(&result.factor, centre_row));
+	return bell->chi_square <= 1 + REFUSE * sqrt(2 / freedom) &&
+	       fabs(lopsided(&scene, p)) <= LOPSIDED_MAX;
+}
+
+double bell_at(const struct bell *bell, double time_s)
+{
+	double angle = UNITS_PI * (time_s - bell->centre_s) / bell->base_s, c = cos(angle);
+
+	if (!(fabs(angle) < UNITS_PI / 2) || !(c > 0))
+		return 0;
+	return bell->height_g * pow(c, bell->power) * (1 + bell->bulge * (1 - c * c));
+}

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ESTIMATE_CLIP_H
+#define DT_HOST_ESTIMATE_CLIP_H
+/*
+ * A sensor at its limit repeats its extreme. Groups of samples that equal the trace's extreme are marked
+ * SAMPLE_CLIPPED and TRACE_LIMIT: three, no further than three samples apart and at least half of what they
+ * span; two where chance does not make samples equal; one at the channel's known range. Only extremes on the
+ * outside count: half the largest magnitude or more, so that the small side of a one-sided shock is not taken
+ * for one. trace_open calls it.
+ */
+#include "host/estimate/trace.h"
+
+void clip_mark(struct trace *trace);
+
+#endif

@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ESTIMATE_DRIVEN_H
+#define DT_HOST_ESTIMATE_DRIVEN_H
+/*
+ * The lag of one axis when S1 sits on S2 as a damped oscillator: S1 is gain times the response (respond.h) to
+ * S2, later by a delay, on a slope that ends in an offset (the sensors' high-pass leaves one). Gain, delay,
+ * frequency, damping and offset are fitted to S1 from the contact to four cycles after it, the decay in
+ * block means; to half a cycle where the residual refuses that, and half a cycle fits far better. The lag is
+ * the fitted response's largest peak less S2's.
+ *
+ * S2 enters as smooth pulse (bell.h) where it is one, since the noise of its samples would count as input,
+ * otherwise by its samples from the pulse's foot to 1.1 widths after the peak. The delay is free because no
+ * oscillator explains every lag that was measured.
+ *
+ * Uncertainty: the fit's, S2's peak time and, with samples, S2's noise as input. Where the residual test
+ * refuses (ESTIMATE_FLAG_MODEL) the residual takes the noise's place, and what the fitted peak misses S1's
+ * own by is added. NAN with not_converged where S1 does not follow an oscillator at all, or the lag is less
+ * certain than a tenth of the pulse's width. S1's or S2's status where they have no peak, S1's ring-down's
+ * where it has none. Clipped samples are left out, and flagged as extrapolated; clipped with S2's shape not
+ * known.
+ */
+#include "host/estimate/peak.h"
+#include "host/estimate/ringdown.h"
+
+struct driven_axis {
+	const struct trace *trace[2]; /* S1, S2 */
+	const struct peak *peak[2];
+	const struct ringdown *ringdown; /* S1's: the start */
+};
+
+struct driven {
+	double lag_s, sigma_s;
+	bool smooth, sampled; /* inputs tried */
+	double chi_square;    /* reduced */
+	unsigned flags;
+	enum estimate_status status;
+};
+
+void driven_find(const struct driven_axis *axis, struct driven *driven);
+
+#endif

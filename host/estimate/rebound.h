@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ESTIMATE_REBOUND_H
+#define DT_HOST_ESTIMATE_REBOUND_H
+/*
+ * How fast the product leaves, over how fast it came, in two ways that share no error:
+ *
+ *   velocity   the velocity changes of the case's axes, added as a vector: dv / v - 1. Gain and cross talk of
+ *              the sensor go into it whole, and its sigma knows nothing of them.
+ *   flight     g t / (2 v) for a flight of t from the end of the contact to the second impact, where the
+ *              record has it: a clock is far better than a gain, as long as the product comes back to the
+ *              height it left, on the corner it left with.
+ *
+ * The second impact is where the case reads REBOUND_AGAIN of its peak again. Status: short without a velocity
+ * change, clipped when an axis is; ambiguous when the two differ by more than REBOUND_APART and by more than
+ * three sigma.
+ */
+#include "host/estimate/peak.h"
+
+#define REBOUND_AGAIN 0.3
+#define REBOUND_APART 0.1
+
+enum { REBOUND_AXES = 3 };
+
+/* The axes of the case that there are; an axis without a velocity change counts as none. */
+struct rebound_axes {
+	unsigned count;
+	const struct trace *trace[REBOUND_AXES];
+	const struct peak *peak[REBOUND_AXES];
+	const struct estimate_pulse *pulse[REBOUND_AXES];
+};
+
+/* impact_speed_m_s must be positive. */
+void rebound_find(const struct rebound_axes *axes, double impact_speed_m_s, struct estimate_rebound *rebound);
+
+#endif

@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ESTIMATE_SERIES_H
+#define DT_HOST_ESTIMATE_SERIES_H
+/*
+ * A stretch of a trace as evenly spaced points, each the mean of a block of samples. The mean of a block of a
+ * damped exponential is that exponential again, smaller, with the same pole: frequency and damping may be
+ * fitted to means as to samples, in a fraction of the time. A point with an unusable sample in its block is
+ * unusable, so blocks longer than one suit a stretch without holes.
+ */
+#include <stdbool.h>
+
+#include "host/estimate/trace.h"
+
+enum { SERIES_MAX = 2048 };
+
+struct series {
+	double first_s; /* time of point 0 after the instant asked for: its block's middle */
+	double step_s;
+	unsigned block; /* samples per point */
+	unsigned count;
+	unsigned used; /* good points */
+	double value_g[SERIES_MAX];
+	bool good[SERIES_MAX];
+};
+
+/* Whether a sample follows the swing: there, not bad and not clipped. */
+static inline bool series_usable(const struct trace *trace, size_t k)
+{
+	return trace_good(trace, k) && !(trace->sample[k] & SAMPLE_CLIPPED);
+}
+
+/* Samples [first, last) of the trace in blocks, times counted from from_s. The block grows as needed to
+ * stay within SERIES_MAX points. */
+void series_take(struct series *series, const struct trace *trace, size_t first, size_t last, double from_s,
+                 unsigned block);
+
+/* The same stretch with so many points in one, those that are whole. */
+void series_thin(struct series *thin, const struct series *series, unsigned points);
+
+/* Makes a series of single samples start more samples earlier, at sample first; what is known of the others
+ * stays. False, and unchanged, when there is no room. */
+bool series_lengthen(struct series *series, const struct trace *trace, size_t first, unsigned more);
+
+/* Sum of squares of the good points about their mean: the residual of a fit that knows nothing. */
+double series_squares(const struct series *series);
+
+#endif

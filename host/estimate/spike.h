@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ESTIMATE_SPIKE_H
+#define DT_HOST_ESTIMATE_SPIKE_H
+/*
+ * Outliers of one or two samples: what no accelerometer reads but a bad contact or a flipped bit leaves. A
+ * sample is one when it stands off the straight line between its neighbours by far more than those bend
+ * among themselves, four on each side, and more than noise. A kink (the onset of a contact), a summit and a
+ * vibration of any frequency bend their neighbours as much as themselves; so does whatever a sensor with a
+ * limited bandwidth shows. A pulse shorter than about three samples is no different from a spike: it is taken
+ * for one.
+ *
+ * Marks SAMPLE_SPIKE, which is not good from then on, and RECORD_FLAG_SPIKE. Before baseline_remove. Nothing
+ * is marked where the noise is not known, next to a missing sample, or in the four first and last samples.
+ */
+#include "host/estimate/trace.h"
+
+/* True when something was marked. */
+bool spike_mark(struct trace *trace, double noise_g);
+
+#endif

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ESTIMATE_SPRING_H
+#define DT_HOST_ESTIMATE_SPRING_H
+/*
+ * The free decay of a mass on a mount that softens with its swing, as a filled rubber does, and comes back
+ * to its small-swing stiffness as the swing vanishes:
+ *
+ *     x'' = -2 a x' - w0^2 x (1 + B / (1 + Q x^2)) / (1 + B),   w0^2 = w^2 + a^2
+ *
+ * read as the acceleration x'' + b. Unlike a frequency that is a function of the envelope it has the
+ * harmonics too. Integrated by Runge-Kutta, one step per sample; the derivatives are differences of eight
+ * solutions that run side by side. Unknowns at the places of modes.h: b, a, w (damped, of a small swing),
+ * w0^2 x and w0 x' at time 0 in g, Q in 1/g^2 of the former, B. A negative B stiffens.
+ */
+#include "host/estimate/cholesky.h"
+#include "host/estimate/series.h"
+
+enum { SPRING_SIZE = 7 };
+
+/* As lm.h asks for it. */
+size_t spring_normal(const struct series *series, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
+                     double right[CHOLESKY_MAX], double *squares);
+
+/* The acceleration at time_s. */
+double spring_at(const double *p, double time_s);
+
+/* Mean damped frequency over that many cycles from time 0 on, by the stiffness that a sinusoid of the swing
+ * feels (describing function). */
+double spring_mean_hz(const double *p, unsigned cycles);
+
+/* Stiffness at the swing of time 0 over that of a small one. */
+double spring_softness(const double *p);
+
+#endif

@@ -1,0 +1,399 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * droptower-hdf5 read|write: HDF5 on standard input to our CSV on standard output, or CSV to HDF5. Started by
+ * droptower (host/record/hdf5.h); works by itself, too. README.md tells the layout.
+ */
+#include <hdf5.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/record/fields.h"
+#include "host/record/source.h"
+#include "host/record/write.h"
+
+enum {
+	LAYOUT = 1,            /* what a reader of another version must refuse */
+	IMAGE_STEP = 1 << 20,  /* bytes by which a file in memory grows */
+	SAMPLES_MAX = 1 << 27, /* of a channel: a gigabyte */
+	MASK = SAMPLE_LOST | SAMPLE_BAD | SAMPLE_CLIPPED,
+};
+
+/* Every failing call comes through here: says what of the file is not as expected. */
+static int refuse(const char *what, const char *expected)
+{
+	fprintf(stderr, "HDF5: %s, expected %s\n", what, expected);
+	return -1;
+}
+
+/* ---- attributes ---- */
+
+static int put_attribute(hid_t at, const char *name, hid_t type, const void *value)
+{
+	hid_t space = H5Screate(H5S_SCALAR);
+	hid_t attribute = H5Acreate2(at, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
+	int result = attribute >= 0 && H5Awrite(attribute, type, value) >= 0 ? 0 : -1;
+
+	if (attribute >= 0)
+		H5Aclose(attribute);
+	H5Sclose(space);
+	return result == 0 ? 0 : refuse(name, "room for the attribute");
+}
+
+static int put_real(hid_t at, const char *name, double value)
+{
+	return put_attribute(at, name, H5T_NATIVE_DOUBLE, &value);
+}
+
+static int put_whole(hid_t at, const char *name, int64_t value)
+{
+	return put_attribute(at, name, H5T_NATIVE_INT64, &value);
+}
+
+static int put_text(hid_t at, const char *name, const char *text)
+{
+	hid_t type = H5Tcopy(H5T_C_S1);
+	int result;
+
+	H5Tset_size(type, strlen(text) + 1);
+	H5Tset_cset(type, H5T_CSET_UTF8);
+	result = put_attribute(at, name, type, text);
+	H5Tclose(type);
+	return result;
+}
+
+static int get_real(hid_t at, const char *name, double *value)
+{
+	hid_t attribute = H5Aopen(at, name, H5P_DEFAULT);
+	hid_t space = attribute >= 0 ? H5Aget_space(attribute) : -1;
+	int result = space >= 0 && H5Sget_simple_extent_npoints(space) == 1 &&
+	                             H5Aread(attribute, H5T_NATIVE_DOUBLE, value) >= 0
+	                     ? 0
+	                     : -1;
+
+	if (space >= 0)
+		H5Sclose(space);
+	if (attribute >= 0)
+		H5Aclose(attribute);
+	return result;
+}
+
+/* A string of fixed length that fits into text. */
+static int get_text(hid_t at, const char *name, char *text, size_t size)
+{
+	hid_t attribute = H5Aopen(at, name, H5P_DEFAULT);
+	hid_t type = attribute >= 0 ? H5Aget_type(attribute) : -1;
+	hid_t space = attribute >= 0 ? H5Aget_space(attribute) : -1;
+	int result = -1;
+
+	memset(text, 0, size);
+	if (type >= 0 && space >= 0 && H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 &&
+	    H5Tget_size(type) <= size && H5Sget_simple_extent_npoints(space) == 1 &&
+	    H5Aread(attribute, type, text) >= 0)
+		result = 0;
+	text[size - 1] = '\0';
+	if (space >= 0)
+		H5Sclose(space);
+	if (type >= 0)
+		H5Tclose(type);
+	if (attribute >= 0)
+		H5Aclose(attribute);
+	return result;
+}
+
+/* ---- writing ---- */
+
+static int put_array(hid_t group, const char *name, hid_t type, const void *values, size_t count,
+                     const char *key, const char *text)
+{
+	hsize_t size = count;
+	hid_t space = H5Screate_simple(1, &size, NULL), plan = H5Pcreate(H5P_DATASET_CREATE);
+	hid_t array;
+	int result = -1;
+
+	H5Pset_obj_track_times(plan, false); /* the same record is the same file */
+	array = H5Dcreate2(group, name, type, space, H5P_DEFAULT, plan, H5P_DEFAULT);
+	if (array >= 0 && H5Dwrite(array, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0)
+		result = put_text(array, key, text);
+	if (array >= 0)
+		H5Dclose(array);
+	H5Pclose(plan);
+	H5Sclose(space);
+	return result;
+}
+
+static int put_samples(hid_t group, const struct channel *channel)
+{
+	uint8_t *mask = malloc(channel->count + 1);
+	int result;
+
+	if (!mask)
+		return refuse("no memory", "some");
+	for (size_t k = 0; k < channel->count; k++)
+		mask[k] = channel->sample[k] & MASK;
+	result = put_array(group, "acceleration", H5T_NATIVE_DOUBLE, channel->value_g, channel->count,
+	                   "units", "g");
+	if (result == 0)
+		result = put_array(group, "mask", H5T_NATIVE_UINT8, mask, channel->count, "bits",
+		                   "1 lost, 2 not taken, 4 beyond the range");
+	free(mask);
+	return result;
+}
+
+static int put_channel(hid_t file, const struct channel *channel)
+{
+	char link[sizeof(channel->name)];
+	hid_t group;
+	int result = 0;
+
+	memcpy(link, channel->name, sizeof(link));
+	for (char *p = link; *p; p++)
+		if (*p == '/') /* would be a group of its own */
+			*p = '_';
+	group = H5Gcreate2(file, link, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+	if (group < 0)
+		return refuse(channel->name, "names of channels that differ in more than a stroke");
+	result |= put_text(group, "name", channel->name);
+	result |= put_real(group, "rate_hz", channel->rate_hz);
+	result |= put_real(group, "start_s", channel->start_s);
+	result |= put_real(group, "range_g", channel->range_g);
+	result |= put_whole(group, "uneven", (channel->flags & RECORD_FLAG_UNEVEN) != 0);
+	result |= put_samples(group, channel);
+	H5Gclose(group);
+	return result;
+}
+
+static int put_record(hid_t file, const struct record *record)
+{
+	const struct fields_entry *entry;
+	int result = put_text(file, "format", "droptower") | put_whole(file, "version", LAYOUT);
+
+	for (size_t i = 0; (entry = fields_entry(i)) != NULL && result == 0; i++) {
+		if (!fields_known(record, entry))
+			continue;
+		if (entry->kind == FIELDS_REAL)
+			result = put_real(file, entry->name, fields_real(record, entry));
+		else
+			result = put_whole(file, entry->name, fields_whole(record, entry));
+	}
+	for (size_t i = 0; i < record->channel_count && result == 0; i++)
+		result = put_channel(file, &record->channels[i]);
+	return result;
+}
+
+static int put_image(hid_t file)
+{
+	ssize_t size = H5Fflush(file, H5F_SCOPE_GLOBAL) >= 0 ? H5Fget_file_image(file, NULL, 0) : -1;
+	char *image = size > 0 ? malloc((size_t)size) : NULL;
+	bool done = image && H5Fget_file_image(file, image, (size_t)size) == size &&
+	            fwrite(image, 1, (size_t)size, stdout) == (size_t)size && fflush(stdout) == 0;
+
+	free(image);
+	return done ? 0 : refuse("cannot be written", "room for it");
+}
+
+static int write_image(const struct record *record)
+{
+	hid_t access = H5Pcreate(H5P_FILE_ACCESS), plan = H5Pcreate(H5P_FILE_CREATE), file;
+	int result;
+
+	H5Pset_fapl_core(access, IMAGE_STEP, false);
+	H5Pset_link_creation_order(plan, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
+	file = H5Fcreate("record", H5F_ACC_TRUNC, plan, access);
+	result = file >= 0 ? put_record(file, record) : refuse("cannot be made", "a library that can");
+	if (result == 0)
+		result = put_image(file);
+	if (file >= 0)
+		H5Fclose(file);
+	H5Pclose(plan);
+	H5Pclose(access);
+	return result;
+}
+
+static int csv_to_hdf5(const struct source *source)
+{
+	char message[READ_MESSAGE_MAX];
+	struct record record;
+	int result;
+
+	if (read_csv(&record, source, message) != 0) {
+		fprintf(stderr, "%s\n", message);
+		return -1;
+	}
+	result = write_image(&record);
+	record_free(&record);
+	return result;
+}
+
+/* ---- reading ---- */
+
+static int64_t count_of(hid_t array)
+{
+	hid_t space = array >= 0 ? H5Dget_space(array) : -1;
+	int64_t count = -1;
+
+	if (space >= 0 && H5Sget_simple_extent_ndims(space) == 1)
+		count = (int64_t)H5Sget_simple_extent_npoints(space);
+	if (space >= 0)
+		H5Sclose(space);
+	return count;
+}
+
+static int get_samples(struct channel *channel, hid_t values, hid_t mask)
+{
+	if (H5Dread(values, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, channel->value_g) < 0 ||
+	    H5Dread(mask, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, channel->sample) < 0)
+		return refuse("samples cannot be read", "numbers");
+	for (size_t k = 0; k < channel->count; k++)
+		if (channel->sample[k] & ~MASK)
+			return refuse("a mask has unknown bits", "1, 2 and 4");
+	return 0;
+}
+
+static int get_arrays(struct record *record, hid_t group, const char *name, double rate_hz)
+{
+	hid_t values = H5Dopen2(group, "acceleration", H5P_DEFAULT),
+	      mask = H5Dopen2(group, "mask", H5P_DEFAULT);
+	int64_t count = count_of(values);
+	struct channel *channel;
+	int result = -1;
+
+	if (count < 0 || count > SAMPLES_MAX || count_of(mask) != count)
+		refuse(name, "arrays acceleration and mask of one length");
+	else if ((channel = record_add_channel(record, name, rate_hz, (size_t)count)) == NULL)
+		refuse("no memory", "some");
+	else
+		result = get_samples(channel, values, mask);
+	if (values >= 0)
+		H5Dclose(values);
+	if (mask >= 0)
+		H5Dclose(mask);
+	return result;
+}
+
+static int get_channel(struct record *record, hid_t file, const char *link)
+{
+	hid_t group = H5Gopen2(file, link, H5P_DEFAULT);
+	double rate_hz, start_s, range_g, uneven;
+	struct channel *channel;
+	char name[32];
+	int result;
+
+	if (group < 0)
+		return refuse(link, "groups, one for each channel");
+	if (get_text(group, "name", name, sizeof(name)) != 0 || get_real(group, "rate_hz", &rate_hz) != 0 ||
+	    get_real(group, "start_s", &start_s) != 0 || get_real(group, "range_g", &range_g) != 0 ||
+	    get_real(group, "uneven", &uneven) != 0)
+		result = refuse(link, "attributes name, rate_hz, start_s, range_g and uneven");
+	else
+		result = get_arrays(record, group, name, rate_hz);
+	if (result == 0) {
+		channel = &record->channels[record->channel_count - 1];
+		channel->start_s = start_s;
+		channel->range_g = range_g;
+		channel->flags = uneven != 0 ? RECORD_FLAG_UNEVEN : 0;
+	}
+	H5Gclose(group);
+	return result;
+}
+
+/* In the order they were written; by name where a program that copied the file did not keep it. */
+static int get_channels(struct record *record, hid_t file)
+{
+	H5_index_t index = H5_INDEX_CRT_ORDER;
+	H5G_info_t info;
+	char link[64];
+	int result = 0;
+
+	if (H5Gget_info(file, &info) < 0)
+		return refuse("no root", "a group for each channel");
+	if (info.nlinks > 0 && H5Lget_name_by_idx(file, ".", index, H5_ITER_INC, 0, NULL, 0, H5P_DEFAULT) < 0)
+		index = H5_INDEX_NAME;
+	for (hsize_t i = 0; i < info.nlinks && result == 0; i++) {
+		ssize_t length =
+		        H5Lget_name_by_idx(file, ".", index, H5_ITER_INC, i, link, sizeof(link), H5P_DEFAULT);
+
+		if (length <= 0 || length >= (ssize_t)sizeof(link))
+			result = refuse("a group's name is too long", "one for each channel");
+		else
+			result = get_channel(record, file, link);
+	}
+	return result;
+}
+
+static int get_fields(struct record *record, hid_t file)
+{
+	const struct fields_entry *entry;
+
+	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++) {
+		double value;
+
+		if (H5Aexists(file, entry->name) <= 0)
+			continue;
+		if (get_real(file, entry->name, &value) != 0 || fields_set(record, entry, value) != 0)
+			return refuse(entry->name, "a number that fits");
+	}
+	return 0;
+}
+
+static int get_record(struct record *record, hid_t file)
+{
+	char format[16];
+	double version;
+	int result;
+
+	if (get_text(file, "format", format, sizeof(format)) != 0 || strcmp(format, "droptower") != 0 ||
+	    get_real(file, "version", &version) != 0 || version != LAYOUT)
+		return refuse("not by droptower", "attributes format = \"droptower\" and version = 1");
+	result = get_fields(record, file);
+	return result == 0 ? get_channels(record, file) : result;
+}
+
+static int read_image(struct record *record, const struct source *source)
+{
+	hid_t access = H5Pcreate(H5P_FILE_ACCESS), file = -1;
+	int result;
+
+	H5Pset_fapl_core(access, IMAGE_STEP, false);
+	if (H5Pset_file_image(access, source->bytes, source->size) >= 0)
+		file = H5Fopen("record", H5F_ACC_RDONLY, access);
+	result = file >= 0 ? get_record(record, file) : refuse("damaged", "a whole file");
+	if (file >= 0)
+		H5Fclose(file);
+	H5Pclose(access);
+	return result;
+}
+
+static int hdf5_to_csv(const struct source *source)
+{
+	struct record record;
+	int result;
+
+	record_init(&record);
+	result = read_image(&record, source);
+	if (result == 0 && write_csv(&record, stdout) != 0)
+		result = refuse("a channel's name is impossible or there is no room", "neither");
+	record_free(&record);
+	return result;
+}
+
+int main(int argc, char **argv)
+{
+	char message[READ_MESSAGE_MAX];
+	struct source source;
+	int result;
+
+	if (argc != 2 || (strcmp(argv[1], "read") != 0 && strcmp(argv[1], "write") != 0)) {
+		fputs("usage: droptower-hdf5 read|write <IN >OUT\n", stderr);
+		return 2;
+	}
+	H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* one line of our own instead */
+	if (source_load(&source, "/dev/stdin", message) != 0) {
+		fprintf(stderr, "%s\n", message);
+		return 3;
+	}
+	result = strcmp(argv[1], "read") == 0 ? hdf5_to_csv(&source) : csv_to_hdf5(&source);
+	source_free(&source);
+	H5close();
+	return result == 0 ? 0 : 3;
+}

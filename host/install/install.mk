@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+#
+# make install, make uninstall: DESTDIR is put in front of every path, PREFIX is where things will be used. All goes
+# below PREFIX, where systemd (252), udev, man and bash-completion look when it is /usr/local or /usr.
+
+PACKAGES_TEST += mandoc systemd
+
+PREFIX ?= /usr/local
+BINDIR = $(PREFIX)/bin
+SHARE = $(PREFIX)/share
+LIBDIR = $(PREFIX)/lib
+INSTALL_IN = host/install
+
+INSTALLED_PROGRAMS = $(PROGRAMS) $(if $(HDF5),$(BUILD)/droptower-hdf5)
+INSTALLED_SCENES = $(wildcard common/scenes/*.ini)
+MAN = $(BUILD)/man
+# A page's date is that of the sources, so that the same sources give the same page.
+MAN_DATE = $(shell git log -1 --format=%cs 2>/dev/null || date +%F)
+
+.PHONY: man install uninstall
+man: all ## write the manual's pages into build/man
+	@rm -rf $(MAN)
+	@$(INSTALL_IN)/manual $(BUILD)/droptower $(MAN) $(MAN_DATE) $(VERSION)
+
+# put MODE FILES FOLDER
+put = @install -d '$(DESTDIR)$(3)' && install -m $(1) $(2) '$(DESTDIR)$(3)/'
+
+install: man ## install below PREFIX (/usr/local), all of it below DESTDIR
+	$(call put,755,$(INSTALLED_PROGRAMS),$(BINDIR))
+	$(call put,644,$(INSTALLED_SCENES),$(SHARE)/droptower/scenes)
+	$(call put,644,$(MAN)/*.1,$(SHARE)/man/man1)
+	$(call put,644,$(INSTALL_IN)/80-can0.network,$(LIBDIR)/systemd/network)
+	$(call put,644,$(INSTALL_IN)/80-droptower-slcan.rules,$(LIBDIR)/udev/rules.d)
+	@install -d '$(DESTDIR)$(SHARE)/bash-completion/completions' '$(DESTDIR)$(LIBDIR)/systemd/system' \
+		'$(DESTDIR)$(LIBDIR)/sysctl.d'
+	@install -m 644 $(INSTALL_IN)/droptower.bash '$(DESTDIR)$(SHARE)/bash-completion/completions/droptower'
+	@install -m 644 $(INSTALL_IN)/80-droptower-sysctl.conf '$(DESTDIR)$(LIBDIR)/sysctl.d/80-droptower.conf'
+	@sed 's|@BINDIR@|$(BINDIR)|' $(INSTALL_IN)/droptower.service.in >'$(DESTDIR)$(LIBDIR)/systemd/system/droptower.service'
+	@chmod 644 '$(DESTDIR)$(LIBDIR)/systemd/system/droptower.service'
+	@echo 'installed below $(DESTDIR)$(PREFIX)'
+
+# Folders that others use too stay; those that are ours alone go.
+uninstall: ## remove what install has installed (same PREFIX and DESTDIR)
+	@rm -f $(foreach p,$(notdir $(PROGRAMS)) droptower-hdf5,'$(DESTDIR)$(BINDIR)/$p') \
+		'$(DESTDIR)$(SHARE)/man/man1/droptower.1' '$(DESTDIR)$(SHARE)'/man/man1/droptower-*.1 \
+		'$(DESTDIR)$(LIBDIR)/systemd/network/80-can0.network' \
+		'$(DESTDIR)$(LIBDIR)/systemd/system/droptower.service' \
+		'$(DESTDIR)$(LIBDIR)/sysctl.d/80-droptower.conf' \
+		'$(DESTDIR)$(LIBDIR)/udev/rules.d/80-droptower-slcan.rules' \
+		'$(DESTDIR)$(SHARE)/bash-completion/completions/droptower'
+	@rm -rf '$(DESTDIR)$(SHARE)/droptower/scenes'
+	@rmdir '$(DESTDIR)$(SHARE)/droptower' 2>/dev/null || true

@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/model/vary.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+static const struct vary_key keys[] = {
+#define SCENE_KEY(section, key, min, max, initial, doc) \
+	{#section "." #key, #key, offsetof(struct scene, section##_##key), min, max, false},
+#include "common/scenes/scene.def"
+#undef SCENE_KEY
+};
+
+static const struct {
+	const char *name, *key;
+} short_names[] = {
+        {"angle", "drop.angle_deg"},
+        {"height", "drop.height_m"},
+        {"mass", "product.case_mass_kg"},
+        {"contact-time", "contact.duration_s"},
+        {"restitution", "contact.restitution"},
+        {"cube", "mount.cube_m"},
+        {"stiffness", "mount.stiffness_n_m"},
+        {"damping", "mount.damping_ratio"},
+};
+
+static const struct vary_key *full(const char *name)
+{
+	for (size_t i = 0; i < sizeof(keys) / sizeof(keys[0]); i++)
+		if (strcmp(keys[i].name, name) == 0)
+			return &keys[i];
+	return NULL;
+}
+
+int vary_find(const char *name, struct vary_key *key)
+{
+	const struct vary_key *found = full(name);
+
+	if (found) {
+		*key = *found;
+		return 0;
+	}
+	for (size_t i = 0; i < sizeof(short_names) / sizeof(short_names[0]); i++) {
+		if (strcmp(short_names[i].name, name) != 0)
+			continue;
+		*key = *full(short_names[i].key);
+		key->name = short_names[i].name;
+		key->linked = true;
+		return 0;
+	}
+	return DT_E_UNKNOWN;
+}
+
+void vary_each(void (*each)(const struct vary_key *key, void *context), void *context)
+{
+	for (size_t i = 0; i < sizeof(keys) / sizeof(keys[0]); i++)
+		each(&keys[i], context);
+}
+
+double vary_get(const struct scene *scene, const struct vary_key *key)
+{
+	return *(const double *)(const void *)((const char *)scene + key->offset);
+}
+
+void vary_set(struct scene *scene, const struct vary_key *key, double value)
+{
+	double *at = (double *)(void *)((char *)scene + key->offset), times = value / *at;
+
+	*at = value;
+	if (!key->linked || !(times > 0.0) || !isfinite(times))
+		return;
+	if (at == &scene->drop_height_m) {
+		scene->contact_duration_s *= pow(times, -0.1);
+	} else if (at == &scene->contact_duration_s) {
+		scene->contact_stiffness_n_m15 *= pow(times, -2.5);
+	} else if (at == &scene->mount_cube_m) {
+		scene->mount_stiffness_n_m *= times;
+		scene->mount_damping_n_s_m *= times;
+	} else if (at == &scene->mount_damping_ratio) {
+		scene->mount_damping_n_s_m *= times;
+	}
+}

@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_MODEL_VARY_H
+#define DT_HOST_MODEL_VARY_H
+/*
+ * Changing a scene by name: any key of scene.def as "section.key", alone; or by a short name, with what
+ * depends on it:
+ *
+ *   angle, mass, restitution, stiffness   drop.angle_deg, product.case_mass_kg, ...: nothing else
+ *   height        the contact time with v^-0.2, as a given mat has it
+ *   contact-time  the contact's stiffness with T^-2.5
+ *   cube          the mounts' stiffness and dampers with the cube's side, cubes being similar
+ *   damping       the identified dampers with the damping ratio
+ *
+ * Pure functions, any thread; a scene that comes out is the caller's to check.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "common/error.h"
+#include "common/scenes/scene.h"
+
+struct vary_key {
+	const char *name; /* as given: "angle", "mount.cube_m" */
+	const char *key;  /* "angle_deg" */
+	size_t offset;    /* in struct scene */
+	double min, max;
+	bool linked; /* a short name */
+};
+
+/* DT_E_UNKNOWN: no such name. */
+DT_MUST_USE int vary_find(const char *name, struct vary_key *key);
+
+/* Calls each(key, context) for every key of scene.def, under its full name. */
+void vary_each(void (*each)(const struct vary_key *key, void *context), void *context);
+
+double vary_get(const struct scene *scene, const struct vary_key *key);
+void vary_set(struct scene *scene, const struct vary_key *key, double value);
+
+#endif

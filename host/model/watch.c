@@ -1,0 +1,233 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/model/watch.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+/* Parabolas through ever closer points, in shares of the samples' distance: their vertex closes in on a
+ * smooth peak to the seventh digit and beyond. Two rounds do; where the vertex escaped the second, it gets
+ * two more, and where it escapes these there is a kink. */
+static const double round_share[] = {0.05, 2e-3, 0.01, 2e-3};
+enum { ROUNDS = sizeof(round_share) / sizeof(round_share[0]), KINK_STEPS = 60, CROSSING_STEPS = 60 };
+
+#define GOLDEN 0.6180339887498949
+#define ROUGH_SHARE 0.2
+
+static void sample(struct watch *w, const struct ode *ode, double t)
+{
+	double y[ODE_STATES_MAX];
+
+	memmove(&w->time_s[0], &w->time_s[1], 2 * sizeof(w->time_s[0]));
+	memmove(&w->value[0], &w->value[1], 2 * sizeof(w->value[0]));
+	ode_at(ode, t, y);
+	w->time_s[2] = t;
+	w->signals(w->context, y, w->value[2]);
+	if (w->seen < 3)
+		w->seen++;
+}
+
+static void record(struct watch *w, size_t signal, double t, const double value[])
+{
+	w->peak[signal] = (struct watch_peak){value[signal], t};
+	memcpy(w->with[signal], value, w->count * sizeof(*value));
+}
+
+void watch_start(struct watch *w, const struct ode *ode)
+{
+	w->seen = 0;
+	sample(w, ode, ode->t);
+	for (size_t i = 0; i < w->count; i++)
+		record(w, i, ode->t, w->value[2]);
+}
+
+static double magnitude(const struct watch *w, const struct ode *ode, size_t signal, double t)
+{
+	double y[ODE_STATES_MAX], value[WATCH_SIGNALS_MAX];
+
+	ode_at(ode, t, y);
+	w->signals(w->context, y, value);
+	return fabs(value[signal]);
+}
+
+/* The vertex of the parabola through three points, no further away than they are. */
+static double vertex(const double t[3], const double f[3])
+{
+	double left = t[1] - t[0], right = t[2] - t[1];
+	double fall_left = (f[1] - f[0]) / left, fall_right = (f[1] - f[2]) / right;
+	double at = t[1] + 0.5 * (fall_left * right - fall_right * left) / (fall_left + fall_right);
+
+	if (!(fall_left + fall_right > 0.0))
+		return t[1];
+	return fmin(fmax(at, t[0]), t[2]);
+}
+
+/* Sharpens *t, a peak between two instants. False if no parabola fits. */
+static bool close_in(const struct watch *w, const struct ode *ode, size_t signal, const double time_s[3],
+                     double *t)
+{
+	double reach = fmin(time_s[2] - time_s[1], time_s[1] - time_s[0]), most = 0.0;
+	bool within = false;
+
+	for (int i = 0; i < ROUNDS && !(within && i == ROUNDS / 2); i++) {
+		double step = round_share[i] * reach, f[3];
+		double at[3] = {*t - step, *t, *t + step};
+
+		if (at[0] < time_s[0] || at[2] > time_s[2])
+			return false;
+		for (int k = 0; k < 3; k++)
+			f[k] = magnitude(w, ode, signal, at[k]);
+		*t = vertex(at, f);
+		within = *t > at[0] && *t < at[2];
+		most = fmax(fmax(f[0], f[1]), f[2]);
+	}
+	return within && magnitude(w, ode, signal, *t) >= most * (1.0 - 1e-12);
+}
+
+/* The largest between two instants that have one peak between them, whatever its shape. */
+static double golden_section(const struct watch *w, const struct ode *ode, size_t signal, double low,
+                             double high)
+{
+	double a = high - GOLDEN * (high - low), b = low + GOLDEN * (high - low);
+	double at_a = magnitude(w, ode, signal, a), at_b = magnitude(w, ode, signal, b);
+
+	for (int i = 0; i < KINK_STEPS; i++) {
+		if (at_a > at_b) {
+			high = b;
+			b = a;
+			at_b = at_a;
+			a = high - GOLDEN * (high - low);
+			at_a = magnitude(w, ode, signal, a);
+		} else {
+			low = a;
+			a = b;
+			at_a = at_b;
+			b = low + GOLDEN * (high - low);
+			at_b = magnitude(w, ode, signal, b);
+		}
+	}
+	return 0.5 * (low + high);
+}
+
+/* A narrower parabola about t, as good as long steps deserve. */
+static double vertex_again(const struct watch *w, const struct ode *ode, size_t signal,
+                           const double time_s[3], double t)
+{
+	double step = ROUGH_SHARE * fmin(time_s[2] - time_s[1], time_s[1] - time_s[0]), f[3];
+	double at[3] = {t - step, t, t + step};
+
+	if (at[0] < time_s[0] || at[2] > time_s[2])
+		return t;
+	for (int k = 0; k < 3; k++)
+		f[k] = magnitude(w, ode, signal, at[k]);
+	return vertex(at, f);
+}
+
+/* The middle one of three instants is where the signal is largest, as far as known; f: its magnitudes. */
+static void refine(struct watch *w, const struct ode *ode, size_t signal, const double time_s[3],
+                   const double f[3])
+{
+	double t = vertex(time_s, f), y[ODE_STATES_MAX], value[WATCH_SIGNALS_MAX];
+
+	if (w->rough)
+		t = vertex_again(w, ode, signal, time_s, t);
+	else if (!close_in(w, ode, signal, time_s, &t))
+		t = golden_section(w, ode, signal, time_s[0], time_s[2]);
+	ode_at(ode, t, y);
+	w->signals(w->context, y, value);
+	if (fabs(value[signal]) < f[1]) {
+		t = time_s[1];
+		ode_at(ode, t, y);
+		w->signals(w->context, y, value);
+	}
+	if (fabs(value[signal]) > fabs(w->peak[signal].value))
+		record(w, signal, t, value);
+}
+
+/* How far above the largest sample a peak between samples may lie. */
+#define HIDDEN_SHARE 1.1
+
+/* How near the end of all its slope is looked at. */
+#define END_SHARE 1e-3
+
+static void look(struct watch *w, const struct ode *ode, double t)
+{
+	sample(w, ode, t);
+	if (w->seen < 3)
+		return;
+	for (size_t i = 0; i < w->count; i++) {
+		double f[3] = {fabs(w->value[0][i]), fabs(w->value[1][i]), fabs(w->value[2][i])};
+
+		if (!(w->skipped >> i & 1u) && f[1] >= f[0] && f[1] > f[2] &&
+		    f[1] * HIDDEN_SHARE > fabs(w->peak[i].value))
+			refine(w, ode, i, w->time_s, f);
+	}
+}
+
+void watch_step(struct watch *w, const struct ode *ode)
+{
+	look(w, ode, 0.5 * (ode->last.from + ode->last.end));
+	look(w, ode, ode->last.end);
+}
+
+/* Between the last two samples, where no later one tells of a peak. */
+static void look_at_end(struct watch *w, const struct ode *ode, size_t signal)
+{
+	double from = w->time_s[1], to = w->time_s[2], half[3] = {from, 0.5 * (from + to), to};
+	double edge[3] = {half[1], to - END_SHARE * (to - from), to}, end = fabs(w->value[2][signal]);
+	double middle = magnitude(w, ode, signal, half[1]);
+	double before = fabs(w->value[1][signal]), slope;
+
+	if (middle >= end && middle >= before) {
+		refine(w, ode, signal, half, (const double[]){before, middle, end});
+	} else if (middle < end) {
+		slope = magnitude(w, ode, signal, edge[1]);
+		if (slope > end)
+			refine(w, ode, signal, edge, (const double[]){middle, slope, end});
+	}
+	if (end > fabs(w->peak[signal].value))
+		record(w, signal, to, w->value[2]);
+}
+
+bool watch_passed(const struct watch *w, size_t signal, double share)
+{
+	double now = fabs(w->value[2][signal]);
+
+	return w->seen == 3 && now < fabs(w->value[1][signal]) && now < share * fabs(w->peak[signal].value);
+}
+
+void watch_end(struct watch *w, const struct ode *ode)
+{
+	for (size_t i = 0; i < w->count; i++)
+		if (!(w->skipped >> i & 1u) && fabs(w->value[2][i]) * HIDDEN_SHARE > fabs(w->peak[i].value))
+			look_at_end(w, ode, i);
+}
+
+double watch_crossing(const struct ode *ode, size_t state)
+{
+	double low = ode->last.from, high = ode->last.end, y[ODE_STATES_MAX];
+	double at_low = ode->last.term[0][state], at_high = ode->y[state], t = high;
+	int side = 0;
+
+	/* the Illinois form of regula falsi */
+	for (int i = 0; i < CROSSING_STEPS && at_low != at_high; i++) {
+		double before = t;
+
+		t = (low * at_high - high * at_low) / (at_high - at_low);
+		if (fabs(t - before) <= 1e-15 * fabs(high))
+			break;
+		ode_at(ode, t, y);
+		if ((y[state] < 0.0) == (at_high < 0.0)) {
+			high = t;
+			at_high = y[state];
+			at_low *= side == 1 ? 0.5 : 1.0;
+			side = 1;
+		} else {
+			low = t;
+			at_low = y[state];
+			at_high *= side == -1 ? 0.5 : 1.0;
+			side = -1;
+		}
+	}
+	return t;
+}

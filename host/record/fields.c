@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/fields.h"
+
+#include <math.h>
+#include <string.h>
+
+#define FIELD(name, kind, member)                           \
+	{                                                   \
+		name, kind, offsetof(struct record, member) \
+	}
+
+static const struct fields_entry entries[] = {
+        FIELD("drop_id", FIELDS_U16, drop_id),
+        FIELD("marks", FIELDS_U16, marks),
+        FIELD("first_tick_ms", FIELDS_U32, first_tick_ms),
+        FIELD("last_tick_ms", FIELDS_U32, last_tick_ms),
+        FIELD("trigger_s", FIELDS_REAL, trigger_s),
+        FIELD("frame_speed_m_s", FIELDS_REAL, frame_speed_m_s),
+        FIELD("crc32", FIELDS_U32, crc32),
+        FIELD("camera_frame", FIELDS_I16, camera_frame),
+        FIELD("blocks", FIELDS_U64, counters.blocks),
+        FIELD("repeated", FIELDS_U64, counters.repeated),
+        FIELD("reordered", FIELDS_U64, counters.reordered),
+        FIELD("corrupt", FIELDS_U64, counters.corrupt),
+        FIELD("gaps", FIELDS_U64, counters.gaps),
+        FIELD("resent", FIELDS_U64, counters.resent),
+        FIELD("conflicting", FIELDS_U64, counters.conflicting),
+};
+
+const struct fields_entry *fields_entry(size_t i)
+{
+	return i < sizeof(entries) / sizeof(entries[0]) ? &entries[i] : NULL;
+}
+
+const struct fields_entry *fields_find(const char *name)
+{
+	for (size_t i = 0; i < sizeof(entries) / sizeof(entries[0]); i++)
+		if (strcmp(entries[i].name, name) == 0)
+			return &entries[i];
+	return NULL;
+}
+
+/* Both come with the capture end and make no sense without. */
+static bool of_capture_end(const struct fields_entry *entry)
+{
+	return entry->offset == offsetof(struct record, crc32) ||
+	       entry->offset == offsetof(struct record, camera_frame);
+}
+
+bool fields_known(const struct record *record, const struct fields_entry *entry)
+{
+	if (!record->is_drop || (of_capture_end(entry) && !record->crc_known))
+		return false;
+	return entry->kind != FIELDS_REAL || isfinite(fields_real(record, entry));
+}
+
+double fields_real(const struct record *record, const struct fields_entry *entry)
+{
+	double value;
+
+	if (entry->kind != FIELDS_REAL)
+		return (double)fields_whole(record, entry);
+	memcpy(&value, (const char *)record + entry->offset, sizeof(value));
+	return value;
+}
+
+int64_t fields_whole(const struct record *record, const struct fields_entry *entry)
+{
+	const char *at = (const char *)record + entry->offset;
+	int16_t i16;
+	uint16_t u16;
+	uint32_t u32;
+	uint64_t u64;
+
+	switch (entry->kind) {
+	case FIELDS_I16:
+		memcpy(&i16, at, sizeof(i16));
+		return i16;
+	case FIELDS_U16:
+		memcpy(&u16, at, sizeof(u16));
+		return u16;
+	case FIELDS_U32:
+		memcpy(&u32, at, sizeof(u32));
+		return u32;
+	case FIELDS_U64:
+		memcpy(&u64, at, sizeof(u64));
+		return (int64_t)u64;
+	case FIELDS_REAL:
+		break;
+	}
+	return 0;
+}
+
+static void set_whole(char *at, enum fields_kind kind, double value)
+{
+	int16_t i16 = kind == FIELDS_I16 ? (int16_t)value : 0;
+	uint16_t u16 = kind == FIELDS_U16 ? (uint16_t)value : 0;
+	uint32_t u32 = kind == FIELDS_U32 ? (uint32_t)value : 0;
+	uint64_t u64 = kind == FIELDS_U64 ? (uint64_t)value : 0;
+
+	if (kind == FIELDS_I16)
+		memcpy(at, &i16, sizeof(i16));
+	else if (kind == FIELDS_U16)
+		memcpy(at, &u16, sizeof(u16));
+	else if (kind == FIELDS_U32)
+		memcpy(at, &u32, sizeof(u32));
+	else
+		memcpy(at, &u64, sizeof(u64));
+}
+
+int fields_set(struct record *record, const struct fields_entry *entry, double value)
+{
+	static const struct {
+		double min, max;
+	} range[] = {
+	        [FIELDS_REAL] = {-INFINITY, INFINITY},  [FIELDS_I16] = {INT16_MIN, INT16_MAX},
+	        [FIELDS_U16] = {0, UINT16_MAX},         [FIELDS_U32] = {0, UINT32_MAX},
+	        [FIELDS_U64] = {0, 9007199254740992.0}, /* beyond, a double is not every whole number */
+	};
+	char *at = (char *)record + entry->offset;
+
+	if (!isfinite(value) || value < range[entry->kind].min || value > range[entry->kind].max ||
+	    (entry->kind != FIELDS_REAL && value != trunc(value)))
+		return DT_E_RANGE;
+	if (entry->kind == FIELDS_REAL)
+		memcpy(at, &value, sizeof(value));
+	else
+		set_whole(at, entry->kind, value);
+	record->is_drop |= entry->offset == offsetof(struct record, drop_id);
+	record->crc_known |= entry->offset == offsetof(struct record, crc32);
+	return 0;
+}

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_REPORT_SHOCK_H
+#define DT_HOST_REPORT_SHOCK_H
+/*
+ * What host/shock found, as parts of JSON and text: shocks, free falls, and a pulse against its band.
+ */
+#include "host/report/put.h"
+#include "host/report/report.h"
+
+/* "events", "free_falls" (always there) and "band" (null without one). */
+void shock_put(struct builder *b, cJSON *root, const struct report *report);
+
+/* The band's verdict; the lists when the report is to show them. Times from zero_s. */
+void shock_write(const struct report *report, double zero_s, FILE *out);
+
+#endif

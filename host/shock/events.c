@@ -1,0 +1,282 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/shock/events.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <gsl/gsl_statistics_double.h>
+
+#include "common/units.h"
+
+#define LEVEL_SIGMAS 8.0
+#define LEVEL_PART 0.02
+#define WIDTH_PART 0.1
+#define MAD_TO_SIGMA 1.482602218505602
+
+enum { SPREAD_SAMPLES = 256, HOLD_OFF_SAMPLES = 3, BLOCK = 64, LANES = 8 };
+
+struct source {
+	struct axes axes;
+	double rest_g[AXES_MAX];
+	double level_g, hold_off_s;
+};
+
+/* A shock that is not over yet. */
+struct shock {
+	bool open;
+	size_t peak;
+	double peak_g;
+	double first_s, last_s; /* when it was outside the level */
+};
+
+static bool value_at(const struct source *source, size_t k, double *value_g)
+{
+	double value[AXES_MAX];
+
+	if (!axes_read(&source->axes, k, source->rest_g, value))
+		return false;
+	*value_g = axes_value(&source->axes, value);
+	return true;
+}
+
+/* ---- rest and level ---- */
+
+/* Median of a channel and the standard deviation of its noise. */
+static void rest_of(const struct channel *channel, double *rest_g, double *noise_g)
+{
+	size_t step = channel->count / SPREAD_SAMPLES + 1, n = 0;
+	double work[SPREAD_SAMPLES], scratch[SPREAD_SAMPLES];
+
+	for (size_t k = 0; k < channel->count; k += step)
+		if (isfinite(channel->value_g[k]))
+			work[n++] = channel->value_g[k];
+	*rest_g = 0;
+	*noise_g = 0;
+	if (n == 0)
+		return;
+	memcpy(scratch, work, n * sizeof(*work));
+	*rest_g = gsl_stats_median(scratch, 1, n);
+	*noise_g = MAD_TO_SIGMA * gsl_stats_mad0(work, 1, n, scratch);
+}
+
+static inline double larger(double a, double b)
+{
+	return a > b ? a : b; /* a NAN in a is never larger */
+}
+
+/* The largest distance from rest between two instants, the samples beside them included. */
+static double reach(const struct channel *channel, double from_s, double until_s, double rest_g)
+{
+	double first = floor((from_s - channel->start_s) * channel->rate_hz);
+	double last = ceil((until_s - channel->start_s) * channel->rate_hz);
+	size_t k = first > 0 ? (size_t)first : 0, end = channel->count;
+	double most[LANES] = {0};
+
+	if (last < 0)
+		return 0;
+	if (last + 1 < (double)end)
+		end = (size_t)last + 1;
+	for (; k + LANES <= end; k += LANES)
+		for (unsigned i = 0; i < LANES; i++)
+			most[i] = larger(fabs(channel->value_g[k + i] - rest_g), most[i]);
+	for (; k < end; k++)
+		most[0] = larger(fabs(channel->value_g[k] - rest_g), most[0]);
+	for (unsigned i = 1; i < LANES; i++)
+		most[0] = larger(most[i], most[0]);
+	return most[0];
+}
+
+/* No reading between two instants lies further from rest: the axes' own extremes together. */
+static double bound(const struct source *source, double from_s, double until_s)
+{
+	double squares = 0;
+
+	for (size_t i = 0; i < source->axes.count; i++) {
+		double most = reach(source->axes.axis[i], from_s, until_s, source->rest_g[i]);
+
+		squares += most * most;
+	}
+	return sqrt(squares);
+}
+
+static void set_level(struct source *source, const struct events_options *options)
+{
+	double noise, squares = 0, rate = source->axes.axis[0]->rate_hz;
+
+	for (size_t i = 0; i < source->axes.count; i++) {
+		rest_of(source->axes.axis[i], &source->rest_g[i], &noise);
+		squares += noise * noise;
+	}
+	source->hold_off_s = fmax(options->hold_off_s > 0 ? options->hold_off_s : EVENTS_HOLD_OFF_S,
+	                          HOLD_OFF_SAMPLES / rate);
+	source->level_g = options->level_g;
+	if (!(options->level_g > 0))
+		source->level_g =
+		        fmax(LEVEL_SIGMAS * sqrt(squares), LEVEL_PART * bound(source, -INFINITY, INFINITY));
+}
+
+/* ---- one shock ---- */
+
+/* From the peak outward to where the value falls below a tenth of it: the last sample inside, and the instant
+ * of the crossing. No further than a hold-off beyond the shock: a sensor that was turned round rests
+ * elsewhere than before. */
+static size_t edge(const struct source *source, const struct shock *shock, int step, double *time_s)
+{
+	double sign = shock->peak_g < 0 ? -1 : 1, inside = fabs(shock->peak_g), value;
+	double level = WIDTH_PART * inside;
+	size_t k = shock->peak, last = k, count = source->axes.axis[0]->count;
+
+	while (step < 0 ? k > 0 : k + 1 < count) {
+		k = step < 0 ? k - 1 : k + 1;
+		if (axes_time(&source->axes, k) < shock->first_s - source->hold_off_s ||
+		    axes_time(&source->axes, k) > shock->last_s + source->hold_off_s)
+			break;
+		if (!value_at(source, k, &value))
+			continue;
+		value *= sign;
+		if (value < level) {
+			double from = axes_time(&source->axes, last), to = axes_time(&source->axes, k);
+
+			*time_s = from + (to - from) * (inside - level) / (inside - value);
+			return last;
+		}
+		inside = value;
+		last = k;
+	}
+	*time_s = axes_time(&source->axes, last);
+	return last;
+}
+
+/* Over the samples from first to last, of each axis; a hole counts as the mean of the others. */
+static double velocity(const struct source *source, size_t first, size_t last)
+{
+	double sum[AXES_MAX] = {0}, value[AXES_MAX];
+	size_t n = 0;
+
+	for (size_t k = first; k <= last; k++) {
+		if (!axes_read(&source->axes, k, source->rest_g, value))
+			continue;
+		for (size_t i = 0; i < source->axes.count; i++)
+			sum[i] += value[i];
+		n++;
+	}
+	for (size_t i = 0; i < source->axes.count; i++)
+		sum[i] *= UNITS_G_M_S2 * (double)(last - first + 1) /
+		          ((double)n * source->axes.axis[0]->rate_hz);
+	return axes_value(&source->axes, sum);
+}
+
+static void refine(const struct source *source, const struct shock *shock, struct event *event)
+{
+	size_t k = shock->peak;
+	double before, after, bend, shift;
+
+	event->peak_g = shock->peak_g;
+	event->time_s = axes_time(&source->axes, k);
+	if (k == 0 || k + 1 == source->axes.axis[0]->count || !value_at(source, k - 1, &before) ||
+	    !value_at(source, k + 1, &after))
+		return;
+	bend = before - 2 * shock->peak_g + after;
+	if (!(fabs(bend) > 0))
+		return;
+	shift = 0.5 * (before - after) / bend;
+	if (!(fabs(shift) <= 0.5))
+		return;
+	event->peak_g -= 0.25 * (before - after) * shift;
+	event->time_s += shift / source->axes.axis[0]->rate_hz;
+}
+
+static void keep(struct events *events, const struct event *event)
+{
+	size_t place = events->count;
+
+	events->found++;
+	while (place > 0 && fabs(events->event[place - 1].peak_g) < fabs(event->peak_g))
+		place--;
+	if (place == EVENTS_MAX)
+		return;
+	if (events->count < EVENTS_MAX)
+		events->count++;
+	memmove(&events->event[place + 1], &events->event[place],
+	        (events->count - 1 - place) * sizeof(*event));
+	events->event[place] = *event;
+}
+
+static void finish(const struct source *source, struct shock *shock, struct events *events)
+{
+	struct event event = {.sensor = source->axes.count > 1};
+	double from, to;
+	size_t first, last;
+
+	if (!shock->open)
+		return;
+	shock->open = false;
+	memcpy(event.name, source->axes.name, sizeof(event.name));
+	refine(source, shock, &event);
+	first = edge(source, shock, -1, &from);
+	last = edge(source, shock, +1, &to);
+	event.duration_s = to - from;
+	event.velocity_change_m_s = velocity(source, first, last);
+	keep(events, &event);
+}
+
+/* ---- all of them ---- */
+
+/* Samples [from, until) of the clock. */
+static void scan_block(const struct source *source, size_t from, size_t until, struct shock *shock,
+                       struct events *events)
+{
+	for (size_t k = from; k < until; k++) {
+		double time_s = axes_time(&source->axes, k), value;
+
+		if (!value_at(source, k, &value) || fabs(value) <= source->level_g)
+			continue;
+		if (shock->open && time_s - shock->last_s > source->hold_off_s)
+			finish(source, shock, events);
+		if (!shock->open || fabs(value) > fabs(shock->peak_g)) {
+			shock->peak = k;
+			shock->peak_g = value;
+		}
+		if (!shock->open)
+			shock->first_s = time_s;
+		shock->open = true;
+		shock->last_s = time_s;
+	}
+}
+
+static void scan(const struct source *source, struct events *events)
+{
+	size_t count = source->axes.axis[0]->count;
+	struct shock shock = {0};
+
+	if (!(source->level_g > 0))
+		return;
+	for (size_t from = 0; from < count; from += BLOCK) {
+		size_t until = count - from < BLOCK ? count : from + BLOCK;
+
+		if (bound(source, axes_time(&source->axes, from), axes_time(&source->axes, until - 1)) >
+		    source->level_g)
+			scan_block(source, from, until, &shock, events);
+	}
+	finish(source, &shock, events);
+}
+
+int events_find(const struct record *record, const struct events_options *options, struct events *events)
+{
+	struct axes *axes = malloc((record->channel_count + 1) * sizeof(*axes));
+	size_t count;
+
+	if (!axes)
+		return DT_E_MEMORY;
+	memset(events, 0, sizeof(*events));
+	count = axes_find(record, axes);
+	for (size_t i = 0; i < count; i++) {
+		struct source source = {.axes = axes[i]};
+
+		set_level(&source, options);
+		scan(&source, events);
+	}
+	free(axes);
+	return 0;
+}

@@ -1,0 +1,98 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_TESTS_ACCURACY_CELLS_H
+#define DT_TESTS_ACCURACY_CELLS_H
+/*
+ * What is promised of the estimates, as scenes of known truth and limits on what estimate_record makes of
+ * many drops of each. A cell is one quantity of one scene:
+ *
+ *   ratio     root mean square error over the Cramer-Rao bound
+ *   bias      mean error, in parts of the bound or in the quantity's unit, beyond two standard errors of it
+ *   coverage  drops whose truth lies within two reported standard uncertainties, of those with a value
+ *   marked    drops that are flagged as the fault that they have
+ *   absent    drops without a value; gross: those off by more than 15 %
+ *
+ * All limits are two-sided where both sides mean something: an error below the bound is a mistake of the
+ * test or an estimator that knows the answer.
+ */
+#include "tests/accuracy/bound.h"
+
+enum quantity {
+	QUANTITY_PEAK_X,
+	QUANTITY_PEAK_Y,
+	QUANTITY_PEAK_Z,
+	QUANTITY_PEAK_TIME_X,
+	QUANTITY_PEAK_TIME_Y,
+	QUANTITY_WIDTH_X,
+	QUANTITY_VELOCITY_X,
+	QUANTITY_CONTACT_X,
+	QUANTITY_FITTED_VELOCITY_X,
+	QUANTITY_RESULTANT,
+	QUANTITY_RESULTANT_TIME,
+	QUANTITY_FREQUENCY_X,
+	QUANTITY_FREQUENCY_Y,
+	QUANTITY_FREQUENCY,
+	QUANTITY_NATURAL,
+	QUANTITY_DAMPING_X,
+	QUANTITY_DAMPING_Y,
+	QUANTITY_DAMPING,
+	QUANTITY_LAG_X,
+	QUANTITY_LAG_Y,
+	QUANTITY_LAG,
+	QUANTITIES
+};
+
+/* What a scene's drops are looked at for. */
+enum group {
+	GROUP_KNOWN,   /* the family is told */
+	GROUP_UNKNOWN, /* it is not */
+	GROUP_SKEWED,  /* Hunt-Crossley, not told */
+	GROUP_APART_KNOWN,
+	GROUP_APART,     /* X and Y peak apart */
+	GROUP_DISTURBED, /* the decay's troubles */
+	GROUP_TWO_MODES,
+	GROUP_LOUD, /* 30 and 100 g */
+	GROUP_CLIPPED,
+	GROUP_HOLE,  /* four samples lost at the peak */
+	GROUP_WRONG, /* a family that it is not */
+	GROUP_FAULT,
+	GROUPS
+};
+
+struct tally {
+	double bound; /* NAN: none is stated */
+	double error, square;
+	unsigned values, covered, gross;
+};
+
+struct cell_scene {
+	struct scene scene;
+	enum group group;
+	unsigned drops, refused; /* estimate_record failed */
+	unsigned marked;         /* as flagged as the scene asks for */
+	unsigned second;         /* drops with a second mode, in any axis or the plate */
+	struct tally tally[QUANTITIES];
+};
+
+struct cells {
+	struct cell_scene *scene; /* [count] */
+	unsigned count;
+};
+
+struct cells_options {
+	unsigned drops;   /* of each scene */
+	bool all;         /* else the short set: sigma 1 g and what must never fail */
+	unsigned jobs;    /* processes */
+	const char *only; /* part of a scene's name; NULL: all of them */
+};
+
+/* Runs every scene. Ends the program when it cannot. Free with cells_free. */
+void cells_run(const struct cells_options *options, struct cells *cells);
+void cells_free(struct cells *cells);
+
+const char *group_name(enum group group);
+
+/* Prints a line for every cell of the group that has a limit; returns how many fail. slack: standard
+ * deviations of the Monte Carlo's own scatter that the limits are widened by. quiet: failures only. */
+unsigned cells_judge(const struct cells *cells, enum group group, double slack, bool quiet, unsigned *judged);
+
+#endif

@@ -1,0 +1,286 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ *
+ * The least rung for a question, held against planar over random drops and questions.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "host/model/auto.h"
+
+#define PI 3.14159265358979323846
+
+enum { SEED = 20231, DROPS = 500 };
+
+static uint64_t state;
+
+/* Vigna's splitmix64, 0 to 1. */
+static double uniform(double low, double high)
+{
+	uint64_t z = (state += 0x9e3779b97f4a7c15u);
+
+	z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+	z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+	return low + (high - low) * (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+static double spread(double low, double high)
+{
+	return low * exp(uniform(0.0, 1.0) * log(high / low));
+}
+
+static struct scene shipped(const char *geometry)
+{
+	char file[64], message[SCENE_MESSAGE_MAX];
+	struct scene scene;
+
+	snprintf(file, sizeof(file), "common/scenes/geometry-%s.ini", geometry);
+	if (scene_read(&scene, file, message) != 0)
+		fail_msg("%s", message);
+	return scene;
+}
+
+/* A product, its mat and a drop; the contact's stiffness is near that of its duration. */
+static struct scene random_scene(void)
+{
+	struct model_options plain = model_defaults;
+	struct scene s = shipped("2A");
+	struct model_prediction p;
+
+	do {
+		double reduced, omega;
+
+		s.drop_height_m = uniform(0.2, 2.0);
+		s.drop_angle_deg = uniform(12.0, 75.0);
+		s.product_case_mass_kg = spread(0.05, 2.0);
+		s.product_length_m = spread(0.08, 0.5);
+		s.product_width_m = s.product_length_m * uniform(0.25, 1.0);
+		s.product_balance_angle_deg = uniform(15.0, 45.0);
+		s.product_inertia_ratio = uniform(0.8, 1.4);
+		s.contact_duration_s = spread(0.0015, 0.008);
+		s.contact_mass_kg = 0.0;
+		s.contact_restitution = uniform(0.25, 0.9);
+		s.contact_tangential_ratio = uniform(0.0, 3.0);
+		s.contact_friction = uniform(0.0, 0.9);
+		s.contact_mat_thickness_m = spread(0.01, 0.05);
+		s.mount_plate_mass_kg =
+		        uniform(0.0, 1.0) < 0.25 ? 0.0 : s.product_case_mass_kg * spread(0.03, 0.4);
+		reduced = 1.0 / (1.0 / s.mount_plate_mass_kg + 1.0 / s.product_case_mass_kg);
+		omega = 2.0 * PI * spread(0.2, 1.5) / s.contact_duration_s;
+		s.mount_stiffness_n_m = reduced * omega * omega;
+		s.mount_damping_ratio = uniform(0.02, 0.3);
+		s.mount_damping_n_s_m = 0.0;
+		s.mount_softening = uniform(-0.5, 0.5) < 0.0 ? 0.0 : uniform(0.0, 0.6);
+		s.mount_softening_strain = spread(0.2, 1.5);
+		s.mount_cube_m = spread(0.002, 0.008);
+		s.sensor_s2_offset_m = uniform(-0.35, 0.35) * s.product_length_m;
+		s.sensor_s1_yaw_deg = 0.0;
+		plain.refinements = 0;
+	} while (model_solve(&s, MODEL_COUPLED, &plain, &p, NULL) != 0);
+	s.contact_stiffness_n_m15 = p.stiffness_n_m15 * uniform(0.8, 1.25);
+	return s;
+}
+
+static const double accuracies[] = {0.01, 0.02, 0.05, 0.1, 0.2};
+
+/* One or two questions; without a plate there is no lag. */
+static unsigned random_question(const struct scene *s)
+{
+	unsigned first = 1u << (unsigned)uniform(0.0, 6.0), second = 1u << (unsigned)uniform(0.0, 6.0);
+	unsigned asked = uniform(0.0, 1.0) < 0.7 ? first : first | second;
+
+	if (!(s->mount_plate_mass_kg > 0.0))
+		asked &= ~(unsigned)MODEL_ASK_LAG;
+	return asked ? asked : MODEL_ASK_BOX;
+}
+
+static void test_random_questions(void **unused)
+{
+	struct model_options fine = model_defaults;
+	unsigned long cost = 0, always = 0;
+	int good = 0, taken[MODEL_FIDELITIES] = {0};
+
+	(void)unused;
+	fine.tolerance = 1e-8;
+	state = SEED;
+	for (int i = 0; i < DROPS;) {
+		struct scene s = random_scene();
+		struct model_options o = model_defaults;
+		struct model_prediction least, full, reference;
+		double apart;
+
+		o.asked = random_question(&s);
+		o.accuracy = accuracies[(int)uniform(0.0, 5.0)];
+		if (model_solve(&s, MODEL_PLANAR, &fine, &reference, NULL) != 0)
+			continue; /* through the mat */
+		i++;
+		assert_int_equal(model_predict(&s, MODEL_PLANAR, &full), 0);
+		assert_int_equal(model_solve(&s, MODEL_AUTO, &o, &least, NULL), 0);
+		apart = auto_apart(&least, &reference, o.asked);
+		good += apart < o.accuracy;
+		taken[least.rung]++;
+		cost += least.evaluations;
+		always += full.evaluations;
+		if (!(apart < o.accuracy))
+			print_message("seed %d drop %d: %s misses question %x by %.2f %%, asked %g %%\n",
+			              SEED, i, least.fidelity, o.asked, 100.0 * apart, 100.0 * o.accuracy);
+	}
+	print_message("%d of %d within; sdof %d, coupled %d, planar %d; %.1f times fewer evaluations\n", good,
+	              DROPS, taken[MODEL_SDOF], taken[MODEL_COUPLED], taken[MODEL_PLANAR],
+	              (double)always / (double)cost);
+	assert_true(good >= DROPS * 99 / 100);
+	assert_true(taken[MODEL_SDOF] >= DROPS / 100 && taken[MODEL_COUPLED] >= DROPS / 20 &&
+	            taken[MODEL_PLANAR] <= DROPS * 95 / 100);
+	assert_true(5 * cost <= always);
+}
+
+/* The predicted difference must be worth something: near it where there is one, not infinite everywhere. */
+static void test_the_difference_is_predicted(void **unused)
+{
+	int known = 0, kept = 0;
+
+	(void)unused;
+	state = SEED + 1;
+	for (int i = 0; i < DROPS; i++) {
+		struct model_options o = model_defaults;
+		struct scene s = random_scene();
+		struct model_prediction coupled, planar;
+		struct drop drop;
+		double predicted;
+
+		o.refinements = MODEL_STIFFNESS | MODEL_WEDGE;
+		if (drop_of_scene(&s, &drop, NULL) != 0 || model_predict(&s, MODEL_PLANAR, &planar) != 0 ||
+		    model_solve(&s, MODEL_COUPLED, &o, &coupled, NULL) != 0)
+			continue;
+		predicted = auto_difference(&drop, MODEL_COUPLED, MODEL_ASK_BOX);
+		if (!isfinite(predicted))
+			continue;
+		known++;
+		kept += auto_apart(&coupled, &planar, MODEL_ASK_BOX) <= predicted;
+	}
+	print_message("%d of %d\n", kept, known);
+	assert_true(known > DROPS / 2);
+	assert_true(kept >= known * 88 / 100 && kept < known);
+}
+
+static struct model_prediction ask(const struct scene *s, unsigned asked, double accuracy)
+{
+	struct model_options o = model_defaults;
+	char message[MODEL_MESSAGE_MAX];
+	struct model_prediction p;
+
+	o.asked = asked;
+	o.accuracy = accuracy;
+	if (model_solve(s, MODEL_AUTO, &o, &p, message) != 0)
+		fail_msg("%s", message);
+	assert_true(strlen(p.reason) > 40);
+	return p;
+}
+
+static void test_the_study(void **unused)
+{
+	struct scene box = shipped("1"), plate = shipped("2A");
+
+	(void)unused;
+	/* at the balance angle nothing turns: two masses are enough for the box, one for a rough plate */
+	assert_string_equal(ask(&box, MODEL_ASK_BOX, 0.05).fidelity, "coupled");
+	assert_string_equal(ask(&plate, MODEL_ASK_BOX, 0.05).fidelity, "coupled");
+	assert_string_equal(ask(&plate, MODEL_ASK_PLATE, 0.2).fidelity, "sdof");
+	assert_string_equal(ask(&plate, MODEL_ASK_PLATE, 0.01).fidelity, "planar");
+	assert_string_equal(ask(&plate, MODEL_ASK_LAG, 0.2).fidelity, "planar");
+	assert_string_equal(ask(&plate, MODEL_ASK_ALL, 0.2).fidelity, "planar");
+	assert_true(ask(&plate, MODEL_ASK_PLATE, 0.2).next == MODEL_COUPLED);
+	assert_true(ask(&plate, MODEL_ASK_PLATE, 0.2).next_change < 0.2);
+	assert_true(ask(&plate, MODEL_ASK_BOX, 0.05).difference <= 0.05);
+	assert_true(ask(&plate, MODEL_ASK_BOX, 0.01).difference == 0.0);
+	/* with everything asked, it is planar as by itself, ring-down and all */
+	assert_true(ask(&plate, 0, 0.0).plate_frequency_hz > 100.0);
+	assert_non_null(strstr(ask(&plate, 0, 0.0).reason, "answers every question asked"));
+	assert_non_null(strstr(ask(&plate, MODEL_ASK_PLATE, 0.2).reason, "within 20 %"));
+}
+
+/* What is not asked for is not told, what is asked for comes as from the whole. */
+static void test_partial_answers(void **unused)
+{
+	const enum model_fidelity rungs[] = {MODEL_COUPLED, MODEL_PLANAR};
+	struct scene s = shipped("2B");
+
+	(void)unused;
+	s.drop_angle_deg = 33.0;
+	for (int r = 0; r < 2; r++)
+		for (unsigned asked = 1; asked <= MODEL_ASK_ALL; asked++) {
+			struct model_options o = model_defaults;
+			struct model_prediction whole, part;
+
+			assert_int_equal(model_solve(&s, rungs[r], &o, &whole, NULL), 0);
+			o.asked = asked;
+			assert_int_equal(model_solve(&s, rungs[r], &o, &part, NULL), 0);
+			assert_true(auto_apart(&part, &whole, asked) < 1e-12);
+			o.tolerance = 0.01;
+			assert_int_equal(model_solve(&s, rungs[r], &o, &part, NULL), 0);
+			assert_true(auto_apart(&part, &whole, asked) < 5e-3);
+			assert_true(part.dent_share > 0.2 && part.dent_share < 0.4);
+			if (!(asked & (MODEL_ASK_BOX | MODEL_ASK_S2)))
+				assert_true(isnan(part.box.value_g));
+			if (asked == MODEL_ASK_BOX)
+				assert_true(isnan(part.resultant[0].value_g) && isnan(part.lag_s));
+			assert_true(!(part.notes & MODEL_NOTE_STUCK));
+		}
+}
+
+static void test_outside_the_sample(void **unused)
+{
+	struct scene s = shipped("2A");
+	struct drop drop;
+
+	(void)unused;
+	assert_int_equal(drop_of_scene(&s, &drop, NULL), 0);
+	assert_true(auto_difference(&drop, MODEL_COUPLED, MODEL_ASK_BOX) < 0.05);
+	assert_true(isinf(auto_difference(&drop, MODEL_SDOF, MODEL_ASK_BOX)));
+	assert_true(isinf(auto_difference(&drop, MODEL_COUPLED, MODEL_ASK_LAG)));
+	s.contact_restitution = 0.1;
+	assert_int_equal(drop_of_scene(&s, &drop, NULL), 0);
+	assert_true(isinf(auto_difference(&drop, MODEL_COUPLED, MODEL_ASK_BOX)));
+	assert_string_equal(ask(&s, MODEL_ASK_BOX, 0.2).fidelity, "planar");
+	s = shipped("2A");
+	s.mount_plate_mass_kg = s.product_case_mass_kg;
+	assert_string_equal(ask(&s, MODEL_ASK_PLATE, 0.2).fidelity, "planar");
+}
+
+static void test_names_and_refusals(void **unused)
+{
+	struct model_options o = model_defaults;
+	struct scene s = shipped("2A");
+	char message[MODEL_MESSAGE_MAX];
+	enum model_question question;
+	struct model_prediction p;
+
+	(void)unused;
+	assert_int_equal(model_question_parse("direction", &question), 0);
+	assert_true(question == MODEL_ASK_DIRECTION);
+	assert_int_equal(model_question_parse("plates", &question), DT_E_UNKNOWN);
+	o.accuracy = -0.1;
+	assert_int_equal(model_solve(&s, MODEL_AUTO, &o, &p, message), DT_E_ARGUMENT);
+	assert_non_null(strstr(message, "accuracy"));
+	o.accuracy = 0.1;
+	s.mount_stiffness_n_m = 0.0;
+	assert_int_equal(model_solve(&s, MODEL_AUTO, &o, &p, message), DT_E_ARGUMENT);
+	assert_non_null(strstr(message, "stiffness_n_m"));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(test_random_questions),   cmocka_unit_test(test_the_difference_is_predicted),
+	        cmocka_unit_test(test_the_study),          cmocka_unit_test(test_partial_answers),
+	        cmocka_unit_test(test_outside_the_sample), cmocka_unit_test(test_names_and_refusals),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

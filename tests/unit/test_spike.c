@@ -1,0 +1,276 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <cmocka.h>
+
+#include "host/estimate/dropout.h"
+#include "host/estimate/spike.h"
+#include "tests/unit/near.h"
+#include "tests/unit/synth.h"
+
+#define DATA "../shared/data"
+#define PI 3.14159265358979323846
+
+enum { PLATE = 60000 };
+
+static double plate[SYNTH_SHAPES][PLATE];
+
+static double quantised(double value)
+{
+	return round(value * 32) / 32;
+}
+
+/* 20 ms before a contact of that base and 80 ms after it: S2, or the plate of S1. */
+static void fill(struct channel *channel, enum synth_shape shape, bool on_plate, double base_s, double peak_g,
+                 double noise_g, struct synth_random *random)
+{
+	double onset = 0.02 + synth_uniform(random) / channel->rate_hz;
+
+	for (size_t k = 0; k < channel->count; k++) {
+		double t = (double)k / channel->rate_hz - onset;
+		double value = on_plate ? synth_table(plate[shape], PLATE, SYNTH_STEP_S, t * 3e-3 / base_s)
+		                        : synth_pulse(shape, t / base_s);
+
+		channel->value_g[k] = quantised(peak_g * value + noise_g * synth_normal(random));
+		channel->sample[k] = 0;
+	}
+}
+
+static size_t marked(const struct channel *channel, double noise_g, size_t *first)
+{
+	struct trace trace;
+	size_t n = 0;
+	bool any;
+
+	assert_int_equal(trace_open(&trace, channel, -INFINITY, INFINITY), 0);
+	any = spike_mark(&trace, noise_g);
+	for (size_t k = trace.count; k-- > 0;) {
+		if (trace.sample[k] & SAMPLE_SPIKE) {
+			n++;
+			*first = k;
+		}
+	}
+	assert_int_equal(any, n > 0);
+	assert_int_equal((trace.flags & RECORD_FLAG_SPIKE) != 0, n > 0);
+	trace_close(&trace);
+	return n;
+}
+
+/* No sample of a clean drop, whatever the shape, the rate, the noise and the base from 1 to 6 ms. */
+static void clean(void **state)
+{
+	static const double noise[] = {0.3, 1, 3, 10};
+	struct synth_random random = {20};
+	size_t drops = 0, samples = 0, at = 0;
+
+	(void)state;
+	for (int run = 0; run < 640; run++) {
+		double rate = run % 2 ? 10000 : 7000, sigma = noise[run / 2 % 4];
+		struct channel channel = synth_channel("a", rate, 0, (size_t)(0.1 * rate));
+
+		for (int kind = 0; kind < 2 * SYNTH_SHAPES; kind++) {
+			double base = run % 4 ? 3e-3 : 1e-3 * (1 + 5 * synth_uniform(&random));
+			double peak = run % 4 ? 485 : 1000 * synth_uniform(&random);
+
+			fill(&channel, (enum synth_shape)(kind / 2), kind % 2, base, peak, sigma, &random);
+			samples += marked(&channel, sigma, &at);
+			drops++;
+		}
+		synth_free(&channel);
+	}
+	printf("%zu of the samples of %zu clean channels marked\n", samples, drops);
+	assert_int_equal(samples, 0);
+}
+
+/* A decay that begins suddenly, damping ratio to 0.1, of any frequency that a sensor's bandwidth lets
+ * through: up to 0.35 of the rate. */
+static void vibrations(void **state)
+{
+	struct channel channel = synth_channel("a", 10000, 0, 1000);
+	struct synth_random random = {21};
+	size_t at = 0;
+
+	(void)state;
+	for (int run = 0; run < 2000; run++) {
+		double w = 2 * PI * 0.35 * synth_uniform(&random), phase = 2 * PI * synth_uniform(&random);
+		double decay = 0.1 * synth_uniform(&random);
+
+		for (size_t k = 0; k < 1000; k++) {
+			double t = (double)k - 300;
+
+			channel.value_g[k] =
+			        (t < 0 ? 0 : 300 * exp(-decay * w * t) * sin(w * t + (run % 2 ? phase : 0))) +
+			        synth_normal(&random);
+		}
+		if (marked(&channel, 1, &at) > 0)
+			fail_msg("run %d: w %g phase %g decay %g at %zu", run, w, phase, decay, at);
+	}
+	synth_free(&channel);
+}
+
+/* A spike of one sample or two, wherever it stands; exactly it is marked. */
+static void found(void **state)
+{
+	struct synth_random random = {22};
+	size_t missed = 0, at = 0;
+
+	(void)state;
+	for (int run = 0; run < 2000; run++) {
+		struct channel channel = synth_channel("a", 7000, 0, 700);
+		size_t wide = 1 + (size_t)(run % 2), k = 10 + (size_t)(680 * synth_uniform(&random));
+		double size = synth_uniform(&random) < 0.5 ? 300 : -300;
+
+		/* On the plate, whose decay is the steepest thing after the contact. */
+		fill(&channel, SYNTH_HALF_SINE, true, 3e-3, 400, 1, &random);
+		for (size_t i = 0; i < wide; i++)
+			channel.value_g[k + i] += size;
+		if (marked(&channel, 1, &at) != wide || at != k)
+			missed++;
+		synth_free(&channel);
+	}
+	printf("%zu of 2000 spikes missed\n", missed);
+	assert_int_equal(missed, 0);
+}
+
+/* On the contact itself, at its summit and on its flanks, but for the steep onset of a Hunt-Crossley pulse.
+ */
+static void on_the_pulse(void **state)
+{
+	struct synth_random random = {23};
+	size_t at = 0;
+
+	(void)state;
+	for (int run = 0; run < 1200; run++) {
+		enum synth_shape shape = (enum synth_shape)(run % SYNTH_SHAPES);
+		double summit = 0.02 + 3e-3 * synth_pulse_summit(shape);
+		struct channel channel = synth_channel("a", 7000, 0, 700);
+		size_t k = (size_t)(summit * 7000) + (size_t)(run / SYNTH_SHAPES % 4);
+
+		fill(&channel, shape, false, 3e-3, 485, 1, &random);
+		channel.value_g[k] += run % 3 ? 300 : -300;
+		if (marked(&channel, 1, &at) != 1 || at != k)
+			fail_msg("run %d: shape %d, sample %zu", run, shape, k);
+		synth_free(&channel);
+	}
+}
+
+/* Nothing to say without noise, at the ends, beside holes. */
+static void says_nothing(void **state)
+{
+	struct channel channel = synth_channel("a", 7000, 0, 100);
+	size_t at = 0;
+
+	(void)state;
+	channel.value_g[50] = 300;
+	assert_int_equal(marked(&channel, 0, &at), 1);
+	assert_int_equal(marked(&channel, NAN, &at), 0);
+	assert_int_equal(marked(&channel, 60, &at), 0);
+	synth_lose(&channel, 52, 1);
+	assert_int_equal(marked(&channel, 0, &at), 0);
+	channel.value_g[50] = 0;
+	channel.value_g[2] = channel.value_g[98] = 300;
+	assert_int_equal(marked(&channel, 0, &at), 0);
+	for (size_t count = 0; count < 12; count++) {
+		channel.count = count;
+		channel.value_g[count / 2] = 300;
+		marked(&channel, 0, &at);
+	}
+	synth_free(&channel);
+}
+
+/* The second column of a recording; false when it is not there. */
+static bool read_second(const char *file, struct channel *channel)
+{
+	FILE *in = fopen(file, "r");
+	char line[256];
+	double time, value;
+	size_t n = 0;
+
+	if (!in)
+		return false;
+	*channel = synth_channel("a", 1e6, 0, 10000);
+	while (n < 10000 && fgets(line, sizeof(line), in))
+		if (sscanf(line, "%lf %lf", &time, &value) == 2)
+			channel->value_g[n++] = value;
+	fclose(in);
+	channel->count = n;
+	return true;
+}
+
+/* Real shocks: fixtures at 1 MS/s, a board at 50 kS/s and what it stood on. Noise from the first samples. */
+static void recordings(void **state)
+{
+	static const char *const files[] = {"afrl_in_situ/T04.txt",
+	                                    "afrl_in_situ/T06.txt",
+	                                    "afrl_in_situ/T08.txt",
+	                                    "repeated_impacts/acc_pcb_a0.txt",
+	                                    "repeated_impacts/acc_pcb_a1.txt",
+	                                    "repeated_impacts/acc_pcb_a2.txt",
+	                                    "repeated_impacts/acc_base_a0.txt"};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(files) / sizeof(files[0]); i++) {
+		struct channel channel;
+		double squares = 0;
+		char path[128];
+		size_t at = 0;
+
+		snprintf(path, sizeof(path), DATA "/%s", files[i]);
+		if (!read_second(path, &channel))
+			skip();
+		for (size_t k = 2; k < 32; k++)
+			squares += pow(
+			        channel.value_g[k] - 2 * channel.value_g[k - 1] + channel.value_g[k - 2], 2);
+		assert_int_equal(marked(&channel, sqrt(squares / 30 / 6), &at), 0);
+		synth_free(&channel);
+	}
+}
+
+/* Zeros in the middle of a pulse or of its decay are taken out; those of a quiet sensor are not. */
+static void dropouts(void **state)
+{
+	struct synth_random random = {24};
+	struct channel channel = synth_channel("a", 7000, 0, 700);
+	size_t clean_marked = 0;
+
+	(void)state;
+	for (int run = 0; run < 2000; run++) {
+		size_t from = 140 + (size_t)(12 * synth_uniform(&random)),
+		       n = run % 2 ? 3 + (size_t)run % 5 : 0;
+		double sigma = 0.02 + 0.3 * synth_uniform(&random); /* fine enough for many exact zeros */
+		struct trace trace;
+
+		fill(&channel, (enum synth_shape)(run / 2 % SYNTH_SHAPES), false, 3e-3, 485, sigma, &random);
+		for (size_t k = from; k < from + n; k++)
+			channel.value_g[k] = 0;
+		assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+		if (n > 0 && fabs(channel.value_g[from - 1]) > 20 && fabs(channel.value_g[from + n]) > 20) {
+			assert_true(dropout_mark(&trace, sigma));
+			assert_int_equal(trace.flags, RECORD_FLAG_BAD | RECORD_FLAG_ZEROED);
+			for (size_t k = 0; k < 700; k++)
+				assert_int_equal(trace.sample[k], k >= from && k < from + n ? SAMPLE_BAD : 0);
+		} else if (n == 0) {
+			clean_marked += dropout_mark(&trace, sigma);
+		}
+		trace_close(&trace);
+	}
+	assert_int_equal(clean_marked, 0);
+	synth_free(&channel);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(clean),        cmocka_unit_test(vibrations), cmocka_unit_test(found),
+	        cmocka_unit_test(on_the_pulse), cmocka_unit_test(recordings), cmocka_unit_test(says_nothing),
+	        cmocka_unit_test(dropouts),
+	};
+
+	for (int shape = 0; shape < SYNTH_SHAPES; shape++)
+		synth_plate(plate[shape], PLATE, (enum synth_shape)shape, 3e-3, 129, 0.1);
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

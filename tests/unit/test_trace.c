@@ -1,0 +1,229 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "host/estimate/trace.h"
+#include "tests/unit/near.h"
+#include "tests/unit/synth.h"
+
+static struct trace open_trace(const struct channel *channel)
+{
+	struct trace trace;
+
+	assert_int_equal(trace_open(&trace, channel, -INFINITY, INFINITY), 0);
+	return trace;
+}
+
+static void fill(struct channel *channel, uint64_t seed)
+{
+	struct synth_random random = {seed};
+
+	for (size_t k = 0; k < channel->count; k++)
+		channel->value_g[k] = 10 * synth_normal(&random);
+}
+
+/* No length is special: values, mask and every block's extremes, whatever is bad where. */
+static void copies(void **state)
+{
+	(void)state;
+	for (size_t count = 0; count < 300; count++) {
+		struct channel channel = synth_channel("a", 1000, 0, count);
+		struct synth_random random = {count};
+		struct trace trace;
+
+		fill(&channel, count);
+		for (size_t k = 0; count % 3 == 1 && k < count; k++) {
+			double u = synth_uniform(&random);
+
+			if (u < 0.02)
+				channel.value_g[k] = u < 0.01 ? NAN : -INFINITY;
+			else if (u < 0.04)
+				channel.sample[k] = u < 0.03 ? SAMPLE_LOST : SAMPLE_BAD;
+		}
+		trace = open_trace(&channel);
+		assert_int_equal(trace.count, count);
+		for (size_t k = 0; k < count; k++) {
+			const struct trace_block *block = &trace.block[k / TRACE_BLOCK];
+			bool good = isfinite(channel.value_g[k]) && channel.sample[k] == 0;
+
+			assert_int_equal(trace_good(&trace, k), good);
+			assert_true(good || !block->whole);
+			if (good) {
+				assert_near(trace.value_g[k], channel.value_g[k], 0);
+				assert_true(block->low_g <= trace.value_g[k] &&
+				            trace.value_g[k] <= block->high_g);
+			}
+		}
+		trace_close(&trace);
+		synth_free(&channel);
+	}
+}
+
+/* The extremes are readings, not just bounds. */
+static void extremes(void **state)
+{
+	struct channel channel = synth_channel("a", 1000, 0, 64);
+	struct trace trace;
+
+	(void)state;
+	for (size_t at = 0; at < 64; at++) {
+		fill(&channel, at);
+		channel.value_g[at] = 77;
+		channel.value_g[(at + 31) % 64] = -78;
+		trace = open_trace(&channel);
+		assert_near(trace.block[0].high_g, 77, 0);
+		assert_near(trace.block[0].low_g, -78, 0);
+		assert_true(trace.block[0].whole);
+		trace.sample[at] |= SAMPLE_SPIKE;
+		trace_marked(&trace);
+		assert_false(trace_good(&trace, at));
+		assert_true(trace.block[0].high_g < 77 && !trace.block[0].whole);
+		trace_close(&trace);
+	}
+	synth_free(&channel);
+}
+
+/* One that is no acceleration is bad wherever it stands, and flagged; the record is not touched. */
+static void no_acceleration(void **state)
+{
+	static const double odd[] = {NAN, INFINITY, -INFINITY, 1.1e9, -1e300};
+	struct channel channel = synth_channel("a", 1000, 0, 200);
+
+	(void)state;
+	for (size_t at = 0; at < 200; at++) {
+		struct trace trace;
+
+		fill(&channel, at);
+		channel.value_g[at] = odd[at % 5];
+		trace = open_trace(&channel);
+		assert_int_equal(trace.sample[at], SAMPLE_BAD);
+		assert_int_equal(trace.flags, RECORD_FLAG_BAD);
+		assert_int_equal(channel.sample[at], 0);
+		assert_int_equal(channel.flags, 0);
+		trace_close(&trace);
+	}
+	synth_free(&channel);
+}
+
+static void limits(void **state)
+{
+	struct channel channel = synth_channel("a", 1000, 0, 500);
+	struct trace trace;
+
+	(void)state;
+	fill(&channel, 5);
+	for (size_t k = 190; k < 200; k++)
+		channel.value_g[k] = 400;
+	channel.value_g[194] = 399;
+	trace = open_trace(&channel);
+	assert_int_equal(trace.flags, RECORD_FLAG_CLIPPED);
+	for (size_t k = 0; k < 500; k++)
+		assert_int_equal(trace.sample[k],
+		                 k >= 190 && k < 200 && k != 194 ? SAMPLE_CLIPPED | TRACE_LIMIT : 0);
+	trace_close(&trace);
+	/* One at the known range is enough. */
+	fill(&channel, 6);
+	channel.value_g[63] = -400;
+	channel.range_g = 400;
+	trace = open_trace(&channel);
+	assert_int_equal(trace.sample[63], SAMPLE_CLIPPED | TRACE_LIMIT);
+	trace_close(&trace);
+	/* A spike is no limit: what was behind it comes out when it is marked. */
+	channel.range_g = 0;
+	for (size_t k = 190; k < 200; k++)
+		channel.value_g[k] = 390;
+	channel.value_g[63] = 800;
+	trace = open_trace(&channel);
+	assert_int_equal(trace.flags, 0);
+	trace.sample[63] |= SAMPLE_SPIKE;
+	trace_marked(&trace);
+	assert_int_equal(trace.flags, RECORD_FLAG_CLIPPED);
+	trace_close(&trace);
+	synth_free(&channel);
+}
+
+/* In the caller's memory, and not a byte beyond it: the sanitizer looks on. */
+static void laid(void **state)
+{
+	(void)state;
+	for (size_t count = 0; count < 200; count++) {
+		struct channel channel = synth_channel("a", 7000, 2, count);
+		void *memory = malloc(trace_bytes(&channel));
+		struct trace trace;
+
+		assert_non_null(memory);
+		fill(&channel, count);
+		assert_int_equal(trace_bytes(&channel) % sizeof(double), 0);
+		trace_lay(&trace, &channel, 2.005, 2.01, memory);
+		assert_int_equal(trace.first, count < 35 ? count : 35);
+		assert_int_equal(trace.last, count < 70 ? count : 70);
+		if (count > 0) {
+			trace.value_g[count - 1] = 1;
+			trace.sample[count - 1] = 1;
+			trace_marked(&trace);
+		}
+		free(memory);
+		synth_free(&channel);
+	}
+}
+
+static void without_a_rate(void **state)
+{
+	static const double rate[] = {0, -1, NAN, INFINITY};
+	struct channel channel = synth_channel("a", 0, 0, 100);
+
+	(void)state;
+	for (size_t i = 0; i < 4; i++) {
+		struct trace trace;
+
+		channel.rate_hz = rate[i];
+		trace = open_trace(&channel);
+		assert_int_equal(trace.count, 0);
+		assert_int_equal(trace_index(&trace, 0.01), 0);
+		trace_close(&trace);
+	}
+	synth_free(&channel);
+}
+
+static void edges(void **state)
+{
+	static const double value[] = {0, 2, 8, 10, 6, 1, 0};
+	struct channel channel = synth_channel("a", 1000, 0, 7);
+	struct trace trace;
+	double time_s;
+
+	(void)state;
+	memcpy(channel.value_g, value, sizeof(value));
+	synth_lose(&channel, 4, 1);
+	trace = open_trace(&channel);
+	assert_true(trace_edge(&trace, 3, -1, 1, 5, &time_s));
+	assert_near(time_s, 1.5e-3, 1e-12);
+	assert_true(trace_edge(&trace, 3, 1, 1, 5.5, &time_s)); /* across the lost one: 10 to 1 in 2 ms */
+	assert_near(time_s, 4e-3, 1e-12);
+	assert_false(trace_edge(&trace, 3, 1, 1, -1, &time_s));
+	assert_near(time_s, 6e-3, 1e-12);
+	assert_true(trace_at(&trace, 2.25e-3, &time_s));
+	assert_near(time_s, 8.5, 1e-12);
+	assert_false(trace_at(&trace, 3.5e-3, &time_s));
+	assert_true(trace_any(&trace, 3.5e-3, 4.1e-3, SAMPLE_LOST));
+	assert_false(trace_any(&trace, 4.5e-3, 6e-3, SAMPLE_LOST));
+	trace_close(&trace);
+	synth_free(&channel);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(copies), cmocka_unit_test(extremes),       cmocka_unit_test(no_acceleration),
+	        cmocka_unit_test(limits), cmocka_unit_test(without_a_rate), cmocka_unit_test(laid),
+	        cmocka_unit_test(edges),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
