@@ -34,7 +34,7 @@ static const char help[] =
         "  --channel NAME   the band's channel; without it, the one with the largest peak\n"
         "  --json           one JSON object per file on standard output\n"
         "  --html PAGE      write a page (one FILE only)\n"
-        "  --strict         a flagged result is a failure (exit 3)\n";
+        "  --strict         a flagged record or channel is a failure (exit 3)\n";
 
 enum {
 	OPTION_COLUMNS = 256,

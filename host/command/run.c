@@ -37,7 +37,7 @@ static const char help[] =
         "                 series), which knows scene and angle; without it $DROPTOWER_ARCHIVE or ./archive\n"
         "  --operator NAME who drops ($USER)\n"
         "  --json         one JSON object on standard output instead of the table\n"
-        "  --strict       a flagged result is a failure (exit 3)\n"
+        "  --strict       a flagged record or channel is a failure (exit 3)\n"
         "  --bench WORD   simulated tower only: a word for droptower-bench, e.g. --bench=--loss\n"
         "                 --bench=0.05; may be repeated\n";
 

@@ -340,6 +340,32 @@ static void analyse_ringdown(const struct desk *desk, size_t i, const struct est
 	channel->ringdown = work->ringdown.result;
 }
 
+/* S1 peaks near the kink at the end of the contact, which no smooth curve follows. Where the driven
+ * oscillator explains S1, its distance to what the curves say of an axis goes into the uncertainty of that
+ * axis' time, and of what hangs on it. */
+static void widen_by_driven(const struct desk *desk, struct analysis *analysis)
+{
+	struct estimate_lag *lag = &analysis->lag;
+	static const char axes[2] = {'X', 'Y'};
+
+	if (lag->driven.status != ESTIMATE_OK || (lag->driven.flags & ESTIMATE_FLAG_MODEL))
+		return;
+	for (unsigned i = 0; i < 2; i++) {
+		struct estimate_peak *s1 = &analysis->channels[find(desk, "S1", axes[i])].peak;
+		const struct estimate_peak *s2 = &analysis->channels[find(desk, "S2", axes[i])].peak;
+		double apart = s1->time_s - s2->time_s - lag->driven_axis_s[i];
+
+		if (isfinite(apart))
+			s1->sigma_time_s = hypot(s1->sigma_time_s, apart);
+	}
+	if (isfinite(lag->largest_peak_s - lag->driven_s)) {
+		double apart = lag->largest_peak_s - lag->driven_s;
+
+		lag->sigma_s = hypot(lag->sigma_s, apart);
+		analysis->resultants[0].sigma_time_s = hypot(analysis->resultants[0].sigma_time_s, apart);
+	}
+}
+
 /* The resultants of the sensors that have X and Y, and the lag when both have. */
 static void analyse_sensors(const struct desk *desk, struct analysis *analysis)
 {
@@ -365,8 +391,10 @@ static void analyse_sensors(const struct desk *desk, struct analysis *analysis)
 		analysis->resultant_count++;
 	}
 	analysis->has_lag = analysis->resultant_count == ESTIMATE_SENSORS_MAX;
-	if (analysis->has_lag)
-		lag_find(&sensor[0], &sensor[1], &analysis->lag);
+	if (!analysis->has_lag)
+		return;
+	lag_find(&sensor[0], &sensor[1], &analysis->lag);
+	widen_by_driven(desk, analysis);
 }
 
 /* Whether that axis of S1 rings on its own. */

@@ -35,6 +35,18 @@ static double agreed(double a, double b)
 	return fabs(a) < fabs(b) ? a : b;
 }
 
+/* Standard deviation of a parabola through three samples at place u between two of them, for samples with one
+ * of 1: the mean over the third before and the third after. */
+static double parabola_spread(double u)
+{
+	double w = 1 - u, beyond = u * w / 2;
+	double before = w * (1 + u), after = u * (1 + w);
+
+	return sqrt((before * before + after * after + pow(u * (1 + u) / 2, 2) + pow(w * (1 + w) / 2, 2)) /
+	                    2 +
+	            beyond * beyond);
+}
+
 /* Where the pulse meets level_g on one side, by the parabola through the two samples as bent as both their
  * neighbourhoods say; and how well that is known: noise, the bend that they do not agree on, and the hole
  * when they are no neighbours. */
@@ -64,7 +76,7 @@ static bool find_edge(const struct trace *trace, const struct peak *peak, int st
 	place = (edge->time_s - trace_time(trace, before)) / gap;
 	/* linear + bent u (u - 1) / 2 meets the level this much of the interval later */
 	edge->time_s += gap * fmin(fmax(bent * place * (1 - place) / (2 * rise), -0.5), 0.5);
-	noise = trace->noise_g * hypot(place, 1 - place);
+	noise = trace->noise_g * (fabs(bent) > 0 ? parabola_spread(place) : hypot(place, 1 - place));
 	edge->sigma_s = hypot(noise, fmax(fabs(bend0 - bent), fabs(bend1 - bent)) / 16) / edge->slope_g_s;
 	edge->sigma_s = hypot(edge->sigma_s, missing);
 	return true;
@@ -212,6 +224,7 @@ static void contact(const struct trace *trace, const struct peak *peak, enum est
 	choose(trace, peak, family, &shape, how);
 	if (shape.family == ESTIMATE_FAMILY_AUTO) {
 		how->flags |= ESTIMATE_FLAG_MODEL;
+		how->status = ESTIMATE_NOT_CONVERGED;
 		return;
 	}
 	how->method = estimate_family_name(shape.family);

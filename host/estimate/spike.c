@@ -3,11 +3,15 @@
 
 #include <math.h>
 
-enum { SIDE = 4 }; /* neighbours looked at on each side */
+enum {
+	SIDE = 4,   /* neighbours looked at on each side */
+	REACH = 10, /* how far for them, where some are missing */
+};
 
 /* A spike of one sample, of two, stands off by so many times its neighbours' bends, and sigmas of noise. */
 #define ONE_BENDS 2.0
 #define TWO_BENDS 3.0
+#define HOLE_BENDS 4.0
 #define SIGMAS 6.0
 
 /* |second difference| about sample k */
@@ -50,14 +54,73 @@ static bool all_good(const struct trace *trace, size_t from, size_t until)
 	return true;
 }
 
+/* A few good samples about one, at their own times: where others are missing. */
+struct around {
+	double time[2 * SIDE + 1]; /* in samples, of the one in the middle 0 */
+	double value[2 * SIDE + 1];
+};
+
+static bool gather(const struct trace *trace, size_t k, struct around *around)
+{
+	for (int side = -1; side <= 1; side += 2) {
+		int found = 0;
+
+		for (int away = 1; away <= REACH && found < SIDE; away++) {
+			size_t at = side < 0 ? k - (size_t)away : k + (size_t)away;
+
+			if (at >= trace->count) /* below 0 too */
+				break;
+			if (!trace_good(trace, at))
+				continue;
+			found++;
+			around->time[SIDE + side * found] = side * away;
+			around->value[SIDE + side * found] = trace->value_g[at];
+		}
+		if (found < SIDE)
+			return false;
+	}
+	around->time[SIDE] = 0;
+	around->value[SIDE] = trace->value_g[k];
+	return true;
+}
+
+/* |second derivative| through three of them, in g per sample squared. */
+static double curvature(const struct around *a, int before, int at, int after)
+{
+	double rise = (a->value[after] - a->value[at]) / (a->time[after] - a->time[at]);
+	double run = (a->value[at] - a->value[before]) / (a->time[at] - a->time[before]);
+
+	return 2 * fabs(rise - run) / (a->time[after] - a->time[before]);
+}
+
+/* The rule of stands_alone for samples that are not evenly spaced: by curvatures instead of bends. */
+static bool stands_alone_by_hole(const struct trace *trace, size_t k, double noise_g)
+{
+	const int m = SIDE;
+	struct around a;
+	double span, near, far;
+
+	if (!gather(trace, k, &a))
+		return false;
+	span = -a.time[m - 1] * a.time[m + 1] / 2;
+	near = fmax(curvature(&a, m - 2, m - 1, m + 1), curvature(&a, m - 1, m + 1, m + 2));
+	far = fmax(fmax(curvature(&a, m - 3, m - 2, m - 1), curvature(&a, m - 4, m - 3, m - 2)),
+	           fmax(curvature(&a, m + 1, m + 2, m + 3), curvature(&a, m + 2, m + 3, m + 4)));
+	return curvature(&a, m - 1, m, m + 1) * span >
+	       (HOLE_BENDS * fmax(near, far) * span) + 2 * SIGMAS * noise_g;
+}
+
 /* How many samples from k on are a spike. */
 static size_t spike_at(const struct trace *trace, size_t k, double noise_g)
 {
 	const double *v = trace->value_g + k;
 
+	if (k + SIDE >= trace->count || !trace_good(trace, k))
+		return 0;
+	if (!all_good(trace, k - SIDE, k + SIDE + 1))
+		return stands_alone_by_hole(trace, k, noise_g) ? 1 : 0;
 	/* A spike bends by no less than it stands off. */
-	if (!(bend(v) > SIGMAS * noise_g) || k + SIDE >= trace->count ||
-	    !all_good(trace, k - SIDE, k + SIDE + 1))
+	if (!(bend(v) > SIGMAS * noise_g))
 		return 0;
 	if (stands_alone(v, noise_g))
 		return 1;

@@ -31,7 +31,7 @@ _droptower_link() {
 
 _droptower_scenes() {
 	local program
-	program=$(type -P -- "$1") && compgen -G "${program%/*}/../share/droptower/scenes/*.ini"
+	program=$(type -P -- "$1") && compgen -G "${program%/*}/../share/droptower/scenes/$2*.ini"
 	compgen -f -X '!*.ini' -- "$2"
 	compgen -d -S / -- "$2"
 }
@@ -62,7 +62,8 @@ _droptower() {
 	fi
 	# not compgen -W: it would expand, and run, what a file's name says
 	while IFS= read -r choice; do
-		[ -n "$choice" ] && [[ $choice == "$current"* ]] && COMPREPLY+=("$choice")
+		# an installed scene is found by its name, and replaced by its path
+		[ -n "$choice" ] && [[ $choice == "$current"* || $choice == */scenes/"$current"* ]] && COMPREPLY+=("$choice")
 	done <<<"$choices"
 	case ${COMPREPLY[0]} in *: | */) compopt -o nospace 2>/dev/null ;; esac
 }

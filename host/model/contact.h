@@ -31,13 +31,13 @@ struct contact_law {
 	double depth;       /* largest d* */
 };
 
-/* The same without the integral for the duration, which is then good to a few percent above e = 0.2. */
-DT_MUST_USE int contact_law_begin(struct contact_law *law, double restitution);
-
 /* 0 < e <= 1; below CONTACT_RESTITUTION_MIN the law has lost its meaning (at e = 0 it has no solution).
  * 0, DT_E_ARGUMENT or DT_E_NUMERIC. */
 #define CONTACT_RESTITUTION_MIN 1e-6
 DT_MUST_USE int contact_law_init(struct contact_law *law, double restitution);
+
+/* The same without the integral for the duration, which is then good to a few percent above e = 0.2. */
+DT_MUST_USE int contact_law_begin(struct contact_law *law, double restitution);
 
 /* The largest F*, and the share of the contact time at which it comes. */
 DT_MUST_USE int contact_law_peak(const struct contact_law *law, double *force, double *time_share);

@@ -235,13 +235,13 @@ int ensemble_monte_carlo(const struct ensemble *e, size_t draws,
 {
 	struct draws d = {.ensemble = e, .points = draws};
 	size_t most = 0;
+	int error;
 
 	d.count = ensemble_select(e->options.asked, d.outputs);
 	d.value = malloc((draws ? draws : 1) * d.count * sizeof(*d.value));
 	if (!d.value)
 		return DT_E_MEMORY;
-	if (ensemble_run(draws, draw, drawn, &d) != 0)
-		most = 0;
+	error = ensemble_run(draws, draw, drawn, &d);
 	for (size_t i = 0; i < d.count; i++) {
 		double *row = &d.value[i * draws];
 		size_t kept = 0;
@@ -255,7 +255,7 @@ int ensemble_monte_carlo(const struct ensemble *e, size_t draws,
 	}
 	free(d.value);
 	*failed = draws - most;
-	return most < 2 ? DT_E_EMPTY : 0;
+	return !error && most < 2 ? DT_E_EMPTY : error;
 }
 
 /* ---- sensitivities ---- */

@@ -20,7 +20,7 @@ struct ensemble_output {
 enum { ENSEMBLE_OUTPUTS = 12 };
 extern const struct ensemble_output ensemble_outputs[ENSEMBLE_OUTPUTS];
 
-/* asked 0: everything. Values as predicted; value has room for ENSEMBLE_OUTPUTS. Returns how many. */
+/* Those that answer what is asked, 0: everything. Returns how many. */
 size_t ensemble_select(unsigned asked, const struct ensemble_output *outputs[ENSEMBLE_OUTPUTS]);
 double ensemble_value(const struct model_prediction *prediction, const struct ensemble_output *output);
 

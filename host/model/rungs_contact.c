@@ -50,11 +50,10 @@ static struct model_peak scaled(struct watch_peak peak, double share)
 	return (struct model_peak){peak_of(peak).value_g * share, peak_of(peak).time_s};
 }
 
-/* A direction is that of one instant, which must be met. */
+/* Whoever asks for little, and that not to many digits. */
 static bool rough(const struct model_options *options)
 {
-	return options->asked &&
-	       options->tolerance >= ROUGH_TOLERANCE;
+	return options->asked && options->tolerance >= ROUGH_TOLERANCE;
 }
 
 static double direction_of(struct model_peak resultant, double direction_rad)

@@ -213,7 +213,7 @@ size_t report_notes(const struct report *report, struct report_note notes[REPORT
 			note(&noting, a->resultants[i].peak_g, a->resultants[i].how.flags,
 			     a->resultants[i].sensor, "resultant");
 		if (a->has_lag)
-			note(&noting, a->lag.driven_s, a->lag.driven.flags, "S1", "lag");
+			note(&noting, a->lag.driven_s, a->lag.driven.flags, "S1", "driven lag");
 		if (a->has_plate)
 			note(&noting, a->plate.frequency_hz, a->plate.how.flags, "plate", "frequency");
 	}

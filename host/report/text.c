@@ -83,7 +83,7 @@ static void write_channels(const struct report *report, const struct report_zero
 		fprintf(out, r->axes_coincide ? ", X and Y peak together\n" : ", Y peaks %+.3f ms after X\n",
 		        r->axes_apart_s * 1e3);
 	}
-	fprintf(out, "Time 0: %s. Width at 10 %% of the peak; dv over that width.\n", zero->name);
+	fprintf(out, "Time 0: %s. Width at 10 %% of the peak; dv from foot to foot.\n", zero->name);
 	if (report_video(report, zero, video, sizeof(video)))
 		fprintf(out, "%s.\n", video);
 }
@@ -166,19 +166,33 @@ static void write_joint(const struct report *report, FILE *out)
 		write_rebound(&a->rebound, out);
 }
 
-/* "note: S1X peak, S2X peak: clipped; ..." one line for each flag. */
+/* Begins a new line when text would go beyond the table's width; returns the column after it. */
+static int fill(FILE *out, int column, const char *text)
+{
+	if (column + (int)strlen(text) > TEXT_WIDTH)
+		column = fprintf(out, "\n ") - 1;
+	return column + fprintf(out, " %s", text);
+}
+
+/* "note: S1X peak, S2X peak: clipped; ..." for each flag. */
 static void write_notes(const struct report *report, FILE *out)
 {
 	struct report_note notes[REPORT_NOTES_MAX];
 	size_t count = report_notes(report, notes);
+	int column = 0;
 
 	for (size_t i = 0; i < count; i++) {
 		bool first = i == 0 || notes[i].flag != notes[i - 1].flag;
 		bool last = i + 1 == count || notes[i].flag != notes[i + 1].flag;
 
-		fprintf(out, "%s%s", first ? "note: " : ", ", notes[i].of);
-		if (last)
-			fprintf(out, ": %s\n", report_note_words(notes[i].flag));
+		if (first)
+			column = fprintf(out, "note:");
+		column = fill(out, column, notes[i].of);
+		column += fprintf(out, last ? ":" : ",");
+		if (last) {
+			fill(out, column, report_note_words(notes[i].flag));
+			fputc('\n', out);
+		}
 	}
 }
 

@@ -191,6 +191,7 @@ static struct contact contacts(enum synth_shape shape, double noise_g, enum esti
 		if (pulse.family == ESTIMATE_FAMILY_AUTO) {
 			assert_string_equal(pulse.contact.method, "");
 			assert_true(pulse.contact.flags & ESTIMATE_FLAG_MODEL);
+			assert_int_equal(pulse.contact.status, ESTIMATE_NOT_CONVERGED);
 		} else {
 			assert_string_equal(pulse.contact.method, estimate_family_name(pulse.family));
 			off = pulse.contact_time_s - BASE_S;
