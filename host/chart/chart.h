@@ -24,13 +24,13 @@ DT_MUST_USE int chart_accuracy(const struct chart_options *options, FILE *out, c
 /* Every method under every trouble, stability-QUANTITY.svg and .csv; what fails where as a table to out. */
 DT_MUST_USE int chart_stability(const struct chart_options *options, FILE *out, char *message);
 
-/* The model's rungs: model-tables, model-finest and model-integrators, .svg and .csv; tables to out. drops and
- * seed play no part. 0, or DT_E_* with a line in message. */
+/* The model's rungs: model-tables, model-finest and model-integrators, .svg and .csv; tables to out. drops
+ * and seed play no part. 0, or DT_E_* with a line in message. */
 DT_MUST_USE int chart_model(const struct chart_options *options, FILE *out, char *message);
 DT_MUST_USE int chart_integrators(const struct chart_options *options, FILE *out, char *message);
 
-/* Where the model's methods fail, model-stability-*.svg and .csv; what each picture says to out. drops: of each
- * cell that depends on chance. 0, or DT_E_* with a line in message. */
+/* Where the model's methods fail, model-stability-*.svg and .csv; what each picture says to out. drops: of
+ * each cell that depends on chance. 0, or DT_E_* with a line in message. */
 DT_MUST_USE int chart_model_stability(const struct chart_options *options, FILE *out, char *message);
 
 #endif

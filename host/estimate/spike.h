@@ -10,8 +10,8 @@
  * for one.
  *
  * Marks SAMPLE_SPIKE, which is not good from then on, and RECORD_FLAG_SPIKE. Before baseline_remove. Nothing
- * is marked where the noise is not known, or in the four first and last samples. Beside missing samples only a
- * single one is looked for, by a wider margin.
+ * is marked where the noise is not known, or in the four first and last samples. Beside missing samples only
+ * a single one is looked for, by a wider margin.
  */
 #include "host/estimate/trace.h"
 
