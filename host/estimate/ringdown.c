@@ -64,12 +64,10 @@
 #define AGREE 3.0
 
 /* Samples before the window that lie this far from what the fit foretells, in standard deviations of one,
- * were still driven: one alone, two together, if the next earlier one is off too. So was their neighbour, a
- * little less. */
+ * were still driven: one alone, two together, if the next earlier one is off too. */
 #define BACK_ALONE 2.2
 #define BACK_PAIR 2.0
 #define BACK_AGAIN 1.5
-#define BACK_RETREAT 1
 
 /* Modes are apart when their frequencies are by this many standard deviations. */
 #define SEPARATION 3.0
@@ -573,7 +571,7 @@ static size_t free_since(const struct job *job, const struct modes *samples, siz
 
 		if ((fabs(off) > BACK_ALONE || fabs(off + after) > BACK_PAIR) &&
 		    (k - 1 == earliest || fabs(off_by(job, samples, k - 2, noise)) > BACK_AGAIN))
-			return k + BACK_RETREAT < job->first ? k + BACK_RETREAT : job->first;
+			return k;
 		after = off;
 	}
 	return k;
