@@ -115,13 +115,13 @@ static size_t spike_at(const struct trace *trace, size_t k, double noise_g)
 {
 	const double *v = trace->value_g + k;
 
-	if (k + SIDE >= trace->count || !trace_good(trace, k))
+	if (!trace_good(trace, k))
+		return 0;
+	/* A spike bends by no less than it stands off. */
+	if (trace_good(trace, k - 1) && trace_good(trace, k + 1) && !(bend(v) > SIGMAS * noise_g))
 		return 0;
 	if (!all_good(trace, k - SIDE, k + SIDE + 1))
 		return stands_alone_by_hole(trace, k, noise_g) ? 1 : 0;
-	/* A spike bends by no less than it stands off. */
-	if (!(bend(v) > SIGMAS * noise_g))
-		return 0;
 	if (stands_alone(v, noise_g))
 		return 1;
 	if (k + SIDE + 1 < trace->count && trace_good(trace, k + SIDE + 1) && stand_alone(v, noise_g))
