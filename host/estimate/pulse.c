@@ -167,6 +167,9 @@ enum { LADDER = sizeof(ladder) / sizeof(ladder[0]) };
 /* A half-sine that is not refused and asks for no other power by this many sigma needs no second opinion. */
 #define CLEAR_SCORE 2.0
 
+/* Unless its noise may hide one: below this many times the noise every family is asked. */
+#define PLAIN_SIGMAS 100.0
+
 /* The family's fit, the peak's own where it has that already. */
 static bool fit(const struct trace *trace, const struct peak *peak, enum estimate_family family,
                 struct shape *shape)
@@ -178,10 +181,12 @@ static bool fit(const struct trace *trace, const struct peak *peak, enum estimat
 	return shape_fit(shape, trace, family, &peak->start);
 }
 
-/* The best of those that are not refused; best stays AUTO when all are. */
+/* The best of those that are not refused; best stays AUTO when all are. Families that the noise lets pass
+ * differ in their base by more than either's own uncertainty: half of it is added to the best one's. */
 static void choose(const struct trace *trace, const struct peak *peak, enum estimate_family family,
                    struct shape *best, struct estimate_how *how)
 {
+	bool plain = fabs(peak->result.value_g) > PLAIN_SIGMAS * trace->noise_g;
 	unsigned tried = 0;
 
 	for (unsigned i = 0; i < LADDER; i++) {
@@ -201,13 +206,19 @@ static void choose(const struct trace *trace, const struct peak *peak, enum esti
 		if (shape_hopeless(&shape))
 			return;
 		verdict = shape_judge(&shape);
+		if (verdict == SHAPE_FITS && best->family != ESTIMATE_FAMILY_AUTO) {
+			double rival = hypot(best->sigma_base_s, (shape.base_s - best->base_s) / 2);
+
+			best->sigma_base_s = rival;
+			shape.sigma_base_s = fmax(shape.sigma_base_s, rival);
+		}
 		/* A doubtful one is not preferred, but what was asked for is given. */
 		if (verdict > (family == ESTIMATE_FAMILY_AUTO ? SHAPE_FITS : SHAPE_DOUBTFUL) ||
 		    (best->family != ESTIMATE_FAMILY_AUTO && !(shape.chi_square < best->chi_square)))
 			continue;
 		*best = shape;
 		how->flags |= verdict == SHAPE_FITS ? 0 : ESTIMATE_FLAG_MODEL;
-		if (fabs(shape.power_z) < CLEAR_SCORE)
+		if (plain && fabs(shape.power_z) < CLEAR_SCORE)
 			return;
 	}
 }
