@@ -322,6 +322,9 @@ int command_srs(int argc, char **argv)
 		fputs(help, stdout);
 		return COMMAND_DONE;
 	}
+	if (arguments.spectrum.to_hz > 0 && arguments.spectrum.to_hz < arguments.spectrum.from_hz)
+		return command_usage("srs", "--from %g Hz lies above --to %g Hz", arguments.spectrum.from_hz,
+		                     arguments.spectrum.to_hz);
 	if (arguments.limit_file && limit_read(&limit, arguments.limit_file, LIMIT_SPECTRUM, message) != 0) {
 		command_error("%s", message);
 		return COMMAND_INPUT;
