@@ -160,11 +160,8 @@ static void cards(struct page *page)
 	fputs("</div>\n", out);
 }
 
-static void notes(struct page *page)
+static void notes(struct page *page, const struct report_note *note, size_t count)
 {
-	struct report_note note[REPORT_NOTES_MAX];
-	size_t count = report_notes(page->report, note);
-
 	for (size_t i = 0; i < count; i++) {
 		bool first = i == 0 || note[i].flag != note[i - 1].flag;
 		bool last = i + 1 == count || note[i].flag != note[i + 1].flag;
@@ -182,12 +179,13 @@ static void notes(struct page *page)
 static void flags(struct page *page)
 {
 	struct report_note note[REPORT_NOTES_MAX];
+	size_t count = report_notes(page->report, note);
 	const struct record *r = page->report->record;
 	const struct analysis *a = page->report->analysis;
 	unsigned all = report_flags(page->report);
 	FILE *out = page->out;
 
-	if (!all && !report_notes(page->report, note))
+	if (!all && !count)
 		return;
 	fputs("<h2>What to know about this record</h2>\n<ul>", out);
 	for (unsigned f = all; f; f &= f - 1) {
@@ -201,7 +199,7 @@ static void flags(struct page *page)
 			}
 		fputs(named ? ").</li>" : ".</li>", out);
 	}
-	notes(page);
+	notes(page, note, count);
 	fputs("</ul>\n", out);
 }
 
