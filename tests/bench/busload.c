@@ -7,7 +7,7 @@
 
 #include "common/segment.h"
 #include "common/wire.h"
-#include "tests/bench/canbits.h"
+#include "common/link/canbits.h"
 
 enum {
 	BLOCKS_PER_S = 2000,

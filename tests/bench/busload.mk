@@ -3,15 +3,12 @@
 # The load of the bus from the rules of the frame formats; unit/test_busload holds the same lengths against
 # others made by hand.
 
-CANBITS_O = $(BUILD)/obj/tests/bench/canbits.o
 BUSLOAD_O = $(BUILD)/obj/tests/bench/busload.o
-ALL_O += $(CANBITS_O) $(BUSLOAD_O)
+ALL_O += $(BUSLOAD_O)
 
-$(BUILD)/tests/busload: $(BUSLOAD_O) $(CANBITS_O) $(call lib,common)
+$(BUILD)/tests/busload: $(BUSLOAD_O) $(call lib,link) $(call lib,common)
 	$(call say,LINK,$@)
 	$(link)
-
-$(BUILD)/tests/test_busload: $(CANBITS_O)
 
 .PHONY: busload
 busload: $(BUILD)/tests/busload ## how much of the CAN bus the wire takes at worst

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 #include <stdbool.h>
 
-#include "tests/bench/canbits.h"
+#include "common/link/canbits.h"
 
 /* 0x181, 64 bytes. Start 0, identifier 00110000001, then RRS IDE FDF res BRS 00101:
  *     0 00110000 0[1] 01 00101             one stuff bit, 18 nominal bits before the data rate

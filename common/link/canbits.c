@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "tests/bench/canbits.h"
+#include "common/link/canbits.h"
 
 enum {
 	RUN = 5, /* equal bits, then a stuff bit */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_TESTS_BENCH_CANBITS_H
-#define DT_TESTS_BENCH_CANBITS_H
+#ifndef DT_COMMON_LINK_CANBITS_H
+#define DT_COMMON_LINK_CANBITS_H
 /*
  * How long a frame can be on the bus: the most bits that a frame with an 11-bit identifier and so many bytes
  * of data takes, over all data, from its start to the end of the intermission. From ISO 11898-1:2015.
