@@ -63,6 +63,7 @@ static void watch_end(struct bench *bench)
 static void each_ms(struct bench *bench)
 {
 	bench_plant_attend(bench);
+	bench_control(bench);
 	bench_events(bench);
 	bench_host(bench);
 	if (bench->watch != NULL)
@@ -210,6 +211,7 @@ static void set_up(struct bench *bench)
 	bench->tower_rate = 1 / (1 + 1e-6 * options->clock_ppm);
 	bench->watch = options->watch;
 	bench->done_ms = -1;
+	bench->control = -1;
 	bench->event_state = UINT8_MAX;
 	for (unsigned state = 0; state < WIRE_STATES; state++)
 		bench->entered_ms[state] = -1;
@@ -230,12 +232,15 @@ static void set_up(struct bench *bench)
 	if (!bench->stop)
 		open_link(bench);
 	if (!bench->stop)
+		bench_control_open(bench);
+	if (!bench->stop)
 		start(bench);
 }
 
 static void tear_down(struct bench *bench)
 {
 	end_target(bench);
+	bench_control_close(bench);
 	codes_flush(&bench->codes);
 	close_file(bench, bench->log, bench->options->log);
 	close_file(bench, bench->truth, bench->options->truth);

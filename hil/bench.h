@@ -46,6 +46,7 @@ struct bench_options {
 	double burst_after_s;        /* so long after it */
 	unsigned event_count;
 	struct event events[EVENTS_MAX];
+	const char *control; /* path of a socket that takes events as they come, NULL: none */
 	/* A run that is watched does not fail by what happens in it: it ends when the script has done its
 	 * drops, all events have happened and every counter was told since, or at end_s. */
 	struct bench_watch *watch; /* NULL: nobody looks */

@@ -107,7 +107,8 @@ static void poll_link(struct bench *bench)
 			bench_fail(bench, BENCH_LINK, "%s: %s", link_url(bench->link), error_text(result));
 		if (result != 1)
 			return;
-		bench_from_host(bench, &frame);
+		if (!bench_in_span(bench, EVENT_HOST_SILENT))
+			bench_from_host(bench, &frame);
 	}
 }
 

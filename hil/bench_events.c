@@ -12,7 +12,7 @@ bool bench_in_span(const struct bench *bench, enum event_action action)
 	return bench_now_ms(bench) < bench->until_ms[action];
 }
 
-static void happen(struct bench *bench, const struct event *event)
+void bench_event(struct bench *bench, const struct event *event)
 {
 	switch (event->action) {
 	case EVENT_FAULT:
@@ -69,7 +69,7 @@ static void make_events(struct bench *bench)
 			bench->events_done++;
 			if (event->state != EVENT_AT_TIME)
 				bench->chain_ms = bench->entered_ms[event->state];
-			happen(bench, event);
+			bench_event(bench, event);
 		} else if (event->state != EVENT_AT_TIME) {
 			chain_free = false;
 		}

@@ -4,7 +4,7 @@
 /*
  * What the bench's own files share: the state of a run. bench.c is the run as a whole, bench_plant.c moves
  * the tower from request to request, bench_bus.c carries the frames, bench_events.c is what goes wrong and
- * when.
+ * when, bench_control.c what does by word from outside.
  */
 #include <math.h>
 #include <stdint.h>
@@ -59,6 +59,9 @@ struct bench {
 	bool restart;                    /* the firmware, after this answer */
 	unsigned restart_cause;
 	bool hang; /* its main loop, with this answer */
+
+	int control; /* socket, -1: none */
+	uint8_t control_sequence;
 
 	unsigned impacts;
 	uint64_t edges_outside; /* output edges that were not in their request's span */
@@ -127,8 +130,19 @@ void bench_host(struct bench *bench);
 bool bench_in_span(const struct bench *bench, enum event_action action);
 bool bench_events_done(const struct bench *bench);
 
+/* Makes it happen now. */
+void bench_event(struct bench *bench, const struct event *event);
+
 /* Each ms, and what of it goes with an answer. */
 void bench_events(struct bench *bench);
 void bench_events_answer(struct bench *bench, struct sensorbus_answer *answer);
+
+/* ---- bench_control.c: the socket of --control, which hil/README.md describes ---- */
+
+void bench_control_open(struct bench *bench);
+void bench_control_close(struct bench *bench);
+
+/* Each ms. */
+void bench_control(struct bench *bench);
 
 #endif

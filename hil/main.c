@@ -58,6 +58,7 @@ enum {
 	OPTION_REORDER,
 	OPTION_CUT_RESEND,
 	OPTION_FAULT,
+	OPTION_CONTROL,
 	OPTION_LOG,
 	OPTION_TRUTH,
 	OPTION_READY_FD,
@@ -82,6 +83,7 @@ static const struct option options_long[] = {
         {"reorder", required_argument, NULL, OPTION_REORDER},
         {"cut-resend", no_argument, NULL, OPTION_CUT_RESEND},
         {"fault", required_argument, NULL, OPTION_FAULT},
+        {"control", required_argument, NULL, OPTION_CONTROL},
         {"log", required_argument, NULL, OPTION_LOG},
         {"truth", required_argument, NULL, OPTION_TRUTH},
         {"ready-fd", required_argument, NULL, OPTION_READY_FD},
@@ -117,6 +119,9 @@ static void help(void)
 		printf(" %s%s", tower_fault_name((enum tower_fault)i),
 		       i == TOWER_FAULTS / 2 ? "\n                      " : "");
 	fputs("\n"
+	      "  --control PATH       unix datagram socket that takes events as they come, a line each:\n"
+	      "                       fault estop, repair estop, bus burst 20, ... as in a scenario's [at],\n"
+	      "                       and faults, which is answered (hil/README.md)\n"
 	      "  --timeline FILE      picture of a scenario's run, SVG by gnuplot\n"
 	      "  --log FILE           frames on the host's side, candump text in virtual time\n"
 	      "  --truth FILE         converter codes: tick sensor x0..x6 y0..y9 z0..z9\n"
@@ -251,6 +256,9 @@ static bool take_link_option(struct line *line, int option, const char *text)
 		return true;
 	case OPTION_LINK:
 		bench->link = text;
+		return true;
+	case OPTION_CONTROL:
+		bench->control = text;
 		return true;
 	case OPTION_READY_FD:
 		bench->ready_fd = (int)whole("ready-fd", text, 0, 1023);

@@ -114,7 +114,12 @@ static bool parse_hang(unsigned count, char **words, struct event *event)
 	return count == 2 && strcmp(words[1], "main_loop") == 0;
 }
 
-static bool parse_action(unsigned count, char **words, uint8_t sequence, struct event *event)
+const char scenario_actions[] =
+        "fault FAULT, repair FAULT, send VERB [TOKEN], send set NAME VALUE, send frame ID#DATA, "
+        "bus silent|blocked|off|babble SECONDS, bus burst N, host silent SECONDS, "
+        "reset power_on|command|watchdog|brown_out, hang main_loop";
+
+bool scenario_parse_action(unsigned count, char **words, uint8_t sequence, struct event *event)
 {
 	if (strcmp(words[0], "fault") == 0 || strcmp(words[0], "repair") == 0)
 		return parse_fault(count, words, event);
@@ -157,7 +162,7 @@ int scenario_read_event(struct scenario_reading *reading, const char *name, cons
 	count = scenario_split(text, words);
 	while (what < count && strcmp(words[what], "at") != 0)
 		what++;
-	if (!parse_action(what, words, (uint8_t)(SEQUENCE_FROM + scenario->event_count), &event))
+	if (!scenario_parse_action(what, words, (uint8_t)(SEQUENCE_FROM + scenario->event_count), &event))
 		return settings_fail(&reading->settings, DT_E_FORMAT,
 		                     "'%.60s = %.100s' is no event (hil/scenarios/README.md lists them)",
 		                     name, value);

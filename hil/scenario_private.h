@@ -15,6 +15,11 @@ struct scenario_reading {
 	struct scenario scenario;
 };
 
+/* One event from the words of [at] in front of "at"; false when they are none. sequence is that of a command
+ * it may send. Its time is left alone. */
+bool scenario_parse_action(unsigned count, char **words, uint8_t sequence, struct event *event);
+extern const char scenario_actions[]; /* what it knows, for messages */
+
 /* As settings' entry, of their sections. */
 int scenario_read_event(struct scenario_reading *reading, const char *name, const char *value);
 int scenario_read_expectation(struct scenario_reading *reading, const char *name, const char *value);

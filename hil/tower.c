@@ -128,6 +128,11 @@ void tower_fault(struct tower *t, enum tower_fault fault, bool on)
 	tower_sensors_feel(t, 0);
 }
 
+bool tower_has_fault(const struct tower *t, enum tower_fault fault)
+{
+	return fault < TOWER_FAULTS && t->fault[fault];
+}
+
 const char *tower_fault_name(enum tower_fault fault)
 {
 	return fault < TOWER_FAULTS ? fault_names[fault] : NULL;

@@ -97,6 +97,7 @@ const struct tower_truth *tower_truth(const struct tower *tower);
 void tower_lift(struct tower *tower);
 
 void tower_fault(struct tower *tower, enum tower_fault fault, bool on);
+bool tower_has_fault(const struct tower *tower, enum tower_fault fault);
 
 /* "door_open" and so on; NULL for what is no fault. */
 const char *tower_fault_name(enum tower_fault fault);

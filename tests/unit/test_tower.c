@@ -416,11 +416,14 @@ static void each_fault_shows_on_its_input(void **state)
 		assert_int_equal(tower_bias_high(tower), known[i].fault == TOWER_CABLE_S1   ? 1
 		                                         : known[i].fault == TOWER_CABLE_S2 ? 2
 		                                                                            : 0);
+		for (size_t j = 0; j < TOWER_FAULTS; j++)
+			assert_int_equal(tower_has_fault(tower, known[j].fault), j == i);
 		tower_fault(tower, known[i].fault, false);
 		assert_int_equal(tower_inputs(tower), quiet);
 		assert_string_equal(tower_fault_name(known[i].fault), known[i].name);
 	}
 	assert_null(tower_fault_name(TOWER_FAULTS));
+	assert_false(tower_has_fault(tower, TOWER_FAULTS));
 	tower_destroy(tower);
 }
 
