@@ -13,7 +13,7 @@
 
 #include "common/error.h"
 
-enum { ODE_STATES_MAX = 11, ODE_STAGES = 7 };
+enum { ODE_STATES_MAX = 10, ODE_STAGES = 7 };
 
 /* One step: what y was in between. */
 struct ode_piece {

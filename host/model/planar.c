@@ -2,25 +2,24 @@
 #include "host/model/planar.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "common/units.h"
 #include "host/model/root.h"
 
-/* Places relative to where the drop began; the plate's relative to the box, in the room's axes. */
+/* Relative to where the drop began, in the room's axes. How far the box went across matters to nothing. */
 enum {
-	ACROSS,
 	UP,
 	TURN,
 	GRIP,
 	V_ACROSS,
 	V_UP,
 	SPIN,
-	PLATE_ACROSS,
-	PLATE_UP,
-	PLATE_V_ACROSS,
-	PLATE_V_UP,
-	STATES
+	PLATE, /* the first of the plate's own */
 };
+
+/* The plate's, relative to the box. */
+enum { OFF_ACROSS, OFF_UP, OFF_V_ACROSS, OFF_V_UP, OFF_STATES, STATES = PLATE + OFF_STATES };
 
 /* A corner that has not left the mat after this many contact times will not. */
 #define CONTACTS_MAX 3.0
@@ -122,15 +121,15 @@ static void press(const struct planar *p, const double y[], struct load *l)
 	}
 }
 
-static void pull(const struct body *b, const double y[], struct load *l)
+static void pull(const struct body *b, const double off[], double spin, struct load *l)
 {
-	double far2 = y[PLATE_ACROSS] * y[PLATE_ACROSS] + y[PLATE_UP] * y[PLATE_UP];
+	double far2 = off[OFF_ACROSS] * off[OFF_ACROSS] + off[OFF_UP] * off[OFF_UP];
 	double k = b->in->mount_n_m * (1.0 + b->in->softening / (1.0 + far2 * b->softening_per_m2));
-	double c = b->in->mount_damping_n_s_m, turn = b->in->mounts_turn ? y[SPIN] : 0.0;
+	double c = b->in->mount_damping_n_s_m, turn = b->in->mounts_turn ? spin : 0.0;
 
 	/* SPIN is clockwise: seen from the box, what stands still in the room turns the other way */
-	l->mount_across = k * y[PLATE_ACROSS] + c * (y[PLATE_V_ACROSS] - turn * y[PLATE_UP]);
-	l->mount_up = k * y[PLATE_UP] + c * (y[PLATE_V_UP] + turn * y[PLATE_ACROSS]);
+	l->mount_across = k * off[OFF_ACROSS] + c * (off[OFF_V_ACROSS] - turn * off[OFF_UP]);
+	l->mount_up = k * off[OFF_UP] + c * (off[OFF_V_UP] + turn * off[OFF_ACROSS]);
 }
 
 /* Of the angle at the touch plus turn. A box turns little during a contact: series are exact to the last
@@ -162,7 +161,7 @@ static struct load load_of(const struct body *b, const double y[])
 	if (l.depth > 0.0)
 		press(p, y, &l);
 	if (p->plate_mass_kg > 0.0)
-		pull(b, y, &l);
+		pull(b, y + PLATE, y[SPIN], &l);
 	return l;
 }
 
@@ -180,7 +179,6 @@ static void rates(const void *context, const double y[], double rate[])
 	double across = (l.along + l.mount_across) / p->case_mass_kg;
 	double up = (l.normal + l.mount_up) / p->case_mass_kg;
 
-	rate[ACROSS] = y[V_ACROSS];
 	rate[UP] = y[V_UP];
 	rate[TURN] = y[SPIN];
 	rate[GRIP] = l.creep;
@@ -188,31 +186,50 @@ static void rates(const void *context, const double y[], double rate[])
 	rate[V_UP] = up - UNITS_G_M_S2;
 	rate[SPIN] = angular_acceleration(p, &l);
 	if (p->plate_mass_kg > 0.0) {
-		rate[PLATE_ACROSS] = y[PLATE_V_ACROSS];
-		rate[PLATE_UP] = y[PLATE_V_UP];
-		rate[PLATE_V_ACROSS] = -l.mount_across / p->plate_mass_kg - across;
-		rate[PLATE_V_UP] = -l.mount_up / p->plate_mass_kg - up;
+		rate[PLATE + OFF_ACROSS] = y[PLATE + OFF_V_ACROSS];
+		rate[PLATE + OFF_UP] = y[PLATE + OFF_V_UP];
+		rate[PLATE + OFF_V_ACROSS] = -l.mount_across / p->plate_mass_kg - across;
+		rate[PLATE + OFF_V_UP] = -l.mount_up / p->plate_mass_kg - up;
 	}
 }
 
-/* The same once the corner has left the mat, when nothing depends on the angle any more. */
+/* Of the plate once the corner has left the mat. */
+static void swing(const struct body *b, const double off[], double spin, struct load *l, double rate[])
+{
+	pull(b, off, spin, l);
+	rate[OFF_ACROSS] = off[OFF_V_ACROSS];
+	rate[OFF_UP] = off[OFF_V_UP];
+	rate[OFF_V_ACROSS] = -l->mount_across * b->per_mass;
+	rate[OFF_V_UP] = -l->mount_up * b->per_mass;
+}
+
+/* Of everything then, when nothing depends on the angle any more. */
 static void rates_in_flight(const void *context, const double y[], double rate[])
 {
 	const struct body *b = context;
 	const struct planar *p = b->in;
 	struct load l = {.normal = 0.0};
 
-	pull(b, y, &l);
-	rate[ACROSS] = y[V_ACROSS];
+	swing(b, y + PLATE, y[SPIN], &l, rate + PLATE);
 	rate[UP] = y[V_UP];
 	rate[TURN] = y[SPIN];
 	rate[GRIP] = rate[SPIN] = 0.0;
 	rate[V_ACROSS] = l.mount_across / p->case_mass_kg;
 	rate[V_UP] = l.mount_up / p->case_mass_kg - UNITS_G_M_S2;
-	rate[PLATE_ACROSS] = y[PLATE_V_ACROSS];
-	rate[PLATE_UP] = y[PLATE_V_UP];
-	rate[PLATE_V_ACROSS] = -l.mount_across * b->per_mass;
-	rate[PLATE_V_UP] = -l.mount_up * b->per_mass;
+}
+
+/* A box whose spin stays, for the plate alone. */
+struct spinning {
+	const struct body *body;
+	double spin;
+};
+
+static void rates_of_plate(const void *context, const double off[], double rate[])
+{
+	const struct spinning *s = context;
+	struct load l = {.normal = 0.0};
+
+	swing(s->body, off, s->spin, &l, rate);
 }
 
 /* An acceleration in the room's axes seen along X and Y. */
@@ -245,8 +262,11 @@ static void signals(const void *context, const double y[], double value[])
 	value[PLANAR_CENTRE_R] = sqrt(box_x * box_x + box_y * box_y);
 	value[PLANAR_DEPTH] = l.depth > 0.0 ? l.depth : 0.0;
 	value[PLANAR_TRAVEL] = 0.0;
-	if (p->plate_mass_kg > 0.0)
-		value[PLANAR_TRAVEL] = sqrt(y[PLATE_ACROSS] * y[PLATE_ACROSS] + y[PLATE_UP] * y[PLATE_UP]);
+	if (p->plate_mass_kg > 0.0) {
+		const double *off = y + PLATE;
+
+		value[PLANAR_TRAVEL] = sqrt(off[OFF_ACROSS] * off[OFF_ACROSS] + off[OFF_UP] * off[OFF_UP]);
+	}
 }
 
 static void start(const struct body *b, struct ode *ode)
@@ -256,16 +276,16 @@ static void start(const struct body *b, struct ode *ode)
 	double depth = contact_depth(&p->law, p->case_mass_kg, p->speed_m_s, p->stiffness_n_m15);
 	double stiff = 1.0, reach = sqrt(p->lever_x_m * p->lever_x_m + p->lever_y_m * p->lever_y_m);
 
-	ode->count = p->plate_mass_kg > 0.0 ? STATES : PLATE_ACROSS;
+	ode->count = p->plate_mass_kg > 0.0 ? STATES : PLATE;
 	ode->rates = rates;
 	ode->context = b;
 	ode->tolerance = p->tolerance;
-	ode->scale[ACROSS] = ode->scale[UP] = ode->scale[GRIP] = depth;
+	ode->scale[UP] = ode->scale[GRIP] = depth;
 	ode->scale[V_ACROSS] = ode->scale[V_UP] = p->speed_m_s;
 	if (p->plate_mass_kg > 0.0) /* a stiff mount moves little */
 		stiff = fmin(1.0, p->speed_m_s * p->speed_m_s / (depth * depth * p->mount_n_m * b->per_mass));
-	ode->scale[PLATE_ACROSS] = ode->scale[PLATE_UP] = depth * stiff;
-	ode->scale[PLATE_V_ACROSS] = ode->scale[PLATE_V_UP] = p->speed_m_s * sqrt(stiff);
+	ode->scale[PLATE + OFF_ACROSS] = ode->scale[PLATE + OFF_UP] = depth * stiff;
+	ode->scale[PLATE + OFF_V_ACROSS] = ode->scale[PLATE + OFF_V_UP] = p->speed_m_s * sqrt(stiff);
 	ode->scale[TURN] = depth / reach;
 	ode->scale[SPIN] = p->speed_m_s / reach;
 	ode_start(ode, y, (p->rough ? FIRST_STEP_ROUGH : FIRST_STEP) * depth / p->speed_m_s);
@@ -300,7 +320,7 @@ static void conclude_contact(const struct body *b, const struct ode *ode, bool r
 {
 	const struct planar *p = b->in;
 	const struct load l = load_of(b, ode->y);
-	double plate = p->plate_mass_kg > 0.0 ? ode->y[PLATE_V_UP] : 0.0;
+	double plate = p->plate_mass_kg > 0.0 ? ode->y[PLATE + OFF_V_UP] : 0.0;
 
 	r->contact_time_s = released ? ode->t : (double)NAN;
 	r->restitution =
@@ -317,19 +337,20 @@ struct ring {
 	double first_s, first_m_s;
 };
 
-static void ring_step(struct ring *ring, const struct ode *ode, struct planar_result *r)
+/* first: of the plate's states in ode. */
+static void ring_step(struct ring *ring, const struct ode *ode, size_t first, struct planar_result *r)
 {
-	double t, fall, y[ODE_STATES_MAX];
+	double t, fall, y[ODE_STATES_MAX], *off = y + first;
 
-	if ((ode->last.term[0][PLATE_UP] < 0.0) == (ode->y[PLATE_UP] < 0.0))
+	if ((ode->last.term[0][first + OFF_UP] < 0.0) == (ode->y[first + OFF_UP] < 0.0))
 		return;
-	t = watch_crossing(ode, PLATE_UP);
+	t = watch_crossing(ode, first + OFF_UP);
 	ode_at(ode, t, y);
 	if (ring->crossings == 0) {
 		ring->first_s = t;
-		ring->first_m_s = y[PLATE_V_UP];
+		ring->first_m_s = off[OFF_V_UP];
 	} else if (ring->crossings == RING_CROSSINGS) {
-		fall = log(ring->first_m_s / y[PLATE_V_UP]) / RING_PERIODS;
+		fall = log(ring->first_m_s / off[OFF_V_UP]) / RING_PERIODS;
 		r->ring_hz = RING_PERIODS / (t - ring->first_s);
 		r->ring_damping = fall / sqrt(fall * fall + 4.0 * UNITS_PI * UNITS_PI);
 	}
@@ -362,25 +383,33 @@ static int fly(const struct body *b, struct ode *ode, struct watch *watch, struc
 		if (error)
 			break;
 		watch_step(watch, ode);
-		ring_step(ring, ode, r);
+		ring_step(ring, ode, PLATE, r);
 		if (b->in->rough && all_passed(b->in, watch))
 			break;
 	}
 	return error;
 }
 
-/* And on, until three oscillations are counted. */
+/* And on, the plate alone, until three oscillations are counted. */
 static int fly_on(const struct body *b, struct ode *ode, struct ring *ring, struct planar_result *r)
 {
+	const struct spinning context = {b, ode->y[SPIN]};
+	struct ode plate = {.count = OFF_STATES,
+	                    .rates = rates_of_plate,
+	                    .context = &context,
+	                    .tolerance = RING_COARSER * ode->tolerance};
 	double end = ode->t + 2.0 * RING_PERIODS * b->period_s;
 	int error = 0;
 
-	ode->tolerance *= RING_COARSER;
-	while (!error && ode->t < end && ring->crossings <= RING_CROSSINGS) {
-		error = ode_step(ode, end);
+	memcpy(plate.scale, ode->scale + PLATE, OFF_STATES * sizeof(*plate.scale));
+	ode_start(&plate, ode->y + PLATE, ode->next);
+	plate.t = ode->t;
+	while (!error && plate.t < end && ring->crossings <= RING_CROSSINGS) {
+		error = ode_step(&plate, end);
 		if (!error)
-			ring_step(ring, ode, r);
+			ring_step(ring, &plate, 0, r);
 	}
+	ode->evaluations += plate.evaluations;
 	return error;
 }
 
