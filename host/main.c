@@ -21,9 +21,11 @@ static const struct {
         {"replay", command_replay, "a logged drop onto CAN or LCM, in its own time"},
         {"convert", command_convert, "candump, LCM, CSV, UFF58 and HDF5 into each other; the wire as DBC"},
         {"series", command_series, "series of drops in an archive: means, decisions, tables"},
+        {"report", command_report, "a series for whoever ordered it: a page, on paper, as CSV"},
         {"chart", command_chart, "what the estimates cost and where they fail, in simulated drops"},
-        {"ctl", command_ctl, "the operator's verbs: status, arm, release, abort, clear"},
+        {"ctl", command_ctl, "the operator's verbs: status, arm, release, abort, clear, set"},
         {"bridge", command_bridge, "CAN to LCM and commands back"},
+        {"serve", command_serve, "the technician's page, for a tower or a simulated one"},
 };
 enum { COMMANDS = sizeof(commands) / sizeof(commands[0]) };
 
@@ -38,9 +40,8 @@ static void help(FILE *out)
 	      out);
 }
 
-int main(int argc, char **argv)
+static int run(int argc, char **argv)
 {
-	gsl_set_error_handler_off();
 	if (argc < 2) {
 		help(stderr);
 		return COMMAND_USAGE;
@@ -57,4 +58,18 @@ int main(int argc, char **argv)
 			return commands[i].run(argc - 1, argv + 1);
 	command_error("no command '%s'; 'droptower --help' lists them", argv[1]);
 	return COMMAND_USAGE;
+}
+
+int main(int argc, char **argv)
+{
+	int code;
+
+	gsl_set_error_handler_off();
+	code = run(argc, argv);
+	/* a command that failed has said why */
+	if ((fflush(stdout) != 0 || ferror(stdout)) && code == COMMAND_DONE) {
+		command_error("standard output: not all of it could be written");
+		code = COMMAND_INPUT;
+	}
+	return code;
 }

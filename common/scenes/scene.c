@@ -147,6 +147,17 @@ int scene_read(struct scene *scene, const char *file, char message[SCENE_MESSAGE
 	return result;
 }
 
+void scene_limits(const char *section, const char *key, double *min, double *max)
+{
+	*min = *max = (double)NAN;
+	for (size_t i = 0; i < KEYS; i++) {
+		if (strcmp(keys[i].section, section) != 0 || strcmp(keys[i].name, key) != 0)
+			continue;
+		*min = keys[i].min;
+		*max = keys[i].max;
+	}
+}
+
 /* What must hold between keys; the text says it as a person would. */
 static const char *contradiction(const struct scene *scene)
 {

@@ -29,4 +29,7 @@ DT_MUST_USE int scene_read(struct scene *scene, const char *file, char message[S
  * message. */
 DT_MUST_USE int scene_check(const struct scene *scene, const char *where, char message[SCENE_MESSAGE_MAX]);
 
+/* What section.key of scene.def may be; NAN when there is no such key. */
+void scene_limits(const char *section, const char *key, double *min, double *max);
+
 #endif

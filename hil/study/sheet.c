@@ -5,6 +5,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "host/report/page.h"
+
 enum { LINE_MAX_ = 1024, TEXT_WIDTH = 110 };
 
 static const char style[] =
@@ -16,31 +18,6 @@ static const char style[] =
         "thead{border-bottom:1px solid}tbody tr:nth-child(even){background:#8882}"
         ".out{font-weight:bold;background:#e69f0066}"
         "svg{width:100%;height:auto;background:#fff}</style>";
-
-/* Text of ours: only what HTML would take for its own. */
-static void put_escaped(FILE *out, const char *text, size_t length)
-{
-	for (size_t i = 0; i < length; i++) {
-		switch (text[i]) {
-		case '<':
-			fputs("&lt;", out);
-			break;
-		case '>':
-			fputs("&gt;", out);
-			break;
-		case '&':
-			fputs("&amp;", out);
-			break;
-		default:
-			fputc(text[i], out);
-		}
-	}
-}
-
-static void put_text(FILE *out, const char *text)
-{
-	put_escaped(out, text, strlen(text));
-}
 
 /* Broken at blanks. */
 static void put_wrapped(FILE *out, const char *text)
@@ -79,7 +56,7 @@ void sheet_heading(struct sheet *sheet, const char *title)
 {
 	fprintf(sheet->text, "\n%s\n", title);
 	fputs("<h2>", sheet->page);
-	put_text(sheet->page, title);
+	page_text(sheet->page, title);
 	fputs("</h2>\n", sheet->page);
 }
 
@@ -93,7 +70,7 @@ void sheet_say(struct sheet *sheet, const char *format, ...)
 	va_end(arguments);
 	put_wrapped(sheet->text, line);
 	fputs("<p>", sheet->page);
-	put_text(sheet->page, line);
+	page_text(sheet->page, line);
 	fputs("</p>\n", sheet->page);
 }
 
@@ -118,7 +95,7 @@ static void put_groups(const struct sheet *sheet)
 			width += sheet->columns[k].width;
 		fprintf(sheet->text, "%*s", width, sheet->columns[i].group);
 		fprintf(sheet->page, "<th colspan=\"%zu\">", n);
-		put_text(sheet->page, sheet->columns[i].group);
+		page_text(sheet->page, sheet->columns[i].group);
 		fputs("</th>", sheet->page);
 	}
 	fputs("</tr>\n", sheet->page);
@@ -141,7 +118,7 @@ void sheet_table(struct sheet *sheet, const struct sheet_column *columns, size_t
 	for (size_t i = 0; i < count; i++) {
 		fprintf(sheet->text, "%*s", columns[i].width, columns[i].name);
 		fputs("<th>", sheet->page);
-		put_text(sheet->page, columns[i].name);
+		page_text(sheet->page, columns[i].name);
 		fputs("</th>", sheet->page);
 	}
 	fputs("</tr></thead><tbody>\n", sheet->page);
@@ -165,7 +142,7 @@ void sheet_row(struct sheet *sheet, const char *format, ...)
 		fprintf(sheet->text, "%s%*.*s", words ? "  " : "", sheet->columns[i].width, (int)length,
 		        cell);
 		fputs(out ? "<td class=\"out\">" : words ? "<td class=\"words\">" : "<td>", sheet->page);
-		put_escaped(sheet->page, cell, length);
+		page_text_part(sheet->page, cell, length);
 		fputs("</td>", sheet->page);
 		cell += length + (cell[length] == '|');
 	}
@@ -183,8 +160,8 @@ void sheet_picture(struct sheet *sheet, const char *title, const char *text, con
 	const char *start = strstr(svg, "<svg");
 
 	fputs("<h2>", sheet->page);
-	put_text(sheet->page, title);
+	page_text(sheet->page, title);
 	fputs("</h2>\n<p>", sheet->page);
-	put_text(sheet->page, text);
+	page_text(sheet->page, text);
 	fprintf(sheet->page, "</p>\n%s\n", start != NULL ? start : "");
 }

@@ -60,6 +60,13 @@ int archive_check_name(struct archive *archive, const char *what, const char *na
 	                      name, ARCHIVE_NAME_MAX);
 }
 
+int archive_check_names(struct archive *archive, const char *series, const char *campaign)
+{
+	int result = archive_check_name(archive, "series", series);
+
+	return result != 0 ? result : archive_check_name(archive, "campaign", campaign);
+}
+
 int archive_check_text(struct archive *archive, const char *what, const char *text)
 {
 	size_t length = strlen(text);
@@ -146,6 +153,29 @@ static int open_for_reading(struct archive *archive, const char *name)
 	return result != 0 ? result : sql_script(archive, "PRAGMA locking_mode = EXCLUSIVE");
 }
 
+static int64_t now_ms(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+/* SQLite does not always wait by itself for who changes the mode at the same time. */
+static int write_ahead(struct archive *archive)
+{
+	const struct timespec step = {.tv_nsec = 10000000};
+	int64_t start_ms = now_ms();
+	int result;
+
+	for (;;) {
+		result = sql_script(archive, "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+		if (result != DT_E_TIMEOUT || now_ms() - start_ms > WAIT_MS)
+			return result;
+		nanosleep(&step, NULL);
+	}
+}
+
 int index_open(struct archive *archive, const char *name, enum archive_mode mode)
 {
 	int result;
@@ -155,7 +185,7 @@ int index_open(struct archive *archive, const char *name, enum archive_mode mode
 	else
 		result = connect_index(archive, name, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, "");
 	if (result == 0 && mode != ARCHIVE_READ)
-		result = sql_script(archive, "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+		result = write_ahead(archive);
 	if (result == 0)
 		result = sql_script(archive, "PRAGMA foreign_keys = ON");
 	return result != 0 ? result : schema_upgrade(archive);
@@ -164,14 +194,15 @@ int index_open(struct archive *archive, const char *name, enum archive_mode mode
 static int open_in(struct archive *archive, enum archive_mode mode)
 {
 	char inside[ARCHIVE_PATH_MAX];
-	bool made = false;
+	bool made = false, raw;
 	int result;
 
 	snprintf(inside, sizeof(inside), "%s/", archive->folder);
 	if (mode == ARCHIVE_CREATE && durable_folders(inside) != 0)
 		return archive_refuse(archive, DT_E_SYSTEM, "%.400s: %s", archive->folder, strerror(errno));
+	raw = is_there(archive, "raw"); /* asked first: who makes an archive makes its index first */
 	if (!is_there(archive, "index.sqlite")) {
-		if (is_there(archive, "raw"))
+		if (raw)
 			return archive_refuse(archive, DT_E_CORRUPT,
 			                      "%.250s: raw files, but no index; 'droptower series --archive "
 			                      "%.250s --rebuild' makes it again",

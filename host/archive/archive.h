@@ -53,11 +53,14 @@ struct archive_series {
 	const char *last; /* time of the last drop; "" when there is none */
 };
 
-/* Name: letters, digits, and . _ - within; its name must be new. The scene is read from scene_file. */
+/* Name: letters, digits, and . _ - within; its name must be new. The scene is read from scene_file; NAN takes
+ * its angle, its height. Another height is written into the scene that the series keeps, since where the
+ * tower's parts stand follows from it. */
 DT_MUST_USE int archive_new_series(struct archive *archive, const char *name, const char *campaign,
-                                   const char *scene_file, double angle_deg, unsigned planned);
+                                   const char *scene_file, double angle_deg, double height_m,
+                                   unsigned planned);
 
-/* The scene of a series, at its angle. */
+/* The scene of a series, at its angle and height. */
 DT_MUST_USE int archive_scene(struct archive *archive, const char *series, struct scene *scene);
 
 /* ---- recording ---- */
@@ -86,7 +89,16 @@ void archive_discard(struct archive *archive, struct archive_recording *recordin
 /* Leaves it as it is, partial. */
 void archive_abandon(struct archive_recording *recording);
 
+/* Takes an interrupted drop up again, because its log may be whole after all. DT_E_STATE: it is recorded, or
+ * being recorded. */
+DT_MUST_USE int archive_resume(struct archive *archive, const char *drop,
+                               struct archive_recording *recording);
+
 /* ---- results, decisions ---- */
+
+/* The series of SERIES/NUMBER, and its log's place in the archive's folder. DT_E_STATE: not recorded. */
+DT_MUST_USE int archive_log(struct archive *archive, const char *drop, char series[ARCHIVE_NAME_MAX + 1],
+                            char raw[ARCHIVE_NAME_MAX + 64]);
 
 /* json: as `analyze --json` gives it. Kept in the index and beside the log; the result of the same version is
  * replaced, others stay. Drops are named SERIES/NUMBER. */
@@ -159,6 +171,13 @@ struct archive_filter {
 };
 struct archive_filter archive_filter_none(void);
 
+/* A day, a month or a year, or two of them with .. between, into from and to, which point into dates. False
+ * when text is none of these. */
+struct archive_dates {
+	char from[12], to[12];
+};
+bool archive_parse_dates(const char *text, struct archive_dates *dates, struct archive_filter *filter);
+
 /* Calls each for what passes, in the order of names and numbers, until it returns other than 0, which is
  * then returned. Texts are valid during the call. from and to take series that have a drop in between. */
 DT_MUST_USE int archive_each_series(struct archive *archive, const struct archive_filter *filter,
@@ -191,6 +210,9 @@ char *archive_json(struct archive *archive, const char *drop, const char *versio
 
 /* Where a log with these bytes is: 1 and "SERIES/NUMBER" in drop, 0 when there is none, or DT_E_*. */
 DT_MUST_USE int archive_find(struct archive *archive, const char *file, char drop[ARCHIVE_NAME_MAX + 16]);
+
+/* A number that is another one once somebody else, not this archive, has changed what there is. */
+DT_MUST_USE int archive_changes(struct archive *archive, int64_t *number);
 
 /* ---- care ---- */
 

@@ -17,6 +17,40 @@ struct archive_filter archive_filter_none(void)
 	return (struct archive_filter){.angle_deg = NAN};
 }
 
+/* YYYY-MM or YYYY-MM-DD in the calendar. */
+static bool is_day(const char *text, size_t length)
+{
+	static const int days[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
+	int year = atoi(text), month = atoi(text + 5), day = length > 7 ? atoi(text + 8) : 1;
+	int leap = month == 2 && (year % 4 == 0 && (year % 100 != 0 || year % 400 == 0));
+
+	return month >= 1 && month <= 12 && day >= 1 && day <= days[month - 1] + leap;
+}
+
+static bool is_date(const char *text)
+{
+	static const char pattern[] = "0000-00-00";
+	size_t length = strlen(text);
+
+	for (size_t i = 0; i < length; i++)
+		if (i >= sizeof(pattern) - 1 ||
+		    (pattern[i] == '-' ? text[i] != '-' : text[i] < '0' || text[i] > '9'))
+			return false;
+	return length == 4 || ((length == 7 || length == 10) && is_day(text, length));
+}
+
+bool archive_parse_dates(const char *text, struct archive_dates *dates, struct archive_filter *filter)
+{
+	const char *dots = strstr(text, "..");
+	size_t length = dots != NULL ? (size_t)(dots - text) : strlen(text);
+
+	snprintf(dates->from, sizeof(dates->from), "%.*s", length < 11 ? (int)length : 11, text);
+	snprintf(dates->to, sizeof(dates->to), "%.11s", dots != NULL ? dots + 2 : dates->from);
+	filter->from = dates->from;
+	filter->to = dates->to;
+	return is_date(dates->from) && is_date(dates->to);
+}
+
 /* ---- a statement with the conditions that were asked for ---- */
 
 enum { QUERY_MAX = 4096, VALUES_MAX = 12 };
@@ -117,7 +151,7 @@ int archive_each_series(struct archive *archive, const struct archive_filter *fi
 		add_dates(&q, filter);
 		add(&q, ")", NULL);
 	}
-	add(&q, " GROUP BY s.id ORDER BY c.name, s.scene_name, s.angle_deg, s.name", NULL);
+	add(&q, " GROUP BY s.id ORDER BY c.name, s.scene_name, s.height_m, s.angle_deg, s.name", NULL);
 	result = start(archive, &q, &s);
 	if (result != 0)
 		return result;
@@ -210,7 +244,7 @@ static void ask_for_drops(struct query *q, const struct archive_filter *filter)
 	add(q, " LEFT JOIN versions v ON v.id = r.version_id", NULL);
 	add_conditions(q, filter);
 	add_dates(q, filter);
-	add(q, " ORDER BY c.name, s.scene_name, s.angle_deg, s.name, d.number", NULL);
+	add(q, " ORDER BY c.name, s.scene_name, s.height_m, s.angle_deg, s.name, d.number", NULL);
 }
 
 int archive_each_drop(struct archive *archive, const struct archive_filter *filter,
@@ -308,6 +342,26 @@ char *archive_json(struct archive *archive, const char *drop, const char *versio
 		archive_refuse(archive, DT_E_EMPTY, "%.100s: no result%s%.60s", drop,
 		               version != NULL ? " by version " : "", version != NULL ? version : "");
 	return json;
+}
+
+int archive_log(struct archive *archive, const char *drop, char series[ARCHIVE_NAME_MAX + 1],
+                char raw[ARCHIVE_NAME_MAX + 64])
+{
+	struct archive_place place;
+	int result = archive_locate(archive, drop, &place);
+
+	if (result == 0 && !place.recorded)
+		result = archive_refuse(archive, DT_E_STATE, "%s was never completely recorded", drop);
+	if (result != 0)
+		return result;
+	strcpy(series, place.name);
+	strcpy(raw, place.raw);
+	return 0;
+}
+
+int archive_changes(struct archive *archive, int64_t *number)
+{
+	return sql_number(archive, number, "PRAGMA data_version", "");
 }
 
 int archive_find(struct archive *archive, const char *file, char drop[ARCHIVE_NAME_MAX + 16])

@@ -113,10 +113,10 @@ static int series_text(void *context, const struct archive_series *series)
 	struct print *p = context;
 
 	if (p->lines++ == 0)
-		fprintf(p->out, "%-20s %-12s %-16s %5s %8s %8s %8s %8s %7s  %s\n", "series", "campaign",
+		fprintf(p->out, "%-20s %-11s %-16s %5s %7s %8s %8s %8s %7s  %s\n", "series", "campaign",
 		        "scene", "deg", "planned", "recorded", "accepted", "rejected", "partial",
-		        "last drop (UTC)");
-	fprintf(p->out, "%-20s %-12s %-16s %5g %8u %8u %8u %8u %7u  %.16s\n", series->name, series->campaign,
+		        "last drop");
+	fprintf(p->out, "%-20s %-11s %-16s %5g %7u %8u %8u %8u %7u  %.10s\n", series->name, series->campaign,
 	        series->scene_name, series->angle_deg, series->planned, series->recorded, series->accepted,
 	        series->rejected, series->partial, series->last);
 	return 0;

@@ -53,7 +53,8 @@ static int drop_json(void *context, const struct archive_drop *drop)
 {
 	struct print *p = context;
 	struct builder *b = &p->builder;
-	cJSON *item = put_append(b, p->array);
+	cJSON *item = cJSON_CreateObject();
+	int result;
 
 	if (archive_counts(drop, p->undecided))
 		archive_cell_add(&p->total, drop);
@@ -62,6 +63,7 @@ static int drop_json(void *context, const struct archive_drop *drop)
 	put_text(b, item, "campaign", drop->series.campaign);
 	put_text(b, item, "scene", drop->series.scene_name);
 	put_number(b, item, "angle_deg", drop->series.angle_deg);
+	put_number(b, item, "height_m", drop->series.height_m);
 	put_text(b, item, "time", drop->time);
 	put_text(b, item, "state", drop->state);
 	put_text(b, item, "decision", drop->decision);
@@ -77,41 +79,58 @@ static int drop_json(void *context, const struct archive_drop *drop)
 		put_item(b, item, "version", cJSON_CreateNull());
 	put_text(b, item, "flags", drop->flags);
 	put_values(b, item, drop);
-	return p->with_events ? put_events(p, item, drop) : 0;
+	result = p->with_events ? put_events(p, item, drop) : 0;
+	if (result != 0) {
+		cJSON_Delete(item);
+		return result;
+	}
+	if (p->lines++ > 0)
+		fputc(',', p->out);
+	return put_part(b, item, p->out);
 }
 
 static int series_of_drops(void *context, const struct archive_series *series)
 {
 	struct print *p = context;
+	cJSON *object = cJSON_CreateObject();
 
-	put_series_keys(&p->builder, p->array, series);
-	put_text(&p->builder, p->array, "scene_text", series->scene);
-	return 0;
+	put_series_keys(&p->builder, object, series);
+	put_text(&p->builder, object, "scene_text", series->scene);
+	p->lines++;
+	return put_part(&p->builder, object, p->out);
 }
 
-static int drops_json(struct print *p, const struct archive_filter *filter)
+static int put_total(struct print *p)
 {
-	struct print head = {.builder = {false}};
-	cJSON *root = cJSON_CreateObject(), *means;
-	int result = 0;
+	cJSON *means = cJSON_CreateObject();
 
-	if (filter->series != NULL) {
-		head.array = put_object(&head.builder, root, "series");
-		result = archive_each_series(p->archive, filter, series_of_drops, &head);
-		p->builder = head.builder;
-	}
-	p->with_events = filter->series != NULL;
-	p->array = put_array(&p->builder, root, "drops");
-	if (result == 0)
-		result = archive_each_drop(p->archive, filter, drop_json, p);
-	means = put_object(&p->builder, root, "means");
 	put_number(&p->builder, means, "drops", p->total.drops);
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT && p->total.drops > 0; i++)
 		put_mean(&p->builder, means, archive_value_name((enum archive_value)i), (enum archive_value)i,
 		         &p->total.value[i]);
+	return put_part(&p->builder, means, p->out);
+}
+
+/* One after the other: there may be ten thousand. */
+static int drops_json(struct print *p, const struct archive_filter *filter)
+{
+	int result = 0;
+
+	p->with_events = filter->series != NULL;
+	fputc('{', p->out);
+	if (filter->series != NULL) {
+		fputs("\"series\":", p->out);
+		result = archive_each_series(p->archive, filter, series_of_drops, p);
+		fputs(p->lines > 0 ? "," : "{},", p->out);
+	}
+	p->lines = 0;
+	fputs("\"drops\":[", p->out);
 	if (result == 0)
-		return put_out(&p->builder, root, p->out);
-	cJSON_Delete(root);
+		result = archive_each_drop(p->archive, filter, drop_json, p);
+	fputs("],\"means\":", p->out);
+	if (result == 0)
+		result = put_total(p);
+	fputs("}\n", p->out);
 	return result;
 }
 
@@ -126,6 +145,7 @@ static int drop_csv(void *context, const struct archive_drop *drop)
 	csv_text(p->out, drop->series.campaign);
 	csv_text(p->out, drop->series.scene_name);
 	csv_number(p->out, drop->series.angle_deg);
+	csv_number(p->out, drop->series.height_m);
 	csv_text(p->out, drop->time);
 	csv_text(p->out, drop->state);
 	csv_text(p->out, drop->decision);
@@ -146,7 +166,8 @@ static int drops_csv(struct print *p, const struct archive_filter *filter)
 {
 	char key[PRINT_KEY_MAX];
 
-	fputs("series,number,campaign,scene,angle_deg,time,state,decision,reason,operator,note,version,"
+	fputs("series,number,campaign,scene,angle_deg,height_m,time,state,decision,reason,operator,note,"
+	      "version,"
 	      "flags,",
 	      p->out);
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
@@ -263,8 +284,8 @@ int print_drops(struct archive *archive, const struct archive_filter *filter, bo
 	struct print p = {.out = out, .archive = archive, .undecided = undecided};
 	int result;
 
-	if (format == PRINT_JSON)
-		return drops_json(&p, filter);
-	result = format == PRINT_CSV ? drops_csv(&p, filter) : drops_text(&p, filter);
+	result = format == PRINT_JSON  ? drops_json(&p, filter)
+	         : format == PRINT_CSV ? drops_csv(&p, filter)
+	                               : drops_text(&p, filter);
 	return result != 0 ? result : print_done(out);
 }

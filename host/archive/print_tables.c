@@ -62,6 +62,7 @@ static void put_place(struct builder *b, cJSON *item, const struct archive_cell 
 	put_text(b, item, "campaign", cell->campaign);
 	put_text(b, item, "scene", cell->scene_name);
 	put_number(b, item, "angle_deg", cell->angle_deg);
+	put_number(b, item, "height_m", cell->height_m);
 	put_number(b, item, "drops", cell->drops);
 }
 
@@ -109,6 +110,7 @@ static void sensor_csv(FILE *out, const struct archive_cell *cell, int sensor,
 	csv_text(out, cell->campaign);
 	csv_text(out, cell->scene_name);
 	csv_number(out, cell->angle_deg);
+	csv_number(out, cell->height_m);
 	fprintf(out, "%s,%u,", sensor_names[sensor], cell->drops);
 	for (int axis = X; axis < AXES; axis++)
 		csv_mean(out, mean_of(cell, sensor, axis));
@@ -124,7 +126,7 @@ static void sensor_csv(FILE *out, const struct archive_cell *cell, int sensor,
 
 static int tables_csv(const struct archive_table *table, const char *reference, FILE *out)
 {
-	fputs("campaign,scene,angle_deg,sensor,drops,", out);
+	fputs("campaign,scene,angle_deg,height_m,sensor,drops,", out);
 	for (int axis = X; axis < AXES; axis++)
 		fprintf(out, "%s_mean_g,%s_sd_g,%s_n,", axis_keys[axis], axis_keys[axis], axis_keys[axis]);
 	fputs("r_of_means_g,s1_over_s2_x,s1_over_s2_y,s1_over_s2_r,over_reference_x,over_reference_y,"
@@ -139,34 +141,38 @@ static int tables_csv(const struct archive_table *table, const char *reference, 
 
 /* ---- text ---- */
 
-static void number_text(FILE *out, double value, int decimals)
+static void number_text(FILE *out, double value, int width, int decimals)
 {
 	if (isnan(value))
-		fprintf(out, "%9s", "-");
+		fprintf(out, "%*s", width, "-");
 	else
-		fprintf(out, "%9.*f", decimals, value);
+		fprintf(out, "%*.*f", width, decimals, value);
 }
 
 static void cell_text(FILE *out, const struct archive_cell *cell)
 {
-	fprintf(out, "%6g  mean", cell->angle_deg);
+	char n[16];
+
+	fprintf(out, "%5g  mean", cell->angle_deg);
 	for (int k = 0; k < 2 * AXES; k++)
-		number_text(out, mean_of(cell, k / AXES, k % AXES)->mean, 1);
-	number_text(out, cell->value[ARCHIVE_LAG].mean * 1000, 2);
-	number_text(out, cell->value[ARCHIVE_FREQUENCY].mean, 1);
-	number_text(out, cell->value[ARCHIVE_DAMPING].mean, 3);
-	fprintf(out, "\n        SD  ");
+		number_text(out, mean_of(cell, k / AXES, k % AXES)->mean, 9, 1);
+	number_text(out, cell->value[ARCHIVE_LAG].mean * 1000, 9, 2);
+	number_text(out, cell->value[ARCHIVE_FREQUENCY].mean, 9, 1);
+	number_text(out, cell->value[ARCHIVE_DAMPING].mean, 9, 3);
+	snprintf(n, sizeof(n), "n=%u", cell->drops);
+	fprintf(out, "\n%5s  SD  ", n);
 	for (int k = 0; k < 2 * AXES; k++)
-		number_text(out, mean_of(cell, k / AXES, k % AXES)->sd, 1);
-	number_text(out, cell->value[ARCHIVE_LAG].sd * 1000, 2);
-	number_text(out, cell->value[ARCHIVE_FREQUENCY].sd, 1);
-	number_text(out, cell->value[ARCHIVE_DAMPING].sd, 3);
-	fprintf(out, "   n = %u\n", cell->drops);
+		number_text(out, mean_of(cell, k / AXES, k % AXES)->sd, 9, 1);
+	number_text(out, cell->value[ARCHIVE_LAG].sd * 1000, 9, 2);
+	number_text(out, cell->value[ARCHIVE_FREQUENCY].sd, 9, 1);
+	number_text(out, cell->value[ARCHIVE_DAMPING].sd, 9, 3);
+	fputc('\n', out);
 }
 
 static bool same_scene(const struct archive_cell *a, const struct archive_cell *b)
 {
-	return strcmp(a->scene_name, b->scene_name) == 0 && strcmp(a->campaign, b->campaign) == 0;
+	return strcmp(a->scene_name, b->scene_name) == 0 && strcmp(a->campaign, b->campaign) == 0 &&
+	       fabs(a->height_m - b->height_m) < 1e-9;
 }
 
 static void means_text(const struct archive_table *table, FILE *out)
@@ -176,29 +182,30 @@ static void means_text(const struct archive_table *table, FILE *out)
 
 		if (i == 0 || !same_scene(cell, cell - 1))
 			fprintf(out,
-			        "%s%s, campaign %s: peaks in g\n%6s      %9s%9s%9s%9s%9s%9s%9s%9s%9s%9s%9s\n",
-			        i > 0 ? "\n" : "", cell->scene_name, cell->campaign, "deg", "S1 X", "S1 Y",
-			        "S1 XY", "S1 Z", "S2 X", "S2 Y", "S2 XY", "S2 Z", "lag ms", "plate Hz",
-			        "damping");
+			        "%s%s from %g m, campaign %s: peaks in g\n"
+			        "%5s      %9s%9s%9s%9s%9s%9s%9s%9s%9s%9s%9s\n",
+			        i > 0 ? "\n" : "", cell->scene_name, cell->height_m, cell->campaign, "deg",
+			        "S1 X", "S1 Y", "S1 XY", "S1 Z", "S2 X", "S2 Y", "S2 XY", "S2 Z", "lag ms",
+			        "plate Hz", "damping");
 		cell_text(out, cell);
 	}
 }
 
 static void ratios_text(const struct archive_table *table, const char *name, FILE *out)
 {
-	fprintf(out, "\nratios of means\n%-16s %5s %27s %27s %27s  %s\n", "scene", "deg", "S1/S2: X, Y, XY",
-	        "S1/S1 of reference", "S2/S2 of reference", "reference");
+	fprintf(out, "\nratios of means\n%-16s %7s %5s %20s %20s %20s  %s\n", "scene", "m", "deg",
+	        "S1/S2: X, Y, XY", "S1/S1 of reference", "S2/S2 of reference", "reference");
 	for (size_t i = 0; i < table->count; i++) {
 		const struct archive_cell *cell = &table->cell[i],
 		                          *reference = reference_of(table, cell, name);
 
-		fprintf(out, "%-16s %5g ", cell->scene_name, cell->angle_deg);
+		fprintf(out, "%-16s %7g %5g ", cell->scene_name, cell->height_m, cell->angle_deg);
 		for (int axis = X; axis <= R; axis++)
-			number_text(out, print_ratio(mean_of(cell, 0, axis), mean_of(cell, 1, axis)), 2);
+			number_text(out, print_ratio(mean_of(cell, 0, axis), mean_of(cell, 1, axis)), 7, 2);
 		for (int k = 0; k < 6 && reference != NULL; k++)
 			number_text(
 			        out,
-			        print_ratio(mean_of(cell, k / 3, k % 3), mean_of(reference, k / 3, k % 3)),
+			        print_ratio(mean_of(cell, k / 3, k % 3), mean_of(reference, k / 3, k % 3)), 7,
 			        2);
 		fprintf(out, "  %s\n", reference != NULL ? reference->scene_name : "");
 	}

@@ -63,6 +63,7 @@ DT_MUST_USE int archive_lock(struct archive *archive, bool exclusive);
 enum { ARCHIVE_TIME_CHARS = 24 };
 void archive_time(char text[ARCHIVE_TIME_CHARS], int64_t time_s);
 DT_MUST_USE int archive_check_name(struct archive *archive, const char *what, const char *name);
+DT_MUST_USE int archive_check_names(struct archive *archive, const char *series, const char *campaign);
 DT_MUST_USE int archive_check_text(struct archive *archive, const char *what, const char *text);
 
 struct archive_place {
@@ -86,6 +87,11 @@ DT_MUST_USE int sidecar_write_series(struct archive *archive, int64_t series);
 /* Puts what file (in the folder) says into the index. 1: all but a result that could not be used, message
  * says why. */
 DT_MUST_USE int sidecar_read(struct archive *archive, const char *file);
+
+/* Puts a series, and its campaign when that is new, into the index alone. */
+DT_MUST_USE int series_insert(struct archive *archive, const char *name, const char *campaign,
+                              const char *text, const struct scene *scene, int64_t planned,
+                              const char *created, int64_t *row);
 
 /* Puts a result into the index alone. DT_E_FORMAT: json is none of ours. */
 DT_MUST_USE int result_insert(struct archive *archive, int64_t drop, const char *when, const char *version,

@@ -40,11 +40,58 @@ static int read_scene_text(struct archive *archive, const char *file, char **tex
 	                      file, SCENE_MAX_BYTES);
 }
 
-static int insert_series(struct archive *archive, const char *name, const char *campaign, const char *text,
-                         const struct scene *scene, unsigned planned)
+/* The line that says height_m; NULL: there is none. A scene has one such key. */
+static const char *height_line(const char *text)
+{
+	for (const char *line = text; *line != '\0'; line += strcspn(line, "\n"), line += *line != '\0') {
+		const char *word = line + strspn(line, " \t");
+
+		if (strcspn(word, " \t=:\n") == 8 && strncmp(word, "height_m", 8) == 0)
+			return line;
+	}
+	return NULL;
+}
+
+/* Puts another height into a scene's text. */
+static int set_height(struct archive *archive, double height_m, char **text)
+{
+	const char *line = height_line(*text);
+	char *changed = NULL;
+
+	if (line == NULL)
+		return archive_refuse(archive, DT_E_FORMAT, "the scene has no line 'height_m = '");
+	if (asprintf(&changed, "%.*sheight_m = %.15g%s", (int)(line - *text), *text, height_m,
+	             line + strcspn(line, "\n")) < 0)
+		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+	free(*text);
+	*text = changed;
+	return 0;
+}
+
+int series_insert(struct archive *archive, const char *name, const char *campaign, const char *text,
+                  const struct scene *scene, int64_t planned, const char *created, int64_t *row)
+{
+	int result = sql_run(archive, "INSERT OR IGNORE INTO campaigns (name, created) VALUES (?, ?)", "ss",
+	                     campaign, created);
+
+	if (result == 0)
+		result = sql_run(
+		        archive,
+		        "INSERT INTO series (name, campaign_id, scene_name, scene, angle_deg, height_m,"
+		        " plate_mass_kg, planned, created)"
+		        " SELECT ?, id, ?, ?, ?, ?, ?, ?, ? FROM campaigns WHERE name = ?",
+		        "sssdddiss", name, scene->name, text, scene->drop_angle_deg, scene->drop_height_m,
+		        scene->mount_plate_mass_kg, planned, created, campaign);
+	*row = sqlite3_last_insert_rowid(archive->index);
+	return result;
+}
+
+/* With its sidecar; the name must be new. */
+static int make_series(struct archive *archive, const char *name, const char *campaign, const char *text,
+                       const struct scene *scene, unsigned planned)
 {
 	char now[ARCHIVE_TIME_CHARS];
-	int64_t known, row;
+	int64_t known, row = 0;
 	int result = sql_number(archive, &known, "SELECT id FROM series WHERE name = ?", "s", name);
 
 	if (result == 0)
@@ -53,29 +100,17 @@ static int insert_series(struct archive *archive, const char *name, const char *
 	if (result != DT_E_EMPTY)
 		return result;
 	archive_time(now, time(NULL));
-	result = sql_run(archive, "INSERT OR IGNORE INTO campaigns (name, created) VALUES (?, ?)", "ss",
-	                 campaign, now);
-	if (result == 0)
-		result = sql_run(
-		        archive,
-		        "INSERT INTO series (name, campaign_id, scene_name, scene, angle_deg, height_m,"
-		        " plate_mass_kg, planned, created)"
-		        " SELECT ?, id, ?, ?, ?, ?, ?, ?, ? FROM campaigns WHERE name = ?",
-		        "sssdddiss", name, scene->name, text, scene->drop_angle_deg, scene->drop_height_m,
-		        scene->mount_plate_mass_kg, (int64_t)planned, now, campaign);
-	row = sqlite3_last_insert_rowid(archive->index);
+	result = series_insert(archive, name, campaign, text, scene, planned, now, &row);
 	return result != 0 ? result : sidecar_write_series(archive, row);
 }
 
 int archive_new_series(struct archive *archive, const char *name, const char *campaign,
-                       const char *scene_file, double angle_deg, unsigned planned)
+                       const char *scene_file, double angle_deg, double height_m, unsigned planned)
 {
 	char message[SCENE_MESSAGE_MAX], *text;
 	struct scene scene;
-	int result = archive_check_name(archive, "series", name);
+	int result = archive_check_names(archive, name, campaign);
 
-	if (result == 0)
-		result = archive_check_name(archive, "campaign", campaign);
 	if (result != 0)
 		return result;
 	if (scene_read(&scene, scene_file, message) != 0)
@@ -85,11 +120,14 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 	result = read_scene_text(archive, scene_file, &text);
 	if (result != 0)
 		return result;
-	result = scene_of_text(archive, name, text, angle_deg, &scene);
+	if (!isnan(height_m))
+		result = set_height(archive, height_m, &text);
+	if (result == 0)
+		result = scene_of_text(archive, name, text, angle_deg, &scene);
 	if (result == 0)
 		result = archive_start(archive);
 	if (result == 0)
-		result = archive_end(archive, insert_series(archive, name, campaign, text, &scene, planned));
+		result = archive_end(archive, make_series(archive, name, campaign, text, &scene, planned));
 	free(text);
 	return result;
 }
@@ -190,6 +228,33 @@ void archive_discard(struct archive *archive, struct archive_recording *recordin
 	if (sql_run(archive, "DELETE FROM drops WHERE id = ?", "i", recording->drop) == 0)
 		remove_files(archive, recording->raw);
 	archive_abandon(recording);
+}
+
+int archive_resume(struct archive *archive, const char *drop, struct archive_recording *recording)
+{
+	struct archive_recording r = {.lock = -1};
+	struct archive_place place;
+	int result = archive_locate(archive, drop, &place);
+
+	if (result != 0)
+		return result;
+	r.drop = place.drop;
+	r.number = place.number;
+	strcpy(r.series, place.name);
+	strcpy(r.raw, place.raw);
+	snprintf(r.log, sizeof(r.log), "%s/%s", archive->folder, r.raw);
+	if (!place.recorded) {
+		r.lock = open(r.log, O_RDWR | O_CLOEXEC);
+		if (r.lock < 0)
+			return refuse_file(archive, r.log);
+		if (flock(r.lock, LOCK_EX | LOCK_NB) == 0) {
+			*recording = r;
+			return 0;
+		}
+		archive_abandon(&r);
+	}
+	return archive_refuse(archive, DT_E_STATE, "%s is %s, expected an interrupted drop", drop,
+	                      place.recorded ? "recorded" : "being recorded");
 }
 
 static int add_event(struct archive *archive, int64_t drop, const char *what, const char *operator_name,
@@ -323,7 +388,7 @@ int archive_calibrate(struct archive *archive, const char *sensor, double gain, 
 	if (end == NULL || *end != '\0' || strlen(date) != 10)
 		return archive_refuse(archive, DT_E_ARGUMENT, "'%.40s' is no date, expected YYYY-MM-DD",
 		                      date);
-	if (!(gain > 0.1 && gain < 10))
+	if (!(gain >= 0.1 && gain <= 10))
 		return archive_refuse(archive, DT_E_RANGE, "a gain of %g, expected 0.1 to 10", gain);
 	result = archive_start(archive);
 	if (result != 0)

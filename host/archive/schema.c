@@ -89,8 +89,10 @@ static int take_steps(struct archive *archive, int64_t version)
 int schema_upgrade(struct archive *archive)
 {
 	int64_t version = 0;
-	int result = version_of(archive, &version);
+	int result = sql_script(archive, "BEGIN"); /* for both numbers from one moment */
 
+	if (result == 0)
+		result = archive_end(archive, version_of(archive, &version));
 	if (result != 0 || version == STEPS)
 		return result;
 	result = archive_start(archive);

@@ -196,12 +196,9 @@ static int split(struct archive *archive, struct sidecar *sidecar, char *text)
 static int take_series(struct archive *archive, const struct sidecar *sidecar, int64_t *series)
 {
 	const char *name = value(sidecar, "series"), *campaign = value(sidecar, "campaign");
-	const char *created = value(sidecar, "created");
 	struct scene scene;
-	int result = archive_check_name(archive, "series", name);
+	int result = archive_check_names(archive, name, campaign);
 
-	if (result == 0)
-		result = archive_check_name(archive, "campaign", campaign);
 	if (result != 0)
 		return result;
 	result = sql_number(archive, series, "SELECT id FROM series WHERE name = ?", "s", name);
@@ -209,18 +206,9 @@ static int take_series(struct archive *archive, const struct sidecar *sidecar, i
 		return result;
 	result = scene_of_text(archive, name, sidecar->scene, number(sidecar, "angle_deg"), &scene);
 	if (result == 0)
-		result = sql_run(archive, "INSERT OR IGNORE INTO campaigns (name, created) VALUES (?, ?)",
-		                 "ss", campaign, created);
-	if (result == 0)
-		result = sql_run(
-		        archive,
-		        "INSERT INTO series (name, campaign_id, scene_name, scene, angle_deg, height_m,"
-		        " plate_mass_kg, planned, created)"
-		        " SELECT ?, id, ?, ?, ?, ?, ?, ?, ? FROM campaigns WHERE name = ?",
-		        "sssdddiss", name, scene.name, sidecar->scene, scene.drop_angle_deg,
-		        scene.drop_height_m, scene.mount_plate_mass_kg,
-		        (int64_t)strtol(value(sidecar, "planned"), NULL, 10), created, campaign);
-	*series = sqlite3_last_insert_rowid(archive->index);
+		result = series_insert(archive, name, campaign, sidecar->scene, &scene,
+		                       strtol(value(sidecar, "planned"), NULL, 10), value(sidecar, "created"),
+		                       series);
 	return result;
 }
 

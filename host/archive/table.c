@@ -25,6 +25,7 @@ void archive_cell_add(struct archive_cell *cell, const struct archive_drop *drop
 		snprintf(cell->campaign, sizeof(cell->campaign), "%s", drop->series.campaign);
 		snprintf(cell->scene_name, sizeof(cell->scene_name), "%s", drop->series.scene_name);
 		cell->angle_deg = drop->series.angle_deg;
+		cell->height_m = drop->series.height_m;
 		cell->plate_mass_kg = drop->series.plate_mass_kg;
 		for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
 			cell->value[i].mean = cell->value[i].sd = NAN;
@@ -45,9 +46,14 @@ struct growing {
 	bool undecided;
 };
 
+static bool equal(double a, double b)
+{
+	return fabs(a - b) < 1e-9;
+}
+
 static bool belongs(const struct archive_cell *cell, const struct archive_series *series)
 {
-	return cell->angle_deg >= series->angle_deg && cell->angle_deg <= series->angle_deg &&
+	return equal(cell->angle_deg, series->angle_deg) && equal(cell->height_m, series->height_m) &&
 	       strcmp(cell->scene_name, series->scene_name) == 0 &&
 	       strcmp(cell->campaign, series->campaign) == 0;
 }
@@ -95,7 +101,8 @@ void archive_table_free(struct archive_table *table)
 
 static bool same_place(const struct archive_cell *a, const struct archive_cell *b)
 {
-	return fabs(a->angle_deg - b->angle_deg) < 1e-9 && strcmp(a->campaign, b->campaign) == 0;
+	return equal(a->angle_deg, b->angle_deg) && equal(a->height_m, b->height_m) &&
+	       strcmp(a->campaign, b->campaign) == 0;
 }
 
 const struct archive_cell *archive_table_find(const struct archive_table *table,

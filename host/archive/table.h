@@ -2,7 +2,7 @@
 #ifndef DT_HOST_ARCHIVE_TABLE_H
 #define DT_HOST_ARCHIVE_TABLE_H
 /*
- * Means and standard deviations of drops, by campaign, scene and angle.
+ * Means and standard deviations of drops, by campaign, scene, height and angle.
  */
 #include "host/archive/archive.h"
 
@@ -17,13 +17,13 @@ struct archive_mean {
 struct archive_cell {
 	char campaign[ARCHIVE_NAME_MAX + 1];
 	char scene_name[64];
-	double angle_deg, plate_mass_kg;
+	double angle_deg, height_m, plate_mass_kg;
 	unsigned drops;
 	struct archive_mean value[ARCHIVE_VALUE_COUNT];
 };
 
 struct archive_table {
-	struct archive_cell *cell; /* in the order of campaign, scene and angle */
+	struct archive_cell *cell; /* in the order of campaign, scene, height and angle */
 	size_t count;
 };
 
@@ -38,12 +38,12 @@ DT_MUST_USE int archive_table(struct archive *archive, const struct archive_filt
                               struct archive_table *table);
 void archive_table_free(struct archive_table *table);
 
-/* The cell of that scene in cell's campaign and at its angle; NULL when there is none. */
+/* The cell of that scene in cell's campaign, at its angle and height; NULL when there is none. */
 const struct archive_cell *archive_table_find(const struct archive_table *table,
                                               const struct archive_cell *cell, const char *scene_name);
 
-/* The scene that others are compared with: the only one of cell's campaign and angle without a plate. NULL
- * when there is none or more than one, or it is cell's own. */
+/* The scene that others are compared with: the only one of cell's campaign, angle and height without a plate.
+ * NULL when there is none or more than one, or it is cell's own. */
 const struct archive_cell *archive_table_reference(const struct archive_table *table,
                                                    const struct archive_cell *cell);
 

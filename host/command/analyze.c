@@ -140,7 +140,7 @@ static int parse(struct arguments *arguments, int argc, char **argv)
 			arguments->scene_file = optarg;
 			break;
 		case OPTION_ANGLE:
-			code = command_number("analyze", "angle", optarg, 10, 80, &arguments->angle_deg);
+			code = command_angle("analyze", optarg, &arguments->angle_deg);
 			break;
 		case OPTION_LOWPASS:
 			code = command_number("analyze", "lowpass", optarg, 1e-3, 1e9,

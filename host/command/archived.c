@@ -60,37 +60,50 @@ int archived_scene_file(struct archive *archive, const char *series, char file[A
 }
 
 /* The result does not depend on where the archive stands. */
-static char *analyse(struct archive *archive, const struct scene *scene, const char *raw)
+static char *analyse(struct archive *archive, const struct scene *scene, const char *raw,
+                     char message[ARCHIVE_MESSAGE_MAX])
 {
-	char path[ARCHIVE_PATH_MAX], message[READ_MESSAGE_MAX], *json;
+	char path[ARCHIVE_PATH_MAX], *json;
 	struct record record;
 
 	snprintf(path, sizeof(path), "%s/%.100s", archive_folder(archive), raw);
-	if (read_record(&record, path, NULL, message) != 0) {
-		command_error("%s", message);
+	if (read_record(&record, path, NULL, message) != 0)
 		return NULL;
-	}
 	snprintf(record.file, sizeof(record.file), "%.200s", raw);
 	json = evaluate_json(&record, scene);
 	record_free(&record);
 	if (json == NULL)
-		command_error("%s: cannot be analysed; kept without a result", path);
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%.500s: cannot be analysed; kept without a result",
+		         path);
 	return json;
+}
+
+int archived_result(struct archive *archive, const char *series, unsigned number, const char *raw,
+                    char message[ARCHIVE_MESSAGE_MAX])
+{
+	char drop[ARCHIVE_NAME_MAX + 16], *json;
+	struct scene scene;
+	int result = archive_scene(archive, series, &scene);
+
+	if (result == 0) {
+		json = analyse(archive, &scene, raw, message);
+		if (json == NULL)
+			return DT_E_FORMAT;
+		snprintf(drop, sizeof(drop), "%s/%u", series, number);
+		result = archive_result(archive, drop, DT_VERSION, json);
+		free(json);
+	}
+	if (result != 0)
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%s", archive_message(archive));
+	return result;
 }
 
 int archived_analyse(struct archive *archive, const char *series, unsigned number, const char *raw)
 {
-	char drop[ARCHIVE_NAME_MAX + 16], *json;
-	struct scene scene;
-	int result;
+	char message[ARCHIVE_MESSAGE_MAX];
 
-	if (archive_scene(archive, series, &scene) != 0)
-		return archived_failed(archive);
-	json = analyse(archive, &scene, raw);
-	if (json == NULL)
-		return COMMAND_INPUT;
-	snprintf(drop, sizeof(drop), "%s/%u", series, number);
-	result = archive_result(archive, drop, DT_VERSION, json);
-	free(json);
-	return result == 0 ? COMMAND_DONE : archived_failed(archive);
+	if (archived_result(archive, series, number, raw, message) == 0)
+		return COMMAND_DONE;
+	command_error("%s", message);
+	return COMMAND_INPUT;
 }

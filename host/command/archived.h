@@ -20,6 +20,10 @@ enum { ARCHIVED_SCENE_MAX = 48 };
 /* A name under which this program and its children can read the scene of a series as a file. */
 int archived_scene_file(struct archive *archive, const char *series, char file[ARCHIVED_SCENE_MAX]);
 
+/* As archived_analyse, with what is wrong in message, and 0 or DT_E_*. */
+DT_MUST_USE int archived_result(struct archive *archive, const char *series, unsigned number, const char *raw,
+                                char message[ARCHIVE_MESSAGE_MAX]);
+
 /* Analyses SERIES/NUMBER from its log, raw in the archive's folder, and keeps the result under this program's
  * version. A log that cannot be analysed stays, without a result. */
 int archived_analyse(struct archive *archive, const char *series, unsigned number, const char *raw);

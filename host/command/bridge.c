@@ -59,7 +59,7 @@ static int parse(struct bridge *bridge, int argc, char **argv)
 			bridge->scene_file = optarg;
 			break;
 		case 'a':
-			code = command_number("bridge", "angle", optarg, 10, 80, &bridge->angle_deg);
+			code = command_angle("bridge", optarg, &bridge->angle_deg);
 			break;
 		case 'h':
 			bridge->help = true;
@@ -190,9 +190,11 @@ static int bridge_session(struct bridge *bridge)
 	}
 	droptower_command_subscribe(bridge->publisher->lcm, PUBLISH_COMMAND, on_command, bridge);
 	if (bridge->scene_file != NULL) {
-		code = tower_setup_hear(bridge->session);
+		code = tower_setup_hear(bridge->session, message);
 		if (code == COMMAND_DONE)
-			code = tower_setup_write(bridge->session, &bridge->scene);
+			code = tower_setup_write(bridge->session, &bridge->scene, message);
+		if (code != COMMAND_DONE)
+			command_error("%s", message);
 	}
 	if (code == COMMAND_DONE)
 		code = serve(bridge);

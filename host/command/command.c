@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "common/error.h"
+#include "common/scenes/scene.h"
 
 static volatile sig_atomic_t interrupted;
 
@@ -68,15 +69,39 @@ int command_stopped(void)
 	return COMMAND_REFUSED;
 }
 
-int command_number(const char *name, const char *option, const char *text, double min, double max,
-                   double *value)
+bool command_is_number(const char *text, double min, double max, double *value)
 {
 	char *end;
 	double number = strtod(text, &end);
 
 	if (end == text || *end != '\0' || !(number >= min && number <= max))
-		return command_usage(name, "--%s is '%s', expected a number from %g to %g", option, text, min,
-		                     max);
+		return false;
 	*value = number;
-	return 0;
+	return true;
+}
+
+int command_number(const char *name, const char *option, const char *text, double min, double max,
+                   double *value)
+{
+	if (command_is_number(text, min, max, value))
+		return COMMAND_DONE;
+	return command_usage(name, "--%s is '%s', expected a number from %g to %g", option, text, min, max);
+}
+
+static int of_the_drop(const char *name, const char *option, const char *key, const char *text, double *value)
+{
+	double min, max;
+
+	scene_limits("drop", key, &min, &max);
+	return command_number(name, option, text, min, max, value);
+}
+
+int command_angle(const char *name, const char *text, double *angle_deg)
+{
+	return of_the_drop(name, "angle", "angle_deg", text, angle_deg);
+}
+
+int command_height(const char *name, const char *text, double *height_m)
+{
+	return of_the_drop(name, "height", "height_m", text, height_m);
 }

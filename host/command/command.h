@@ -5,6 +5,7 @@
  * The subcommands of `droptower`, one file each. A command gets its own argv (argv[0] is its name) and
  * returns the program's exit code. Results go to stdout, progress and errors to stderr.
  */
+#include <stdbool.h>
 
 enum command_exit {
 	COMMAND_DONE = 0,
@@ -24,6 +25,8 @@ int command_bridge(int argc, char **argv);
 int command_chart(int argc, char **argv);
 int command_model(int argc, char **argv);
 int command_series(int argc, char **argv);
+int command_report(int argc, char **argv);
+int command_serve(int argc, char **argv);
 
 /* What `droptower --version` prints: this program, its wire, and the libraries that run with it. */
 int command_version(void);
@@ -44,9 +47,15 @@ int command_interrupted(void);
 /* Interrupted before anything was released: says so and returns COMMAND_REFUSED. */
 int command_stopped(void);
 
-/* A whole text as a finite number in [min, max]; 0 on success, else says why for option and returns
- * COMMAND_USAGE. */
+/* A whole text as a finite number in [min, max]. */
+bool command_is_number(const char *text, double min, double max, double *value);
+
+/* The same of --option; 0 on success, else says why and returns COMMAND_USAGE. */
 int command_number(const char *name, const char *option, const char *text, double min, double max,
                    double *value);
+
+/* --angle and --height, within what a scene may have. */
+int command_angle(const char *name, const char *text, double *angle_deg);
+int command_height(const char *name, const char *text, double *height_m);
 
 #endif

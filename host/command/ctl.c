@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <getopt.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,13 +10,16 @@
 #include "host/command/session.h"
 
 static const char help[] =
-        "usage: droptower ctl [--link URL] status|arm|release TOKEN|abort|clear\n"
+        "usage: droptower ctl [--link URL] status|arm|release TOKEN|abort|clear|set NAME VALUE\n"
         "\n"
         "  status         state, checks, faults and every counter\n"
         "  arm            prints the token that release needs within 10 s\n"
         "  release TOKEN  opens the latch: the product falls\n"
         "  abort          never asks, never refused\n"
         "  clear          out of a fault whose cause is gone\n"
+        "  set NAME VALUE a parameter, until the tower starts again: bus_mode (0 CAN FD, 1 classic CAN), "
+        "data_kbit_s,\n"
+        "                 trigger_counts, ...; a name that is none lists them\n"
         "\n"
         "The tower arms only while a host keeps its heartbeat going: run 'droptower bridge' beside.\n"
         "--link is unix:PATH, can:IF, slcan:DEV or udpm://...; default $DROPTOWER_LINK, else can:can0.\n";
@@ -104,6 +108,38 @@ static int act(struct session *session, const char *verb, uint16_t token)
 	return COMMAND_USAGE;
 }
 
+static int set(struct session *session, enum wire_parameter_number number, uint32_t value)
+{
+	const struct wire_parameter_info *parameter = &wire_parameters[number];
+	int result = session_set_parameter(session, number, value);
+
+	if (result == 0) {
+		printf("%s %u\n", parameter->name, value);
+		return COMMAND_DONE;
+	}
+	if (result == DT_E_UNKNOWN) {
+		command_error(
+		        "set: over LCM parameters are the bridge's business, expected --link to the bus");
+		return COMMAND_LINK;
+	}
+	if (result == DT_E_RANGE) {
+		command_error("set: the tower cannot have %s = %u beside its other parameters: %s",
+		              parameter->name, value, parameter->doc);
+		return COMMAND_REFUSED;
+	}
+	(void)wait_for_status(session, false);
+	return refused("set", result, session_view(session));
+}
+
+/* ---- words ---- */
+
+struct order {
+	const char *verb;
+	uint16_t token;                    /* of release */
+	enum wire_parameter_number number; /* of set */
+	uint32_t value;
+};
+
 static int parse_token(const char *text, uint16_t *token)
 {
 	char *end;
@@ -115,27 +151,101 @@ static int parse_token(const char *text, uint16_t *token)
 	return COMMAND_DONE;
 }
 
-static int with_session(const char *url, const char *verb, uint16_t token)
+static int parse_parameter(const char *name, enum wire_parameter_number *number)
+{
+	char names[24 * WIRE_PARAMETERS];
+	size_t length = 0;
+
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++) {
+		if (strcmp(name, wire_parameters[i].name) == 0) {
+			*number = (enum wire_parameter_number)i;
+			return COMMAND_DONE;
+		}
+		length += (size_t)snprintf(names + length, sizeof(names) - length, " %s",
+		                           wire_parameters[i].name);
+	}
+	return command_usage("ctl", "set: no parameter '%s', expected one of%s", name, names);
+}
+
+static int parse_set(char **words, int count, struct order *order)
+{
+	const struct wire_parameter_info *parameter;
+	double value;
+	int code;
+
+	if (count < 2)
+		return command_usage("ctl", "set: expected NAME VALUE");
+	code = parse_parameter(words[0], &order->number);
+	if (code != COMMAND_DONE)
+		return code;
+	parameter = &wire_parameters[order->number];
+	if (!command_is_number(words[1], parameter->min, parameter->max, &value) || value > floor(value))
+		return command_usage("ctl", "set: %s is '%s', expected a whole number from %u to %u%s%s (%s)",
+		                     parameter->name, words[1], parameter->min, parameter->max,
+		                     parameter->unit[0] != '\0' ? " " : "", parameter->unit, parameter->doc);
+	order->value = (uint32_t)value;
+	return COMMAND_DONE;
+}
+
+static int parse_order(char **words, int count, struct order *order)
+{
+	static const char *const plain[] = {"status", "arm", "abort", "clear"};
+	int taken = 1, code = COMMAND_DONE;
+	bool known = false;
+
+	if (count == 0)
+		return command_usage("ctl", "no verb given");
+	order->verb = words[0];
+	for (size_t i = 0; i < sizeof(plain) / sizeof(plain[0]); i++)
+		known |= strcmp(words[0], plain[i]) == 0;
+	if (strcmp(words[0], "release") == 0) {
+		if (count < 2)
+			return command_usage("ctl", "release needs the token that arm printed");
+		code = parse_token(words[1], &order->token);
+		taken = 2;
+	} else if (strcmp(words[0], "set") == 0) {
+		code = parse_set(words + 1, count - 1, order);
+		taken = 3;
+	} else if (!known) {
+		return command_usage(
+		        "ctl", "no verb '%s', expected status, arm, release, abort, clear or set", words[0]);
+	}
+	if (code == COMMAND_DONE && count > taken)
+		code = command_usage("ctl", "'%s' is too much", words[taken]);
+	return code;
+}
+
+/* ---- the order of things ---- */
+
+static int carry_out(struct session *session, const char *url, const struct order *order)
+{
+	int result;
+
+	if (strcmp(order->verb, "set") == 0)
+		return set(session, order->number, order->value);
+	if (strcmp(order->verb, "status") != 0)
+		return act(session, order->verb, order->token);
+	result = wait_for_status(session, true);
+	if (result != 0) {
+		command_error("%s: no tower heard: %s", url, error_text(result));
+		return COMMAND_LINK;
+	}
+	print_status(session_view(session));
+	return COMMAND_DONE;
+}
+
+static int with_session(const char *url, const struct order *order)
 {
 	struct session_options options = {.passive = true};
 	char message[SESSION_MESSAGE_MAX];
 	struct session *session = session_open(url, &options, message);
-	int code, result;
+	int code;
 
 	if (session == NULL) {
 		command_error("%s", message);
 		return COMMAND_LINK;
 	}
-	if (strcmp(verb, "status") == 0) {
-		result = wait_for_status(session, true);
-		code = result == 0 ? COMMAND_DONE : COMMAND_LINK;
-		if (result == 0)
-			print_status(session_view(session));
-		else
-			command_error("%s: no tower heard: %s", url, error_text(result));
-	} else {
-		code = act(session, verb, token);
-	}
+	code = carry_out(session, url, order);
 	session_close(session);
 	return code;
 }
@@ -144,8 +254,8 @@ int command_ctl(int argc, char **argv)
 {
 	static const struct option options[] = {
 	        {"link", required_argument, NULL, 'l'}, {"help", no_argument, NULL, 'h'}, {0}};
-	const char *url = getenv("DROPTOWER_LINK"), *verb;
-	uint16_t token = 0;
+	const char *url = getenv("DROPTOWER_LINK");
+	struct order order = {0};
 	int option, code;
 
 	opterr = 0;
@@ -159,22 +269,9 @@ int command_ctl(int argc, char **argv)
 			                     argv[optind - 1]);
 		url = optarg;
 	}
-	if (optind == argc)
-		return command_usage("ctl", "no verb given");
-	verb = argv[optind++];
-	if (strcmp(verb, "release") == 0) {
-		if (optind == argc)
-			return command_usage("ctl", "release needs the token that arm printed");
-		code = parse_token(argv[optind++], &token);
-		if (code != 0)
-			return code;
-	} else if (strcmp(verb, "status") != 0 && strcmp(verb, "arm") != 0 && strcmp(verb, "abort") != 0 &&
-	           strcmp(verb, "clear") != 0) {
-		return command_usage("ctl", "no verb '%s', expected status, arm, release, abort or clear",
-		                     verb);
-	}
-	if (optind != argc)
-		return command_usage("ctl", "'%s' is too much", argv[optind]);
+	code = parse_order(argv + optind, argc - optind, &order);
+	if (code != COMMAND_DONE)
+		return code;
 	command_catch_signals();
-	return with_session(url != NULL ? url : "can:can0", verb, token);
+	return with_session(url != NULL ? url : "can:can0", &order);
 }

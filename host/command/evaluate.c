@@ -68,35 +68,25 @@ static struct estimate_options estimate_options_of(const struct evaluate_options
 	return estimate;
 }
 
-enum { TOLD = 1 };
-
-/* What a report points to beside the record. */
-struct findings {
-	struct analysis analysis;
-	struct model_prediction prediction, below;
-	struct events events;
-	struct free_falls falls;
-	struct band band;
-};
-
 /* Shocks, free falls and the band, when there is one. */
-static int find_shocks(struct report *report, struct findings *found, const struct evaluate_options *options,
+static int find_shocks(struct evaluated *e, const struct evaluate_options *options,
                        const struct estimate_options *estimate)
 {
-	int result = events_find(report->record, &options->events, &found->events);
+	struct report *report = &e->report;
+	int result = events_find(report->record, &options->events, &e->events);
 
 	if (result == 0)
-		result = free_fall_find(report->record, &found->falls);
+		result = free_fall_find(report->record, &e->falls);
 	if (result != 0)
 		return result;
-	report->events = &found->events;
-	report->falls = &found->falls;
+	report->events = &e->events;
+	report->falls = &e->falls;
 	report->show_events = options->show_events;
 	if (options->band.curve == NULL)
 		return 0;
-	result = band_check(report->record, report->analysis, estimate, &options->band, &found->band);
+	result = band_check(report->record, report->analysis, estimate, &options->band, &e->band);
 	if (result == 0) {
-		report->band = &found->band;
+		report->band = &e->band;
 		return 0;
 	}
 	if (result == DT_E_UNKNOWN)
@@ -105,7 +95,7 @@ static int find_shocks(struct report *report, struct findings *found, const stru
 	else
 		command_error("%s: no pulse to lay the band on: %s", report->record->file,
 		              error_text(result));
-	return TOLD;
+	return EVALUATE_TOLD;
 }
 
 /* The first channel that is too slow for the class; false when there is none. */
@@ -123,10 +113,7 @@ static bool refuses_cfc(const struct record *record, unsigned cfc)
 	return false;
 }
 
-/* Estimates and predicts; the report points into what is found. 0, with the analysis to be freed; DT_E_*; or
- * TOLD, when why not was printed. */
-static int make_report(struct report *report, struct findings *found, const struct record *record,
-                       const struct evaluate_options *options)
+int evaluate_open(struct evaluated *e, const struct record *record, const struct evaluate_options *options)
 {
 	struct estimate_options estimate = estimate_options_of(options);
 	const struct scene *scene = options->scene;
@@ -134,77 +121,80 @@ static int make_report(struct report *report, struct findings *found, const stru
 	int result;
 
 	if (refuses_cfc(record, options->cfc))
-		return TOLD;
-	result = estimate_record(record, &estimate, &found->analysis);
+		return EVALUATE_TOLD;
+	result = estimate_record(record, &estimate, &e->analysis);
 	if (result != 0)
 		return result;
-	*report = (struct report){
-	        .record = record, .analysis = &found->analysis, .scene = scene, .version = DT_VERSION};
-	result = find_shocks(report, found, options, &estimate);
+	e->report = (struct report){
+	        .record = record, .analysis = &e->analysis, .scene = scene, .version = DT_VERSION};
+	result = find_shocks(e, options, &estimate);
 	if (result != 0) {
-		estimate_free(&found->analysis);
+		evaluate_close(e);
 		return result;
 	}
 	if (scene == NULL)
 		return 0;
-	result = model_solve(scene, MODEL_AUTO, NULL, &found->prediction, message);
+	result = model_solve(scene, MODEL_AUTO, NULL, &e->prediction, message);
 	if (result != 0) {
 		command_error("%s: no prediction: %s", scene->name, message);
 		return 0;
 	}
-	report->prediction = &found->prediction;
-	if (model_below(scene, &found->prediction, &found->below) == 0)
-		report->below = &found->below;
+	e->report.prediction = &e->prediction;
+	if (model_below(scene, &e->prediction, &e->below) == 0)
+		e->report.below = &e->below;
 	return 0;
+}
+
+void evaluate_close(struct evaluated *e)
+{
+	estimate_free(&e->analysis);
 }
 
 int evaluate(const struct record *record, const struct evaluate_options *options)
 {
-	struct findings found;
-	struct report report;
-	int code, result = make_report(&report, &found, record, options);
+	struct evaluated e;
+	int code, result = evaluate_open(&e, record, options);
 
-	if (result == TOLD)
+	if (result == EVALUATE_TOLD)
 		return COMMAND_INPUT;
 	if (result != 0) {
 		command_error("%s: %s", record->file,
 		              result == DT_E_EMPTY ? "no good sample in any channel" : error_text(result));
 		return COMMAND_INPUT;
 	}
-	code = write_out(&report, options);
-	if (code == COMMAND_DONE && options->strict && report.band != NULL && !report.band->verdict.pass) {
+	code = write_out(&e.report, options);
+	if (code == COMMAND_DONE && options->strict && e.report.band != NULL && !e.band.verdict.pass) {
 		command_error("%s: outside its band, and --strict was asked for", record->file);
 		code = COMMAND_INPUT;
 	}
-	if (code == COMMAND_DONE && options->strict && any_flag(record, &found.analysis)) {
+	if (code == COMMAND_DONE && options->strict && any_flag(record, &e.analysis)) {
 		command_error("%s: flagged, and --strict was asked for", record->file);
 		code = COMMAND_INPUT;
 	}
-	estimate_free(&found.analysis);
+	evaluate_close(&e);
 	return code;
 }
 
 char *evaluate_json(const struct record *record, const struct scene *scene)
 {
 	struct evaluate_options options = {.scene = scene, .iepe_time_constant_s = NAN};
-	struct findings found;
-	struct report report;
+	struct evaluated e;
 	char *json = NULL;
 	size_t size = 0;
 	FILE *out;
 
-	if (make_report(&report, &found, record, &options) != 0)
+	if (evaluate_open(&e, record, &options) != 0)
 		return NULL;
 	out = open_memstream(&json, &size);
 	if (out != NULL) {
-		int result = report_json(&report, out);
+		int result = report_json(&e.report, out);
 
 		if (fclose(out) != 0 || result != 0) {
 			free(json);
 			json = NULL;
 		}
 	}
-	estimate_free(&found.analysis);
+	evaluate_close(&e);
 	return json;
 }
 

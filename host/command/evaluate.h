@@ -10,8 +10,7 @@
 #include "common/scenes/scene.h"
 #include "host/estimate/estimate.h"
 #include "host/record/record.h"
-#include "host/shock/band.h"
-#include "host/shock/events.h"
+#include "host/report/report.h"
 
 struct evaluate_options {
 	const struct scene *scene;   /* NULL: no model */
@@ -28,6 +27,24 @@ struct evaluate_options {
 	const char *json_file;        /* JSON beside it; NULL: none */
 	bool strict;                  /* a flag is a failure */
 };
+
+/* A record with all that is found of it. */
+struct evaluated {
+	struct report report; /* points into what follows */
+	struct analysis analysis;
+	struct model_prediction prediction, below;
+	struct events events;
+	struct free_falls falls;
+	struct band band;
+};
+
+enum { EVALUATE_TOLD = 1 };
+
+/* Estimates and predicts; e stays where it is until evaluate_close, and so do record and scene. Why there is
+ * no prediction is printed. 0, DT_E_*, or EVALUATE_TOLD when what was wrong was printed: cfc or band. */
+DT_MUST_USE int evaluate_open(struct evaluated *e, const struct record *record,
+                              const struct evaluate_options *options);
+void evaluate_close(struct evaluated *e);
 
 /* Prints and writes what was asked for. Returns a COMMAND_* exit code; errors were printed. */
 int evaluate(const struct record *record, const struct evaluate_options *options);

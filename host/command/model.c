@@ -80,6 +80,7 @@ enum { TIMINGS = 5, LIST_MAX = 256, HISTORY_MAX = 10000000 };
 
 struct arguments {
 	const char *scene_file, *history;
+	const char *of_history; /* an option that says something of it */
 	double angle_deg, step_us, span_ms, draws, seed;
 	struct ensemble ensemble; /* scene is set once it is read */
 	const char *vary;
@@ -121,11 +122,13 @@ static int parse_refine(struct model_options *options, const char *list)
 	char word[LIST_MAX];
 
 	options->refinements = 0;
+	if (strcmp(list, "none") == 0)
+		return COMMAND_DONE;
 	while (next_word(&list, word)) {
 		enum model_refinement refinement;
 
 		if (strcmp(word, "none") == 0)
-			continue;
+			return command_usage("model", "--refine has none among others, expected it alone");
 		if (model_refinement_parse(word, &refinement) != 0)
 			return command_usage(
 			        "model", "--refine has '%s', expected stiffness, wedge, grip, mounts or none",
@@ -217,10 +220,12 @@ static int parse_number(struct arguments *a, int option, const char *text)
 
 	switch (option) {
 	case OPTION_ANGLE:
-		return command_number("model", "angle", text, 0, 90, &a->angle_deg);
+		return command_angle("model", text, &a->angle_deg);
 	case OPTION_STEP:
+		a->of_history = "--step";
 		return command_number("model", "step", text, 0.001, 1e6, &a->step_us);
 	case OPTION_SPAN:
+		a->of_history = "--span";
 		return command_number("model", "span", text, 0.001, 1e6, &a->span_ms);
 	case OPTION_MONTE_CARLO:
 		return command_number("model", "monte-carlo", text, 2, 1e6, &a->draws);
@@ -291,6 +296,8 @@ static int check(const struct arguments *a, int rest)
 	if (tasks > 1)
 		return command_usage("model",
 		                     "expected one of --sweep, --monte-carlo, --sensitivity and --history");
+	if (a->of_history != NULL && a->history == NULL)
+		return command_usage("model", "%s needs --history FILE", a->of_history);
 	if (a->ensemble.axes > 0 && ensemble_points(&a->ensemble) == 0)
 		return command_usage("model", "--sweep makes too many points, expected %d at most",
 		                     ENSEMBLE_POINTS_MAX);

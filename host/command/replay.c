@@ -169,7 +169,7 @@ static int replay_file(struct replay *replay)
 	struct source source;
 	int code;
 
-	if (source_load(&source, replay->file, message) != 0) {
+	if (source_load(&source, replay->file, "a recording", message) != 0) {
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}

@@ -36,6 +36,16 @@ void session_close(struct session *session)
 	free(session);
 }
 
+void session_log(struct session *session, struct link *log)
+{
+	session->options.log = log;
+}
+
+void session_hold(struct session *session, bool hold)
+{
+	session->hold = hold;
+}
+
 int session_poll(struct session *session, int timeout_ms)
 {
 	return session->how->poll(session, timeout_ms);
@@ -51,12 +61,11 @@ int session_command(struct session *session, enum wire_op op, uint16_t token)
 	return session->how->command(session, op, token);
 }
 
-bool session_cancelled(struct session *session, enum wire_op op)
+bool session_cancelled(struct session *session)
 {
 	const struct session_options *options = &session->options;
 
-	return op != WIRE_OP_ABORT &&
-	       (command_interrupted() || (options->cancelled != NULL && options->cancelled(options->user)));
+	return command_interrupted() || (options->cancelled != NULL && options->cancelled(options->user));
 }
 
 int session_set_parameter(struct session *session, enum wire_parameter_number number, uint32_t value)

@@ -39,10 +39,10 @@ struct session_view {
 
 struct session_options {
 	bool passive;     /* no heartbeat, no collecting: look and command only */
-	struct link *log; /* every frame sent or received is appended; NULL: none; stays the caller's */
+	struct link *log; /* as session_log */
 	void (*on_frame)(void *user, const struct frame *frame); /* every frame received; NULL: none */
-	bool (*cancelled)(void *user); /* a command other than ABORT is not sent again once this says so;
-	                                * NULL: only Ctrl-C cancels */
+	bool (*cancelled)(void *user); /* a command other than ABORT is given up once this says so, asked
+	                                * every 10 ms; NULL: only Ctrl-C cancels */
 	void *user;
 };
 
@@ -53,8 +53,16 @@ struct session *session_open(const char *url, const struct session_options *opti
                              char message[SESSION_MESSAGE_MAX]);
 void session_close(struct session *session);
 
-/* Handles what arrives within timeout_ms (returns earlier after handling something). 0; DT_E_CLOSED when the
- * tower was heard and then nothing came for 2 s, or the link's other end is gone; DT_E_LINK; DT_E_SYSTEM
+/* Every frame sent or received from now on is appended to log, over LCM the drop's own; NULL: none. It stays
+ * the caller's. */
+void session_log(struct session *session, struct link *log);
+
+/* With hold the tower keeps what it captures and is asked for nothing; without, it is collected. Over LCM the
+ * bridge collects in any case. */
+void session_hold(struct session *session, bool hold);
+
+/* Handles what arrives within timeout_ms (returns earlier after handling what was there). 0; DT_E_CLOSED when
+ * the tower was heard and then nothing came for 2 s, or the link's other end is gone; DT_E_LINK; DT_E_SYSTEM
  * when the log cannot be written. */
 DT_MUST_USE int session_poll(struct session *session, int timeout_ms);
 

@@ -18,6 +18,7 @@ enum {
 	RESEND_PATIENCE_MS = 60, /* without a resent block: ask again */
 	RESEND_ROUNDS = 25,      /* without progress: give up */
 	FORGET_MAX = 3,          /* whole captures fetched again because of a wrong CRC-32 */
+	FRAMES_AT_ONCE = 64,     /* handled before anything else is done */
 };
 
 struct can_way {
@@ -174,6 +175,8 @@ static int collect(struct session *session, const struct frame *frame)
 	if (frame->id == WIRE_ID_CAPTURE_END && wire_unpack_capture_end(frame, &end) == 0) {
 		if (way->judged && same_capture(&end, &way->end))
 			return send_verdict(session); /* it was lost on its way */
+		if (session->hold)
+			return 0; /* it comes again */
 		if (!way->collecting)
 			begin_collecting(way, &end);
 	}
@@ -250,35 +253,50 @@ static const struct frame *put_together(struct can_way *way, const struct frame 
 	return whole;
 }
 
-static int can_poll(struct session *session, int timeout_ms)
+static int take_frame(struct session *session, const struct frame *frame)
 {
 	struct can_way *way = session->way;
 	const struct frame *whole;
-	struct frame frame;
+	int result = 0;
+
+	if (session->options.log != NULL)
+		result = link_send(session->options.log, frame);
+	whole = put_together(way, frame);
+	if (whole == NULL)
+		return result;
+	follow_tower(session, whole);
+	hear_answers(way, whole);
+	if (result == 0)
+		result = collect(session, whole);
+	if (session->options.on_frame != NULL)
+		session->options.on_frame(session->options.user, whole);
+	return result;
+}
+
+static int can_poll(struct session *session, int timeout_ms)
+{
+	struct can_way *way = session->way;
 	int result = send_heartbeat(session);
 
 	if (result == 0)
 		result = drive_collection(session);
-	if (result == 0)
-		result = link_receive(way->link, &frame,
-		                      timeout_ms > HEARTBEAT_MS / 2 ? HEARTBEAT_MS / 2 : timeout_ms);
-	if (result == 0 && session->view.seen && session_now_ms() - way->heard_ms > SILENCE_MS)
-		return DT_E_CLOSED;
-	if (result <= 0)
-		return result;
-	way->heard_ms = session_now_ms();
-	if (session->options.log != NULL)
-		result = link_send(session->options.log, &frame);
-	whole = put_together(way, &frame);
-	if (whole == NULL)
-		return result < 0 ? result : 0;
-	follow_tower(session, whole);
-	hear_answers(way, whole);
-	if (result >= 0)
-		result = collect(session, whole);
-	if (session->options.on_frame != NULL)
-		session->options.on_frame(session->options.user, whole);
-	return result < 0 ? result : 0;
+	if (timeout_ms > HEARTBEAT_MS / 2)
+		timeout_ms = HEARTBEAT_MS / 2;
+	for (unsigned count = 0; result == 0 && count < FRAMES_AT_ONCE; count++) {
+		struct frame frame;
+
+		result = link_receive(way->link, &frame, count == 0 ? timeout_ms : 0);
+		if (result == 0) {
+			if (count == 0 && session->view.seen && session_now_ms() - way->heard_ms > SILENCE_MS)
+				result = DT_E_CLOSED;
+			return result;
+		}
+		if (result > 0) {
+			way->heard_ms = session_now_ms();
+			result = take_frame(session, &frame);
+		}
+	}
+	return result;
 }
 
 /* A command that was lost and sent again may be refused only because the first one worked. */
@@ -300,11 +318,11 @@ static bool worked(enum wire_op op, unsigned state)
 	return false;
 }
 
-static int await(struct session *session, const bool *awaited)
+static int await(struct session *session, const bool *awaited, bool always)
 {
 	int64_t deadline_ms = session_now_ms() + REPLY_MS;
 
-	while (*awaited && session_now_ms() < deadline_ms) {
+	while (*awaited && session_now_ms() < deadline_ms && (always || !session_cancelled(session))) {
 		int result = can_poll(session, 10);
 
 		if (result != 0)
@@ -316,10 +334,12 @@ static int await(struct session *session, const bool *awaited)
 static int can_command(struct session *session, enum wire_op op, uint16_t token)
 {
 	struct can_way *way = session->way;
+	bool always = op == WIRE_OP_ABORT;
 	int result = DT_E_TIMEOUT;
 
 	way->sequence++;
-	for (int attempt = 0; attempt < TRIES && result == DT_E_TIMEOUT && !session_cancelled(session, op);
+	for (int attempt = 0;
+	     attempt < TRIES && result == DT_E_TIMEOUT && (always || !session_cancelled(session));
 	     attempt++) {
 		if (op == WIRE_OP_ABORT) { /* both ways to stop: any tool's, and ours with a reply */
 			struct wire_nmt stop = {.command = 2, .node = 1};
@@ -333,7 +353,7 @@ static int can_command(struct session *session, enum wire_op op, uint16_t token)
 		way->reply_awaited = true;
 		result = send_op(session, op, token, 0);
 		if (result == 0)
-			result = await(session, &way->reply_awaited);
+			result = await(session, &way->reply_awaited, always);
 		if (result == 0 && way->reply.result != 0 && !(attempt > 0 && worked(op, way->reply.state)))
 			result = way->reply.result;
 	}
@@ -349,12 +369,13 @@ static int can_set_parameter(struct session *session, enum wire_parameter_number
 	int result = DT_E_TIMEOUT;
 
 	wire_pack_sdo(&frame, WIRE_ID_SDO_REQUEST, &write);
-	for (int attempt = 0; attempt < TRIES && result == DT_E_TIMEOUT; attempt++) {
+	for (int attempt = 0; attempt < TRIES && result == DT_E_TIMEOUT && !session_cancelled(session);
+	     attempt++) {
 		way->sdo = write;
 		way->sdo_awaited = true;
 		result = send(session, &frame);
 		if (result == 0)
-			result = await(session, &way->sdo_awaited);
+			result = await(session, &way->sdo_awaited, false);
 	}
 	way->sdo_awaited = false;
 	if (result == 0 && way->sdo.specifier != 0x60)

@@ -96,7 +96,7 @@ static int lcm_way_command(struct session *session, enum wire_op op, uint16_t to
 
 		if (result != 0)
 			return result;
-		if (session_now_ms() > deadline_ms || session_cancelled(session, op))
+		if (session_now_ms() > deadline_ms || (op != WIRE_OP_ABORT && session_cancelled(session)))
 			return DT_E_TIMEOUT;
 	}
 	return way->command_result;
@@ -120,8 +120,12 @@ static int lcm_way_take_drop(struct session *session, struct record *record)
 {
 	struct lcm_way *way = session->way;
 
-	if (!way->has_drop)
-		return way->drop_error;
+	if (!way->has_drop) {
+		int error = way->drop_error;
+
+		way->drop_error = 0;
+		return error;
+	}
 	*record = way->drop;
 	way->has_drop = false;
 	if (session->options.log != NULL && write_frames(record, log_frame, session->options.log) != 0) {

@@ -23,10 +23,11 @@ struct session {
 	void *way;
 	struct session_options options;
 	struct session_view view;
+	bool hold;
 };
 
-/* Nobody wants op any longer: Ctrl-C or an ABORT came. ABORT itself is always wanted. */
-bool session_cancelled(struct session *session, enum wire_op op);
+/* Nobody wants what is under way any longer: Ctrl-C or an ABORT came. ABORT itself is always wanted. */
+bool session_cancelled(struct session *session);
 
 extern const struct session_way session_can, session_lcm;
 

@@ -16,18 +16,19 @@
 
 enum { START_MS = 5000, ARGUMENTS_MAX = 40 };
 
-static void become_bench(const char *path, const char *const *arguments, const char *url, int ready_fd)
+static void become_bench(const struct simulated *tower, const char *path, const char *const *arguments,
+                         int ready_fd)
 {
-	const char *argv[ARGUMENTS_MAX] = {path, "--link", url, "--ready-fd"};
 	char number[16];
-	int count = 4;
+	const char *argv[ARGUMENTS_MAX] = {path,           "--link",     tower->url, "--control",
+	                                   tower->control, "--ready-fd", number};
+	int count = 7;
 	union { /* execv promises not to write through its argument */
 		const char **given;
 		char *const *taken;
 	} words = {.given = argv};
 
 	snprintf(number, sizeof(number), "%d", ready_fd);
-	argv[count++] = number;
 	while (*arguments != NULL && count < ARGUMENTS_MAX - 1)
 		argv[count++] = *arguments++;
 	execv(path, words.taken);
@@ -62,12 +63,17 @@ int simulated_start(struct simulated *tower, const char *const *arguments, char 
 		return -1;
 	}
 	snprintf(tower->url, sizeof(tower->url), "unix:%s/bus", tower->directory);
+	snprintf(tower->control, sizeof(tower->control), "%s/control", tower->directory);
 	tower->pid = fork();
 	if (tower->pid == 0) {
+		sigset_t none;
+
+		sigemptyset(&none); /* a thread of ours may have blocked them */
+		sigprocmask(SIG_SETMASK, &none, NULL);
 		fcntl(pipes[1], F_SETFD, 0);
 		setpgid(0, 0); /* Ctrl-C is for us: we abort the drop, then end the tower */
 		prctl(PR_SET_PDEATHSIG, SIGTERM); /* when we are killed, nobody else ends it */
-		become_bench(path, arguments, tower->url, pipes[1]);
+		become_bench(tower, path, arguments, pipes[1]);
 	}
 	close(pipes[1]);
 	ready = tower->pid > 0 ? wait_ready(pipes[0]) : -1;
@@ -79,17 +85,24 @@ int simulated_start(struct simulated *tower, const char *const *arguments, char 
 	return -1;
 }
 
+bool simulated_alive(struct simulated *tower)
+{
+	if (tower->pid > 0 && waitpid(tower->pid, NULL, WNOHANG) == tower->pid)
+		tower->pid = 0;
+	return tower->pid > 0;
+}
+
 void simulated_stop(struct simulated *tower)
 {
-	char bus[96];
+	const char *bus = tower->url + strlen("unix:");
 
 	if (tower->pid > 0) {
 		kill(tower->pid, SIGTERM);
 		while (waitpid(tower->pid, NULL, 0) < 0 && errno == EINTR)
 			continue;
 	}
-	snprintf(bus, sizeof(bus), "%s/bus", tower->directory);
-	unlink(bus);
+	unlink(bus); /* of one that was killed */
+	unlink(tower->control);
 	rmdir(tower->directory);
 	tower->pid = 0;
 }

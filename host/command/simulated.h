@@ -5,18 +5,24 @@
  * A simulated tower for a command that was given no link: droptower-bench, found beside this program, on a
  * bus of its own in a temporary directory.
  */
+#include <stdbool.h>
 #include <stdint.h>
 #include <sys/types.h>
 
 struct simulated {
 	pid_t pid;
 	char directory[64];
-	char url[96]; /* of its bus */
+	char url[96];     /* of its bus */
+	char control[80]; /* its control socket */
 };
 
-/* arguments: what to hand to the bench besides --link and --ready-fd, NULL-terminated, at most 32. 0, or -1
- * with one line in message. Waits until the bus is open. */
+/* arguments: what to hand to the bench besides --link, --control and --ready-fd, NULL-terminated, at most 32.
+ * 0, or -1 with one line in message. Waits until the bus is open. The thread that calls it keeps it alive:
+ * the bench ends with that thread. */
 int simulated_start(struct simulated *tower, const char *const *arguments, char *message, unsigned size);
+
+/* It has not ended by itself. */
+bool simulated_alive(struct simulated *tower);
 
 /* Ends it and removes its directory. */
 void simulated_stop(struct simulated *tower);

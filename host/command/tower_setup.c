@@ -2,6 +2,7 @@
 #include "host/command/tower_setup.h"
 
 #include <math.h>
+#include <stdio.h>
 
 #include "common/wire_table.h"
 #include "host/command/command.h"
@@ -14,7 +15,13 @@ static bool passing(unsigned state)
 	return state == WIRE_STATE_BOOT || state == WIRE_STATE_UPLOADED;
 }
 
-int tower_setup_hear(struct session *session)
+static int stopped(char message[SESSION_MESSAGE_MAX])
+{
+	snprintf(message, SESSION_MESSAGE_MAX, "interrupted, nothing was released");
+	return COMMAND_REFUSED;
+}
+
+int tower_setup_hear(struct session *session, char message[SESSION_MESSAGE_MAX])
 {
 	const struct session_view *view = session_view(session);
 	int64_t start_ms = session_now_ms();
@@ -23,20 +30,22 @@ int tower_setup_hear(struct session *session)
 		int result = session_poll(session, 50);
 
 		if (command_interrupted())
-			return command_stopped();
+			return stopped(message);
 		if (result == 0 && session_now_ms() - start_ms > HEAR_MS)
 			result = DT_E_TIMEOUT;
-		if (result != 0)
-			return command_link_failed("no tower heard", result);
+		if (result != 0) {
+			snprintf(message, SESSION_MESSAGE_MAX, "no tower heard: %s", error_text(result));
+			return COMMAND_LINK;
+		}
 	}
 	if (view->hash_agrees)
 		return COMMAND_DONE;
-	command_error("the tower's wire hash is %08x, ours is %08x: %s", view->wire_hash, wire_hash(),
-	              error_text(DT_E_HASH));
+	snprintf(message, SESSION_MESSAGE_MAX, "the tower's wire hash is %08x, ours is %08x: %s",
+	         view->wire_hash, wire_hash(), error_text(DT_E_HASH));
 	return COMMAND_REFUSED;
 }
 
-int tower_setup_write(struct session *session, const struct scene *scene)
+int tower_setup_write(struct session *session, const struct scene *scene, char message[SESSION_MESSAGE_MAX])
 {
 	const struct {
 		enum wire_parameter_number number;
@@ -56,10 +65,12 @@ int tower_setup_write(struct session *session, const struct scene *scene)
 
 		if (result == DT_E_UNKNOWN)
 			return COMMAND_DONE; /* over LCM: the bridge has set them */
+		if (result != 0 && command_interrupted())
+			return stopped(message);
 		if (result != 0) {
-			command_error("the tower refuses %s = %.0f: %s",
-			              wire_parameters[parameters[i].number].name, parameters[i].value,
-			              error_text(result));
+			snprintf(message, SESSION_MESSAGE_MAX, "the tower refuses %s = %.0f: %s",
+			         wire_parameters[parameters[i].number].name, parameters[i].value,
+			         error_text(result));
 			return result == DT_E_STATE || result == DT_E_RANGE ? COMMAND_REFUSED : COMMAND_LINK;
 		}
 	}

@@ -8,11 +8,11 @@
 #include "common/scenes/scene.h"
 #include "host/command/session.h"
 
-/* Waits until the tower is heard, speaks our wire and has done its self-test. Returns a COMMAND_* code;
- * errors were printed. */
-int tower_setup_hear(struct session *session);
+/* Waits until the tower is heard, speaks our wire and has done its self-test. Returns a COMMAND_* code; other
+ * than COMMAND_DONE with one line in message. */
+int tower_setup_hear(struct session *session, char message[SESSION_MESSAGE_MAX]);
 
-/* Writes the parameters; over LCM there is nothing to do. Returns a COMMAND_* code; errors were printed. */
-int tower_setup_write(struct session *session, const struct scene *scene);
+/* Writes the parameters; over LCM there is nothing to do. Returns as above. */
+int tower_setup_write(struct session *session, const struct scene *scene, char message[SESSION_MESSAGE_MAX]);
 
 #endif

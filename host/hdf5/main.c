@@ -388,7 +388,7 @@ int main(int argc, char **argv)
 		return 2;
 	}
 	H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* one line of our own instead */
-	if (source_load(&source, "/dev/stdin", message) != 0) {
+	if (source_load(&source, "/dev/stdin", "a recording", message) != 0) {
 		fprintf(stderr, "%s\n", message);
 		return 3;
 	}

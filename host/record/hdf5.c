@@ -138,7 +138,7 @@ static int read_csv_of(struct record *record, int fd, const char *file, char *me
 	int error;
 
 	snprintf(path, sizeof(path), "/proc/self/fd/%d", fd);
-	error = source_load(&csv, path, message);
+	error = source_load(&csv, path, "a recording", message);
 	if (error)
 		return error;
 	csv.file = file;

@@ -58,7 +58,7 @@ int read_record(struct record *record, const char *file, const char *columns, ch
 		return source_refuse(message, DT_E_ARGUMENT, file, 0,
 		                     "name of %zu bytes, expected less than %zu", strlen(file),
 		                     sizeof(record->file));
-	error = source_load(&source, file, message);
+	error = source_load(&source, file, "a recording", message);
 	if (error)
 		return error;
 	error = dispatch(record, &source, columns, message);

@@ -33,9 +33,10 @@ int source_refuse(char message[READ_MESSAGE_MAX], int code, const char *file, ui
 	return code;
 }
 
-static int refuse_system(char *message, const char *file)
+static int refuse_system(char *message, const struct source *source)
 {
-	return source_refuse(message, DT_E_SYSTEM, file, 0, "%s, expected a recording", strerror(errno));
+	return source_refuse(message, DT_E_SYSTEM, source->file, 0, "%s, expected %s", strerror(errno),
+	                     source->expected);
 }
 
 /* Makes room for at least one more byte, or says why not. */
@@ -46,8 +47,8 @@ static int grow(struct source *source, size_t *room, char *message)
 	if (source->size < *room)
 		return 0;
 	if (*room >= SIZE_MAX_BYTES)
-		return source_refuse(message, DT_E_RANGE, source->file, 0,
-		                     "larger than 2 GiB, expected a recording");
+		return source_refuse(message, DT_E_RANGE, source->file, 0, "larger than 2 GiB, expected %s",
+		                     source->expected);
 	bytes = realloc(source->bytes, 2 * *room);
 	if (!bytes)
 		return source_refuse(message, DT_E_MEMORY, source->file, 0, "no memory for %zu bytes",
@@ -67,15 +68,15 @@ static int read_all(struct source *source, int descriptor, size_t room, char *me
 			return error;
 		count = read(descriptor, source->bytes + source->size, room - source->size);
 		if (count < 0 && errno != EINTR)
-			return refuse_system(message, source->file);
+			return refuse_system(message, source);
 		if (count == 0)
 			break;
 		if (count > 0)
 			source->size += (size_t)count;
 	}
 	if (source->size == 0)
-		return source_refuse(message, DT_E_EMPTY, source->file, 0,
-		                     "empty file, expected a recording");
+		return source_refuse(message, DT_E_EMPTY, source->file, 0, "empty file, expected %s",
+		                     source->expected);
 	return 0;
 }
 
@@ -90,16 +91,16 @@ static void skip_mark(struct source *source)
 	memmove(source->bytes, source->bytes + sizeof(mark), source->size);
 }
 
-int source_load(struct source *source, const char *file, char message[READ_MESSAGE_MAX])
+int source_load(struct source *source, const char *file, const char *expected, char message[READ_MESSAGE_MAX])
 {
 	int descriptor = open(file, O_RDONLY | O_CLOEXEC);
-	struct source loaded = {.file = file};
+	struct source loaded = {.file = file, .expected = expected};
 	size_t room = 1 << 16;
 	struct stat stat;
 	int error;
 
 	if (descriptor < 0)
-		return refuse_system(message, file);
+		return refuse_system(message, &loaded);
 	if (fstat(descriptor, &stat) == 0 && S_ISREG(stat.st_mode) && stat.st_size > 0)
 		room = (size_t)stat.st_size + 1; /* the byte that finds the end */
 	loaded.bytes = malloc(room);

@@ -15,8 +15,9 @@
 #include "host/record/read.h"
 
 struct source {
-	const char *file; /* as given */
-	char *bytes;      /* not terminated */
+	const char *file;     /* as given */
+	const char *expected; /* of it, for its refusal */
+	char *bytes;          /* not terminated */
 	size_t size;
 };
 
@@ -27,8 +28,9 @@ struct source_line {
 	size_t next;      /* where the next line begins */
 };
 
-/* 0, or an error told in message, with nothing to free. An empty file is refused. */
-DT_MUST_USE int source_load(struct source *source, const char *file, char message[READ_MESSAGE_MAX]);
+/* 0, or an error told in message, with nothing to free. An empty file is refused. expected: "a recording". */
+DT_MUST_USE int source_load(struct source *source, const char *file, const char *expected,
+                            char message[READ_MESSAGE_MAX]);
 void source_free(struct source *source);
 
 /* Steps from line to line; start with a zeroed *line. */

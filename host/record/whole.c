@@ -86,3 +86,15 @@ int whole_close(struct whole *whole, int result, char *message, size_t size)
 	forget(whole);
 	return result;
 }
+
+int whole_write(const char *file, const void *bytes, size_t length, char *message, size_t size)
+{
+	struct whole whole;
+	int result = whole_open(&whole, file, message, size);
+
+	if (result)
+		return result;
+	if (fwrite(bytes, 1, length, whole.out) != length)
+		result = DT_E_SYSTEM;
+	return whole_close(&whole, result, message, size);
+}

@@ -25,4 +25,7 @@ DT_MUST_USE int whole_open(struct whole *whole, const char *file, char *message,
  * result, or DT_E_SYSTEM if only now writing fails; errors with "FILE: why" in message. */
 DT_MUST_USE int whole_close(struct whole *whole, int result, char *message, size_t size);
 
+/* All of a file at once; as whole_close. */
+DT_MUST_USE int whole_write(const char *file, const void *bytes, size_t length, char *message, size_t size);
+
 #endif

@@ -1,13 +1,18 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/report/page.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <string.h>
 
-void page_text(FILE *out, const char *s)
+#include <gsl/gsl_version.h>
+
+#include "common/wire.h"
+
+void page_text_part(FILE *out, const char *text, size_t length)
 {
-	for (; *s; s++) {
-		switch (*s) {
+	for (size_t i = 0; i < length; i++) {
+		switch (text[i]) {
 		case '&':
 			fputs("&amp;", out);
 			break;
@@ -20,16 +25,26 @@ void page_text(FILE *out, const char *s)
 		case '"':
 			fputs("&quot;", out);
 			break;
+		case '\'':
+			fputs("&#39;", out);
+			break;
 		default:
-			fputc(*s, out);
+			fputc(text[i], out);
 		}
 	}
 }
 
+void page_text(FILE *out, const char *text)
+{
+	page_text_part(out, text, strlen(text));
+}
+
 void page_number(FILE *out, int decimals, double value)
 {
+	bool negative = value < -0.5 * pow(10.0, -decimals); /* as it is rounded: no -0.0 */
+
 	if (isfinite(value))
-		fprintf(out, "%s%.*f", value < 0.0 ? "&minus;" : "", decimals, fabs(value));
+		fprintf(out, "%s%.*f", negative ? "&minus;" : "", decimals, fabs(value));
 	else
 		fputs("&ndash;", out);
 }
@@ -50,4 +65,40 @@ void page_channel_name(FILE *out, const char *name)
 		fprintf(out, "%.2s %c", name, name[2]);
 	else
 		page_text(out, name);
+}
+
+/* Nothing is fetched and nothing runs, whatever a text may try. */
+void page_begin(FILE *out, const char *title, const char *more)
+{
+	fputs("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
+	      "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
+	      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
+	      "style-src 'unsafe-inline'\"><title>",
+	      out);
+	page_text(out, title);
+	fprintf(out, "</title>\n<style>%s%s</style></head>\n<body><main>\n<h1>", page_style, more);
+	page_text(out, title);
+	fputs("</h1>\n", out);
+}
+
+void page_end(FILE *out, const char *version)
+{
+	fputs("<p>droptower", out);
+	if (version) {
+		fputc(' ', out);
+		page_text(out, version);
+	}
+	fprintf(out,
+	        ", wire %08" PRIX32 ", GSL %s, pictures by gnuplot.</p></footer>\n</main></body></html>\n",
+	        wire_hash(), gsl_version);
+}
+
+void page_begin_card(FILE *out, const char *label)
+{
+	fprintf(out, "<div class=\"card\"><span class=\"label\">%s</span><span class=\"value\">", label);
+}
+
+void page_end_card(FILE *out, const char *unit, const char *note)
+{
+	fprintf(out, "<small> %s</small></span><span class=\"note\">%s</span></div>\n", unit, note);
 }

@@ -2,24 +2,25 @@
 #ifndef DT_HOST_REPORT_PAGE_H
 #define DT_HOST_REPORT_PAGE_H
 /*
- * The HTML page while it is written: what its sections share. html.c puts them in their order; private to it
- * and to the page_*.c beside it.
+ * HTML pages while they are written: what the page of a drop (html.c, page_*.c) and that of a series
+ * (series*.c) share. page_text is for everybody who writes HTML.
  */
 #include "host/report/facts.h"
 
 /* The first picture that fails is remembered and the rest are left out. */
 struct page {
 	FILE *out;
-	const struct report *report;
-	struct report_zero zero;
+	const struct report *report; /* of a drop; NULL: of a series */
+	struct report_zero zero;     /* of the report */
 	size_t pictures;
 	int error; /* DT_E_* of that picture, its line in message */
 	char *message;
 	size_t size;
 };
 
-/* A text of the user's, escaped. */
+/* A text of the user's, escaped: harmless between tags and within a quoted attribute. */
 void page_text(FILE *out, const char *text);
+void page_text_part(FILE *out, const char *text, size_t length);
 
 /* A dash when it is not known. */
 void page_number(FILE *out, int decimals, double value);
@@ -28,7 +29,28 @@ void page_with_sigma(FILE *out, int decimals, double value, double sigma);
 /* "S1X" as "S1 X"; other names as they are. */
 void page_channel_name(FILE *out, const char *name);
 
-/* The sections that are pictures, and those that are tables. */
+/* Colours, type, tables and pictures of every page. */
+extern const char page_style[];
+
+/* From the doctype to the title as heading; more: style beside page_style. */
+void page_begin(FILE *out, const char *title, const char *more);
+
+/* What wrote it, and the end; version NULL: not said. A footer is open. */
+void page_end(FILE *out, const char *version);
+
+/* A figure that stands out: label, then a value is written, then unit and note. */
+void page_begin_card(FILE *out, const char *label);
+void page_end_card(FILE *out, const char *unit, const char *note);
+
+/* A gnuplot script in the making; NULL, with the page's error set, without memory or after an earlier error.
+ */
+FILE *page_begin_script(struct page *page, char **buffer, size_t *length);
+
+/* Closes and frees it and puts its picture into the page. drawn: whether there is something to see. */
+void page_draw(struct page *page, FILE *script, char **buffer, const size_t *length, bool drawn,
+               const char *label);
+
+/* The sections of a drop that are pictures, and those that are tables. */
 void page_pictures(struct page *page);
 void page_tables(struct page *page);
 

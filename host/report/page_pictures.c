@@ -1,74 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "host/report/page.h"
-#include "host/report/picture.h"
 #include "host/report/traces.h"
 
 enum { CHANNELS_MAX = 12 }; /* drawn */
-
-static const char *after(const char *s, const char *end)
-{
-	const char *found = strstr(s, end);
-
-	return found ? found + strlen(end) : s + strlen(s);
-}
-
-/* The <svg> element alone. What every picture of gnuplot repeats (symbols, an id) may stand only once in
- * a page, and its <title>s would pop up as hints. */
-static void inline_svg(FILE *out, const char *svg, bool first, const char *label)
-{
-	const char *s = strstr(svg, "<svg");
-
-	if (!s)
-		return;
-	fputs("<svg role=\"img\" aria-label=\"", out);
-	page_text(out, label);
-	fputc('"', out);
-	s += strlen("<svg");
-	while (*s) {
-		if (!strncmp(s, "<title>", 7))
-			s = after(s, "</title>");
-		else if (!strncmp(s, "<desc>", 6))
-			s = after(s, "</desc>");
-		else if (!first && !strncmp(s, "<defs>", 6))
-			s = after(s, "</defs>");
-		else if (!strncmp(s, " id=\"gnuplot", 12))
-			s = after(s + 5, "\"");
-		else
-			fputc(*s++, out);
-	}
-}
-
-static void draw(struct page *page, FILE *script, char **buffer, const size_t *length, bool drawn,
-                 const char *label)
-{
-	char *svg = NULL;
-
-	if (fclose(script) != 0) {
-		page->error = DT_E_MEMORY;
-	} else if (drawn) {
-		page->error = picture_draw(*buffer, *length, &svg, page->message, page->size);
-		if (!page->error)
-			inline_svg(page->out, svg, page->pictures++ == 0, label);
-		free(svg);
-	} else {
-		fputs("<p class=\"soft\">Nothing to draw: no good sample here.</p>", page->out);
-	}
-	free(*buffer);
-}
-
-/* A script in the making; NULL, with the page's error set, without memory or after an earlier error. */
-static FILE *begin_script(struct page *page, char **buffer, size_t *length)
-{
-	FILE *script = page->error ? NULL : open_memstream(buffer, length);
-
-	if (!script && !page->error)
-		page->error = DT_E_MEMORY;
-	return script;
-}
 
 static void picture_of_channel(struct page *page, size_t channel)
 {
@@ -76,7 +13,7 @@ static void picture_of_channel(struct page *page, size_t channel)
 	const struct estimate_channel *e = &page->report->analysis->channels[channel];
 	size_t length;
 	char *buffer, status[48];
-	FILE *script = begin_script(page, &buffer, &length);
+	FILE *script = page_begin_script(page, &buffer, &length);
 
 	if (!script)
 		return;
@@ -92,8 +29,8 @@ static void picture_of_channel(struct page *page, size_t channel)
 	if (strcmp(report_channel_status(e, status, sizeof(status)), "ok") != 0)
 		fprintf(page->out, "(%s)", status);
 	fputs("</span></figcaption>", page->out);
-	draw(page, script, &buffer, &length, traces_channel(script, page->report, &page->zero, channel),
-	     c->name);
+	page_draw(page, script, &buffer, &length, traces_channel(script, page->report, &page->zero, channel),
+	          c->name);
 	fputs("</figure>\n", page->out);
 }
 
@@ -104,12 +41,12 @@ static void wide_picture(struct page *page,
 {
 	size_t length;
 	char *buffer;
-	FILE *script = begin_script(page, &buffer, &length);
+	FILE *script = page_begin_script(page, &buffer, &length);
 
 	if (!script)
 		return;
 	fputs("<figure class=\"scroll\">", page->out);
-	draw(page, script, &buffer, &length, traces(script, page->report, &page->zero), name);
+	page_draw(page, script, &buffer, &length, traces(script, page->report, &page->zero), name);
 	fputs("</figure>\n", page->out);
 }
 
@@ -117,13 +54,13 @@ static void picture_of_ringdown(struct page *page, char axis)
 {
 	size_t length;
 	char *buffer;
-	FILE *script = begin_script(page, &buffer, &length);
+	FILE *script = page_begin_script(page, &buffer, &length);
 
 	if (!script)
 		return;
 	fprintf(page->out, "<figure><figcaption><b>S1 %c</b></figcaption>", axis);
-	draw(page, script, &buffer, &length, traces_ringdown(script, page->report, &page->zero, axis),
-	     "ring-down");
+	page_draw(page, script, &buffer, &length, traces_ringdown(script, page->report, &page->zero, axis),
+	          "ring-down");
 	fputs("</figure>\n", page->out);
 }
 

@@ -142,14 +142,24 @@ cJSON *put_flags(struct builder *b, cJSON *object, unsigned flags, const char *(
 	return array;
 }
 
-int put_out(struct builder *b, cJSON *root, FILE *out)
+int put_part(struct builder *b, cJSON *part, FILE *out)
 {
-	char *text = b->failed ? NULL : cJSON_PrintUnformatted(root);
+	char *text = b->failed ? NULL : cJSON_PrintUnformatted(part);
 
-	cJSON_Delete(root);
+	cJSON_Delete(part);
 	if (!text)
 		return DT_E_MEMORY;
-	fprintf(out, "%s\n", text);
+	fputs(text, out);
 	cJSON_free(text);
+	return 0;
+}
+
+int put_out(struct builder *b, cJSON *root, FILE *out)
+{
+	int result = put_part(b, root, out);
+
+	if (result != 0)
+		return result;
+	fputc('\n', out);
 	return fflush(out) != 0 || ferror(out) ? DT_E_SYSTEM : 0;
 }

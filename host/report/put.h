@@ -30,6 +30,9 @@ void put_numbers(struct builder *b, cJSON *object, const char *key, const double
 cJSON *put_flags(struct builder *b, cJSON *object, unsigned flags, const char *(*name_of)(unsigned));
 void put_more_flags(struct builder *b, cJSON *array, unsigned flags, const char *(*name_of)(unsigned));
 
+/* Prints part of a larger whole, to which the caller sees, and frees it. 0 or DT_E_MEMORY. */
+int put_part(struct builder *b, cJSON *part, FILE *out);
+
 /* Prints root on one line and frees it. 0, DT_E_SYSTEM or DT_E_MEMORY. */
 int put_out(struct builder *b, cJSON *root, FILE *out);
 

@@ -117,12 +117,12 @@ void script_bands(FILE *out, const struct channel *c, double zero_s, struct scri
 	}
 }
 
-size_t script_clipped(FILE *out, const struct channel *c, double offset, double zero_s,
+size_t script_clipped(FILE *out, const char *name, const struct channel *c, double offset, double zero_s,
                       struct script_window window)
 {
 	size_t last = script_from(c, window.to_s), points = 0;
 
-	fprintf(out, "$clipped << EOD\n");
+	fprintf(out, "$%s << EOD\n", name);
 	for (size_t k = script_from(c, window.from_s); k < last && points < CLIPPED_MAX; k++) {
 		if (!(c->sample[k] & SAMPLE_CLIPPED) || !script_good(c, k))
 			continue;
@@ -157,8 +157,7 @@ void script_axes(FILE *out, int width, int height, struct script_window window, 
 	fprintf(out, "set tics nomirror out scale 0.5 textcolor rgb 'black'\nset grid linecolor rgb "
 	             "'#999999' linewidth 0.4 "
 	             "dashtype 1\n");
-	fprintf(out,
-	        "set xlabel 'ms' offset 0,0.7\nset label 'g' at graph 0, graph 1.07 right offset -1,0\n");
+	fprintf(out, "set xlabel 'ms' offset 0,0.7\nset label 'g' at graph 0, graph 1 right offset -1,1\n");
 	fprintf(out, "set tmargin 1.5\nset rmargin 1\nset lmargin 7\nset bmargin 2.6\n");
 	fprintf(out, "set xrange [%.6f:%.6f]\n", (window.from_s - zero_s) * 1e3,
 	        (window.to_s - zero_s) * 1e3);

@@ -2,7 +2,8 @@
 #ifndef DT_HOST_REPORT_SCRIPT_H
 #define DT_HOST_REPORT_SCRIPT_H
 /*
- * The parts of a gnuplot script: axes, samples, curves, shading. What traces*.c share; private to them.
+ * The parts of a gnuplot script: axes, samples, curves, shading. What traces*.c and series*.c share; private
+ * to them.
  *
  * Times given are s after the record's first instant, those in the script ms after zero_s; values are less
  * offset, in g. A data block that has no point ($name empty) must not be plotted.
@@ -51,8 +52,8 @@ void script_axes(FILE *out, int width, int height, struct script_window window, 
 size_t script_samples(FILE *out, const char *name, const struct channel *c, double offset, double zero_s,
                       struct script_window window);
 
-/* $clipped, the marks of clipped samples; returns how many. */
-size_t script_clipped(FILE *out, const struct channel *c, double offset, double zero_s,
+/* $name from the clipped samples, for marks; returns how many. */
+size_t script_clipped(FILE *out, const char *name, const struct channel *c, double offset, double zero_s,
                       struct script_window window);
 
 /* $name from SCRIPT_CURVE_POINTS values spread evenly over the window, both ends included. */

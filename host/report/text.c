@@ -166,12 +166,21 @@ static void write_joint(const struct report *report, FILE *out)
 		write_rebound(&a->rebound, out);
 }
 
-/* Begins a new line when text would go beyond the table's width; returns the column after it. */
-static int fill(FILE *out, int column, const char *text)
+/* Writes text behind what ends at column, a blank before each word, its last one followed by end; no line
+ * becomes longer than the table. Returns the column after it. */
+static int fill(FILE *out, int column, const char *text, const char *end)
 {
-	if (column + (int)strlen(text) > TEXT_WIDTH)
-		column = fprintf(out, "\n ") - 1;
-	return column + fprintf(out, " %s", text);
+	while (*text) {
+		size_t length = strcspn(text, " ");
+		const char *next = text + length + strspn(text + length, " ");
+		const char *behind = *next ? "" : end;
+
+		if (column + 1 + (int)(length + strlen(behind)) > TEXT_WIDTH)
+			column = fprintf(out, "\n ") - 1;
+		column += fprintf(out, " %.*s%s", (int)length, text, behind);
+		text = next;
+	}
+	return column;
 }
 
 /* "note: S1X peak, S2X peak: clipped; ..." for each flag. */
@@ -187,36 +196,19 @@ static void write_notes(const struct report *report, FILE *out)
 
 		if (first)
 			column = fprintf(out, "note:");
-		column = fill(out, column, notes[i].of);
-		column += fprintf(out, last ? ":" : ",");
-		if (last) {
-			fill(out, column, report_note_words(notes[i].flag));
-			fputc('\n', out);
-		}
+		column = fill(out, column, notes[i].of, last ? ":" : ",");
+		if (!last)
+			continue;
+		fill(out, column, report_note_words(notes[i].flag), "");
+		fputc('\n', out);
 	}
-}
-
-/* "Model sdof, ..." with no line longer than the table. */
-static void write_wrapped(FILE *out, const char *fidelity, const char *reason)
-{
-	int column = fprintf(out, "Model %s,", fidelity);
-
-	while (*reason) {
-		int length = (int)strcspn(reason, " ");
-
-		if (column + 1 + length > TEXT_WIDTH)
-			column = fprintf(out, "\n ");
-		column += fprintf(out, " %.*s", length, reason);
-		reason += length;
-		reason += strspn(reason, " ");
-	}
-	fprintf(out, ".\n");
 }
 
 static void write_model(const struct report *report, FILE *out)
 {
 	struct report_row rows[REPORT_ROWS_MAX];
 	size_t count = report_compare(report, rows);
+	int column;
 
 	if (!count)
 		return;
@@ -232,7 +224,9 @@ static void write_model(const struct report *report, FILE *out)
 		else
 			fprintf(out, " %10s\n", "-");
 	}
-	write_wrapped(out, report->prediction->fidelity, report->prediction->reason);
+	column = fprintf(out, "Model %s,", report->prediction->fidelity);
+	fill(out, column, report->prediction->reason, ".");
+	fputc('\n', out);
 }
 
 static void write_frames(const struct record *r, FILE *out)

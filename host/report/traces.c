@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "host/report/curves.h"
 #include "host/report/script.h"
 
 /* Around the impact: wide enough for the pulse and what follows it. The whole record if there is none. */
@@ -35,27 +36,12 @@ static bool model_axis_of(const char *channel, enum model_axis *axis)
 	return false;
 }
 
-/* The instant of the record at which the model's first touch lies, so that its S2 peaks where S2 did. */
-static bool model_start(const struct report *report, double *start_s)
-{
-	const struct estimate_channel *s2x = report_estimate(report, "S2X");
-	double peak_s = s2x ? s2x->peak.time_s : (double)NAN;
-
-	for (size_t i = 0; i < report->analysis->resultant_count; i++)
-		if (!strcmp(report->analysis->resultants[i].sensor, "S2"))
-			peak_s = report->analysis->resultants[i].time_s;
-	if (!report->scene || !report->prediction || !isfinite(peak_s))
-		return false;
-	*start_s = peak_s - report->prediction->resultant[1].time_s;
-	return true;
-}
-
 bool traces_has_model(const struct report *report, const char *channel)
 {
 	enum model_axis axis;
 	double start_s;
 
-	return model_axis_of(channel, &axis) && model_start(report, &start_s);
+	return model_axis_of(channel, &axis) && curves_model_start(report, &start_s);
 }
 
 /* value_g[SCRIPT_CURVE_POINTS] over the window; false without a model. */
@@ -65,7 +51,7 @@ static bool model_values(const struct report *report, enum model_axis axis, stru
 	double start_s, step_s = (window.to_s - window.from_s) / (SCRIPT_CURVE_POINTS - 1);
 	enum model_fidelity fidelity;
 
-	return model_start(report, &start_s) &&
+	return curves_model_start(report, &start_s) &&
 	       model_fidelity_parse(report->prediction->fidelity, &fidelity) == 0 &&
 	       model_history(report->scene, fidelity, axis, window.from_s - start_s, step_s, value_g,
 	                     SCRIPT_CURVE_POINTS) == 0;
@@ -123,7 +109,7 @@ bool traces_channel(FILE *out, const struct report *report, const struct report_
 	script_bands(out, c, zero->time_s, window);
 	script_limits(out, c, offset, range);
 	points = script_samples(out, "measured", c, offset, zero->time_s, window);
-	clipped = script_clipped(out, c, offset, zero->time_s, window);
+	clipped = script_clipped(out, "clipped", c, offset, zero->time_s, window);
 	if (!points)
 		return false;
 	if (has_model)
@@ -146,46 +132,24 @@ bool traces_channel(FILE *out, const struct report *report, const struct report_
 
 /* ---- resultants ---- */
 
-/* X between its samples, straight; NAN beside a bad one. */
-static double value_at(const struct channel *c, double offset, double time_s)
-{
-	double place = (time_s - c->start_s) * c->rate_hz, whole = floor(place);
-	size_t k;
-
-	if (!(whole >= 0.0) || whole + 1.0 >= (double)c->count)
-		return (double)NAN;
-	k = (size_t)whole;
-	if (!script_good(c, k) || !script_good(c, k + 1))
-		return (double)NAN;
-	return c->value_g[k] + (place - whole) * (c->value_g[k + 1] - c->value_g[k]) - offset;
-}
-
 static size_t write_resultant(FILE *out, const struct report *report, const char *sensor, double zero_s,
                               struct script_window window, struct script_range *range)
 {
-	char x_name[12], y_name[12];
-	const struct channel *x, *y;
-	double x_offset, y_offset;
+	struct curves_axes axes;
 	size_t last, points = 0;
 
-	snprintf(x_name, sizeof(x_name), "%sX", sensor);
-	snprintf(y_name, sizeof(y_name), "%sY", sensor);
-	x = record_channel(report->record, x_name);
-	y = record_channel(report->record, y_name);
-	if (!x || !y)
+	if (!curves_axes(report, sensor, &axes))
 		return 0;
-	x_offset = report_offset(report_estimate(report, x_name));
-	y_offset = report_offset(report_estimate(report, y_name));
-	last = script_from(y, window.to_s);
+	last = script_from(axes.y, window.to_s);
 	fprintf(out, "$%s << EOD\n", sensor);
-	for (size_t k = script_from(y, window.from_s); k < last; k++) {
-		double r = hypot(value_at(x, x_offset, script_time(y, k)), y->value_g[k] - y_offset);
+	for (size_t k = script_from(axes.y, window.from_s); k < last; k++) {
+		double r = curves_resultant(&axes, k);
 
-		if (!script_good(y, k) || !isfinite(r)) {
+		if (!isfinite(r)) {
 			fputc('\n', out);
 			continue;
 		}
-		fprintf(out, "%.6f %.4f\n", (script_time(y, k) - zero_s) * 1e3, r);
+		fprintf(out, "%.6f %.4f\n", (script_time(axes.y, k) - zero_s) * 1e3, r);
 		script_reach(range, r);
 		points++;
 	}

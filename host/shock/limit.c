@@ -8,6 +8,9 @@
 #include "host/record/number.h"
 #include "host/record/source.h"
 
+#define SPECTRUM_NAMES "frequency_hz,limit"
+#define BAND_NAMES "time_s,lower_g,upper_g"
+
 enum { NUMBERS_MAX = 3, POINTS_FIRST = 64 };
 
 static bool is_separator(char c)
@@ -70,7 +73,7 @@ static int read_points(struct limit_curve *curve, const struct source *source, e
                        char message[READ_MESSAGE_MAX])
 {
 	size_t columns = kind == LIMIT_SPECTRUM ? 2 : 3, room = 0;
-	const char *names = kind == LIMIT_SPECTRUM ? "frequency_hz,limit" : "time_s,lower_g,upper_g";
+	const char *names = kind == LIMIT_SPECTRUM ? SPECTRUM_NAMES : BAND_NAMES;
 	struct source_line line = {0};
 	bool first = true;
 
@@ -110,9 +113,13 @@ static int read_points(struct limit_curve *curve, const struct source *source, e
 int limit_read(struct limit_curve *curve, const char *file, enum limit_kind kind,
                char message[READ_MESSAGE_MAX])
 {
+	static const char *const expected[] = {
+	        [LIMIT_SPECTRUM] = "a limit curve of lines " SPECTRUM_NAMES,
+	        [LIMIT_BAND] = "a tolerance band of lines " BAND_NAMES,
+	};
 	struct limit_curve read = {0};
 	struct source source;
-	int result = source_load(&source, file, message);
+	int result = source_load(&source, file, expected[kind], message);
 
 	if (result != 0)
 		return result;

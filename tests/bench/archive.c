@@ -2,6 +2,7 @@
 #include "tests/bench/archive.h"
 
 #include <ftw.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,7 +34,7 @@ bool bench_archive_make(void)
 	if (nowhere == NULL || mkdtemp(folder) == NULL)
 		return false;
 	archive = open_it(ARCHIVE_CREATE);
-	result = archive_new_series(archive, "first", "bench", "common/scenes/geometry-2A.ini", 25, 5);
+	result = archive_new_series(archive, "first", "bench", "common/scenes/geometry-2A.ini", 25, NAN, 5);
 	archive_close(archive);
 	return result == 0 && archive_stock_fill(folder, BENCH_ARCHIVE_DROPS, BENCH_ARCHIVE_JSON_BYTES);
 }

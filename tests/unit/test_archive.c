@@ -11,6 +11,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
+#include <cjson/cJSON.h>
 #include <sqlite3.h>
 
 #include "host/archive/print.h"
@@ -55,7 +56,7 @@ static struct archive *with_series(const char *name)
 {
 	struct archive *archive = open_it(ARCHIVE_CREATE);
 
-	assert_int_equal(archive_new_series(archive, name, "trial", SCENE, 25, 5), 0);
+	assert_int_equal(archive_new_series(archive, name, "trial", SCENE, 25, NAN, 5), 0);
 	return archive;
 }
 
@@ -157,6 +158,23 @@ static void test_a_drop_is_partial_until_it_is_whole(void **state)
 	archive_close(archive);
 }
 
+static void test_changes_by_others_are_seen(void **state)
+{
+	struct archive *archive = with_series("one"), *other = open_it(ARCHIVE_WRITE);
+	int64_t before, after;
+
+	(void)state;
+	assert_int_equal(archive_changes(archive, &before), 0);
+	record_one(archive, "one", "abc");
+	assert_int_equal(archive_changes(archive, &after), 0);
+	assert_int_equal(after, before);
+	assert_int_equal(archive_note(other, "one/1", "Ann", "seen"), 0);
+	assert_int_equal(archive_changes(archive, &after), 0);
+	assert_int_not_equal(after, before);
+	archive_close(other);
+	archive_close(archive);
+}
+
 static void test_nothing_stays_of_what_was_discarded(void **state)
 {
 	struct archive *archive = with_series("one");
@@ -251,12 +269,14 @@ static void test_names_stay_inside_the_folder(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
-		assert_int_equal(archive_new_series(archive, wrong[i], "trial", SCENE, 25, 5), DT_E_ARGUMENT);
-		assert_int_equal(archive_new_series(archive, "two", wrong[i], SCENE, 25, 5), DT_E_ARGUMENT);
+		assert_int_equal(archive_new_series(archive, wrong[i], "trial", SCENE, 25, NAN, 5),
+		                 DT_E_ARGUMENT);
+		assert_int_equal(archive_new_series(archive, "two", wrong[i], SCENE, 25, NAN, 5),
+		                 DT_E_ARGUMENT);
 	}
-	assert_int_equal(archive_new_series(archive, "one", "trial", SCENE, 25, 5), DT_E_STATE);
-	assert_int_equal(archive_new_series(archive, "two", "trial", "README.md", 25, 5), DT_E_FORMAT);
-	assert_int_equal(archive_new_series(archive, "two", "trial", SCENE, 95, 5), DT_E_RANGE);
+	assert_int_equal(archive_new_series(archive, "one", "trial", SCENE, 25, NAN, 5), DT_E_STATE);
+	assert_int_equal(archive_new_series(archive, "two", "trial", "README.md", 25, NAN, 5), DT_E_FORMAT);
+	assert_int_equal(archive_new_series(archive, "two", "trial", SCENE, 95, NAN, 5), DT_E_RANGE);
 	record_one(archive, "one", "abc");
 	assert_int_equal(archive_note(archive, "one/1", "", "two\nlines"), DT_E_ARGUMENT);
 	archive_close(archive);
@@ -320,7 +340,7 @@ static void test_means_by_hand(void **state)
 	const struct archive_cell *bare, *plate;
 
 	(void)state;
-	assert_int_equal(archive_new_series(archive, "flat", "trial", BARE, 25, 8), 0);
+	assert_int_equal(archive_new_series(archive, "flat", "trial", BARE, 25, NAN, 8), 0);
 	fill_eight(archive, "one", 1);
 	fill_eight(archive, "flat", 4);
 	record_one(archive, "one", "undecided");
@@ -348,6 +368,123 @@ static void test_means_by_hand(void **state)
 	assert_int_equal(archive_table(archive, &filter, true, &table), 0);
 	assert_int_equal(table.cell[0].drops, 9);
 	assert_near(table.cell[0].value[ARCHIVE_S1_X].mean, -1040.0 / 9, 1e-9);
+	archive_table_free(&table);
+	archive_close(archive);
+}
+
+static void count_wrong(void *context, const char *text)
+{
+	(void)text;
+	(*(int *)context)++;
+}
+
+/* A series whose drops the filter leaves out, and one of which it leaves out the series itself. */
+static void test_json_of_nothing(void **state)
+{
+	struct archive_filter filter = archive_filter_none();
+	struct archive *archive = with_series("one");
+
+	(void)state;
+	record_one(archive, "one", "abc");
+	filter.series = "one";
+	for (int i = 0; i < 3; i++) {
+		char *text = NULL;
+		size_t size;
+		FILE *out = open_memstream(&text, &size);
+		cJSON *tree;
+
+		filter.angle_deg = i == 2 ? 80 : NAN;
+		filter.number = i == 1 ? 7 : 0;
+		assert_non_null(out);
+		assert_int_equal(print_drops(archive, &filter, true, PRINT_JSON, out), 0);
+		fclose(out);
+		tree = cJSON_Parse(text);
+		assert_non_null(tree);
+		assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(tree, "drops")), i == 0);
+		assert_int_equal(cJSON_HasObjectItem(cJSON_GetObjectItem(tree, "series"), "name"), i == 0);
+		assert_true(cJSON_IsObject(cJSON_GetObjectItem(tree, "means")));
+		cJSON_Delete(tree);
+		free(text);
+	}
+	archive_close(archive);
+}
+
+/* ---- heights ---- */
+
+static void write_scene(const char *path, const char *section, const char *key)
+{
+	FILE *in = fopen(SCENE, "r"), *out = fopen(path, "w");
+	char line[300];
+
+	assert_non_null(in);
+	assert_non_null(out);
+	while (fgets(line, sizeof(line), in) != NULL)
+		fputs(strcmp(line, "[drop]\n") == 0                ? section
+		      : strncmp(line, "height_m = 0.894", 16) == 0 ? key
+		                                                   : line,
+		      out);
+	fclose(in);
+	assert_int_equal(fclose(out), 0);
+}
+
+/* Gates and separation go with the height, as if the file had said so. */
+static void test_a_series_from_another_height(void **state)
+{
+	static const char *const sections[] = {"[drop]\n", "[drop] ; height_m = 7\n", "[drop]  \n"};
+	static const char *const keys[] = {"height_m = 0.894\n", "  height_m:0.894 ; as the study\n",
+	                                   "height_m\t=\t0.894\n"};
+	struct archive *archive = open_it(ARCHIVE_CREATE);
+	struct scene scene, expected;
+	char path[100], name[8];
+
+	(void)state;
+	snprintf(path, sizeof(path), "%s/scene.ini", folder);
+	write_scene(path, "[drop]\n", "height_m = 0.6\n");
+	assert_int_equal(scene_read(&expected, path, message), 0);
+	expected.drop_angle_deg = 33;
+	for (int i = 0; i < 3; i++) {
+		write_scene(path, sections[i], keys[i]);
+		snprintf(name, sizeof(name), "s%d", i);
+		assert_int_equal(archive_new_series(archive, name, "trial", path, 33, 0.6, 5), 0);
+		assert_int_equal(archive_scene(archive, name, &scene), 0);
+		assert_memory_equal(&scene, &expected, sizeof(scene));
+	}
+	assert_int_equal(archive_new_series(archive, "low", "trial", path, NAN, 0.1, 5), DT_E_RANGE);
+	assert_non_null(strstr(archive_message(archive), "is the height too small?"));
+	assert_int_equal(archive_new_series(archive, "high", "trial", path, NAN, 5.5, 5), DT_E_RANGE);
+	archive_close(archive);
+	assert_int_equal(unlink(path), 0);
+	snprintf(path, sizeof(path), "%s/index.sqlite", folder);
+	assert_int_equal(unlink(path), 0);
+	assert_int_equal(archive_rebuild(folder, count_wrong, &(int){0}, message), 0);
+	archive = open_it(ARCHIVE_READ);
+	assert_int_equal(archive_scene(archive, "s1", &scene), 0);
+	assert_memory_equal(&scene, &expected, sizeof(scene));
+	archive_close(archive);
+}
+
+static void test_heights_are_not_averaged(void **state)
+{
+	struct archive_filter filter = archive_filter_none();
+	struct archive *archive = with_series("one");
+	struct archive_table table;
+
+	(void)state;
+	assert_int_equal(archive_new_series(archive, "low", "trial", SCENE, 25, 0.5, 5), 0);
+	assert_int_equal(archive_new_series(archive, "bare", "trial", BARE, 25, NAN, 5), 0);
+	record_one(archive, "one", "abc");
+	record_one(archive, "low", "abcd");
+	record_one(archive, "bare", "abcde");
+	give_result(archive, "one/1", "v1", -400, 500);
+	give_result(archive, "low/1", "v1", -300, 400);
+	give_result(archive, "bare/1", "v1", -500, 500);
+	assert_int_equal(archive_table(archive, &filter, true, &table), 0);
+	assert_int_equal(table.count, 3);
+	assert_near(table.cell[1].height_m, 0.5, 0);
+	assert_near(table.cell[1].value[ARCHIVE_S1_X].mean, -300, 0);
+	assert_near(table.cell[2].height_m, 0.894, 0);
+	assert_null(archive_table_reference(&table, &table.cell[1]));
+	assert_ptr_equal(archive_table_reference(&table, &table.cell[2]), &table.cell[0]);
 	archive_table_free(&table);
 	archive_close(archive);
 }
@@ -482,18 +619,12 @@ static char *listing(void)
 	return text;
 }
 
-static void count_wrong(void *context, const char *text)
-{
-	(void)text;
-	(*(int *)context)++;
-}
-
 static void make_many_things(void)
 {
 	struct archive *archive = with_series("one");
 	struct archive_recording r;
 
-	assert_int_equal(archive_new_series(archive, "empty", "other", BARE, 35, 3), 0);
+	assert_int_equal(archive_new_series(archive, "empty", "other", BARE, 35, NAN, 3), 0);
 	record_one(archive, "one", "abc");
 	give_result(archive, "one/1", "v1", -1.0 / 3, 2);
 	give_result(archive, "one/1", "v2", -2.0 / 3, 2);
@@ -632,6 +763,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        IN_A_FOLDER(test_a_drop_is_partial_until_it_is_whole),
+	        IN_A_FOLDER(test_changes_by_others_are_seen),
 	        IN_A_FOLDER(test_nothing_stays_of_what_was_discarded),
 	        IN_A_FOLDER(test_a_log_that_stands_there_is_not_written_over),
 	        IN_A_FOLDER(test_a_rejection_needs_a_reason),
@@ -639,6 +771,9 @@ int main(void)
 	        IN_A_FOLDER(test_names_stay_inside_the_folder),
 	        IN_A_FOLDER(test_old_results_stay),
 	        IN_A_FOLDER(test_means_by_hand),
+	        IN_A_FOLDER(test_json_of_nothing),
+	        IN_A_FOLDER(test_a_series_from_another_height),
+	        IN_A_FOLDER(test_heights_are_not_averaged),
 	        IN_A_FOLDER(test_a_version_1_index_is_migrated),
 	        IN_A_FOLDER(test_other_indexes_are_refused),
 	        IN_A_FOLDER(test_the_index_can_be_made_again),

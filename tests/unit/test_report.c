@@ -473,6 +473,36 @@ static void test_text_notes(void **state)
 	free(text);
 }
 
+/* Lines end at 90 columns: "Model sdof," and a blank are 12, the stop is one, 77 are left. */
+static void test_text_lines_fit_the_table(void **state)
+{
+	static const char end[] = "the last of them.\n";
+	struct fixture *f = *state;
+	char line[128];
+
+	for (size_t length = 77; length <= 78; length++) {
+		char *text;
+
+		memset(f->prediction.reason, 'x', length);
+		strcpy(f->prediction.reason + length - strlen("the last of them"), "the last of them");
+		f->prediction.reason[length - strlen(" the last of them")] = ' ';
+		text = print(&f->report);
+		snprintf(line, sizeof(line), "Model sdof, %.*s", (int)length - 5, f->prediction.reason);
+		check_has(text, line);
+		check_has(text, length == 77 ? end : "the last of\n  them.\n");
+		free(text);
+	}
+	for (size_t i = 0; i < CHANNELS; i++)
+		f->estimates[i].peak.how.flags = ESTIMATE_FLAG_EXTRAPOLATED | ESTIMATE_FLAG_GAPS;
+	{
+		char *text = print(&f->report);
+
+		for (const char *at = strstr(text, "note:"); at && *at; at += strcspn(at, "\n") + 1)
+			assert_in_range(strcspn(at, "\n"), 0, 90);
+		free(text);
+	}
+}
+
 static void test_text(void **state)
 {
 	struct fixture *f = *state;
@@ -835,6 +865,7 @@ int main(void)
 	        TEST(test_json_of_holes),
 	        TEST(test_json_how),
 	        TEST(test_text_notes),
+	        TEST(test_text_lines_fit_the_table),
 	        TEST(test_text),
 	        TEST(test_text_of_holes),
 	        TEST(test_verdicts),

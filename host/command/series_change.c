@@ -1,0 +1,302 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * The verbs of `droptower series` that change an archive: series, logs, decisions, notes, results.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "host/command/archived.h"
+#include "host/command/command.h"
+#include "host/command/series_private.h"
+#include "host/record/read.h"
+
+/* ---- new series and logs ---- */
+
+int series_verb_new(struct archive *archive, struct series_arguments *a)
+{
+	const char *campaign = a->filter.campaign != NULL ? a->filter.campaign : "default";
+
+	if (archive_new_series(archive, a->word[0], campaign, a->scene, a->filter.angle_deg, a->height_m,
+	                       (unsigned)a->drops) != 0)
+		return archived_failed(archive);
+	printf("series %s\n", a->word[0]);
+	return COMMAND_DONE;
+}
+
+static int copy_bytes(int from, int to)
+{
+	char block[65536];
+	ssize_t n, done;
+
+	while ((n = read(from, block, sizeof(block))) > 0)
+		for (ssize_t at = 0; at < n; at += done) {
+			done = write(to, block + at, (size_t)(n - at));
+			if (done < 0)
+				return -1;
+		}
+	return n == 0 ? 0 : -1;
+}
+
+/* file to the log of r, and when file was last written. */
+static int copy_log(const char *file, const struct archive_recording *r, int64_t *time_s)
+{
+	int from = open(file, O_RDONLY | O_CLOEXEC), to = open(r->log, O_WRONLY | O_CLOEXEC), result = -1;
+	struct stat status;
+
+	if (from >= 0 && to >= 0 && fstat(from, &status) == 0) {
+		*time_s = status.st_mtime;
+		result = copy_bytes(from, to);
+	}
+	if (result != 0)
+		command_error("%s to %s: %s", file, r->log, strerror(errno));
+	if (from >= 0)
+		close(from);
+	if (to >= 0 && close(to) != 0 && result == 0) {
+		command_error("%s: %s", r->log, strerror(errno));
+		result = -1;
+	}
+	return result;
+}
+
+/* A log is looked at before anything is made of it. */
+static int is_new_log(struct archive *archive, const char *file, const char **ending)
+{
+	char message[READ_MESSAGE_MAX], drop[ARCHIVE_NAME_MAX + 16];
+	struct record record;
+	int found;
+
+	if (read_record(&record, file, NULL, message) != 0) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	*ending = strcmp(record.format, "lcm") == 0   ? ".lcm"
+	          : strcmp(record.format, "csv") == 0 ? ".csv"
+	                                              : ".log";
+	record_free(&record);
+	found = archive_find(archive, file, drop);
+	if (found < 0)
+		return archived_failed(archive);
+	if (found == 0)
+		return COMMAND_DONE;
+	command_error("%s: is there already as %s, expected a log that is not", file, drop);
+	return COMMAND_INPUT;
+}
+
+static int add_log(struct archive *archive, const struct series_arguments *a, const char *file)
+{
+	struct archive_recording r;
+	const char *ending = NULL;
+	int64_t time_s = 0;
+	int code = is_new_log(archive, file, &ending);
+
+	if (code != COMMAND_DONE)
+		return code;
+	if (archive_begin(archive, a->word[0], a->operator_name, ending, &r) != 0)
+		return archived_failed(archive);
+	if (copy_log(file, &r, &time_s) != 0) {
+		archive_discard(archive, &r);
+		return COMMAND_INPUT;
+	}
+	if (archive_finish(archive, &r, time_s, a->note != NULL ? a->note : "") != 0)
+		return archived_failed(archive);
+	printf("%s/%u  %s\n", r.series, r.number, file);
+	fflush(stdout);
+	return archived_analyse(archive, r.series, r.number, r.raw);
+}
+
+int series_verb_add(struct archive *archive, struct series_arguments *a)
+{
+	int code = series_must_be(archive, a->word[0]);
+
+	for (int i = 1; i < a->count && code == COMMAND_DONE; i++)
+		code = add_log(archive, a, a->word[i]);
+	return code;
+}
+
+/* ---- the drops that a verb works on ---- */
+
+/* The drops that a verb works on: looked up first, since what it does changes the list. */
+struct chosen {
+	struct {
+		char name[ARCHIVE_NAME_MAX + 16], series[ARCHIVE_NAME_MAX + 1];
+		char raw[ARCHIVE_NAME_MAX + 64];
+		unsigned number;
+	} * drop;
+	size_t count, room;
+	bool undecided_only, without_result_only;
+};
+
+static int choose_one(void *context, const struct archive_drop *drop)
+{
+	struct chosen *c = context;
+
+	if (strcmp(drop->state, "recorded") != 0 ||
+	    (c->undecided_only && strcmp(drop->decision, "open") != 0) ||
+	    (c->without_result_only && drop->version != NULL))
+		return 0;
+	if (c->count == c->room) {
+		size_t room = 2 * c->room + 16;
+		void *more = realloc(c->drop, room * sizeof(*c->drop));
+
+		if (more == NULL)
+			return DT_E_MEMORY;
+		c->drop = more;
+		c->room = room;
+	}
+	snprintf(c->drop[c->count].name, sizeof(c->drop->name), "%.60s/%u", drop->series.name, drop->number);
+	snprintf(c->drop[c->count].series, sizeof(c->drop->series), "%s", drop->series.name);
+	snprintf(c->drop[c->count].raw, sizeof(c->drop->raw), "%s", drop->raw);
+	c->drop[c->count++].number = drop->number;
+	return 0;
+}
+
+static int choose(struct archive *archive, const char *series, struct chosen *chosen)
+{
+	struct archive_filter filter = archive_filter_none();
+	int code = series != NULL ? series_must_be(archive, series) : COMMAND_DONE;
+
+	filter.series = series;
+	if (code == COMMAND_DONE && archive_each_drop(archive, &filter, choose_one, chosen) != 0)
+		code = archived_failed(archive);
+	return code;
+}
+
+/* Analyses all chosen, and goes on past those that cannot be. */
+static int analyse_chosen(struct archive *archive, struct chosen *chosen)
+{
+	int code = COMMAND_DONE;
+
+	for (size_t i = 0; i < chosen->count && !command_interrupted(); i++) {
+		int one = archived_analyse(archive, chosen->drop[i].series, chosen->drop[i].number,
+		                           chosen->drop[i].raw);
+
+		if (one != COMMAND_DONE)
+			code = one;
+	}
+	if (command_interrupted())
+		command_error("interrupted; the rest keeps the results it had");
+	free(chosen->drop);
+	return command_interrupted() ? COMMAND_REFUSED : code;
+}
+
+/* ---- decisions and notes ---- */
+
+static int decide(struct archive *archive, const struct series_arguments *a, const char *drop,
+                  enum archive_decision decision)
+{
+	const char *reason = a->reason != NULL ? a->reason : "";
+
+	if (archive_decide(archive, drop, decision, a->operator_name, reason) != 0)
+		return archived_failed(archive);
+	printf("%s %s\n", drop,
+	       decision == ARCHIVE_OPEN       ? "open"
+	       : decision == ARCHIVE_ACCEPTED ? "accepted"
+	                                      : "rejected");
+	return COMMAND_DONE;
+}
+
+static int accept_series(struct archive *archive, const struct series_arguments *a, const char *series)
+{
+	struct chosen chosen = {.undecided_only = true};
+	int code = choose(archive, series, &chosen);
+
+	for (size_t i = 0; i < chosen.count && code == COMMAND_DONE; i++)
+		code = decide(archive, a, chosen.drop[i].name, ARCHIVE_ACCEPTED);
+	free(chosen.drop);
+	return code;
+}
+
+int series_verb_accept(struct archive *archive, struct series_arguments *a)
+{
+	int code = COMMAND_DONE;
+
+	for (int i = 0; i < a->count && code == COMMAND_DONE; i++)
+		code = strchr(a->word[i], '/') != NULL ? decide(archive, a, a->word[i], ARCHIVE_ACCEPTED)
+		                                       : accept_series(archive, a, a->word[i]);
+	return code;
+}
+
+static int decide_all(struct archive *archive, const struct series_arguments *a,
+                      enum archive_decision decision)
+{
+	int code = COMMAND_DONE;
+
+	for (int i = 0; i < a->count && code == COMMAND_DONE; i++)
+		code = decide(archive, a, a->word[i], decision);
+	return code;
+}
+
+int series_verb_reject(struct archive *archive, struct series_arguments *a)
+{
+	return decide_all(archive, a, ARCHIVE_REJECTED);
+}
+
+int series_verb_reopen(struct archive *archive, struct series_arguments *a)
+{
+	return decide_all(archive, a, ARCHIVE_OPEN);
+}
+
+int series_verb_note(struct archive *archive, struct series_arguments *a)
+{
+	if (archive_note(archive, a->word[0], a->operator_name, a->word[1]) != 0)
+		return archived_failed(archive);
+	return COMMAND_DONE;
+}
+
+int series_verb_calibrate(struct archive *archive, struct series_arguments *a)
+{
+	double gain;
+
+	if (a->count == 0)
+		return series_verb_calibrations(archive, a);
+	if (!command_is_number(a->word[1], 0.1, 10, &gain))
+		return command_usage("series", "calibrate: GAIN is '%s', expected a number from 0.1 to 10",
+		                     a->word[1]);
+	if (archive_calibrate(archive, a->word[0], gain, a->date, a->note != NULL ? a->note : "") != 0)
+		return archived_failed(archive);
+	return COMMAND_DONE;
+}
+
+/* ---- analysed again ---- */
+
+int series_verb_reanalyse(struct archive *archive, struct series_arguments *a)
+{
+	int code = COMMAND_DONE;
+
+	command_catch_signals();
+	for (int i = 0; i < a->count && code == COMMAND_DONE; i++) {
+		struct chosen chosen = {0};
+
+		code = choose(archive, a->word[i], &chosen);
+		if (code == COMMAND_DONE)
+			code = analyse_chosen(archive, &chosen);
+	}
+	return code;
+}
+
+/* Then analyses what came without a result. */
+int series_rebuild(const struct series_arguments *a)
+{
+	struct chosen chosen = {.without_result_only = true};
+	char message[ARCHIVE_MESSAGE_MAX];
+	struct archive *archive;
+	int wrong = 0, code;
+
+	if (archive_rebuild(a->archive, series_tell_wrong, &wrong, message) != 0 ||
+	    (archive = archive_open(a->archive, ARCHIVE_WRITE, message)) == NULL) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	command_catch_signals();
+	code = choose(archive, NULL, &chosen);
+	if (code == COMMAND_DONE)
+		code = analyse_chosen(archive, &chosen);
+	archive_close(archive);
+	printf("%s: index made again from the raw files\n", a->archive);
+	return code == COMMAND_DONE && wrong > 0 ? COMMAND_INPUT : code;
+}

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/report/page.h"
+#include "host/report/picture.h"
+
+static const char *after(const char *s, const char *end)
+{
+	const char *found = strstr(s, end);
+
+	return found ? found + strlen(end) : s + strlen(s);
+}
+
+/* The <svg> element alone. What every picture of gnuplot repeats (symbols, an id) may stand only once in
+ * a page, and its <title>s would pop up as hints. */
+static void inline_svg(FILE *out, const char *svg, bool first, const char *label)
+{
+	const char *s = strstr(svg, "<svg");
+
+	if (!s)
+		return;
+	fputs("<svg role=\"img\" aria-label=\"", out);
+	page_text(out, label);
+	fputc('"', out);
+	s += strlen("<svg");
+	while (*s) {
+		if (!strncmp(s, "<title>", 7))
+			s = after(s, "</title>");
+		else if (!strncmp(s, "<desc>", 6))
+			s = after(s, "</desc>");
+		else if (!first && !strncmp(s, "<defs>", 6))
+			s = after(s, "</defs>");
+		else if (!strncmp(s, " id=\"gnuplot", 12))
+			s = after(s + 5, "\"");
+		else
+			fputc(*s++, out);
+	}
+}
+
+void page_draw(struct page *page, FILE *script, char **buffer, const size_t *length, bool drawn,
+               const char *label)
+{
+	char *svg = NULL;
+
+	if (fclose(script) != 0) {
+		page->error = DT_E_MEMORY;
+	} else if (drawn) {
+		page->error = picture_draw(*buffer, *length, &svg, page->message, page->size);
+		if (!page->error)
+			inline_svg(page->out, svg, page->pictures++ == 0, label);
+		free(svg);
+	} else {
+		fputs("<p class=\"soft\">Nothing to draw: no good sample here.</p>", page->out);
+	}
+	free(*buffer);
+}
+
+FILE *page_begin_script(struct page *page, char **buffer, size_t *length)
+{
+	FILE *script = page->error ? NULL : open_memstream(buffer, length);
+
+	if (!script && !page->error)
+		page->error = DT_E_MEMORY;
+	return script;
+}

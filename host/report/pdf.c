@@ -1,0 +1,187 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/report/pdf.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <ftw.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/pidfd.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "host/archive/durable.h"
+#include "host/record/whole.h"
+
+enum { LIMIT_MS = 60000, ASK_MS = 100, FOLDER_MAX = 512, PROGRAM_MAX = 4096 };
+
+static const char *const browsers[] = {"chromium", "chromium-browser", "google-chrome"};
+enum { BROWSERS = sizeof(browsers) / sizeof(browsers[0]) };
+
+/* The first of them that PATH has. */
+static bool find_in(const char *path, const char *name, char program[PROGRAM_MAX])
+{
+	for (const char *end; *path; path = *end ? end + 1 : end) {
+		end = path + strcspn(path, ":");
+		if (end > path &&
+		    snprintf(program, PROGRAM_MAX, "%.*s/%s", (int)(end - path), path, name) < PROGRAM_MAX &&
+		    access(program, X_OK) == 0)
+			return true;
+	}
+	return false;
+}
+
+static bool find_browser(char program[PROGRAM_MAX])
+{
+	const char *path = getenv("PATH");
+
+	for (int i = 0; path && i < BROWSERS; i++)
+		if (find_in(path, browsers[i], program))
+			return true;
+	return false;
+}
+
+/* Starts it in folder, where page.html is and page.pdf is wanted; 0 or errno. */
+static int start(const char *program, const char *folder, pid_t *pid)
+{
+	char name[] = "chromium", headless[] = "--headless", gpu[] = "--disable-gpu";
+	char shm[] = "--disable-dev-shm-usage", quiet[] = "--disable-background-networking";
+	char still[] = "--disable-component-update", bare[] = "--no-pdf-header-footer";
+	char first[] = "--no-first-run", pdf[] = "--print-to-pdf=page.pdf", page[] = "page.html";
+	char profile[FOLDER_MAX + 32], home[FOLDER_MAX + 32], temporary[FOLDER_MAX + 32],
+	        path[PROGRAM_MAX + 32];
+	char root[] = "--no-sandbox", language[] = "LANG=C.UTF-8";
+	char *argv[] = {name, headless, gpu, shm, quiet, still, first, bare, pdf, profile, page, NULL, NULL};
+	char *environment[] = {path, home, temporary, language, NULL};
+	posix_spawn_file_actions_t actions;
+	posix_spawnattr_t attributes;
+	int error;
+
+	snprintf(profile, sizeof(profile), "--user-data-dir=%s/profile", folder);
+	snprintf(home, sizeof(home), "HOME=%s", folder);
+	snprintf(temporary, sizeof(temporary), "TMPDIR=%s", folder);
+	snprintf(path, sizeof(path), "PATH=%s", getenv("PATH"));
+	if (geteuid() == 0) {
+		argv[11] = argv[10];
+		argv[10] = root;
+	}
+	if (posix_spawn_file_actions_init(&actions) != 0)
+		return ENOMEM;
+	if (posix_spawnattr_init(&attributes) != 0) {
+		posix_spawn_file_actions_destroy(&actions);
+		return ENOMEM;
+	}
+	error = posix_spawn_file_actions_addchdir_np(&actions, folder);
+	for (int fd = 0; fd < 3 && !error; fd++)
+		error = posix_spawn_file_actions_addopen(&actions, fd, "/dev/null", O_RDWR, 0);
+	if (!error) /* a group of its own, so that all of it can be ended */
+		error = posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+	if (!error)
+		error = posix_spawn(pid, program, &actions, &attributes, argv, environment);
+	posix_spawnattr_destroy(&attributes);
+	posix_spawn_file_actions_destroy(&actions);
+	return error;
+}
+
+static long now_ms(void)
+{
+	struct timespec t;
+
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (long)t.tv_sec * 1000 + t.tv_nsec / 1000000;
+}
+
+/* Until it ends by itself, or is ended: 0, DT_E_TIMEOUT, DT_E_CLOSED, DT_E_SYSTEM. */
+static int wait_for(pid_t pid, int (*stop)(void))
+{
+	struct pollfd end = {.fd = pidfd_open(pid, 0), .events = POLLIN};
+	long until_ms = now_ms() + LIMIT_MS;
+	int status = 0, result = end.fd >= 0 ? 0 : DT_E_SYSTEM;
+
+	while (!result && poll(&end, 1, ASK_MS) <= 0) {
+		if (stop && stop())
+			result = DT_E_CLOSED;
+		else if (now_ms() >= until_ms)
+			result = DT_E_TIMEOUT;
+	}
+	if (end.fd >= 0)
+		close(end.fd);
+	kill(-pid, SIGKILL); /* what it left behind, too */
+	while (waitpid(pid, &status, 0) < 0 && errno == EINTR)
+		;
+	if (!result && !(WIFEXITED(status) && WEXITSTATUS(status) == 0))
+		result = DT_E_SYSTEM;
+	return result;
+}
+
+static int remove_one(const char *path, const struct stat *status, int type, struct FTW *place)
+{
+	(void)status;
+	(void)type;
+	(void)place;
+	return remove(path);
+}
+
+static int fail(int result, const char *why, char *message, size_t size)
+{
+	snprintf(message, size, "no PDF: %s", why);
+	return result;
+}
+
+static int print_in(const char *folder, const char *program, int (*stop)(void), char **pdf,
+                    size_t *pdf_length, char *message, size_t size)
+{
+	char file[FOLDER_MAX + 32];
+	pid_t pid;
+	int result = start(program, folder, &pid);
+
+	if (result) {
+		snprintf(message, size, "no PDF: %s: %s", program, strerror(result));
+		return DT_E_SYSTEM;
+	}
+	result = wait_for(pid, stop);
+	if (result == DT_E_TIMEOUT)
+		return fail(result, "the browser did not end within a minute", message, size);
+	if (result == DT_E_CLOSED)
+		return fail(result, "interrupted", message, size);
+	snprintf(file, sizeof(file), "%s/page.pdf", folder);
+	*pdf = result ? NULL : durable_read(file, pdf_length);
+	if (!*pdf || *pdf_length < 5 || memcmp(*pdf, "%PDF-", 5) != 0) {
+		free(*pdf);
+		return fail(DT_E_SYSTEM, "the browser failed", message, size);
+	}
+	return 0;
+}
+
+int pdf_print(const char *page, size_t length, int (*stop)(void), char **pdf, size_t *pdf_length,
+              char *message, size_t size)
+{
+	const char *temporary = getenv("TMPDIR");
+	char folder[FOLDER_MAX], file[FOLDER_MAX + 32], program[PROGRAM_MAX], *made = NULL;
+	size_t made_length = 0;
+	int result;
+
+	if (!find_browser(program))
+		return fail(DT_E_UNKNOWN, "neither chromium, chromium-browser nor google-chrome is on PATH",
+		            message, size);
+	if (snprintf(folder, sizeof(folder), "%s/droptower-pdf-XXXXXX",
+	             temporary && temporary[0] == '/' ? temporary : "/tmp") >= (int)sizeof(folder) ||
+	    !mkdtemp(folder))
+		return fail(DT_E_SYSTEM, "no temporary folder", message, size);
+	snprintf(file, sizeof(file), "%s/page.html", folder);
+	result = whole_write(file, page, length, message, size);
+	if (!result)
+		result = print_in(folder, program, stop, &made, &made_length, message, size);
+	nftw(folder, remove_one, 16, FTW_DEPTH | FTW_PHYS);
+	if (result)
+		return result;
+	*pdf = made;
+	*pdf_length = made_length;
+	return 0;
+}

@@ -1,0 +1,247 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * A series gathered from its archive, and the order of its page.
+ */
+#include "host/report/series.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/archive/durable.h"
+#include "host/record/read.h"
+#include "host/report/series_private.h"
+
+/* ---- what the archive has ---- */
+
+/* Texts of the archive are valid during a call: each is copied, and its pointer set to the copy. */
+static void keep(char to[ARCHIVE_TEXT_MAX + 1], const char **text)
+{
+	if (!*text)
+		return;
+	snprintf(to, ARCHIVE_TEXT_MAX + 1, "%s", *text);
+	*text = to;
+}
+
+static int take_series(void *context, const struct archive_series *series)
+{
+	struct series_page *page = context;
+	struct archive_series *s = &page->series;
+	const char **texts[] = {&s->name, &s->campaign, &s->scene_name, &s->created, &s->last};
+
+	*s = *series;
+	s->scene = "";
+	for (size_t i = 0; i < sizeof(texts) / sizeof(texts[0]); i++)
+		keep(page->text[i], texts[i]);
+	return 0;
+}
+
+static int take_drop(void *context, const struct archive_drop *drop)
+{
+	struct series_page *page = context;
+	struct series_drop *d = calloc(1, sizeof(*d)), **more = page->drop;
+	struct archive_drop *a;
+
+	if (d && page->count == page->room) {
+		page->room = 2 * page->room + 8;
+		more = realloc(page->drop, page->room * sizeof(struct series_drop *));
+	}
+	if (!d || !more) {
+		free(d);
+		return DT_E_MEMORY;
+	}
+	page->drop = more;
+	page->drop[page->count++] = d;
+	record_init(&d->record);
+	a = &d->a;
+	*a = *drop;
+	a->series = page->series;
+	const char **texts[SERIES_TEXTS] = {&a->state,   &a->decision, &a->reason, &a->operator_name,
+	                                    &a->note,    &a->raw,      &a->sha256, &a->time,
+	                                    &a->version, &a->flags};
+	for (size_t i = 0; i < SERIES_TEXTS; i++)
+		keep(d->text[i], texts[i]);
+	d->counts = archive_counts(drop, page->request->undecided);
+	if (d->counts)
+		archive_cell_add(&page->cell, drop);
+	return 0;
+}
+
+/* The log, if its bytes are those that were recorded. */
+static void read_log(struct series_page *page, struct series_drop *drop)
+{
+	char path[ARCHIVE_PATH_MAX], hash[DURABLE_HASH_CHARS], message[READ_MESSAGE_MAX];
+	int64_t bytes;
+
+	snprintf(path, sizeof(path), "%s/%.200s", archive_folder(page->request->archive), drop->a.raw);
+	if (!drop->a.sha256[0])
+		snprintf(drop->no_log, sizeof(drop->no_log), "recording was not finished");
+	else if (durable_hash(path, hash, &bytes) != 0)
+		snprintf(drop->no_log, sizeof(drop->no_log), "the raw log is missing");
+	else if (strcmp(hash, drop->a.sha256))
+		snprintf(drop->no_log, sizeof(drop->no_log), "the raw log is not the one that was recorded");
+	else if (read_record(&drop->record, path, NULL, message) != 0) {
+		snprintf(drop->no_log, sizeof(drop->no_log), "the raw log cannot be read");
+		record_init(&drop->record);
+	}
+}
+
+static int read_drop(struct series_page *page, struct series_drop *drop)
+{
+	char name[ARCHIVE_NAME_MAX + 16], *json;
+	int result;
+
+	read_log(page, drop);
+	drop->model_s = (double)NAN;
+	if (!drop->a.version)
+		return 0;
+	snprintf(name, sizeof(name), "%.60s/%u", page->series.name, drop->a.number);
+	json = archive_json(page->request->archive, name, drop->a.version);
+	if (!json)
+		return DT_E_EMPTY;
+	result = series_result_read(drop, json);
+	free(json);
+	if (result)
+		return result == DT_E_MEMORY ? result : 0;
+	drop->has_result = true;
+	drop->report = (struct report){.record = &drop->record, .analysis = &drop->analysis};
+	drop->zero = report_zero(&drop->report);
+	for (size_t i = 0; i < drop->analysis.resultant_count && page->has_model; i++)
+		if (!strcmp(drop->analysis.resultants[i].sensor, "S2"))
+			drop->model_s = drop->analysis.resultants[i].time_s - drop->zero.time_s -
+			                page->prediction.resultant[1].time_s;
+	return 0;
+}
+
+/* ---- what all pictures share ---- */
+
+static void set_window(struct series_page *page)
+{
+	double width_s = 0.0, before_s = 0.0, after_s = 0.0;
+
+	for (size_t i = 0; i < page->count; i++) {
+		const struct series_drop *d = page->drop[i];
+		struct script_window whole = script_whole(&d->record);
+
+		if (!series_is_drawn(d))
+			continue;
+		width_s = fmax(width_s, d->zero.width_s);
+		before_s = fmax(before_s, d->zero.time_s - whole.from_s);
+		after_s = fmax(after_s, whole.to_s - d->zero.time_s);
+	}
+	if (!(width_s > 0.0))
+		width_s = 0.003;
+	page->window.from_s = -fmin(before_s, 1.5 * width_s);
+	page->window.to_s = fmin(after_s, 6.5 * width_s);
+}
+
+/* A drop's first touch is where its S2 says, some tenths of a ms before zero: the curve begins earlier. */
+static void solve_model(struct series_page *page)
+{
+	struct script_window *w = &page->curve;
+
+	page->has_model = model_solve(&page->scene, MODEL_AUTO, NULL, &page->prediction, NULL) == 0;
+	page->has_below = page->has_model && model_below(&page->scene, &page->prediction, &page->below) == 0;
+	*w = (struct script_window){-0.005, 0.025};
+}
+
+static void draw_model(struct series_page *page)
+{
+	struct script_window *w = &page->curve;
+	double first_s = 0.0, last_s = 0.0;
+
+	for (size_t i = 0; i < page->count; i++) {
+		first_s = fmax(first_s, page->drop[i]->model_s);
+		last_s = fmin(last_s, page->drop[i]->model_s);
+	}
+	w->from_s = page->window.from_s - first_s;
+	w->to_s = page->window.to_s - last_s;
+	if (page->has_model)
+		page->has_model = model_histories(&page->scene, page->prediction.rung, NULL, w->from_s,
+		                                  (w->to_s - w->from_s) / (SCRIPT_CURVE_POINTS - 1),
+		                                  page->curve_g, SCRIPT_CURVE_POINTS, NULL) == 0;
+}
+
+static int gather(struct series_page *page)
+{
+	struct archive *archive = page->request->archive;
+	struct archive_filter filter = archive_filter_none();
+	int result = archive_scene(archive, page->request->series, &page->scene);
+
+	filter.series = page->request->series;
+	if (result == 0)
+		result = archive_each_series(archive, &filter, take_series, page);
+	if (result == 0)
+		result = archive_each_drop(archive, &filter, take_drop, page);
+	solve_model(page);
+	for (size_t i = 0; i < page->count && result == 0; i++)
+		result = read_drop(page, page->drop[i]);
+	if (result != 0)
+		snprintf(page->page.message, page->page.size, "%s",
+		         result == DT_E_MEMORY || !archive_message(archive)[0] ? error_text(result)
+		                                                               : archive_message(archive));
+	set_window(page);
+	draw_model(page);
+	return result;
+}
+
+static void release(struct series_page *page)
+{
+	for (size_t i = 0; i < page->count; i++) {
+		free(page->drop[i]->analysis.channels);
+		record_free(&page->drop[i]->record);
+		free(page->drop[i]);
+	}
+	free(page->drop);
+	free(page);
+}
+
+bool series_is_drawn(const struct series_drop *drop)
+{
+	return drop->has_result && !drop->no_log[0];
+}
+
+size_t series_counted(const struct series_page *page)
+{
+	size_t counted = 0;
+
+	for (size_t i = 0; i < page->count; i++)
+		counted += page->drop[i]->counts;
+	return counted;
+}
+
+static int write_page(struct series_page *page)
+{
+	series_head(page);
+	series_subject(page);
+	series_results(page);
+	series_remarks(page);
+	series_pictures(page);
+	series_excluded(page);
+	series_model(page);
+	series_records(page);
+	page_end(page->page.out, page->request->version);
+	if (page->page.error)
+		return page->page.error;
+	if (fflush(page->page.out) == 0 && !ferror(page->page.out))
+		return 0;
+	snprintf(page->page.message, page->page.size, "the report cannot be written");
+	return DT_E_SYSTEM;
+}
+
+int series_report_html(const struct series_report *request, FILE *out, char *message, size_t size)
+{
+	struct series_page *page = calloc(1, sizeof(*page));
+	int result;
+
+	snprintf(message, size, "%s", error_text(DT_E_MEMORY));
+	if (!page)
+		return DT_E_MEMORY;
+	page->request = request;
+	page->page = (struct page){.out = out, .message = message, .size = size};
+	result = gather(page);
+	if (result == 0)
+		result = write_page(page);
+	release(page);
+	return result;
+}

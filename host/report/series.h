@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_REPORT_SERIES_H
+#define DT_HOST_REPORT_SERIES_H
+/*
+ * The report of a series: one self-contained HTML file for whoever ordered the drops. Every number of its
+ * tables is the archive's; the traces are drawn from the raw logs, once their SHA-256 is what was recorded,
+ * with baseline, peak and time 0 of the archived results: nothing is estimated here. The model is solved
+ * again from the series' scene.
+ *
+ * For the thread that has the archive. Memory is given back before the return.
+ */
+#include <stdbool.h>
+#include <stdio.h>
+
+#include "host/archive/archive.h"
+
+struct series_report {
+	struct archive *archive;
+	const char *series;
+	bool undecided;      /* drops that are not decided count, too */
+	const char *version; /* of the program, for the page's foot; NULL: not said */
+};
+
+/* Writes the page to out, gnuplot is run for its pictures. 0, or DT_E_* with one line in message, and what
+ * out has got is of no use: DT_E_UNKNOWN, no such series. A series without drops, without results or without
+ * its logs is no error: the page says so. */
+DT_MUST_USE int series_report_html(const struct series_report *request, FILE *out, char *message,
+                                   size_t size);
+
+#endif

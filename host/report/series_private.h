@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_REPORT_SERIES_PRIVATE_H
+#define DT_HOST_REPORT_SERIES_PRIVATE_H
+/*
+ * A series while it is reported: what series*.c share.
+ */
+#include "host/archive/table.h"
+#include "host/report/page.h"
+#include "host/report/script.h"
+#include "host/report/series.h"
+
+enum { SERIES_TEXTS = 10 };
+
+struct series_drop {
+	struct archive_drop a; /* its texts stand in text */
+	char text[SERIES_TEXTS][ARCHIVE_TEXT_MAX + 1];
+	bool counts;              /* goes into the means */
+	bool has_result;          /* analysis is filled */
+	char no_log[128];         /* why there is no trace to draw; "": there is one */
+	struct record record;     /* from the log; without it, what the result knows of it, without samples */
+	struct analysis analysis; /* from the result: what pictures and remarks need */
+	struct report report;     /* of these */
+	struct report_zero zero;
+	double model_s; /* the model's first touch, after zero; NAN: no model to lay over it */
+};
+
+struct series_page {
+	struct page page;
+	const struct series_report *request;
+	struct archive_series series; /* its texts stand in text */
+	char text[6][ARCHIVE_TEXT_MAX + 1];
+	struct scene scene;
+	bool has_model, has_below;
+	struct model_prediction prediction, below;
+	struct series_drop **drop;
+	size_t count, room;
+	struct archive_cell cell;                        /* means of those that count */
+	struct script_window window;                     /* of every picture, after zero */
+	double curve_g[SCRIPT_CURVE_POINTS][MODEL_AXES]; /* the model, from curve.from_s to curve.to_s */
+	struct script_window curve;                      /* after its first touch */
+};
+
+/* Fills analysis, and what the log did not give of record, from the JSON of a result. 0, or DT_E_FORMAT or
+ * DT_E_MEMORY with nothing to be freed but record. */
+DT_MUST_USE int series_result_read(struct series_drop *drop, const char *json);
+
+/* Gnuplot scripts as those of traces.h: one sensor (0: S1) along an axis ('X', 'Y') of all drops that count,
+ * with the model; and both sensors of one drop. The same axes for all drops. */
+bool series_traces_over(FILE *out, const struct series_page *page, size_t sensor, char axis);
+bool series_traces_drop(FILE *out, const struct series_page *page, const struct series_drop *drop, char axis);
+
+/* Whether there is a trace to draw of it. */
+bool series_is_drawn(const struct series_drop *drop);
+
+/* How many drops go into the means. */
+size_t series_counted(const struct series_page *page);
+
+/* "2026-11-21 19:07" of a time as the archive has it; a dash for none. */
+void series_time(FILE *out, const char *time);
+
+/* "accepted", "rejected", "undecided", or the state of what was never finished. */
+const char *series_decision(const struct series_drop *drop);
+
+/* Sections, in the order of the page. */
+void series_head(struct series_page *page);
+void series_subject(struct series_page *page);
+void series_results(struct series_page *page);
+void series_remarks(struct series_page *page);
+void series_pictures(struct series_page *page);
+void series_excluded(struct series_page *page);
+void series_model(struct series_page *page);
+void series_records(struct series_page *page);
+
+#endif

@@ -1,0 +1,277 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <string.h>
+
+#include "host/report/series_private.h"
+
+struct column {
+	enum archive_value value;
+	const char *title;
+	double scale;
+	int decimals;
+};
+
+static const struct column peaks[] = {
+        {ARCHIVE_S1_X, "S1 X", 1.0, 1},  {ARCHIVE_S1_Y, "S1 Y", 1.0, 1}, {ARCHIVE_S1_R, "S1 XY", 1.0, 1},
+        {ARCHIVE_S1_Z, "S1 Z", 1.0, 1},  {ARCHIVE_S2_X, "S2 X", 1.0, 1}, {ARCHIVE_S2_Y, "S2 Y", 1.0, 1},
+        {ARCHIVE_S2_R, "S2 XY", 1.0, 1}, {ARCHIVE_S2_Z, "S2 Z", 1.0, 1},
+};
+static const struct column others[] = {
+        {ARCHIVE_LAG, "lag, largest peaks, ms", 1e3, 3},
+        {ARCHIVE_LAG_FIRST, "first peaks, ms", 1e3, 3},
+        {ARCHIVE_LAG_DRIVEN, "driven, ms", 1e3, 3},
+        {ARCHIVE_FREQUENCY, "plate, Hz", 1.0, 2},
+        {ARCHIVE_THREE_CYCLE, "over three cycles, Hz", 1.0, 2},
+        {ARCHIVE_DAMPING, "damping ratio", 1.0, 4},
+};
+enum { PEAKS = sizeof(peaks) / sizeof(peaks[0]), OTHERS = sizeof(others) / sizeof(others[0]) };
+
+const char *series_decision(const struct series_drop *drop)
+{
+	if (!drop->a.sha256[0])
+		return drop->a.state;
+	return strcmp(drop->a.decision, "open") ? drop->a.decision : "undecided";
+}
+
+/* ---- drops, mean, SD, n ---- */
+
+static void drop_row(FILE *out, const struct series_drop *drop, const struct column *column, size_t count)
+{
+	fprintf(out, "<tr%s><td>%u</td><td class=\"text\">%s</td>", drop->counts ? "" : " class=\"out\"",
+	        drop->a.number, series_decision(drop));
+	for (size_t i = 0; i < count; i++) {
+		const struct column *c = &column[i];
+
+		fputs("<td>", out);
+		page_with_sigma(out, c->decimals, drop->a.value[c->value] * c->scale,
+		                drop->a.sigma[c->value] * c->scale);
+		if (isfinite(drop->a.value[c->value]) && (drop->a.not_ok >> c->value & 1u))
+			fputc('*', out);
+		fputs("</td>", out);
+	}
+	fputs("</tr>\n", out);
+}
+
+static void mean_row(FILE *out, const char *label, bool first)
+{
+	fprintf(out, "<tr class=\"mean%s\"><td>%s</td><td></td>", first ? " first" : "", label);
+}
+
+static void mean_rows(const struct series_page *page, const struct column *column, size_t count)
+{
+	const struct archive_mean *m = page->cell.value;
+	FILE *out = page->page.out;
+
+	mean_row(out, "mean", true);
+	for (size_t i = 0; i < count; i++) {
+		fputs("<td>", out);
+		page_number(out, column[i].decimals, m[column[i].value].mean * column[i].scale);
+		fputs(m[column[i].value].not_ok ? "*</td>" : "</td>", out);
+	}
+	fputs("</tr>\n", out);
+	mean_row(out, "SD", false);
+	for (size_t i = 0; i < count; i++) {
+		fputs("<td>", out);
+		page_number(out, column[i].decimals + 1, m[column[i].value].sd * column[i].scale);
+		fputs("</td>", out);
+	}
+	fputs("</tr>\n", out);
+	mean_row(out, "n", false);
+	for (size_t i = 0; i < count; i++)
+		fprintf(out, "<td>%u</td>", m[column[i].value].n);
+	fputs("</tr>\n", out);
+}
+
+/* Those of the columns that any drop has a value for; how many. */
+static size_t filled(const struct series_page *page, const struct column *all, size_t count,
+                     struct column *column)
+{
+	size_t kept = 0;
+
+	for (size_t i = 0; i < count; i++) {
+		bool any = false;
+
+		for (size_t k = 0; k < page->count; k++)
+			any |= isfinite(page->drop[k]->a.value[all[i].value]);
+		if (any)
+			column[kept++] = all[i];
+	}
+	return kept;
+}
+
+static void table(const struct series_page *page, const struct column *all, size_t most)
+{
+	struct column column[ARCHIVE_VALUE_COUNT];
+	size_t count = filled(page, all, most, column);
+	FILE *out = page->page.out;
+
+	fputs("<div class=\"scroll\"><table><thead><tr><th>drop</th><th class=\"text\"></th>", out);
+	for (size_t i = 0; i < count; i++)
+		fprintf(out, "<th>%s</th>", column[i].title);
+	fputs("</tr></thead><tbody>\n", out);
+	for (size_t i = 0; i < page->count; i++)
+		drop_row(out, page->drop[i], column, count);
+	if (page->cell.drops)
+		mean_rows(page, column, count);
+	fputs("</tbody></table></div>\n", out);
+}
+
+void series_results(struct series_page *page)
+{
+	FILE *out = page->page.out;
+
+	fputs("<h2>Peaks, g</h2>\n", out);
+	if (!page->count) {
+		fputs("<p class=\"soft\">No drop was made yet.</p>\n", out);
+		return;
+	}
+	table(page, peaks, PEAKS);
+	fputs("<p class=\"note\">&plusmn; is one standard uncertainty of that drop. XY: largest resultant of "
+	      "X "
+	      "and "
+	      "Y. SD: standard deviation of a single drop, over n &minus; 1. Struck through: in no mean. "
+	      "*: see the remarks.</p>\n<h2>Lag of S1 behind S2, and the plate</h2>\n",
+	      out);
+	table(page, others, OTHERS);
+	fputs("<p class=\"note\">Lag between the largest and between the first peaks, and as that of an "
+	      "oscillator which S2 drives. Frequency and damping from the free ring-down of S1.</p>\n",
+	      out);
+}
+
+/* ---- model ---- */
+
+/* The means as an analysis, for the comparison that one drop has, too. What is not ok in any drop is not
+ * compared. */
+struct means {
+	struct channel channel[MODEL_AXES];
+	struct estimate_channel estimate[MODEL_AXES];
+	struct record record;
+	struct analysis analysis;
+	struct report report;
+};
+
+static enum estimate_status mean_status(const struct archive_mean *m)
+{
+	return m->n && !m->not_ok ? ESTIMATE_OK : ESTIMATE_SHORT;
+}
+
+static void fill_means(struct means *means, const struct series_page *page)
+{
+	static const struct {
+		const char *name;
+		enum archive_value value;
+	} axes[MODEL_AXES] = {
+	        {"S1X", ARCHIVE_S1_X}, {"S1Y", ARCHIVE_S1_Y}, {"S2X", ARCHIVE_S2_X}, {"S2Y", ARCHIVE_S2_Y}};
+	const struct archive_mean *m = page->cell.value;
+	struct analysis *a = &means->analysis;
+
+	memset(means, 0, sizeof(*means));
+	for (size_t i = 0; i < MODEL_AXES; i++) {
+		const struct archive_mean *mean = &m[axes[i].value];
+
+		snprintf(means->channel[i].name, sizeof(means->channel[i].name), "%s", axes[i].name);
+		means->estimate[i].peak.value_g = mean->mean;
+		means->estimate[i].peak.sigma_g = mean->sd;
+		means->estimate[i].peak.how.status = mean_status(mean);
+	}
+	means->record = (struct record){.channels = means->channel, .channel_count = MODEL_AXES};
+	*a = (struct analysis){
+	        .channels = means->estimate, .channel_count = MODEL_AXES, .resultant_count = 2};
+	for (size_t i = 0; i < 2; i++) {
+		const struct archive_mean *mean = &m[i ? ARCHIVE_S2_R : ARCHIVE_S1_R];
+
+		a->resultants[i].peak_g = mean->mean;
+		a->resultants[i].sigma_g = mean->sd;
+		a->resultants[i].how.status = mean_status(mean);
+		snprintf(a->resultants[i].sensor, sizeof(a->resultants[i].sensor), "S%zu", i + 1);
+	}
+	a->has_lag = a->has_plate = true;
+	a->lag.largest_peak_s = m[ARCHIVE_LAG].mean;
+	a->lag.sigma_s = m[ARCHIVE_LAG].sd;
+	a->lag.status = mean_status(&m[ARCHIVE_LAG]);
+	a->lag.driven.status = ESTIMATE_SHORT;
+	a->plate.frequency_hz = m[ARCHIVE_FREQUENCY].mean;
+	a->plate.sigma_hz = m[ARCHIVE_FREQUENCY].sd;
+	a->plate.damping_ratio = m[ARCHIVE_DAMPING].mean;
+	a->plate.sigma_damping = m[ARCHIVE_DAMPING].sd;
+	a->plate.how.status = mean_status(&m[ARCHIVE_FREQUENCY]);
+	means->report = (struct report){.record = &means->record,
+	                                .analysis = a,
+	                                .scene = &page->scene,
+	                                .prediction = &page->prediction,
+	                                .below = page->has_below ? &page->below : NULL};
+}
+
+static void model_reason(const struct series_page *page)
+{
+	const struct model_prediction *p = &page->prediction;
+	FILE *out = page->page.out;
+
+	fputs("<p>Taken: <b>", out);
+	page_text(out, p->fidelity);
+	fputs("</b>, ", out);
+	page_text(out, p->reason);
+	fputs(". ", out);
+	if (p->next != MODEL_AUTO && isfinite(p->next_change))
+		fprintf(out, "The next rung, %s, would change it by %.1f %%. ", model_fidelity_name(p->next),
+		        100.0 * p->next_change);
+	else if (p->next == MODEL_AUTO)
+		fputs("There is no rung above it. ", out);
+	if (page->has_below) {
+		fputs("The next simpler one is ", out);
+		page_text(out, page->below.fidelity);
+		fputs(".", out);
+	}
+	fputs("</p>\n", out);
+}
+
+static void model_rows(const struct series_page *page)
+{
+	struct report_row rows[REPORT_ROWS_MAX];
+	struct means means;
+	size_t count;
+	FILE *out = page->page.out;
+
+	fill_means(&means, page);
+	count = report_compare(&means.report, rows);
+	fputs("<div class=\"scroll\"><table "
+	      "class=\"small\"><thead><tr><th>quantity</th><th>model</th><th>mean of "
+	      "drops</th><th>SD</th><th>difference</th></tr></thead><tbody>\n",
+	      out);
+	for (size_t i = 0; i < count; i++) {
+		fprintf(out, "<tr><td>%s%s%s</td><td>", rows[i].label, rows[i].unit[0] ? ", " : "",
+		        rows[i].unit);
+		page_with_sigma(out, rows[i].decimals, rows[i].predicted * rows[i].scale,
+		                rows[i].rungs_apart * rows[i].scale);
+		fputs("</td><td>", out);
+		page_number(out, rows[i].decimals, rows[i].measured * rows[i].scale);
+		fputs("</td><td>", out);
+		page_number(out, rows[i].decimals, rows[i].sigma * rows[i].scale);
+		fprintf(out, "</td><td>%s", rows[i].difference_percent > 0.0 ? "+" : "");
+		page_number(out, 1, rows[i].difference_percent);
+		fputs(isfinite(rows[i].difference_percent) ? " %</td></tr>\n" : "</td></tr>\n", out);
+	}
+	fputs("</tbody></table></div>\n", out);
+}
+
+void series_model(struct series_page *page)
+{
+	FILE *out = page->page.out;
+
+	fputs("<h2>Model against drops</h2>\n", out);
+	if (!page->has_model) {
+		fputs("<p class=\"soft\">No model answers for this scene.</p>\n", out);
+		return;
+	}
+	model_reason(page);
+	if (!page->cell.drops) {
+		fputs("<p class=\"soft\">No drop counts, so there is nothing to compare with.</p>\n", out);
+		return;
+	}
+	model_rows(page);
+	fputs("<p class=\"note\">Difference: model less measured, over measured. A dash: not known well "
+	      "enough "
+	      "to compare. Behind the model's value, &plusmn;: how far the next simpler model is from "
+	      "it.</p>\n",
+	      out);
+}

@@ -1,0 +1,210 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "tests/unit/firmware_by_hand.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <cmocka.h>
+
+#include "firmware/app.h"
+#include "tests/unit/fake_port.h"
+
+struct firmware_by_hand by_hand;
+
+const struct frame *firmware_last(uint32_t id)
+{
+	const struct frame *frame = fake_last(id);
+
+	if (frame == NULL)
+		fail_msg("no frame 0x%03x was sent", id);
+	return frame;
+}
+
+static void host_beat(void)
+{
+	struct frame frame;
+
+	wire_pack_heartbeat(&frame, WIRE_ID_HEARTBEAT_HOST,
+	                    &(struct wire_heartbeat){.nmt_state = 5, .wire_hash = by_hand.host_hash});
+	fake_receive(&frame);
+}
+
+void firmware_forget_frames(void)
+{
+	fake.sent_count = 0;
+}
+
+/* One millisecond; main runs after each sample instant of Y. */
+void firmware_run_ms(void)
+{
+	fake_time(by_hand.next_ms * 1000);
+	if (by_hand.host_alive && by_hand.next_ms % 100 == 10)
+		host_beat();
+	app_on_turn();
+	app_on_tick();
+	for (int k = 0; k < 10; k++) {
+		int16_t noise = (int16_t)(by_hand.next_ms + (uint32_t)k) & 1;
+
+		if (k < 7)
+			app_on_x(noise, by_hand.s2x ? by_hand.s2x : noise, true);
+		app_on_yz(noise, noise, (int16_t)(4 + noise + by_hand.s2y_offset), noise, true);
+		fake_time(by_hand.next_ms * 1000 + 100 * (unsigned)k);
+		app_poll();
+	}
+	by_hand.next_ms++;
+}
+
+void firmware_run(unsigned ms)
+{
+	while (ms-- > 0)
+		firmware_run_ms();
+}
+
+void firmware_power_on(enum port_reset cause)
+{
+	fake_init();
+	by_hand.next_ms = 0;
+	by_hand.host_alive = true;
+	by_hand.host_hash = wire_hash();
+	by_hand.s2x = 0;
+	by_hand.s2y_offset = 0;
+	app_init(cause);
+}
+
+struct wire_status firmware_status(void)
+{
+	struct wire_status m = {0};
+
+	firmware_forget_frames();
+	for (unsigned i = 0; i < 200 && fake_count(WIRE_ID_STATUS) == 0; i++)
+		firmware_run_ms();
+	assert_int_equal(wire_unpack_status(firmware_last(WIRE_ID_STATUS), &m), 0);
+	return m;
+}
+
+uint32_t firmware_counter(unsigned index)
+{
+	struct wire_counter m = {0};
+
+	for (unsigned i = 0; i <= WIRE_COUNTERS; i++) {
+		firmware_forget_frames();
+		firmware_run(100);
+		assert_int_equal(fake_count(WIRE_ID_COUNTER), 1);
+		assert_int_equal(wire_unpack_counter(firmware_last(WIRE_ID_COUNTER), &m), 0);
+		if (m.index == index)
+			return m.value;
+	}
+	fail_msg("counter %u is never sent", index);
+	return 0;
+}
+
+struct wire_reply firmware_order(unsigned op, uint16_t token, uint32_t argument)
+{
+	static uint8_t sequence;
+	struct wire_command command = {
+	        .op = (uint8_t)op, .sequence = ++sequence, .token = token, .argument = argument};
+	struct wire_reply reply = {0};
+	struct frame frame;
+
+	wire_pack_command(&frame, WIRE_ID_COMMAND, &command);
+	fake_receive(&frame);
+	firmware_forget_frames();
+	app_poll();
+	assert_int_equal(fake_count(WIRE_ID_REPLY), 1);
+	assert_int_equal(wire_unpack_reply(firmware_last(WIRE_ID_REPLY), &reply), 0);
+	assert_int_equal(reply.op, op);
+	assert_int_equal(reply.sequence, sequence);
+	return reply;
+}
+
+struct wire_sdo firmware_sdo(unsigned specifier, unsigned index, unsigned subindex, uint32_t value)
+{
+	struct wire_sdo m = {.specifier = (uint8_t)specifier,
+	                     .index = (uint16_t)index,
+	                     .subindex = (uint8_t)subindex,
+	                     .value = value};
+	struct frame frame;
+
+	wire_pack_sdo(&frame, WIRE_ID_SDO_REQUEST, &m);
+	fake_receive(&frame);
+	firmware_forget_frames();
+	app_poll();
+	assert_int_equal(fake_count(WIRE_ID_SDO_REPLY), 1);
+	assert_int_equal(wire_unpack_sdo(firmware_last(WIRE_ID_SDO_REPLY), &m), 0);
+	assert_int_equal(m.index, index);
+	return m;
+}
+
+void firmware_ask(unsigned sensor, uint32_t first_ms, unsigned count)
+{
+	struct frame frame;
+
+	wire_pack_resend(&frame, WIRE_ID_RESEND,
+	                 &(struct wire_resend){.sensor = (uint8_t)sensor,
+	                                       .count = (uint16_t)count,
+	                                       .first_tick_ms = first_ms});
+	fake_receive(&frame);
+}
+
+void firmware_to_ready(void)
+{
+	firmware_power_on(PORT_RESET_POWER_ON);
+	firmware_run(250);
+	assert_int_equal(firmware_status().state, WIRE_STATE_READY);
+}
+
+void firmware_to_armed(void)
+{
+	firmware_to_ready();
+	assert_int_equal(firmware_order(WIRE_OP_ARM, FIRMWARE_TOKEN, 0).result, 0);
+}
+
+void firmware_fall(unsigned drop_id)
+{
+	struct wire_reply reply;
+
+	assert_int_equal(firmware_order(WIRE_OP_ARM, FIRMWARE_TOKEN, 0).result, 0);
+	reply = firmware_order(WIRE_OP_RELEASE, FIRMWARE_TOKEN, 0);
+	assert_int_equal(reply.result, 0);
+	assert_int_equal(reply.state, WIRE_STATE_FALLING);
+	assert_int_equal(reply.drop_id, drop_id);
+	by_hand.release_ms = by_hand.next_ms - 1;
+	firmware_run(12);
+	fake.inputs &= (uint16_t)~WIRE_IO_LATCH_CLOSED;
+}
+
+void firmware_to_falling(void)
+{
+	firmware_to_ready();
+	firmware_fall(1);
+}
+
+/* The gates as in free fall; the magnet goes off at 390.8 ms. */
+void firmware_separate(void)
+{
+	uint32_t start_us = fake.now_us;
+
+	firmware_run(202);
+	app_on_gate(0, start_us + 201928);
+	firmware_run(176);
+	app_on_gate(1, start_us + 377773);
+	firmware_run(14);
+	assert_false(fake.outputs & WIRE_IO_MAGNET_HOLD);
+	fake.inputs &= (uint16_t)~WIRE_IO_PRODUCT_HELD;
+}
+
+void firmware_to_separated(void)
+{
+	firmware_to_falling();
+	firmware_separate();
+}
+
+void firmware_to_captured(void)
+{
+	firmware_to_separated();
+	firmware_run(30);
+	by_hand.s2x = 2000;
+	firmware_run(1);
+	by_hand.s2x = 0;
+	firmware_run(405);
+	assert_int_equal(firmware_status().state, WIRE_STATE_CAPTURED);
+}
