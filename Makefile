@@ -13,7 +13,7 @@ JOBS ?= $(shell nproc)
 PACKAGES_RUN = gcc libc6-dev libgsl-dev liblcm-dev liblcm-bin libinih-dev libcjson-dev gnuplot-nox \
 	libsqlite3-dev nettle-dev
 PACKAGES_TEST = $(PACKAGES_RUN) libcmocka-dev clang llvm libclang-rt-14-dev can-utils python3-canmatrix \
-	iproute2 util-linux gawk
+	iproute2 util-linux gawk libmicrohttpd-dev
 
 # ---- flags -----------------------------------------------------------------------------------------
 
@@ -46,7 +46,9 @@ FIRMWARE_C = $(wildcard firmware/*.c)
 POSIX_C = $(wildcard firmware/port/posix/*.c)
 LOCKSTEP_C = firmware/port/lockstep.c
 LINK_C = $(wildcard common/link/*.c common/scenes/*.c)
-HOST_C = $(filter-out host/main.c host/hdf5/%,$(wildcard host/*.c host/*/*.c))
+HOST_C = $(filter-out host/main.c host/hdf5/% host/console/%,$(wildcard host/*.c host/*/*.c))
+# The page's program: its main is built by console.mk, the rest is a library that tests use too.
+CONSOLE_C = $(filter-out host/console/main.c,$(wildcard host/console/*.c))
 HIL_C = $(filter-out hil/main.c,$(wildcard hil/*.c))
 UNIT_C = $(wildcard tests/unit/test_*.c)
 UNIT_HELPER_C = $(filter-out $(UNIT_C),$(wildcard tests/unit/*.c))
@@ -56,7 +58,7 @@ obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 lib = $(BUILD)/lib/lib$(1).a
 
 LCM_O = $(LCM_C:.c=.o)
-ALL_O = $(call obj,$(FREESTANDING_C) $(LOCKSTEP_C) $(POSIX_C) $(LINK_C) $(HOST_C) host/main.c $(HIL_C) hil/main.c \
+ALL_O = $(call obj,$(FREESTANDING_C) $(LOCKSTEP_C) $(POSIX_C) $(LINK_C) $(HOST_C) host/main.c $(CONSOLE_C) $(HIL_C) hil/main.c \
 	$(UNIT_C) $(UNIT_HELPER_C) $(TOOL_C))
 PROGRAMS = $(BUILD)/droptower $(BUILD)/droptower-firmware $(BUILD)/droptower-bench
 UNITS = $(UNIT_C:tests/unit/%.c=$(BUILD)/tests/%)
@@ -68,15 +70,15 @@ all: $(PROGRAMS) ## build the three programs into build/
 # ---- compiling --------------------------------------------------------------------------------------
 
 $(call obj,$(FREESTANDING_C) $(LOCKSTEP_C)): CFLAGS += -ffreestanding
-$(call obj,$(POSIX_C) $(LINK_C) $(HOST_C) host/main.c $(HIL_C) hil/main.c $(UNIT_C) $(UNIT_HELPER_C) $(TOOL_C)): \
-	CPPFLAGS += $(LINUX)
+$(call obj,$(POSIX_C) $(LINK_C) $(HOST_C) host/main.c $(CONSOLE_C) host/console/main.c $(HIL_C) hil/main.c $(UNIT_C) \
+	$(UNIT_HELPER_C) $(TOOL_C)): CPPFLAGS += $(LINUX)
 
 $(BUILD)/obj/%.o: %.c Makefile
 	$(call say,CC,$<)
 	$(Q)mkdir -p $(@D)
 	$(Q)$(CC) $(CFLAGS) $(CPPFLAGS) -MMD -MP -c $< -o $@
 
-$(call obj,$(HOST_C) host/main.c $(UNIT_C) $(TOOL_C)): | $(LCM_H) $(BUILD)/generated/droptower_version.h
+$(call obj,$(HOST_C) host/main.c $(CONSOLE_C) host/console/main.c $(UNIT_C) $(TOOL_C)): | $(LCM_H) $(BUILD)/generated/droptower_version.h
 
 # Touched only when the version changes, so that nothing is compiled in vain.
 $(BUILD)/generated/droptower_version.h: always
@@ -104,6 +106,7 @@ $(call lib,common): $(call obj,$(COMMON_C))
 $(call lib,firmware): $(call obj,$(FIRMWARE_C))
 $(call lib,link): $(call obj,$(LINK_C))
 $(call lib,host): $(call obj,$(HOST_C)) $(LCM_O)
+$(call lib,console): $(call obj,$(CONSOLE_C))
 $(call lib,hil): $(call obj,$(HIL_C))
 
 link = $(Q)mkdir -p $(@D) && $(CC) $(LDFLAGS) $(filter %.o,$^) -Wl,--start-group $(filter %.a,$^) -Wl,--end-group \
@@ -122,10 +125,10 @@ $(BUILD)/droptower-firmware: $(call obj,$(LOCKSTEP_C) $(POSIX_C)) $(foreach l,fi
 	$(link)
 
 $(UNITS): $(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(call obj,$(UNIT_HELPER_C)) \
-		$(foreach l,host hil firmware link common,$(call lib,$l))
+		$(foreach l,console host hil firmware link common,$(call lib,$l))
 	$(call say,LINK,$@)
 	$(Q)mkdir -p $(@D) && $(CC) $(LDFLAGS) $(filter %.o,$^) -Wl,--start-group $(filter %.a,$^) -Wl,--end-group \
-		$(LIBRARIES) -lcmocka -o $@
+		$(LIBRARIES) -lmicrohttpd -lcmocka -o $@
 
 $(TOOLS): $(BUILD)/tests/%: $(BUILD)/obj/tests/system/%.o $(foreach l,host link common,$(call lib,$l))
 	$(call say,LINK,$@)

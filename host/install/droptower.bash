@@ -36,6 +36,16 @@ _droptower_scenes() {
 	compgen -d -S / -- "$2"
 }
 
+# Series of the archive that the line names, or else of the one that the program takes.
+_droptower_series() {
+	local program=$1 word before= archive=()
+	for word in "${COMP_WORDS[@]}"; do
+		[ "$before" = --archive ] && archive=(--archive "$word")
+		before=$word
+	done
+	"$program" series list "${archive[@]}" 2>/dev/null | awk 'NR > 1 { print $1 }'
+}
+
 _droptower() {
 	local program=${COMP_WORDS[0]} command=${COMP_WORDS[1]} current=${COMP_WORDS[COMP_CWORD]}
 	local before=${COMP_WORDS[COMP_CWORD - 1]} option=${COMP_WORDS[COMP_CWORD - 1]} scheme= choice choices
@@ -52,11 +62,17 @@ _droptower() {
 		--scene) choices=$(_droptower_scenes "$program" "$current") ;;
 		--link | --lcm | --to) choices=$(_droptower_link "$scheme" "$current") ;;
 		--out | --archive) choices=$(compgen -d -- "$current") ;;
+		--series) choices=$(_droptower_series "$program") ;;
 		*)
 			choices=$(compgen -f -- "$current")
 			case $current in
 			-*) choices=$(_droptower_options "$program" "$command") ;;
-			*) [ "$COMP_CWORD" -eq 2 ] && choices=$(_droptower_words "$program" "$command")$'\n'$choices ;;
+			*)
+				[ "$COMP_CWORD" -eq 2 ] && choices=$(_droptower_words "$program" "$command")$'\n'$choices
+				case $command$option in
+				report--html | report--pdf | report--csv) ;;
+				report*) choices=$(_droptower_series "$program") ;;
+				esac ;;
 			esac ;;
 		esac
 	fi

@@ -11,7 +11,7 @@ SHARE = $(PREFIX)/share
 LIBDIR = $(PREFIX)/lib
 INSTALL_IN = host/install
 
-INSTALLED_PROGRAMS = $(PROGRAMS) $(if $(HDF5),$(BUILD)/droptower-hdf5)
+INSTALLED_PROGRAMS = $(PROGRAMS) $(CONSOLE) $(if $(HDF5),$(BUILD)/droptower-hdf5)
 INSTALLED_SCENES = $(wildcard common/scenes/*.ini)
 MAN = $(BUILD)/man
 # A page's date is that of the sources, so that the same sources give the same page.
@@ -25,7 +25,7 @@ man: all ## write the manual's pages into build/man
 # put MODE FILES FOLDER
 put = @install -d '$(DESTDIR)$(3)' && install -m $(1) $(2) '$(DESTDIR)$(3)/'
 
-install: man ## install below PREFIX (/usr/local), all of it below DESTDIR
+install: man $(CONSOLE) ## install below PREFIX (/usr/local), all of it below DESTDIR
 	$(call put,755,$(INSTALLED_PROGRAMS),$(BINDIR))
 	$(call put,644,$(INSTALLED_SCENES),$(SHARE)/droptower/scenes)
 	$(call put,644,$(MAN)/*.1,$(SHARE)/man/man1)
@@ -41,7 +41,7 @@ install: man ## install below PREFIX (/usr/local), all of it below DESTDIR
 
 # Folders that others use too stay; those that are ours alone go.
 uninstall: ## remove what install has installed (same PREFIX and DESTDIR)
-	@rm -f $(foreach p,$(notdir $(PROGRAMS)) droptower-hdf5,'$(DESTDIR)$(BINDIR)/$p') \
+	@rm -f $(foreach p,$(notdir $(PROGRAMS) $(CONSOLE)) droptower-hdf5,'$(DESTDIR)$(BINDIR)/$p') \
 		'$(DESTDIR)$(SHARE)/man/man1/droptower.1' '$(DESTDIR)$(SHARE)'/man/man1/droptower-*.1 \
 		'$(DESTDIR)$(LIBDIR)/systemd/network/80-can0.network' \
 		'$(DESTDIR)$(LIBDIR)/systemd/system/droptower.service' \

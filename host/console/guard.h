@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_CONSOLE_GUARD_H
+#define DT_HOST_CONSOLE_GUARD_H
+/*
+ * Who may ask for what, before anything else looks at a request: the token, the Host and Origin a browser
+ * names, and how often. THREATS.md says against whom. Times in milliseconds of session_now_ms. One thread.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+#include <sys/socket.h>
+
+enum { GUARD_TOKEN_MIN = 32, GUARD_TOKEN_MAX = 128, GUARD_MESSAGE_MAX = 4400 };
+
+/* A new token: 128 bit from the kernel as 32 hexadecimal digits. */
+void guard_make_token(char token[GUARD_TOKEN_MAX + 1]);
+
+/* The token in file, made there (mode 0600) when there is no file. 0, or DT_E_* with one line in message: not
+ * readable, readable for everybody, or not 32 to 128 letters and digits. */
+int guard_read_token(const char *file, char token[GUARD_TOKEN_MAX + 1], char message[GUARD_MESSAGE_MAX]);
+
+/* authorization: what the request says, NULL: nothing. Takes as long for any wrong one. */
+bool guard_token_agrees(const char *token, const char *authorization);
+
+/* A browser that was led here by somebody else's name says that name: only this machine's address at the
+ * connection's end, or localhost, is the console's. host NULL: the request named none. */
+bool guard_host_agrees(const char *host, const struct sockaddr *local);
+
+/* origin: "http://" and the request's host; NULL (no browser, or its own page's GET) is right. */
+bool guard_origin_agrees(const char *origin, const char *host);
+
+/* A console's name, 16 to 64 letters and digits. */
+bool guard_console_valid(const char *console);
+
+/* So many at once, and so many a second. */
+struct guard_rate {
+	double burst, per_s;
+	double left;
+	int64_t then_ms;
+};
+/* Takes one; false when there is none left. */
+bool guard_take(struct guard_rate *rate, int64_t now_ms);
+
+#endif

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_CONSOLE_HTTP_PRIVATE_H
+#define DT_HOST_CONSOLE_HTTP_PRIVATE_H
+/*
+ * What http and visit share. A visit is a connection that has not shown the token: visit.c keeps them few and
+ * short.
+ */
+#include <microhttpd.h>
+#include <pthread.h>
+
+#include "host/console/guard.h"
+#include "host/console/hold.h"
+#include "host/console/http.h"
+#include "host/console/stream.h"
+
+struct visit {
+	struct visit *older,
+	        *newer; /* those without the token, by when they came; NULL for one that has shown it */
+	bool listed;
+	int fd;
+	int64_t came_ms;
+};
+
+struct http {
+	struct MHD_Daemon *daemon;
+	struct console *console;
+	const struct page_part *parts;
+	size_t part_count;
+	const char *token;
+	struct hold hold;
+	struct streams *streams;
+	struct guard_rate asked, wrong; /* requests with the token, and without */
+	pthread_mutex_t jobs_lock;      /* of closing and jobs */
+	bool closing;
+	unsigned jobs;               /* given away and not yet done */
+	pthread_mutex_t visits_lock; /* of what follows */
+	struct visit *oldest, *newest;
+	unsigned visits;
+};
+
+/* A connection comes or goes; MHD_NotifyConnectionCallback. */
+void http_visit(void *user, struct MHD_Connection *connection, void **context,
+                enum MHD_ConnectionNotificationCode code);
+
+/* It has shown the token. */
+void http_prove(struct http *http, struct MHD_Connection *connection);
+
+/* Closes those that took too long; on any thread. */
+void http_close_slow(struct http *http);
+
+#endif

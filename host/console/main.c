@@ -1,0 +1,504 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * droptower-console: options, and the start and end of the threads. `droptower serve` becomes this program,
+ * and its
+ * --help tells the options.
+ */
+#include <errno.h>
+#include <getopt.h>
+#include <glob.h>
+#include <gsl/gsl_errno.h>
+#include <semaphore.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "host/command/archived.h"
+#include "host/command/beside.h"
+#include "host/command/command.h"
+#include "host/command/notify.h"
+#include "host/console/console.h"
+#include "host/console/guard.h"
+#include "host/console/http.h"
+
+enum {
+	OPTION_LINK = 256,
+	OPTION_CONTROL,
+	OPTION_ARCHIVE,
+	OPTION_SERIES,
+	OPTION_OPERATOR,
+	OPTION_SCENE,
+	OPTION_BIND,
+	OPTION_PORT,
+	OPTION_TOKEN_FILE,
+	OPTION_BENCH,
+	PORT = 8731,
+	SCENES_MAX = 64,
+	BENCH_WORDS_MAX = 24,
+	TICK_MS = 40,      /* 25 Hz */
+	FILES_BESIDE = 64, /* descriptors that are no connection */
+	SELECT_AGAIN_MS = 1000,
+};
+
+static const struct option long_options[] = {
+        {"link", required_argument, NULL, OPTION_LINK},
+        {"control", required_argument, NULL, OPTION_CONTROL},
+        {"archive", required_argument, NULL, OPTION_ARCHIVE},
+        {"series", required_argument, NULL, OPTION_SERIES},
+        {"operator", required_argument, NULL, OPTION_OPERATOR},
+        {"scene", required_argument, NULL, OPTION_SCENE},
+        {"bind", required_argument, NULL, OPTION_BIND},
+        {"port", required_argument, NULL, OPTION_PORT},
+        {"token-file", required_argument, NULL, OPTION_TOKEN_FILE},
+        {"bench", required_argument, NULL, OPTION_BENCH},
+        {0},
+};
+
+struct serve {
+	struct console console;
+	struct tower_options tower;
+	struct work_options work;
+	struct http_options http;
+	const char *series, *token_file;
+	const char *scenes[SCENES_MAX + 1];
+	int scene_count;
+	const char *bench_words[BENCH_WORDS_MAX + 1];
+	int bench_word_count;
+	char token[GUARD_TOKEN_MAX + 1];
+	glob_t found;
+	struct http *server;
+	/* a question to the tower's thread, whose answer says that it is alive */
+	struct job ping;
+	sem_t pong;
+	bool pinged;
+	/* --series, until it is selected: a tower in motion, or not there yet, does not take it at once */
+	struct job select;
+	cJSON *select_body;
+	sem_t selected;
+	bool select_wanted, select_asked;
+	int64_t select_due_ms;
+};
+
+static volatile sig_atomic_t stops; /* how often we were asked to end */
+
+static void on_signal(int number)
+{
+	(void)number;
+	stops = stops + 1;
+}
+
+/* Handlers and no mask: what is started inherits a mask, and a simulated tower must be stoppable. */
+static void catch_signals(void)
+{
+	struct sigaction action;
+
+	memset(&action, 0, sizeof(action));
+	action.sa_handler = on_signal;
+	action.sa_flags = SA_RESTART;
+	sigemptyset(&action.sa_mask);
+	sigaction(SIGINT, &action, NULL);
+	sigaction(SIGTERM, &action, NULL);
+	signal(SIGPIPE, SIG_IGN);
+}
+
+/* ---- options ---- */
+
+static int add_word(const char *option, const char **words, int *count, int max)
+{
+	if (*count == max)
+		return command_usage("serve", "more than %d %s", max, option);
+	words[(*count)++] = optarg;
+	return COMMAND_DONE;
+}
+
+static int take_port(struct serve *serve)
+{
+	double port;
+	int code = command_number("serve", "port", optarg, 0, 65535, &port);
+
+	if (code == COMMAND_DONE)
+		serve->http.port = (unsigned)port;
+	return code;
+}
+
+static int take_option(struct serve *serve, int option, char **argv)
+{
+	switch (option) {
+	case OPTION_LINK:
+		serve->tower.link = optarg;
+		return COMMAND_DONE;
+	case OPTION_CONTROL:
+		serve->tower.control = optarg;
+		return COMMAND_DONE;
+	case OPTION_ARCHIVE:
+		serve->work.archive = optarg;
+		return COMMAND_DONE;
+	case OPTION_SERIES:
+		serve->series = optarg;
+		return COMMAND_DONE;
+	case OPTION_OPERATOR:
+		serve->work.operator_name = optarg;
+		return COMMAND_DONE;
+	case OPTION_BIND:
+		serve->http.address = optarg;
+		return COMMAND_DONE;
+	case OPTION_TOKEN_FILE:
+		serve->token_file = optarg;
+		return COMMAND_DONE;
+	case OPTION_PORT:
+		return take_port(serve);
+	case OPTION_SCENE:
+		return add_word("--scene", serve->scenes, &serve->scene_count, SCENES_MAX);
+	case OPTION_BENCH:
+		return add_word("--bench", serve->bench_words, &serve->bench_word_count, BENCH_WORDS_MAX);
+	default:
+		return command_usage("serve", "option '%s' is not known or lacks its value",
+		                     argv[optind - 1]);
+	}
+}
+
+/* One that is not there yet is waited for; one that can never be is not. */
+static bool is_link(const char *url)
+{
+	return strncmp(url, "unix:", 5) == 0 || strncmp(url, "can:", 4) == 0 ||
+	       strncmp(url, "slcan:", 6) == 0;
+}
+
+static int parse(struct serve *serve, int argc, char **argv)
+{
+	int option, code = COMMAND_DONE;
+
+	opterr = 0;
+	while (code == COMMAND_DONE && (option = getopt_long(argc, argv, "", long_options, NULL)) != -1)
+		code = take_option(serve, option, argv);
+	if (code != COMMAND_DONE)
+		return code;
+	if (optind != argc)
+		return command_usage("serve", "'%s' is too much", argv[optind]);
+	if (serve->tower.link != NULL && serve->bench_word_count > 0)
+		return command_usage("serve", "--bench is for the simulated tower, --link for another one");
+	if (serve->tower.link == NULL && serve->tower.control != NULL)
+		return command_usage("serve", "--control goes with --link");
+	if (serve->tower.link != NULL && !is_link(serve->tower.link))
+		return command_usage("serve", "--link %.80s: expected unix:PATH, can:IF or slcan:DEV",
+		                     serve->tower.link);
+	serve->work.archive = archived_folder(serve->work.archive);
+	serve->work.operator_name = archived_operator(serve->work.operator_name);
+	return COMMAND_DONE;
+}
+
+/* In the sources' folder those, elsewhere those that were installed with this program. */
+static int find_scenes(struct serve *serve)
+{
+	char installed[PATH_MAX];
+
+	if (serve->scene_count > 0)
+		return COMMAND_DONE;
+	if (glob("common/scenes/*.ini", 0, NULL, &serve->found) != 0 &&
+	    (beside("../share/droptower/scenes/*.ini", installed) != 0 ||
+	     glob(installed, 0, NULL, &serve->found) != 0)) {
+		command_error("no scenes came along; --scene FILE names them");
+		return COMMAND_INPUT;
+	}
+	for (size_t i = 0; i < serve->found.gl_pathc && serve->scene_count < SCENES_MAX; i++)
+		serve->scenes[serve->scene_count++] = serve->found.gl_pathv[i];
+	return COMMAND_DONE;
+}
+
+static int make_token(struct serve *serve)
+{
+	char message[GUARD_MESSAGE_MAX];
+
+	if (serve->token_file == NULL) {
+		guard_make_token(serve->token);
+		return COMMAND_DONE;
+	}
+	if (guard_read_token(serve->token_file, serve->token, message) == 0)
+		return COMMAND_DONE;
+	command_error("%s", message);
+	return COMMAND_INPUT;
+}
+
+/* ---- start ---- */
+
+/* Connections are bounded: no more descriptors than they can need. */
+static void allow_connections(void)
+{
+	struct rlimit limit;
+	const rlim_t needed = HTTP_CONNECTIONS + FILES_BESIDE;
+
+	if (getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur < needed) {
+		limit.rlim_cur = limit.rlim_max < needed ? limit.rlim_max : needed;
+		(void)setrlimit(RLIMIT_NOFILE, &limit);
+	}
+}
+
+static int start_work(struct serve *serve)
+{
+	struct console *console = &serve->console;
+	char message[ARCHIVE_MESSAGE_MAX];
+
+	job_queue_init(&console->tower_queue);
+	job_queue_init(&console->work_queue);
+	console->live = live_create();
+	serve->work.scenes = serve->scenes;
+	if (console->live == NULL) {
+		command_error("no memory");
+		return COMMAND_INPUT;
+	}
+	console->work = work_start(console, &serve->work, message);
+	if (console->work != NULL)
+		return COMMAND_DONE;
+	command_error("%s", message);
+	return COMMAND_INPUT;
+}
+
+static int start_tower(struct serve *serve)
+{
+	char message[SESSION_MESSAGE_MAX];
+
+	serve->tower.bench_words = serve->bench_words;
+	serve->tower.scene = serve->scenes[0];
+	serve->console.tower = tower_start(&serve->console, &serve->tower, message);
+	if (serve->console.tower != NULL)
+		return COMMAND_DONE;
+	command_error("%s", message);
+	return COMMAND_LINK;
+}
+
+static int start_http(struct serve *serve)
+{
+	char message[HTTP_MESSAGE_MAX];
+
+	serve->http.token = serve->token;
+	serve->http.parts = page_parts;
+	serve->http.part_count = page_part_count;
+	/* The threads from here on step back behind the tower's: a page can wait. */
+	errno = 0;
+	if (nice(5) == -1 && errno != 0)
+		command_error("nice: %s", strerror(errno));
+	serve->server = http_start(&serve->console, &serve->http, message);
+	if (serve->server != NULL)
+		return COMMAND_DONE;
+	command_error("%s", message);
+	return COMMAND_LINK;
+}
+
+static void select_answered(struct job *job)
+{
+	struct serve *serve = job->maker;
+
+	sem_post(&serve->selected);
+}
+
+/* As the page would. */
+static void ask_select(struct serve *serve)
+{
+	serve->select = (struct job){.console = &serve->console,
+	                             .body = serve->select_body,
+	                             .done = select_answered,
+	                             .maker = serve};
+	serve->select_asked = true;
+	tower_select(&serve->select);
+}
+
+static void take_select(struct serve *serve)
+{
+	serve->select_asked = false;
+	serve->select_wanted = serve->select.status != 200;
+	serve->select_due_ms = session_now_ms() + SELECT_AGAIN_MS;
+}
+
+static void tell_refused(const struct serve *serve)
+{
+	cJSON *answer = cJSON_ParseWithLength(serve->select.answer, serve->select.size);
+	const char *why = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(answer, "error"));
+
+	command_error("--series %s: %s", serve->series, why != NULL ? why : "no answer");
+	cJSON_Delete(answer);
+}
+
+/* A series that is not there is an error; whatever else is in the way may pass. */
+static int select_series(struct serve *serve)
+{
+	int status;
+
+	if (serve->series == NULL)
+		return COMMAND_DONE;
+	serve->select_body = cJSON_CreateObject();
+	cJSON_AddStringToObject(serve->select_body, "series", serve->series);
+	ask_select(serve);
+	while (sem_wait(&serve->selected) != 0)
+		continue;
+	take_select(serve);
+	status = serve->select.status;
+	if (status != 200)
+		tell_refused(serve);
+	free(serve->select.answer);
+	return status == 404 || status == 400 ? COMMAND_INPUT : COMMAND_DONE;
+}
+
+/* Until it worked, or a page has selected one. */
+static void select_again(struct serve *serve)
+{
+	struct tower_view view;
+
+	if (serve->select_asked) {
+		if (sem_trywait(&serve->selected) != 0)
+			return;
+		take_select(serve);
+		free(serve->select.answer);
+	}
+	if (!serve->select_wanted || session_now_ms() < serve->select_due_ms)
+		return;
+	tower_look(serve->console.tower, &view);
+	serve->select_wanted = view.series[0] == '\0';
+	if (serve->select_wanted)
+		ask_select(serve);
+}
+
+static bool loopback(const char *address)
+{
+	return strncmp(address, "127.", 4) == 0 || strcmp(address, "::1") == 0;
+}
+
+/* The token stands behind #, which a browser sends to nobody. */
+static void tell_address(const struct serve *serve)
+{
+	const char *address = serve->http.address;
+	bool six = strchr(address, ':') != NULL;
+
+	if (!loopback(address))
+		command_error(
+		        "WARNING: --bind %s: everybody on that network can watch the token go by and then "
+		        "drop; nothing is encrypted",
+		        address);
+	if (strcmp(address, "0.0.0.0") == 0 || strcmp(address, "::") == 0)
+		address = six ? "::1" : "127.0.0.1";
+	printf(six ? "http://[%s]:%u/#token=%s\n" : "http://%s:%u/#token=%s\n", address,
+	       http_port(serve->server), serve->token);
+	fflush(stdout);
+}
+
+/* ---- while it runs ---- */
+
+static void run_ping(struct job *job)
+{
+	job_done(job);
+}
+
+static void answered(struct job *job)
+{
+	struct serve *serve = job->maker;
+
+	sem_post(&serve->pong);
+}
+
+/* The watchdog is fed as long as the thread that keeps the tower's heartbeat answers. */
+static void feed_watchdog(struct serve *serve)
+{
+	if (serve->pinged && sem_trywait(&serve->pong) != 0)
+		return;
+	notify_alive();
+	serve->ping =
+	        (struct job){.console = &serve->console, .run = run_ping, .done = answered, .maker = serve};
+	serve->pinged = job_put(&serve->console.tower_queue, &serve->ping) == 0;
+}
+
+/* Asked once: when no drop is in motion, or only to be kept. Twice: at once. */
+static bool may_end(const struct serve *serve, bool *told)
+{
+	struct tower_view view;
+
+	if (stops == 0)
+		return false;
+	tower_look(serve->console.tower, &view);
+	if (stops > 1 || view.phase < TOWER_MOVING)
+		return true;
+	if (!*told)
+		command_error("a drop is under way: ends when it is kept; once more to end now");
+	*told = true;
+	return false;
+}
+
+/* The next tick; those that were slept through are left out. */
+static void wait_tick(int64_t *next_ms)
+{
+	int64_t now_ms = session_now_ms();
+	struct timespec then;
+
+	*next_ms = *next_ms + TICK_MS > now_ms ? *next_ms + TICK_MS : now_ms;
+	then.tv_sec = *next_ms / 1000;
+	then.tv_nsec = *next_ms % 1000 * 1000000L;
+	clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &then, NULL);
+}
+
+static void serve_until_stopped(struct serve *serve)
+{
+	int64_t next_ms = session_now_ms();
+	bool told = false;
+
+	while (!may_end(serve, &told)) {
+		wait_tick(&next_ms);
+		http_tick(serve->server);
+		select_again(serve);
+		feed_watchdog(serve);
+	}
+}
+
+static void stop(struct serve *serve)
+{
+	struct console *console = &serve->console;
+
+	if (serve->server != NULL)
+		http_stop(serve->server);
+	if (console->tower != NULL)
+		tower_stop(console->tower);
+	if (console->work != NULL)
+		work_stop(console->work);
+	tower_free(console->tower);
+	if (console->live != NULL) {
+		live_destroy(console->live);
+		job_queue_destroy(&console->work_queue);
+		job_queue_destroy(&console->tower_queue);
+	}
+	cJSON_Delete(serve->select_body);
+	globfree(&serve->found);
+}
+
+int main(int argc, char **argv)
+{
+	static struct serve serve = {.http = {.address = "127.0.0.1", .port = PORT}};
+	int code = parse(&serve, argc, argv);
+
+	gsl_set_error_handler_off();
+	sem_init(&serve.pong, 0, 0);
+	sem_init(&serve.selected, 0, 0);
+	if (code == COMMAND_DONE)
+		code = find_scenes(&serve);
+	if (code == COMMAND_DONE)
+		code = make_token(&serve);
+	if (code != COMMAND_DONE)
+		return code;
+	catch_signals();
+	allow_connections();
+	code = start_work(&serve);
+	if (code == COMMAND_DONE)
+		code = start_tower(&serve);
+	if (code == COMMAND_DONE)
+		code = start_http(&serve);
+	if (code == COMMAND_DONE)
+		code = select_series(&serve);
+	if (code == COMMAND_DONE) {
+		tell_address(&serve);
+		notify("READY=1");
+		serve_until_stopped(&serve);
+		notify("STOPPING=1");
+	}
+	stop(&serve);
+	return code;
+}

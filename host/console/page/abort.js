@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* ABORT: sent at once, without a question, and again until the console answers. */
+import { request } from "./api.js";
+import { byId, setText } from "./dom.js";
+import { clock } from "./words.js";
+
+const ANSWER_MS = 1000; /* an attempt may take so long */
+const PAUSE_MS = 250;
+const SHOWN_MS = 20000; /* what went well is not news for ever */
+
+let round = 0; /* the newest press; older ones end */
+
+function tell(text, level) {
+	byId("abort-outcome").dataset.level = level;
+	setText(byId("abort-outcome"), text);
+}
+
+async function send() {
+	const answer = await request("POST", "/api/abort", { body: "{}", signal: AbortSignal.timeout(ANSWER_MS) });
+	if (answer.ok) return { done: true, text: "" };
+	let text = `answer ${answer.status}`;
+	try {
+		text = (await answer.json()).error ?? text;
+	} catch {
+		/* the number has to do */
+	}
+	/* A refusal is an answer; what may pass is tried again. */
+	return { done: answer.status < 500 && answer.status !== 429, refused: true, text };
+}
+
+export async function abort() {
+	const mine = ++round;
+	tell("ABORT: sending …", "warn");
+	for (let tries = 1; mine === round; tries++) {
+		let outcome;
+		try {
+			outcome = await send();
+		} catch {
+			outcome = { done: false, text: "no answer" };
+		}
+		if (mine !== round) return;
+		if (outcome.done) {
+			if (outcome.refused) tell(`${clock()} ABORT refused: ${outcome.text}`, "bad");
+			else tell(`${clock()} ABORT done: the tower has it`, "good");
+			setTimeout(() => mine === round && tell("", "good"), SHOWN_MS);
+			return;
+		}
+		tell(`ABORT: no success yet (${outcome.text}), try ${tries + 1} … Use the emergency stop.`, "bad");
+		await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
+	}
+}
+
+/* Anywhere on the page, before anything else sees the key. */
+export function listen() {
+	byId("abort").addEventListener("click", abort);
+	addEventListener(
+		"keydown",
+		(event) => {
+			if (event.key === "Escape" && !event.repeat) abort();
+		},
+		{ capture: true },
+	);
+}

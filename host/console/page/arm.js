@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Arming, the countdown, releasing. Arming is asked for twice, at two places; the token that releases lives in this
+ * page only, is used once, and is gone when the page is loaded again. */
+import { post } from "./api.js";
+import { attempt, byId, setText, show } from "./dom.js";
+import { holding } from "./hold.js";
+
+let token = null; /* of our own arming, while it can be used */
+let wasArmed = false;
+let until = 0; /* performance.now() at which the tower disarms by itself */
+let whole = 10;
+
+function ask(open) {
+	show(byId("arm-dialog"), open);
+	show(byId("arm"), !open);
+	if (open) byId("arm-cancel").focus();
+}
+
+async function arm() {
+	ask(false);
+	await attempt(async () => {
+		const answer = await holding(() => post("/api/arm"));
+		token = answer.token;
+		wasArmed = false;
+		whole = answer.expires_s;
+		until = performance.now() + 1000 * answer.expires_s;
+	});
+}
+
+async function release() {
+	const used = token;
+	token = null;
+	if (used !== null) await attempt(() => post("/api/release", { token: used }));
+}
+
+function tick() {
+	if (byId("step-release").hidden) return;
+	const left = Math.max(0, (until - performance.now()) / 1000);
+	setText(byId("countdown"), String(Math.ceil(left)));
+	byId("countdown-bar").style.width = `${Math.min(100, (100 * left) / whole)}%`;
+}
+
+/* With every state: the tower's own clock is the one that counts. */
+export function follow(state) {
+	const armed = state.tower.state === "ARMED";
+	if (armed) {
+		until = performance.now() + 1000 * state.tower.armed_s;
+		wasArmed = true;
+	} else if (wasArmed) {
+		wasArmed = false;
+		token = null;
+	}
+	show(byId("release"), armed && token !== null && state.hold.mine);
+	setText(
+		byId("release-say"),
+		byId("release").hidden
+			? "Another page armed the tower, or this one was loaded again. It disarms by itself; ABORT disarms now."
+			: "Nobody near the tower? Then release. Without a release the tower disarms by itself.",
+	);
+	show(byId("release-say"), armed);
+	tick();
+}
+
+/* Of the step before: a question that was open is not open any more. */
+export function forget() {
+	ask(false);
+}
+
+export function showArm(state) {
+	const { series, tower } = state;
+	if (!series) return;
+	const done = series.accepted >= series.planned;
+	setText(
+		byId("arm-say"),
+		done
+			? `All ${series.planned} drops are accepted: the series is complete. Another one can still be made.`
+			: `Drop ${series.accepted + 1} of ${series.planned}. All checks are green.`,
+	);
+	setText(
+		byId("arm-what"),
+		`The frame with the product is at ${series.height_m} m, angle ${series.angle_deg}°. ` +
+			"After arming there are 10 s to release. Keep hands and heads out of the tower.",
+	);
+	byId("arm-confirm").dataset.tower = tower.url;
+}
+
+export function listen() {
+	byId("arm").addEventListener("click", () => ask(true));
+	byId("arm-cancel").addEventListener("click", () => {
+		ask(false);
+		byId("arm").focus();
+	});
+	byId("arm-confirm").addEventListener("click", arm);
+	/* An ABORT takes the question back as well. */
+	byId("abort").addEventListener("click", forget);
+	addEventListener("keydown", (event) => event.key === "Escape" && forget(), { capture: true });
+	byId("release").addEventListener("click", release);
+	setInterval(tick, 100);
+}

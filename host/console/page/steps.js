@@ -1,0 +1,129 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The one thing to do now, the checks, and which controls may be used. */
+import * as arm from "./arm.js";
+import { byId, el, setData, setText, show, sign } from "./dom.js";
+import { isBusy } from "./table.js";
+import { GREEN, plain } from "./words.js";
+import { atRest, placeOf, stepOf } from "./workflow.js";
+
+const PANELS = ["setup", "checks", "fault", "arm", "release", "moving", "wait", "decide"];
+
+let current = "";
+let watched = false; /* another console held the arm, and ours has not taken it since */
+
+function mark(step) {
+	const place = placeOf(step);
+	[...byId("steps").children].forEach((item, i) => {
+		setData(item, "when", i < place ? "before" : i > place ? "after" : "now");
+		if (i === place) item.setAttribute("aria-current", "step");
+		else item.removeAttribute("aria-current");
+	});
+}
+
+/* What is scrolled to must not end up below what always stays on top, which is not always as high. */
+export function listen() {
+	const room = () => {
+		document.documentElement.style.scrollPaddingTop = `${byId("top").offsetHeight + 10}px`;
+	};
+	new ResizeObserver(room).observe(byId("top"));
+}
+
+/* What is to do now is at the top; where it all fits, the row of steps above it too. */
+function toNow() {
+	if (matchMedia("(max-width: 900px)").matches) byId("now").scrollIntoView({ block: "start" });
+	else scrollTo(0, 0);
+}
+
+/* Keys must not act on what took the place of the control they were meant for: focus goes to the step's title. */
+function change(step) {
+	const panel = byId(`step-${current || "setup"}`);
+	const hadFocus = panel.contains(document.activeElement) || document.activeElement === document.body;
+	for (const name of PANELS) show(byId(`step-${name}`), name === step);
+	current = step;
+	setData(document.documentElement, "step", step);
+	mark(step);
+	arm.forget();
+	if (!byId("drop").hidden && !isBusy(byId("series-table"))) toNow();
+	if (!hadFocus) return;
+	const title = byId(`step-${step}`).querySelector("h2");
+	title.tabIndex = -1;
+	title.focus({ preventScroll: true });
+}
+
+function checks(list) {
+	const red = list.filter(({ green }) => !green);
+	setText(byId("checks-summary"), red.length ? `${red.length} to do` : "all green");
+	setData(byId("checks-summary"), "level", red.length ? "bad" : "good");
+	setData(byId("checks-card"), "level", red.length ? "bad" : "good");
+	setText(
+		byId("checks-say"),
+		red.length
+			? "Do what is marked. When all is green, the tower is ready."
+			: "All is green. The tower makes itself ready.",
+	);
+	const text = JSON.stringify(list);
+	if (byId("checks").dataset.shown === text) return;
+	byId("checks").dataset.shown = text;
+	const item = ({ name, green, text: what }) =>
+		el(
+			"li",
+			{ data: { check: name, green: green ? "yes" : "no" } },
+			sign(green ? "good" : "bad"),
+			el("span", {}, green ? (GREEN[name] ?? plain(name)) : what),
+		);
+	byId("checks").replaceChildren(...red.map(item), ...list.filter(({ green }) => green).map(item));
+	byId("todo").replaceChildren(...red.map(item));
+}
+
+function holdNotice({ mine, taken }) {
+	if (taken && !mine) watched = true;
+	if (mine) watched = false;
+	show(byId("hold-notice"), watched);
+	setText(
+		byId("hold-text"),
+		taken
+			? "Another console holds the arm. This one watches; ABORT works here too."
+			: "The arm is free. Take it to work from here.",
+	);
+	show(byId("hold-take"), !taken);
+	show(byId("hold-give"), mine);
+}
+
+function enable(model) {
+	const { hold, tower } = model.state;
+	const may = model.connected && !(hold.taken && !hold.mine);
+	for (const button of document.querySelectorAll("[data-command]"))
+		if (button.disabled === may) button.disabled = !may;
+	byId("hold-give").disabled = !model.connected;
+	byId("change-series").disabled = !model.connected || !atRest(tower);
+	for (const id of ["setup-go", "continue-go"]) byId(id).disabled = !may || !atRest(tower) || !tower.open;
+	setData(document.documentElement, "hold", hold.mine ? "mine" : hold.taken ? "other" : "free");
+}
+
+export function disableAll() {
+	for (const button of document.querySelectorAll("[data-command], [data-fault], #simulation button, #hold-give"))
+		button.disabled = true;
+}
+
+/* model: {state, connected, pending, setupOpen}. Returns the step. */
+export function render(model) {
+	const { state } = model;
+	const step = stepOf({
+		tower: state.tower,
+		series: state.series,
+		pending: model.pending,
+		setupOpen: model.setupOpen,
+	});
+	if (step !== current) change(step);
+	checks(state.checks);
+	show(byId("checks-card"), atRest(state.tower) || state.tower.state === "ARMED");
+	holdNotice(state.hold);
+	arm.showArm(state);
+	arm.follow(state);
+	setText(byId("fault-text"), state.tower.fault_text);
+	show(byId("todo"), step === "checks" || step === "fault" || step === "setup");
+	setText(byId("decide-drop"), model.pending);
+	show(byId("setup-back"), state.series !== null);
+	enable(model);
+	return step;
+}

@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The console's events. EventSource cannot send the token, so the stream is read by hand. */
+import { refusal, request } from "./api.js";
+
+const SILENT_MS = 1500; /* then what the page shows is old */
+const GIVE_UP_MS = 4000; /* then the connection is made anew */
+const BACKOFF_MS = [250, 500, 1000, 2000];
+
+function parse(text, on) {
+	let name = "message",
+		data = "";
+	for (const line of text.split("\n")) {
+		if (line.startsWith("event:")) name = line.slice(6).trim();
+		else if (line.startsWith("data:")) data += line.slice(5);
+	}
+	if (data) on(name, JSON.parse(data));
+}
+
+async function read(answer, on) {
+	const reader = answer.body.getReader();
+	const decoder = new TextDecoder();
+	let rest = "";
+	for (;;) {
+		const { value, done } = await reader.read();
+		if (done) return;
+		rest += decoder.decode(value, { stream: true });
+		const whole = rest.split("\n\n");
+		rest = whole.pop();
+		for (const text of whole) parse(text, on);
+	}
+}
+
+/* on(name, data) for each event; connected(bool) whenever that changes. */
+export function follow(on, connected) {
+	let heard = -Infinity,
+		begun = 0,
+		failures = 0,
+		is = null,
+		attempt = null,
+		stopped = false;
+
+	const tell = (value) => {
+		if (value !== is) connected((is = value));
+	};
+	const event = (name, data) => {
+		heard = performance.now();
+		failures = 0;
+		tell(true);
+		on(name, data);
+	};
+	async function once() {
+		attempt = new AbortController();
+		begun = performance.now();
+		const answer = await request("GET", "/api/stream", { signal: attempt.signal });
+		if (!answer.ok) throw await refusal(answer);
+		await read(answer, event);
+	}
+	async function forever() {
+		while (!stopped) {
+			try {
+				await once();
+			} catch (error) {
+				if (error.status === 401) return;
+			}
+			attempt = null;
+			const pause = BACKOFF_MS[Math.min(failures++, BACKOFF_MS.length - 1)];
+			await new Promise((resolve) => setTimeout(resolve, pause));
+		}
+	}
+	setInterval(() => {
+		const now = performance.now();
+		if (now - heard > SILENT_MS) tell(false);
+		if (now - Math.max(heard, begun) > GIVE_UP_MS) attempt?.abort();
+	}, 200);
+	addEventListener("pagehide", () => {
+		stopped = true;
+		attempt?.abort();
+	});
+	forever();
+}

@@ -1,0 +1,154 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Names of the tower, of records and of analyses, in words; and numbers as a technician reads them. */
+
+/* An input in words when it is on and off, and which of them a tower that is ready has. */
+const INPUTS = {
+	LATCH_CLOSED: ["latch closed", "latch open", true],
+	PRODUCT_HELD: ["product held", "no product held", true],
+	DAMPERS_ENGAGED: ["dampers engaged", "dampers not engaged", true],
+	DOOR_CLOSED: ["door closed", "door open", true],
+	ESTOP_CLEAR: ["E-stop clear", "E-stop pressed", true],
+	SUPPLY_GOOD: ["supply good", "supply low", true],
+	GATE_UPPER: ["upper gate blocked", "upper gate clear", false],
+	GATE_LOWER: ["lower gate blocked", "lower gate clear", false],
+	FRAME_DOWN: ["frame down", "frame up", false],
+	IEPE_S1: ["S1 cables good", "S1 cable bad", true],
+	IEPE_S2: ["S2 cables good", "S2 cable bad", true],
+	OVERRUN: ["samples missed", "no sample missed", false],
+};
+
+/* A check that is green, in words; what to do for one that is not comes from the tower. */
+export const GREEN = {
+	LATCH: "frame latched",
+	PRODUCT: "product held",
+	DAMPERS: "dampers engaged",
+	DOOR: "door closed",
+	ESTOP: "E-stop clear",
+	SUPPLY: "supply charged",
+	GATES: "light gates clear",
+	HOST: "host fits the tower",
+	SENSOR_S1: "S1 quiet",
+	SENSOR_S2: "S2 quiet",
+	TRIGGER: "below the trigger",
+	OPEN_S1: "S1 plugged in",
+	OPEN_S2: "S2 plugged in",
+	SHORT_S1: "S1 not shorted",
+	SHORT_S2: "S2 not shorted",
+};
+
+export const plain = (name) =>
+	name
+		.toLowerCase()
+		.replaceAll("_", " ")
+		.replace(/\bs([12])\b/g, "S$1")
+		.replace("estop", "E-stop");
+
+export function inputWords({ name, on }) {
+	const words = INPUTS[name];
+	if (!words) return { text: `${plain(name)} ${on ? "on" : "off"}`, good: true };
+	return { text: on ? words[0] : words[1], good: on === words[2] };
+}
+
+export const FLAGS = {
+	lost_samples: "samples never arrived; they are left out, nothing is drawn or fitted across them",
+	bad_samples: "samples were not taken",
+	clipped: "beyond the sensor's range: the true peak may be higher",
+	incomplete: "the capture could not be completed",
+	crc_unknown: "the capture end is missing, so completeness cannot be proven",
+	slow_frame: "the frame fell slower than free fall: check rails and bearings",
+	no_impact: "no impact was seen: the capture was ended by time",
+	fault: "a fault was latched during the drop",
+	uneven_sampling: "the samples are not evenly spaced",
+	full_scale: "at the converter's limit: the true value is unknown",
+	overrun: "the controller missed samples; they are marked and left out",
+	zero_shift: "the offset after the drop is not the one before: the sensor may have been overloaded",
+	cable: "a sensor lost its supply during the drop: check its cable",
+	stuck: "one value for 20 ms: check sensor and converter",
+	spike: "single outliers were left out: look for a loose contact",
+	zeroed: "runs of exact zeros were left out: data were lost on the way",
+	offset: "zero was far off before the pulse; it was taken off",
+	drift: "zero moved before the pulse; that was taken off",
+	hum: "the mains shows before the pulse; it was taken off: check screen and earth",
+	too_short: "the record begins or ends inside its pulse",
+};
+
+const STATUS = {
+	clipped: "clipped",
+	short: "too short",
+	no_peak: "no peak",
+	ambiguous: "ambiguous",
+	not_converged: "no fit",
+};
+
+export const statusWords = (status) => STATUS[status] ?? plain(status ?? "");
+
+export const FAULTS = {
+	door_open: "Door open",
+	estop: "Emergency stop",
+	supply_low: "Supply low",
+	dampers_out: "Dampers out",
+	gate_upper_dead: "Upper gate dead",
+	gate_lower_dead: "Lower gate dead",
+	latch_stuck: "Latch stuck",
+	magnet_weak: "Magnet weak",
+	cable_s1: "S1 cable open",
+	cable_s2: "S2 cable open",
+	short_s1: "S1 cable shorted",
+	short_s2: "S2 cable shorted",
+};
+
+/* The columns of every table of drops: JSON key of a drop, key of the means, unit of both, head, scale, decimals. */
+const column = (mean, unit, head, shown, scale = 1, decimals = 1) => ({
+	mean,
+	unit,
+	head,
+	shown,
+	scale,
+	decimals,
+	key: `${mean}_${unit}`,
+});
+export const COLUMNS = [
+	column("s1_x", "g", "S1 X", "g"),
+	column("s1_y", "g", "S1 Y", "g"),
+	column("s1_r", "g", "S1 XY", "g"),
+	column("s1_z", "g", "S1 Z", "g"),
+	column("s2_x", "g", "S2 X", "g"),
+	column("s2_y", "g", "S2 Y", "g"),
+	column("s2_r", "g", "S2 XY", "g"),
+	column("s2_z", "g", "S2 Z", "g"),
+	column("lag_largest_peak", "s", "lag", "ms", 1000, 3),
+	column("frequency", "hz", "plate", "Hz"),
+	column("damping", "ratio", "damping", "", 1, 4),
+];
+
+export function number(value, decimals = 1) {
+	if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+	return value.toFixed(decimals).replace("-", "−");
+}
+
+export function withSigma(value, sigma, decimals) {
+	const text = number(value, decimals);
+	return text === "–" || !Number.isFinite(sigma) ? text : `${text} ± ${number(sigma, decimals)}`;
+}
+
+export function bytes(count) {
+	if (!Number.isFinite(count)) return "–";
+	const [size, unit] = count >= 1e9 ? [1e9, "GB"] : [1e6, "MB"];
+	return `${(count / size).toFixed(count >= 1e10 ? 0 : 1)} ${unit}`;
+}
+
+const two = (n) => String(n).padStart(2, "0");
+
+/* UTC in the archive, the laboratory's clock on the page; the date unless it is today. */
+export function time(iso) {
+	const date = new Date(iso);
+	if (Number.isNaN(date.getTime())) return iso ?? "";
+	const day = `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())}`;
+	const clock = `${two(date.getHours())}:${two(date.getMinutes())}`;
+	return date.toDateString() === new Date().toDateString() ? clock : `${day} ${clock}`;
+}
+
+export function clock() {
+	const now = new Date();
+	return [now.getHours(), now.getMinutes(), now.getSeconds()].map(two).join(":");
+}

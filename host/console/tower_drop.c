@@ -1,0 +1,329 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * A drop, from its ARM to its hand-over. It goes by what the tower says of its state, so that it ends well
+ * whoever released or aborted it, and whether the link held or not.
+ */
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/wire_table.h"
+#include "host/console/tower_private.h"
+
+enum {
+	DROP_MS = 20000,    /* fall, capture and upload take about one second */
+	ARM_LATE_MS = 2000, /* after the tower should have disarmed by itself */
+	SETTLE_MS =
+	        100, /* a state is believed: the last blocks on their way may still carry the one before */
+};
+
+struct tower_drop *tower_drop_new(const char *series)
+{
+	struct tower_drop *drop = calloc(1, sizeof(*drop));
+
+	if (drop == NULL)
+		return NULL;
+	drop->recording.lock = -1;
+	record_init(&drop->record);
+	snprintf(drop->series, sizeof(drop->series), "%s", series);
+	return drop;
+}
+
+/* ---- the log ---- */
+
+static bool open_log(struct tower *tower)
+{
+	char url[ARCHIVE_PATH_MAX + 8], message[SESSION_MESSAGE_MAX];
+
+	snprintf(url, sizeof(url), "log:%s", tower->drop->recording.log);
+	tower->log = link_open(url, LINK_WRITE, message, sizeof(message));
+	if (tower->log == NULL)
+		snprintf(tower->drop_trouble, sizeof(tower->drop_trouble), "%s", message);
+	session_log(tower->session, tower->log);
+	return tower->log != NULL;
+}
+
+/* Whether every frame is in it. */
+static bool close_log(struct tower *tower)
+{
+	bool whole = tower->log != NULL;
+
+	if (tower->session != NULL)
+		session_log(tower->session, NULL);
+	if (tower->log != NULL)
+		whole = link_close(tower->log) == 0;
+	tower->log = NULL;
+	return whole;
+}
+
+void tower_drop_log_failed(struct tower *tower)
+{
+	(void)close_log(tower);
+	snprintf(tower->drop_trouble, sizeof(tower->drop_trouble), "%.300s: could not be written",
+	         tower->drop->recording.raw);
+	if (tower->phase <= TOWER_ARMED)
+		atomic_fetch_add(&tower->aborts, 1); /* nothing shall fall that is not recorded */
+}
+
+/* ---- its phases ---- */
+
+static void enter(struct tower *tower, enum tower_phase phase)
+{
+	tower->phase = phase;
+	tower->phase_ms = session_now_ms();
+	tower->rest_ms = 0;
+	if (phase != TOWER_ARMED)
+		tower->armed_until_ms = 0;
+}
+
+static void take(struct tower *tower, struct tower_drop *drop)
+{
+	tower->drop = drop;
+	tower->fault = WIRE_FAULT_NONE;
+	tower->abort_moving = false;
+	tower->drop_trouble[0] = '\0';
+	tower->drop_name[0] = '\0';
+	if (drop->recording.lock >= 0)
+		snprintf(tower->drop_name, sizeof(tower->drop_name), "%s/%u", drop->series,
+		         drop->recording.number);
+}
+
+bool tower_drop_begin(struct tower *tower, struct tower_drop *drop)
+{
+	take(tower, drop);
+	if (!open_log(tower)) {
+		tower_drop_end(tower);
+		return false;
+	}
+	enter(tower, TOWER_ARMING);
+	return true;
+}
+
+void tower_drop_armed(struct tower *tower)
+{
+	enter(tower, TOWER_ARMED);
+	tower->armed_until_ms =
+	        tower->phase_ms + (int64_t)wire_parameters[WIRE_PARAMETER_arm_timeout_ms].initial;
+}
+
+void tower_drop_released(struct tower *tower)
+{
+	tower->drop->released = true;
+	enter(tower, TOWER_MOVING);
+}
+
+void tower_drop_end(struct tower *tower)
+{
+	(void)close_log(tower);
+	if (tower->drop != NULL)
+		work_discard(tower->console->work, tower->drop);
+	tower->drop = NULL;
+	tower->drop_name[0] = '\0';
+	enter(tower, TOWER_IDLE);
+}
+
+void tower_drop_leave(struct tower *tower)
+{
+	if (tower->phase == TOWER_ARMED) {
+		atomic_fetch_add(&tower->aborts, 1);
+		tower_obey_abort(tower);
+	}
+	if (tower->drop != NULL)
+		tower_drop_end(tower);
+}
+
+static void __attribute__((format(printf, 2, 3))) give_up(struct tower *tower, const char *format, ...)
+{
+	va_list arguments;
+
+	tower->origin = "was given up before it was collected";
+	tower_drop_end(tower);
+	va_start(arguments, format);
+	vsnprintf(tower->drop_trouble, sizeof(tower->drop_trouble), format, arguments);
+	va_end(arguments);
+}
+
+/* ---- collecting ---- */
+
+/* A drop that we did not release. */
+static struct tower_drop *without_recording(const struct tower *tower)
+{
+	struct tower_drop *drop = tower_drop_new(tower->series);
+
+	if (drop == NULL)
+		return NULL;
+	drop->released = true;
+	snprintf(drop->note, sizeof(drop->note), "%s", tower->origin);
+	return drop;
+}
+
+static void add_note(struct tower_drop *drop, const char *text)
+{
+	size_t length = strlen(drop->note);
+
+	snprintf(drop->note + length, sizeof(drop->note) - length, "%s%s", length > 0 ? "; " : "", text);
+}
+
+/* The drop that the record belongs to, no longer the tower's; NULL without memory. */
+static struct tower_drop *hand_over(struct tower *tower)
+{
+	struct tower_drop *drop = tower->drop;
+
+	if (drop == NULL)
+		drop = without_recording(tower);
+	if (!close_log(tower) && drop != NULL && drop->recording.lock >= 0)
+		add_note(drop, "the log could not be written while it fell");
+	tower->drop = NULL;
+	return drop;
+}
+
+static void collected(struct tower *tower, struct record *record)
+{
+	struct tower_drop *drop = hand_over(tower);
+
+	if (drop == NULL) {
+		record_free(record);
+		give_up(tower, "the drop is lost: %s", error_text(DT_E_MEMORY));
+		return;
+	}
+	if (tower->abort_moving)
+		add_note(drop, "aborted in motion");
+	else if (tower->fault != WIRE_FAULT_NONE)
+		add_note(drop, wire_fault_text(tower->fault));
+	drop->record = *record;
+	enter(tower, TOWER_SAVING);
+	work_keep(tower->console->work, drop);
+}
+
+void tower_saved(struct tower *tower, const char *drop, const char *trouble)
+{
+	pthread_mutex_lock(&tower->lock);
+	tower->saved = true;
+	snprintf(tower->saved_trouble, sizeof(tower->saved_trouble), "%s", drop[0] != '\0' ? "" : trouble);
+	pthread_mutex_unlock(&tower->lock);
+}
+
+static void take_saved(struct tower *tower)
+{
+	bool saved;
+
+	pthread_mutex_lock(&tower->lock);
+	saved = tower->saved;
+	tower->saved = false;
+	if (saved)
+		snprintf(tower->drop_trouble, sizeof(tower->drop_trouble), "%s", tower->saved_trouble);
+	pthread_mutex_unlock(&tower->lock);
+	if (saved && tower->phase == TOWER_SAVING) {
+		tower->drop_name[0] = '\0';
+		enter(tower, TOWER_IDLE);
+	}
+}
+
+/* ---- following ---- */
+
+static bool drops(unsigned state)
+{
+	return wire_state_moving(state) || state == WIRE_STATE_CAPTURED;
+}
+
+/* Whether what is there of the tower's state has been so for long enough to be believed. */
+static bool settled(struct tower *tower, bool now)
+{
+	if (!now)
+		tower->rest_ms = 0;
+	else if (tower->rest_ms == 0)
+		tower->rest_ms = session_now_ms();
+	return now && session_now_ms() - tower->rest_ms >= SETTLE_MS;
+}
+
+/* No drop can come of this state. */
+static bool at_rest(unsigned state)
+{
+	return !drops(state) && state != WIRE_STATE_ARMED && state != WIRE_STATE_UPLOADED;
+}
+
+static void follow_idle(struct tower *tower, unsigned state)
+{
+	struct tower_drop *drop;
+
+	if (at_rest(state))
+		tower->origin = "was not released from the console";
+	if (!settled(tower, drops(state) && tower->series[0] != '\0'))
+		return;
+	drop = without_recording(tower);
+	if (drop == NULL)
+		return;
+	take(tower, drop);
+	enter(tower, TOWER_MOVING);
+}
+
+static void follow_armed(struct tower *tower, unsigned state)
+{
+	if (drops(state))
+		tower_drop_released(tower);
+	else if (settled(tower, at_rest(state)))
+		tower_drop_end(tower);
+}
+
+static void follow_drop(struct tower *tower, const struct session_view *view)
+{
+	if (view->fault != WIRE_FAULT_NONE)
+		tower->fault = view->fault;
+	if (tower->phase == TOWER_MOVING && view->state == WIRE_STATE_CAPTURED)
+		enter(tower, TOWER_COLLECTING);
+	if (settled(tower, at_rest(view->state)))
+		give_up(tower, "nothing was captured: %s",
+		        tower->fault != WIRE_FAULT_NONE ? wire_fault_text(tower->fault)
+		                                        : "the frame did not move");
+}
+
+static void follow_phase(struct tower *tower, const struct session_view *view)
+{
+	switch (tower->phase) {
+	case TOWER_IDLE:
+		follow_idle(tower, view->state);
+		break;
+	case TOWER_ARMED:
+		follow_armed(tower, view->state);
+		break;
+	case TOWER_MOVING:
+	case TOWER_COLLECTING:
+		follow_drop(tower, view);
+		break;
+	case TOWER_ARMING:
+	case TOWER_SAVING:
+		break;
+	}
+}
+
+/* Whether the link is there or not. */
+static void watch_time(struct tower *tower)
+{
+	int64_t now_ms = session_now_ms();
+
+	if (tower->phase == TOWER_ARMED && now_ms > tower->armed_until_ms + ARM_LATE_MS)
+		give_up(tower, "armed, and then nothing was heard of the tower");
+	else if ((tower->phase == TOWER_MOVING || tower->phase == TOWER_COLLECTING) &&
+	         now_ms > tower->phase_ms + DROP_MS)
+		give_up(tower, "no capture within %d s of the release", DROP_MS / 1000);
+}
+
+void tower_drop_follow(struct tower *tower)
+{
+	struct record record;
+	int taken = 0;
+
+	take_saved(tower);
+	if (tower->session != NULL && session_view(tower->session)->seen) {
+		if (tower->phase != TOWER_SAVING)
+			taken = session_take_drop(tower->session, &record);
+		if (taken > 0)
+			collected(tower, &record);
+		else if (taken < 0)
+			give_up(tower, "the drop could not be collected: %s", error_text(taken));
+		else
+			follow_phase(tower, session_view(tower->session));
+	}
+	watch_time(tower);
+}

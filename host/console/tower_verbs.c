@@ -1,0 +1,367 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * What the operator asks for. Each verb is begun on any thread (tower_arm ...) and sent on the tower's
+ * (send_arm ...). An ABORT that was asked for after it makes it void wherever it is on its way.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/wire_table.h"
+#include "host/command/command.h"
+#include "host/console/tower_private.h"
+
+enum { LINE_MAX_CHARACTERS = 150 };
+
+static void finish(struct job *job)
+{
+	tower_publish(job->console->tower);
+	job_done(job);
+}
+
+static void answer_empty(struct job *job)
+{
+	job_answer_json(job, cJSON_CreateObject());
+}
+
+/* Puts the job into queue with run, or answers it. */
+static bool hand_on(struct job *job, struct job_queue *queue, void (*run)(struct job *job))
+{
+	int result;
+
+	job->run = run;
+	result = job_put(queue, job);
+	if (result == 0)
+		return true;
+	job_refuse(job, 503, "%s",
+	           result == DT_E_CLOSED ? "the console is ending" : "too much is asked for at once");
+	job_done(job);
+	return false;
+}
+
+/* ---- arm ---- */
+
+static void answer_token(struct job *job, uint16_t token)
+{
+	cJSON *tree = cJSON_CreateObject();
+
+	if (tree != NULL) {
+		cJSON_AddNumberToObject(tree, "token", token);
+		cJSON_AddNumberToObject(tree, "expires_s",
+		                        wire_parameters[WIRE_PARAMETER_arm_timeout_ms].initial / 1000.0);
+	}
+	job_answer_json(job, tree);
+}
+
+static void arm(struct job *job, struct tower_drop *drop)
+{
+	struct tower *tower = job->console->tower;
+	uint16_t token = session_token();
+	int result;
+
+	if (!tower_drop_begin(tower, drop)) {
+		job_refuse(job, 500, "%s", tower->drop_trouble);
+		return;
+	}
+	tower_publish(tower);
+	result = session_command(tower->session, WIRE_OP_ARM, token);
+	if (result == 0)
+		tower_drop_armed(tower);
+	else
+		tower_drop_end(tower);
+	if (result == DT_E_TIMEOUT && !tower_is_void(tower, tower->wanted))
+		atomic_fetch_add(&tower->aborts, 1); /* it may be armed all the same */
+	if (result == 0 && !tower_is_void(tower, tower->wanted))
+		answer_token(job, token);
+	else
+		tower_refuse_result(job, result);
+}
+
+static void send_arm(struct job *job)
+{
+	struct tower *tower = job->console->tower;
+	struct tower_drop *drop = job->luggage;
+	bool may = false;
+
+	tower->wanted = drop->aborted;
+	if (tower_is_void(tower, drop->aborted))
+		job_refuse(job, 409, "aborted");
+	else if (strcmp(drop->series, tower->series) != 0)
+		job_refuse(job, 409, "another series was selected");
+	else
+		may = tower_check_arm(job);
+	if (may)
+		arm(job, drop);
+	else
+		work_discard(tower->console->work, drop);
+	finish(job);
+}
+
+static void begin_arm(struct job *job)
+{
+	work_begin(job, send_arm);
+}
+
+void tower_arm(struct job *job)
+{
+	struct tower *tower = job->console->tower;
+	unsigned aborted = atomic_load(&tower->aborts);
+	struct tower_drop *drop;
+
+	if (!tower_check_arm(job)) {
+		job_done(job);
+		return;
+	}
+	pthread_mutex_lock(&tower->lock);
+	drop = tower_drop_new(tower->view.series);
+	pthread_mutex_unlock(&tower->lock);
+	if (drop == NULL) {
+		job_refuse(job, 500, "%s", error_text(DT_E_MEMORY));
+		job_done(job);
+		return;
+	}
+	drop->aborted = aborted;
+	job->luggage = drop;
+	if (!hand_on(job, &job->console->work_queue, begin_arm))
+		free(drop);
+}
+
+/* ---- release, clear ---- */
+
+/* Of a verb without luggage of its own: how many aborts were asked for before it. */
+static void mark(struct job *job)
+{
+	job->luggage = (void *)(uintptr_t)atomic_load(&job->console->tower->aborts);
+}
+
+/* False with job refused when it is void, or there is no tower to send it to. */
+static bool check_sending(struct job *job)
+{
+	struct tower *tower = job->console->tower;
+
+	tower->wanted = (unsigned)(uintptr_t)job->luggage;
+	if (tower_is_void(tower, tower->wanted))
+		job_refuse(job, 409, "aborted");
+	else if (tower->session == NULL)
+		job_refuse(job, 503, "no tower is heard");
+	else
+		return true;
+	return false;
+}
+
+static void release(struct job *job, uint16_t token)
+{
+	struct tower *tower = job->console->tower;
+	int result = session_command(tower->session, WIRE_OP_RELEASE, token);
+
+	/* unanswered it may have worked */
+	if (result == 0 || result == DT_E_TIMEOUT || result == DT_E_CLOSED || result == DT_E_LINK ||
+	    result == DT_E_SYSTEM)
+		tower_drop_released(tower);
+	if (result == 0)
+		answer_empty(job);
+	else
+		tower_refuse_result(job, result);
+}
+
+static void send_release(struct job *job)
+{
+	struct tower *tower = job->console->tower;
+	double token;
+
+	if (check_sending(job) && job_number(job, "token", 1, UINT16_MAX, NAN, &token)) {
+		if (tower->phase == TOWER_ARMED)
+			release(job, (uint16_t)token);
+		else
+			job_refuse(job, 409, "nothing is armed");
+	}
+	finish(job);
+}
+
+void tower_release(struct job *job)
+{
+	mark(job);
+	(void)hand_on(job, &job->console->tower_queue, send_release);
+}
+
+static void send_clear(struct job *job)
+{
+	struct tower *tower = job->console->tower;
+
+	if (check_sending(job)) {
+		int result = session_command(tower->session, WIRE_OP_CLEAR, 0);
+
+		if (result == 0)
+			answer_empty(job);
+		else
+			tower_refuse_result(job, result);
+	}
+	finish(job);
+}
+
+void tower_clear(struct job *job)
+{
+	mark(job);
+	(void)hand_on(job, &job->console->tower_queue, send_clear);
+}
+
+/* ---- abort ---- */
+
+void tower_obey_abort(struct tower *tower)
+{
+	unsigned asked = atomic_load(&tower->aborts);
+
+	if (asked == tower->aborted)
+		return;
+	tower->aborted = asked;
+	tower->abort_result = DT_E_CLOSED;
+	if (tower->session == NULL)
+		return;
+	if (tower->phase == TOWER_MOVING)
+		tower->abort_moving = true;
+	tower->abort_result = session_command(tower->session, WIRE_OP_ABORT, 0);
+}
+
+static void answer_abort(struct job *job)
+{
+	struct tower *tower = job->console->tower;
+
+	tower_obey_abort(tower);
+	if (tower->abort_result == 0)
+		answer_empty(job);
+	else if (tower->abort_result == DT_E_TIMEOUT)
+		job_refuse(job, 504, "ABORT was sent, the tower does not answer");
+	else
+		job_refuse(job, 503, "no tower is heard: %s", error_text(tower->abort_result));
+	finish(job);
+}
+
+void tower_abort(struct job *job)
+{
+	atomic_fetch_add(&job->console->tower->aborts, 1);
+	(void)hand_on(job, &job->console->tower_queue, answer_abort);
+}
+
+/* ---- select ---- */
+
+/* A simulated tower of our own becomes one of that scene. */
+static bool change_bench(struct tower *tower, const struct tower_scene *scene)
+{
+	if (!tower->own)
+		return true;
+	if (tower_bench_scene(tower, scene) != 0)
+		return false;
+	tower_link_close(tower, 0);
+	tower_bench_stop(tower);
+	live_restart(tower->console->live);
+	return true;
+}
+
+static void select_series(struct job *job, const struct tower_scene *scene)
+{
+	struct tower *tower = job->console->tower;
+
+	if (!change_bench(tower, scene)) {
+		job_refuse(job, 500, "the scene: %s", error_text(DT_E_SYSTEM));
+		return;
+	}
+	snprintf(tower->series, sizeof(tower->series), "%s", scene->series);
+	tower->scene = scene->scene;
+	if (tower->session != NULL)
+		session_hold(tower->session, false);
+	tower->drop_trouble[0] = '\0';
+	tower->setup_trouble[0] = '\0';
+	tower->setup_due = true;
+	tower->setup_due_ms = 0;
+	if (tower_set_up(tower) == COMMAND_DONE)
+		answer_empty(job);
+	else
+		job_refuse(job, 409, "%s is selected, but %s", tower->series, tower->setup_trouble);
+}
+
+static void send_select(struct job *job)
+{
+	struct tower *tower = job->console->tower;
+	struct tower_scene *scene = job->luggage;
+
+	if (tower_is_void(tower, scene->aborted))
+		job_refuse(job, 409, "aborted");
+	else if (tower_check_select(job))
+		select_series(job, scene);
+	free(scene->text);
+	free(scene);
+	finish(job);
+}
+
+static void begin_select(struct job *job)
+{
+	work_scene(job, send_select);
+}
+
+void tower_select(struct job *job)
+{
+	const char *series = job_text(job, "series", NULL);
+	struct tower_scene *scene = NULL;
+
+	if (series == NULL || !tower_check_select(job)) {
+		job_done(job);
+		return;
+	}
+	if (strlen(series) < sizeof(scene->series))
+		scene = calloc(1, sizeof(*scene));
+	if (scene == NULL) {
+		job_refuse(job, 404, "no series of that name");
+		job_done(job);
+		return;
+	}
+	snprintf(scene->series, sizeof(scene->series), "%s", series);
+	scene->aborted = atomic_load(&job->console->tower->aborts);
+	job->luggage = scene;
+	if (!hand_on(job, &job->console->work_queue, begin_select))
+		free(scene);
+}
+
+/* ---- simulate ---- */
+
+static void send_line(struct job *job)
+{
+	tower_bench_say(job->console->tower, job, job_text(job, "line", NULL));
+}
+
+static bool is_line(const char *text)
+{
+	size_t length = strlen(text);
+
+	for (size_t i = 0; i < length; i++)
+		if (text[i] < ' ' || text[i] > '~')
+			return false;
+	return length > 0 && length <= LINE_MAX_CHARACTERS;
+}
+
+static bool has_control(struct tower *tower)
+{
+	bool simulated;
+
+	pthread_mutex_lock(&tower->lock);
+	simulated = tower->view.simulated;
+	pthread_mutex_unlock(&tower->lock);
+	return simulated;
+}
+
+void tower_simulate(struct job *job)
+{
+	const char *line = NULL;
+
+	if (!has_control(job->console->tower))
+		job_refuse(job, 404, "this tower is not simulated");
+	else
+		line = job_text(job, "line", NULL);
+	if (line != NULL && is_line(line)) {
+		(void)hand_on(job, &job->console->tower_queue, send_line);
+		return;
+	}
+	if (line != NULL)
+		job_refuse(job, 400, "\"line\": expected 1 to %d printable characters", LINE_MAX_CHARACTERS);
+	job_done(job);
+}

@@ -1,0 +1,191 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * A drop's way into the archive. What was collected is not lost: where the archive does not take it, its
+ * frames go into a file of their own, and the view tells which.
+ */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "common/link/link.h"
+#include "host/command/archived.h"
+#include "host/console/work_private.h"
+#include "host/record/write.h"
+
+/* ---- before ---- */
+
+void work_begin(struct job *job, void (*then)(struct job *job))
+{
+	struct work *work = job->console->work;
+	struct tower_drop *drop = job->luggage;
+	int result = 0;
+
+	work->tower_there = true;
+	if (work->view.disk_free_bytes < WORK_RESERVE_BYTES) {
+		job_refuse(job, 507, "%.0f MB left on the disk, expected %.0f MB for a drop",
+		           work->view.disk_free_bytes / 1e6, WORK_RESERVE_BYTES / 1e6);
+	} else {
+		result = archive_begin(work->archive, drop->series, work->options.operator_name, ".log",
+		                       &drop->recording);
+		if (result != 0)
+			job_refuse(job, work_status(result), "%s", archive_message(work->archive));
+	}
+	job->run = then;
+	if (drop->recording.lock >= 0 && job_put(&job->console->tower_queue, job) == 0) {
+		work_changed(work);
+		return;
+	}
+	if (drop->recording.lock >= 0) {
+		archive_discard(work->archive, &drop->recording);
+		job_refuse(job, 503, "the tower's thread takes nothing more");
+	}
+	record_free(&drop->record);
+	free(drop);
+	job_done(job);
+}
+
+/* ---- after ---- */
+
+static int send_frame(void *context, const struct frame *frame)
+{
+	return link_send(context, frame);
+}
+
+/* Writes the record's frames into the log, instead of what is there. */
+static int write_log(struct tower_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
+{
+	char url[ARCHIVE_PATH_MAX + 8];
+	struct link *log;
+	int result;
+
+	snprintf(url, sizeof(url), "log:%s", drop->recording.log);
+	log = link_open(url, LINK_WRITE, message, ARCHIVE_MESSAGE_MAX);
+	if (log == NULL)
+		return DT_E_SYSTEM;
+	result = write_frames(&drop->record, send_frame, log);
+	if (link_close(log) != 0 && result == 0)
+		result = DT_E_SYSTEM;
+	if (result != 0)
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%.500s: could not be written", drop->recording.log);
+	return result;
+}
+
+/* A disk that was full for a moment leaves a log with holes, and no error afterwards. */
+static bool log_is_whole(const struct tower_drop *drop)
+{
+	char message[READ_MESSAGE_MAX];
+	struct record read;
+	bool whole;
+
+	if (read_record(&read, drop->recording.log, NULL, message) != 0)
+		return false;
+	whole = read.drop_id == drop->record.drop_id && read.lost_samples <= drop->record.lost_samples &&
+	        read.crc_agrees >= drop->record.crc_agrees;
+	record_free(&read);
+	return whole;
+}
+
+static int record_drop(struct work *work, struct tower_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
+{
+	int result = 0;
+
+	if (drop->recording.lock < 0)
+		result = archive_begin(work->archive, drop->series, work->options.operator_name, ".log",
+		                       &drop->recording);
+	if (result == 0 && !log_is_whole(drop) && write_log(drop, message) != 0) {
+		archive_abandon(&drop->recording);
+		return DT_E_SYSTEM;
+	}
+	if (result == 0)
+		result = archive_finish(work->archive, &drop->recording, 0, drop->note);
+	if (result != 0)
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%s", archive_message(work->archive));
+	return result;
+}
+
+/* The frames to where there is room; message is what the archive said, and then also where they are. */
+static void rescue(const struct work *work, const struct tower_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
+{
+	const char *folder[] = {archive_folder(work->archive), "/var/tmp", "/tmp"};
+	char path[ARCHIVE_PATH_MAX], why[READ_MESSAGE_MAX];
+	size_t length;
+
+	for (size_t i = 0; i < sizeof(folder) / sizeof(folder[0]); i++) {
+		snprintf(path, sizeof(path), "%s/rescued-%" PRId64 "-drop-%u.log", folder[i],
+		         (int64_t)time(NULL), drop->record.drop_id);
+		if (write_record(&drop->record, path, why) != 0)
+			continue;
+		length = strnlen(message, ARCHIVE_MESSAGE_MAX / 2);
+		snprintf(message + length, ARCHIVE_MESSAGE_MAX - length,
+		         "; the drop is in %s, 'droptower series add' takes it in", path);
+		return;
+	}
+	length = strnlen(message, ARCHIVE_MESSAGE_MAX / 2);
+	snprintf(message + length, ARCHIVE_MESSAGE_MAX - length,
+	         "; no place was found for the drop's frames, %s has what came",
+	         drop->recording.log[0] != '\0' ? drop->recording.log : "nothing");
+}
+
+static void keep(struct job *way)
+{
+	struct tower_drop *drop = way->maker;
+	struct work *work = way->console->work;
+	const struct archive_recording *r = &drop->recording;
+	char name[ARCHIVE_NAME_MAX + 16] = "", message[ARCHIVE_MESSAGE_MAX] = "";
+	bool analysed = false;
+
+	work->tower_there = true;
+	if (record_drop(work, drop, message) != 0) {
+		rescue(work, drop, message);
+	} else {
+		snprintf(name, sizeof(name), "%s/%u", r->series, r->number);
+		analysed = archived_result(work->archive, r->series, r->number, r->raw, message) == 0;
+	}
+	work_changed(work);
+	pthread_mutex_lock(&work->lock);
+	if (analysed)
+		strcpy(work->view.result, name);
+	snprintf(work->view.trouble, sizeof(work->view.trouble), "%s", analysed ? "" : message);
+	pthread_mutex_unlock(&work->lock);
+	tower_saved(work->console->tower, name, analysed ? "" : message);
+	record_free(&drop->record);
+	free(drop);
+}
+
+static void discard(struct job *way)
+{
+	struct tower_drop *drop = way->maker;
+	struct work *work = way->console->work;
+
+	if (drop->recording.lock >= 0 && drop->released)
+		archive_abandon(&drop->recording);
+	else if (drop->recording.lock >= 0)
+		archive_discard(work->archive, &drop->recording);
+	work_changed(work);
+	record_free(&drop->record);
+	free(drop);
+}
+
+static void send(struct work *work, struct tower_drop *drop, void (*run)(struct job *job))
+{
+	drop->way = (struct job){.console = work->console, .run = run, .maker = drop};
+	if (job_put_first(&work->console->work_queue, &drop->way) == 0)
+		return;
+	/* the program ends: what is on the disk shows up as interrupted */
+	if (drop->recording.lock >= 0)
+		archive_abandon(&drop->recording);
+	record_free(&drop->record);
+	free(drop);
+}
+
+void work_keep(struct work *work, struct tower_drop *drop)
+{
+	send(work, drop, keep);
+}
+
+void work_discard(struct work *work, struct tower_drop *drop)
+{
+	send(work, drop, discard);
+}

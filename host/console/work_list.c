@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * What the archive says of series, drops and results, in the very bytes that `droptower series` prints.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/archive/print.h"
+#include "host/console/work_private.h"
+
+struct wanted {
+	struct archive_filter filter;
+	struct archive_dates dates;
+	bool undecided;
+};
+
+/* False with the job refused. */
+static bool read_query(struct job *job, struct wanted *w)
+{
+	const char *angle = job->query(job, "angle_deg"), *date = job->query(job, "date"),
+	           *undecided = job->query(job, "undecided");
+	char *end;
+
+	w->filter = archive_filter_none();
+	w->filter.series = job->query(job, "series");
+	w->filter.campaign = job->query(job, "campaign");
+	w->filter.scene_name = job->query(job, "scene");
+	w->undecided = undecided != NULL && strcmp(undecided, "1") == 0;
+	if (angle != NULL) {
+		w->filter.angle_deg = strtod(angle, &end);
+		if (end == angle || *end != '\0' || !isfinite(w->filter.angle_deg)) {
+			job_refuse(job, 400, "angle_deg is '%.40s', expected a number", angle);
+			return false;
+		}
+	}
+	if (date == NULL || archive_parse_dates(date, &w->dates, &w->filter))
+		return true;
+	job_refuse(job, 400, "date is '%.40s', expected YYYY, YYYY-MM, YYYY-MM-DD, or two of them with ..",
+	           date);
+	return false;
+}
+
+/* A list of no such series is no empty list. */
+static int check_series(struct archive *archive, const struct wanted *w)
+{
+	struct scene scene;
+
+	return w->filter.series != NULL ? archive_scene(archive, w->filter.series, &scene) : 0;
+}
+
+static void answer(struct job *job,
+                   int (*print)(struct archive *archive, const struct wanted *wanted, FILE *out),
+                   const char *type)
+{
+	struct archive *archive = job->console->work->archive;
+	struct wanted wanted;
+	char *text = NULL;
+	size_t size = 0;
+	FILE *out = NULL;
+	int result;
+
+	if (!read_query(job, &wanted)) {
+		job_done(job);
+		return;
+	}
+	result = check_series(archive, &wanted);
+	if (result == 0) {
+		out = open_memstream(&text, &size);
+		result = out != NULL ? print(archive, &wanted, out) : DT_E_MEMORY;
+	}
+	if (out != NULL && fclose(out) != 0 && result == 0)
+		result = DT_E_MEMORY;
+	if (result != 0) {
+		free(text);
+		work_refuse(job, result);
+		return;
+	}
+	job_answer_bytes(job, type, text, size);
+	job_done(job);
+}
+
+static int series_json(struct archive *archive, const struct wanted *w, FILE *out)
+{
+	return print_series(archive, &w->filter, PRINT_JSON, out);
+}
+
+static int drops_json(struct archive *archive, const struct wanted *w, FILE *out)
+{
+	return print_drops(archive, &w->filter, w->undecided, PRINT_JSON, out);
+}
+
+static int drops_csv(struct archive *archive, const struct wanted *w, FILE *out)
+{
+	return print_drops(archive, &w->filter, w->undecided, PRINT_CSV, out);
+}
+
+static int tables_json(struct archive *archive, const struct wanted *w, FILE *out)
+{
+	return print_tables(archive, &w->filter, w->undecided, NULL, PRINT_JSON, out);
+}
+
+void work_series(struct job *job)
+{
+	answer(job, series_json, "application/json");
+}
+
+void work_drops(struct job *job)
+{
+	answer(job, drops_json, "application/json");
+}
+
+void work_tables(struct job *job)
+{
+	answer(job, tables_json, "application/json");
+}
+
+void work_csv(struct job *job)
+{
+	answer(job, drops_csv, "text/csv; charset=utf-8");
+}
+
+void work_result(struct job *job)
+{
+	struct archive *archive = job->console->work->archive;
+	char series[ARCHIVE_NAME_MAX + 1], raw[ARCHIVE_NAME_MAX + 64], *json;
+	int result = archive_log(archive, job->path, series, raw);
+
+	json = result == 0 || result == DT_E_STATE ? archive_json(archive, job->path, NULL) : NULL;
+	if (json != NULL) {
+		job_answer_bytes(job, "application/json", json, strlen(json));
+		job_done(job);
+		return;
+	}
+	work_refuse(job, result == 0 || result == DT_E_STATE ? DT_E_EMPTY : result);
+}

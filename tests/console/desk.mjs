@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Somebody at a browser tab: what the page says, and what goes wrong in it. The ids are those that the head of
+// host/console/page/index.html promises.
+import assert from "node:assert/strict";
+import { mkdirSync } from "node:fs";
+import { join } from "node:path";
+import { chromium, pictures } from "./programs.mjs";
+
+const WAIT_MS = 20000;
+const SOON_MS = 4000;
+const PROMISED = "droptower-test";
+
+export function browse() {
+	return chromium.launch({
+		executablePath: "/usr/bin/chromium",
+		args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+			"--disable-component-update", "--disable-sync"],
+	});
+}
+
+/* In the page, before its own code: what it must not do, and every state it shows. */
+function watch(word) {
+	document.addEventListener("securitypolicyviolation", (event) =>
+		console.error(`${word}: against the content security policy: ${event.violatedDirective} ${event.blockedURI}`));
+	window.shownStates = [];
+	new MutationObserver(() => {
+		const { state } = document.documentElement.dataset;
+		if (state !== undefined && state !== window.shownStates.at(-1))
+			window.shownStates.push(state);
+	}).observe(document, { attributes: true, subtree: true, attributeFilter: ["data-state"] });
+}
+
+export class Desk {
+	static async open(browser, { width = 1400, height = 900, colorScheme = "light" } = {}) {
+		const context = await browser.newContext({ viewport: { width, height }, colorScheme, acceptDownloads: true });
+		return new Desk(await context.newPage());
+	}
+
+	constructor(page) {
+		this.page = page;
+		this.errors = [];
+		this.allowed = []; // patterns of errors that a test makes on purpose
+		page.setDefaultTimeout(WAIT_MS);
+		page.addInitScript(watch, PROMISED);
+		page.on("console", (message) => message.type() === "error" && this.wrong(`${message.text()} ${message.location().url}`));
+		page.on("pageerror", (error) => this.wrong(error.stack));
+	}
+
+	wrong(text) {
+		if (!this.allowed.some((pattern) => pattern.test(text)))
+			this.errors.push(text);
+	}
+
+	/* data-NAME of the page, in JavaScript's spelling */
+	data(name) {
+		return this.page.evaluate((n) => document.documentElement.dataset[n], name);
+	}
+
+	/* {name: value or list of values}: until all agree */
+	async until(wanted, timeout = WAIT_MS) {
+		const agrees = (want) => Object.entries(want).every(([name, value]) =>
+			[].concat(value).includes(document.documentElement.dataset[name]));
+		await this.page.waitForFunction(agrees, wanted, { timeout, polling: 20 }).catch(async (error) => {
+			const is = await this.page.evaluate(() => JSON.stringify(document.documentElement.dataset));
+			const said = await this.page.evaluate(() => [...document.querySelectorAll("#message, #abort-outcome, #connection")]
+				.map((node) => node.textContent.trim()).filter(Boolean).join(" | "));
+			const path = await this.states();
+			throw new Error(`waited for ${JSON.stringify(wanted)}, the page has ${is} after ${path}, says "${said}"`, { cause: error });
+		});
+	}
+
+	/* every state that was shown since, and forgets them */
+	states() {
+		return this.page.evaluate(() => window.shownStates.splice(0));
+	}
+
+	text(selector) {
+		return this.page.locator(selector).first().innerText();
+	}
+
+	async untilText(selector, pattern) {
+		const fits = ([where, source, flags]) => new RegExp(source, flags).test(document.querySelector(where)?.textContent ?? "");
+		await this.page.waitForFunction(fits, [selector, pattern.source, pattern.flags], { polling: 20 }).catch(async (error) => {
+			const is = await this.page.locator(selector).first().textContent({ timeout: 100 }).catch(() => "nothing");
+			throw new Error(`waited for ${pattern} in ${selector}, which has "${is}"`, { cause: error });
+		});
+	}
+
+	async picture(name, options = {}) {
+		mkdirSync(pictures, { recursive: true });
+		await this.page.screenshot({ path: join(pictures, `${name}.png`), ...options });
+	}
+
+	click(selector, options) {
+		return this.page.click(selector, options);
+	}
+
+	key(name) {
+		return this.page.keyboard.press(name);
+	}
+
+	/* The focus goes there by the Tab key alone. */
+	async tabTo(id) {
+		const reached = [];
+		for (let i = 0; i < 150; i++) {
+			const at = await this.page.evaluate(() => document.activeElement.id);
+			if (at === id)
+				return;
+			reached.push(at);
+			await this.key("Tab");
+		}
+		assert.fail(`Tab never came to #${id}, but to: ${[...new Set(reached)].join(" ")}`);
+	}
+
+	/* What is in a field is replaced, by keys. */
+	async typeInto(id, text) {
+		await this.tabTo(id);
+		await this.key("Control+a");
+		await this.page.keyboard.type(text);
+	}
+
+	/* ---- the workflow, by mouse ---- */
+
+	async setUp({ name, scene, angle, planned }) {
+		await this.until({ step: "setup" });
+		await this.page.selectOption("#scene", scene);
+		await this.page.fill("#angle", String(angle));
+		await this.page.fill("#planned", String(planned));
+		await this.page.fill("#series-name", name);
+		await this.click("#setup-go");
+		await this.untilText("#series-head", new RegExp(name));
+	}
+
+	/* A machine that is too busy loses heartbeats, and then the tower holds a fault, as it must. */
+	async ready() {
+		await this.until({ step: ["arm", "fault"] });
+		if (await this.data("step") === "fault")
+			await this.click("#clear");
+		await this.until({ step: "arm", state: "READY" });
+	}
+
+	async arm() {
+		await this.ready();
+		await this.click("#arm");
+		await this.click("#arm-confirm");
+		await this.until({ step: "release", state: "ARMED" });
+	}
+
+	/* Armed and released; again when the tower disarmed before the click came, for the reason above. */
+	async release() {
+		for (let tries = 1; ; tries++) {
+			await this.arm();
+			await this.click("#release", { timeout: SOON_MS }).catch(() => {});
+			if (await this.until({ step: ["moving", "wait", "decide"] }, SOON_MS).then(() => true, () => false))
+				return;
+			assert.ok(tries < 3, "armed three times, and never released");
+		}
+	}
+
+	/* Released, and something else at once: with the console's answer, before the page hears of it. */
+	async releaseAnd(action) {
+		const done = new Promise((settle, fail) => {
+			this.page.route("**/api/release", async (route) => {
+				const response = await route.fetch();
+				await action().then(settle, fail);
+				await route.fulfill({ response });
+			}, { times: 1 });
+		});
+		await this.click("#release");
+		return done;
+	}
+
+	/* until its result is on the page; returns the ms that the page measured from the capture's end */
+	async result(drop) {
+		await this.until({ step: ["decide", "fault"], result: drop });
+		if (await this.data("step") === "fault")
+			await this.click("#clear");
+		await this.until({ step: "decide" });
+		return Number(await this.data("resultMs"));
+	}
+
+	async drop(drop) {
+		await this.release();
+		return this.result(drop);
+	}
+}

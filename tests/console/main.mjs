@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// main.mjs BUILD SANITIZED: the browser tests, as TAP. Pictures of every step go into BUILD/tests/console.
+import assert from "node:assert/strict";
+import { found } from "./looks.mjs";
+import restart from "./restart.mjs";
+import { run } from "./tap.mjs";
+import workflow from "./workflow.mjs";
+
+const VIEWS = 12; // so many were looked at
+
+const looks = {
+	name: "looks", apart: true,
+	steps: [
+		["nothing scrolls sideways at 390 px", async () => assert.deepEqual([found.views === VIEWS, ...found.wide], [true])],
+		["every text has a contrast of 4.5, light and dark", async () => assert.deepEqual([found.views === VIEWS, ...found.faint], [true])],
+		["every control has a name", async () => assert.deepEqual([found.views === VIEWS, ...found.nameless], [true])],
+	],
+};
+
+process.exit(await run([workflow, restart, looks]));
