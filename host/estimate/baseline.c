@@ -7,6 +7,7 @@
 #include "common/units.h"
 #include "host/estimate/cholesky.h"
 #include "host/estimate/median.h"
+#include "host/estimate/pair.h"
 
 /* As long as the study's pre-trigger and more; longer reaches into what happened before the fall. */
 #define QUIET_S 0.25
@@ -212,18 +213,25 @@ static bool is_plain(const struct quiet *quiet, size_t from, size_t until, doubl
 static void add_plain(const struct quiet *quiet, size_t from, size_t until, double about, struct sums *sums)
 {
 	const double *value = quiet->trace->value_g;
-	double first = 0, second = 0;
+	PAIR first = {0}, second = {0};
+	size_t k = from;
 
-	for (size_t k = from; k < until; k++) {
-		double d = value[k] - about;
+	for (; k + 2 <= until; k += 2) {
+		const PAIR d = pair_load(value + k) - about;
 
 		first += d;
 		second += d * d;
 	}
+	if (k < until) {
+		double d = value[k] - about;
+
+		first[0] += d;
+		second[0] += d * d;
+	}
 	sums->good += until - from;
 	sums->used += until - from;
-	sums->first += first;
-	sums->second += second;
+	sums->first += first[0] + first[1];
+	sums->second += second[0] + second[1];
 }
 
 /* Adds the samples [from, until) that lie within reach of about. */
@@ -256,6 +264,7 @@ static void add_up(const struct quiet *quiet, size_t from, size_t until, double 
 static struct moments take_blocks(struct quiet *quiet, double about, double reach)
 {
 	double all = (double)(quiet->until - quiet->from), n, mean;
+	bool plain = is_plain(quiet, quiet->from, quiet->until, about, reach);
 	struct sums sums = {0};
 
 	quiet->count = 0;
@@ -264,7 +273,7 @@ static struct moments take_blocks(struct quiet *quiet, double about, double reac
 		struct block *block = &quiet->block[quiet->count++];
 		struct sums before = sums;
 
-		if (is_plain(quiet, k, end, about, reach))
+		if (plain || is_plain(quiet, k, end, about, reach))
 			add_plain(quiet, k, end, about, &sums);
 		else
 			add_up(quiet, k, end, about, reach, &sums);
@@ -448,29 +457,39 @@ void baseline_find(const struct trace *trace, double *scratch, struct estimate_b
 
 static void subtract(struct trace *trace, const struct estimate_baseline *baseline)
 {
-	double offset = baseline->offset_g;
-	size_t k;
+	double offset = baseline->offset_g, *value = trace->value_g;
+	size_t k = 0;
 
 	if (baseline->hum_g > 0 || fabs(baseline->drift_g_s) > 0) {
 		struct walk zero = walk_from(baseline, trace, 0);
 
-		for (k = 0; k < trace->count; k++)
-			trace->value_g[k] -= walk(&zero);
+		for (; k < trace->count; k++)
+			value[k] -= walk(&zero);
+		trace_changed(trace);
 		return;
 	}
-	for (k = 0; k + TRACE_BLOCK <= trace->count; k += TRACE_BLOCK)
-		for (unsigned i = 0; i < TRACE_BLOCK; i++)
-			trace->value_g[k + i] -= offset;
+	for (; k + 4 <= trace->count; k += 4) {
+		pair_store(value + k, pair_load(value + k) - offset);
+		pair_store(value + k + 2, pair_load(value + k + 2) - offset);
+	}
 	for (; k < trace->count; k++)
-		trace->value_g[k] -= offset;
+		value[k] -= offset;
+	for (size_t i = 0; i < trace_blocks(trace); i++) {
+		trace->block[i].low_g -= offset;
+		trace->block[i].high_g -= offset;
+	}
 }
 
 void baseline_remove(struct trace *trace, const struct estimate_baseline *baseline)
 {
 	double offset = baseline->offset_g, most = 0;
 
-	for (size_t i = 0; i < trace_blocks(trace); i++)
-		most = fmax(most, fmax(trace->block[i].high_g - offset, offset - trace->block[i].low_g));
+	for (size_t i = 0; i < trace_blocks(trace); i++) {
+		double high = trace->block[i].high_g - offset, low = offset - trace->block[i].low_g;
+
+		most = high > most ? high : most;
+		most = low > most ? low : most;
+	}
 	subtract(trace, baseline);
 	if (fabs(offset) > fmax(OFFSET_MIN_G, OFFSET_PART * most))
 		trace->flags |= RECORD_FLAG_OFFSET;

@@ -12,11 +12,6 @@
 
 #define BULGE_PRIOR 0.05
 
-/* A pulse whose middles at half and at a tenth of its height lie further apart than this part of its width,
- * and this many times the noise's part of its height, is not worth a fit. */
-#define SKEW_MAX 0.06
-#define SKEW_NOISE 2.0
-
 #define POWER_MIN 0.3
 #define POWER_MAX 8.0
 
@@ -103,20 +98,16 @@ static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_
 
 /* From the widths at half and at a tenth of the height: of a half-sine 2/3 and 0.9362 of the base, of a
  * haversine 1/2 and 0.7952. */
-static bool start(const struct trace *trace, const struct peak *peak, double noise_g, double p[PARAMETERS])
+static bool start(const struct trace *trace, const struct peak *peak, double p[PARAMETERS])
 {
-	double height = fabs(peak->result.value_g), from[2], until[2], width, ratio;
+	double height = fabs(peak->result.value_g), from[2], until[2], ratio;
 	static const double level[] = {0.5, 0.1};
 
 	for (unsigned i = 0; i < 2; i++)
 		if (!trace_edge(trace, peak->at, -1, peak->sign, level[i] * height, &from[i]) ||
 		    !trace_edge(trace, peak->at, 1, peak->sign, level[i] * height, &until[i]))
 			return false;
-	width = until[1] - from[1];
-	if (fabs(until[1] + from[1] - until[0] - from[0]) / 2 >
-	    (SKEW_MAX + SKEW_NOISE * noise_g / height) * width)
-		return false;
-	ratio = width / (until[0] - from[0]);
+	ratio = (until[1] - from[1]) / (until[0] - from[0]);
 	p[HEIGHT] = peak->result.value_g;
 	p[CENTRE] = (until[0] + from[0]) / 2;
 	p[POWER] = fmin(fmax(1 + (ratio - 1.404) / 0.186, 0.5), 3);
@@ -157,7 +148,7 @@ bool bell_fit(const struct trace *trace, const struct peak *peak, struct bell *b
 	struct lm_result result;
 	double p[PARAMETERS], freedom;
 
-	if (!start(trace, peak, noise, p))
+	if (peak->lopsided || !start(trace, peak, p))
 		return false;
 	scene.first = trace_index(trace, p[CENTRE] - REACH_BASES * p[BASE]);
 	scene.last = trace_index(trace, p[CENTRE] + REACH_BASES * p[BASE]);

@@ -8,21 +8,24 @@
 
 bool cholesky_factor(struct cholesky *factor, unsigned size, double a[CHOLESKY_MAX][CHOLESKY_MAX])
 {
+	double scaled[CHOLESKY_MAX]; /* a row of L D */
+
 	factor->size = size;
 	for (unsigned i = 0; i < size; i++) {
-		for (unsigned j = 0; j <= i; j++) {
+		double pivot = a[i][i];
+
+		for (unsigned j = 0; j < i; j++) {
 			double sum = a[i][j];
 
 			for (unsigned k = 0; k < j; k++)
-				sum -= factor->lower[i][k] * factor->lower[j][k];
-			if (j < i) {
-				factor->lower[i][j] = sum / factor->lower[j][j];
-				continue;
-			}
-			if (!(sum > PIVOT_MIN * a[i][i]) || !isfinite(sum))
-				return false;
-			factor->lower[i][i] = sqrt(sum);
+				sum -= scaled[k] * factor->lower[j][k];
+			scaled[j] = sum;
+			factor->lower[i][j] = sum * factor->inverse[j];
+			pivot -= sum * factor->lower[i][j];
 		}
+		if (!(pivot > PIVOT_MIN * a[i][i]) || !isfinite(pivot))
+			return false;
+		factor->inverse[i] = 1 / pivot;
 	}
 	return true;
 }
@@ -35,7 +38,7 @@ static void forward(const struct cholesky *factor, const double *b, double *z)
 
 		for (unsigned k = 0; k < i; k++)
 			sum -= factor->lower[i][k] * z[k];
-		z[i] = sum / factor->lower[i][i];
+		z[i] = sum;
 	}
 }
 
@@ -43,9 +46,9 @@ void cholesky_solve(const struct cholesky *factor, const double *b, double *x)
 {
 	forward(factor, b, x);
 	for (unsigned i = factor->size; i-- > 0;) {
+		x[i] *= factor->inverse[i];
 		for (unsigned k = i + 1; k < factor->size; k++)
 			x[i] -= factor->lower[k][i] * x[k];
-		x[i] /= factor->lower[i][i];
 	}
 }
 
@@ -55,6 +58,6 @@ double cholesky_variance(const struct cholesky *factor, const double *v)
 
 	forward(factor, v, z);
 	for (unsigned i = 0; i < factor->size; i++)
-		sum += z[i] * z[i];
+		sum += z[i] * z[i] * factor->inverse[i];
 	return sum;
 }

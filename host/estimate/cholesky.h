@@ -11,10 +11,12 @@ enum { CHOLESKY_MAX = 11 };
 
 struct cholesky {
 	unsigned size;
-	double lower[CHOLESKY_MAX][CHOLESKY_MAX];
+	double lower[CHOLESKY_MAX][CHOLESKY_MAX]; /* L below its diagonal of ones */
+	double inverse[CHOLESKY_MAX];             /* of D */
 };
 
-/* a = L L^T. False, and factor undefined, unless a is positive definite beyond rounding. */
+/* a = L D L^T, the form of Cholesky's without square roots. False, and factor undefined, unless a is positive
+ * definite beyond rounding. */
 bool cholesky_factor(struct cholesky *factor, unsigned size, double a[CHOLESKY_MAX][CHOLESKY_MAX]);
 
 /* x = a^-1 b; x may be b. */

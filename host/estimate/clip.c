@@ -55,16 +55,13 @@ static bool at_extreme(const struct trace *trace, size_t k, double extreme_g)
 /* The first sample from k on that equals the extreme; count when there is none. */
 static size_t next_extreme(const struct trace *trace, size_t k, double extreme_g)
 {
-	while (k < trace->count) {
-		const struct trace_block *block = &trace->block[k / TRACE_BLOCK];
-
-		if (block->low_g > extreme_g || block->high_g < extreme_g) {
-			k += TRACE_BLOCK - k % TRACE_BLOCK;
+	for (size_t i = k / TRACE_BLOCK, end; i < trace_blocks(trace); i++, k = end) {
+		end = (i + 1) * TRACE_BLOCK;
+		if (trace->block[i].low_g > extreme_g || trace->block[i].high_g < extreme_g)
 			continue;
-		}
-		if (at_extreme(trace, k, extreme_g))
-			return k;
-		k++;
+		for (; k < end && k < trace->count; k++)
+			if (at_extreme(trace, k, extreme_g))
+				return k;
 	}
 	return trace->count;
 }

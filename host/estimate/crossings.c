@@ -23,14 +23,14 @@ static double meet(const struct trace *trace, size_t before, size_t after, doubl
 	return from + (trace_time(trace, after) - from) * a / (a - b);
 }
 
-static void note_swing(struct crossings *found, double value, double time)
+static void note_swing(struct crossings *found, double value, const struct trace *trace, size_t k)
 {
 	unsigned i = found->count - 1;
 
 	if (found->count == 0 || fabs(value) <= found->swing_g[i])
 		return;
 	found->swing_g[i] = fabs(value);
-	found->swing_s[i] = time;
+	found->swing_s[i] = trace_time(trace, k);
 }
 
 /* Whether time is so long after the latest crossing that the swings are over. */
@@ -42,14 +42,27 @@ static bool over(const struct crossings *found, double time)
 	       (time - found->time_s[last]) * last > QUIET * (found->time_s[last] - found->time_s[0]);
 }
 
+/* The end of the last block of [first, last) in which a sample may lie so far from the offset. */
+static size_t loud_until(const struct trace *trace, size_t first, size_t last, double offset_g,
+                         double threshold_g)
+{
+	size_t block = (last + TRACE_BLOCK - 1) / TRACE_BLOCK, end;
+
+	while (block * TRACE_BLOCK > first && trace->block[block - 1].high_g - offset_g < threshold_g &&
+	       offset_g - trace->block[block - 1].low_g < threshold_g)
+		block--;
+	end = block * TRACE_BLOCK;
+	return end < last ? end : last;
+}
+
 void crossings_find(struct crossings *found, const struct trace *trace, size_t first, size_t last,
                     double offset_g, double threshold_g)
 {
 	double side = 0, early = NAN, late = NAN, value = 0, value_before = 0;
-	size_t before = first;
+	size_t before = first, end = loud_until(trace, first, last, offset_g, threshold_g);
 
 	memset(found, 0, sizeof(*found));
-	for (size_t k = first; k < last && found->count < CROSSINGS_MAX; k++) {
+	for (size_t k = first; k < end && found->count < CROSSINGS_MAX; k++) {
 		if (!series_usable(trace, k))
 			continue;
 		value = trace->value_g[k] - offset_g;
@@ -70,11 +83,13 @@ void crossings_find(struct crossings *found, const struct trace *trace, size_t f
 			found->time_s[found->count++] = (early + late) / 2;
 		side = value > 0 ? 1 : -1;
 		early = NAN;
-		note_swing(found, value, trace_time(trace, k));
+		note_swing(found, value, trace, k);
 	}
 	/* Still under way when the samples ran out? */
-	found->ended =
-	        found->count > 1 ? !over(found, trace_time(trace, before)) : fabs(value) >= threshold_g;
+	if (found->count > 1)
+		found->ended = !over(found, trace_time(trace, end < last ? last - 1 : before));
+	else
+		found->ended = end == last && fabs(value) >= threshold_g;
 }
 
 /* Decay rate from the first swing to the last whole one, which the last crossing ends. */

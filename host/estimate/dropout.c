@@ -55,9 +55,8 @@ bool dropout_mark(struct trace *trace, double noise_g)
 	bool marked = false, was_loud = false;
 
 	for (size_t i = 0; noise_g > 0 && i < trace_blocks(trace); i++) {
-		const struct trace_block *block = &trace->block[i];
-		bool loud = fmax(block->high_g, -block->low_g) > SIGMAS * noise_g;
 		size_t from = i * TRACE_BLOCK, until = from + TRACE_BLOCK;
+		bool loud = trace_most(trace, from) > SIGMAS * noise_g;
 
 		/* A run begins beside a reading that stands off. */
 		if (loud || was_loud)

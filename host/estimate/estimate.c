@@ -263,10 +263,9 @@ static size_t contact_channel(const struct desk *desk, const struct analysis *an
 /* When the case is hit again; INFINITY if it is not. */
 static double next_contact(const struct trace *trace, double after_s, double level_g)
 {
-	for (size_t k = trace_index(trace, after_s); k < trace->count; k++)
-		if (trace_good(trace, k) && fabs(trace->value_g[k]) > level_g)
-			return trace_time(trace, k);
-	return INFINITY;
+	size_t k = trace_reaches(trace, trace_index(trace, after_s), trace->count, level_g);
+
+	return k < trace->count ? trace_time(trace, k) : INFINITY;
 }
 
 /* Whether a channel's peak is too near the noise to say where its pulse ends. */
@@ -281,6 +280,8 @@ static void window_by_pulse(const struct estimate_pulse *pulse, struct ringdown_
 {
 	span->from_s = pulse->end_s + TAIL_WIDTHS * pulse->duration_s;
 	span->margin_s = MARGIN_WIDTHS * pulse->duration_s;
+	if (pulse->contact.status == ESTIMATE_OK && !(pulse->contact.flags & ESTIMATE_FLAG_MODEL))
+		span->foot_s = pulse->contact_start_s + pulse->contact_time_s;
 }
 
 static bool window_by_bump(const struct trace *trace, struct ringdown_span *span)

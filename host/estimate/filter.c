@@ -88,6 +88,7 @@ int filter_two_pass(struct trace *trace, struct filter_section *section, size_t 
 		from = k + 1;
 	}
 	free(padded);
+	trace_changed(trace);
 	return 0;
 }
 

@@ -3,50 +3,44 @@
 
 #include <string.h>
 
-static unsigned entries(const struct gram *gram)
-{
-	return gram->columns * (gram->columns + 1) / 2;
-}
-
 void gram_start(struct gram *gram, unsigned unknowns)
 {
 	gram->columns = unknowns + 1;
-	gram->rows = 0;
 	gram->taken = 0;
-	memset(gram->sum, 0, entries(gram) * sizeof(*gram->sum));
+	memset(gram->sum, 0, gram->columns * sizeof(gram->sum[0]));
 }
 
-void gram_sum(struct gram *gram)
+void gram_add_any(struct gram *gram, const double *row)
 {
-	size_t k = 0;
+	const unsigned columns = gram->columns;
 
-	for (size_t i = 0; i < gram->columns; i++)
-		for (size_t j = 0; j <= i; j++)
-			gram->sum[k++] += gram->column[i] * gram->column[j];
-	gram->taken += gram->rows;
-	gram->rows = 0;
+	gram->taken++;
+	for (unsigned i = 0; i < columns && i < GRAM_COMMON; i++)
+		gram_add_column(gram, row, i);
+	if (columns > 6)
+		gram_add_column(gram, row, 6);
+	if (columns > 7)
+		gram_add_column(gram, row, 7);
+	if (columns > 8)
+		gram_add_column(gram, row, 8);
+	if (columns > 9)
+		gram_add_column(gram, row, 9);
+	if (columns > 10)
+		gram_add_column(gram, row, 10);
+	if (columns > 11)
+		gram_add_column(gram, row, 11);
 }
 
-static double total(const struct gram *gram, unsigned k)
-{
-	return (gram->sum[k][0] + gram->sum[k][1]) + (gram->sum[k][2] + gram->sum[k][3]);
-}
-
-size_t gram_finish(struct gram *gram, double normal[CHOLESKY_MAX][CHOLESKY_MAX], double right[CHOLESKY_MAX],
-                   double *squares)
+size_t gram_finish(const struct gram *gram, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
+                   double right[CHOLESKY_MAX], double *squares)
 {
 	const unsigned unknowns = gram->columns - 1;
-	unsigned k = 0;
 
-	for (unsigned i = 0; i < gram->columns; i++)
-		for (unsigned lane = gram->rows; lane < GRAM_LANES; lane++)
-			gram->column[i][lane] = 0;
-	gram_sum(gram);
-	for (unsigned i = 0; i < unknowns; i++)
+	for (unsigned i = 0; i < unknowns; i++) {
 		for (unsigned j = 0; j <= i; j++)
-			normal[i][j] += total(gram, k++);
-	for (unsigned i = 0; i < unknowns; i++)
-		right[i] += total(gram, k++);
-	*squares += total(gram, k);
+			normal[i][j] += gram->sum[i][j / 2][j % 2];
+		right[i] += gram->sum[unknowns][i / 2][i % 2];
+	}
+	*squares += gram->sum[unknowns][unknowns / 2][unknowns % 2];
 	return gram->taken;
 }

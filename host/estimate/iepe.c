@@ -16,4 +16,5 @@ void iepe_undo(struct trace *trace, double from_s, double time_constant_s)
 		at = k;
 		trace->value_g[k] += integral;
 	}
+	trace_changed(trace);
 }

@@ -9,7 +9,7 @@
 
 enum {
 	SHIFTS = 48,     /* to either side */
-	COARSE = 8,      /* shifts left out between the first ones tried */
+	COARSE = 12,     /* shifts left out between the first ones tried */
 	COARSE_USE = 16, /* samples used of S2's gate then */
 };
 

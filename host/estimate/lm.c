@@ -30,7 +30,9 @@ struct place {
 
 static bool stand(const struct lm_problem *problem, const double *p, struct place *place)
 {
-	memset(place, 0, sizeof(*place));
+	memset(place->normal, 0, problem->size * sizeof(place->normal[0]));
+	memset(place->right, 0, sizeof(place->right));
+	place->squares = 0;
 	place->used = problem->normal(problem->model, p, place->normal, place->right, &place->squares);
 	return place->used > problem->size && isfinite(place->squares);
 }
@@ -42,7 +44,7 @@ static bool step(const struct lm_problem *problem, const struct place *place, do
 	double damped[CHOLESKY_MAX][CHOLESKY_MAX];
 	struct cholesky factor;
 
-	memcpy(damped, place->normal, sizeof(damped));
+	memcpy(damped, place->normal, problem->size * sizeof(damped[0]));
 	for (unsigned i = 0; i < problem->size; i++)
 		damped[i][i] *= 1 + damping;
 	if (!cholesky_factor(&factor, problem->size, damped))
@@ -65,52 +67,52 @@ static double squares_of(const struct lm_problem *problem, const struct place *p
 	return sum;
 }
 
-static bool finish(const struct lm_problem *problem, const struct place *place, struct lm_result *result)
+static bool finish(const struct lm_problem *problem, struct place *place, struct lm_result *result)
 {
-	double normal[CHOLESKY_MAX][CHOLESKY_MAX];
-
-	memcpy(normal, place->normal, sizeof(normal));
 	result->squares = place->squares;
 	result->used = place->used;
-	return cholesky_factor(&result->factor, problem->size, normal);
+	return cholesky_factor(&result->factor, problem->size, place->normal);
 }
 
 bool lm_fit(const struct lm_problem *problem, double *p, struct lm_result *result)
 {
-	struct place here, there;
+	struct place place[2], *here = &place[0], *there = &place[1];
 	double damping = DAMPING_START, rounding;
 
-	if (!stand(problem, p, &here))
+	if (!stand(problem, p, here))
 		return false;
-	rounding = fmax(GAIN_MIN * here.squares, STEP_MIN * STEP_MIN * squares_of(problem, &here, p));
+	rounding = fmax(GAIN_MIN * here->squares, STEP_MIN * STEP_MIN * squares_of(problem, here, p));
 	result->iterations = 1;
 	while (result->iterations < LM_ITERATIONS) {
 		double change[CHOLESKY_MAX], trial[CHOLESKY_MAX], promise, gain, variance;
+		struct place *swap;
 
-		if (!step(problem, &here, damping, change, &promise))
+		if (!step(problem, here, damping, change, &promise))
 			return false;
 		for (unsigned i = 0; i < problem->size; i++)
 			trial[i] = p[i] + change[i];
-		variance = here.squares / (double)(here.used - problem->size);
+		variance = here->squares / (double)(here->used - problem->size);
 		if (damping < DAMPING_FELT && promise <= LM_STEP * LM_STEP * variance) {
 			memcpy(p, trial, problem->size * sizeof(*p));
-			return finish(problem, &here, result);
+			return finish(problem, here, result);
 		}
 		result->iterations++;
-		if (!stand(problem, trial, &there) || there.squares > here.squares) {
+		if (!stand(problem, trial, there) || there->squares > here->squares) {
 			if (promise <= rounding || damping > DAMPING_MAX)
-				return finish(problem, &here, result);
+				return finish(problem, here, result);
 			damping = fmax(damping * DAMPING_UP, DAMPING_FELT);
 			continue;
 		}
-		gain = here.squares - there.squares;
+		gain = here->squares - there->squares;
 		memcpy(p, trial, problem->size * sizeof(*p));
+		swap = here;
 		here = there;
+		there = swap;
 		damping *= DAMPING_DOWN;
-		variance = here.squares / (double)(here.used - problem->size);
+		variance = here->squares / (double)(here->used - problem->size);
 		if (promise <= LM_STEP * LM_STEP * variance || promise <= rounding ||
 		    (result->iterations > LM_PATIENCE && gain <= problem->kink * variance))
-			return finish(problem, &here, result);
+			return finish(problem, here, result);
 	}
 	return false;
 }

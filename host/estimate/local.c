@@ -8,16 +8,42 @@
 /* A sample on the end of the window belongs to it, whatever rounding says. */
 #define SLACK 1e-5
 
+/* Sums over the samples: of the powers of x, of those times the value, of the value's square. */
+struct sums {
+	/* an even power and the odd one after it */
+	PAIR moments[CHOLESKY_MAX], products[CHOLESKY_MAX];
+	double squares;
+	size_t used;
+};
+
+static inline void add_up(struct sums *sums, const struct trace *trace, size_t first, size_t last,
+                          double start, double step, unsigned terms)
+{
+	for (size_t k = first; k < last; k++) {
+		double x = start + (double)(k - first) * step, value = trace->value_g[k];
+		PAIR power = {1, x};
+
+		if (!trace_good(trace, k))
+			continue;
+		sums->used++;
+		sums->squares += value * value;
+		for (unsigned i = 0; 2 * i < terms; i++, power *= x * x) {
+			sums->moments[i] += power;
+			sums->products[i] += power * value;
+		}
+		for (unsigned i = (terms + 1) / 2; i < terms; i++, power *= x * x)
+			sums->moments[i] += power;
+	}
+}
+
 bool local_fit(struct local *local, const struct trace *trace, double centre_s, double half_s,
                const struct local_span *span, unsigned order)
 {
 	double from = fmax(centre_s - half_s, span->from_s), until = fmin(centre_s + half_s, span->until_s);
-	/* an even power and the odd one after it */
-	PAIR moments[CHOLESKY_MAX] = {{0}}, products[CHOLESKY_MAX] = {{0}};
-	double normal[CHOLESKY_MAX][CHOLESKY_MAX], right[CHOLESKY_MAX];
-	double squares = 0, start, step;
+	double normal[CHOLESKY_MAX][CHOLESKY_MAX], right[CHOLESKY_MAX], start, step;
+	struct sums sums = {.used = 0};
 	unsigned terms = order + 1;
-	size_t used = 0, first, last;
+	size_t first, last;
 
 	if (!(half_s > 0))
 		return false;
@@ -25,33 +51,27 @@ bool local_fit(struct local *local, const struct trace *trace, double centre_s, 
 	last = trace_index(trace, until + SLACK / trace->rate_hz);
 	start = (trace_time(trace, first) - centre_s) / half_s;
 	step = 1 / (trace->rate_hz * half_s);
-	for (size_t k = first; k < last; k++) {
-		double x = start + (double)(k - first) * step, value = trace->value_g[k];
-		PAIR power = {1, x};
-
-		if (!trace_good(trace, k))
-			continue;
-		used++;
-		squares += value * value;
-		for (unsigned i = 0; i < terms; i++, power *= x * x) {
-			moments[i] += power;
-			products[i] += power * value;
-		}
-	}
-	if (used < terms + 2)
+	/* The orders in use, so that the compiler knows how often the loops go round. */
+	if (terms == 7)
+		add_up(&sums, trace, first, last, start, step, 7);
+	else if (terms == 5)
+		add_up(&sums, trace, first, last, start, step, 5);
+	else
+		add_up(&sums, trace, first, last, start, step, terms);
+	if (sums.used < terms + 2)
 		return false;
 	for (unsigned i = 0; i < terms; i++) {
 		for (unsigned j = 0; j <= i; j++)
-			normal[i][j] = moments[(i + j) / 2][(i + j) % 2];
-		right[i] = products[i / 2][i % 2];
+			normal[i][j] = sums.moments[(i + j) / 2][(i + j) % 2];
+		right[i] = sums.products[i / 2][i % 2];
 	}
 	if (!cholesky_factor(&local->normal, terms, normal))
 		return false;
 	cholesky_solve(&local->normal, right, local->coefficient);
 	for (unsigned i = 0; i < terms; i++)
-		squares -= local->coefficient[i] * right[i];
-	local->freedom = (unsigned)(used - terms);
-	local->residual_g = sqrt(fmax(squares, 0) / local->freedom);
+		sums.squares -= local->coefficient[i] * right[i];
+	local->freedom = (unsigned)(sums.used - terms);
+	local->residual_g = sqrt(fmax(sums.squares, 0) / local->freedom);
 	local->terms = terms;
 	local->centre_s = centre_s;
 	local->half_s = half_s;

@@ -56,38 +56,65 @@ static bool possible(const struct modes *modes, const double *p)
 	return true;
 }
 
-/* Sums over the points of one mode with t^i in them: of e^2, of e, and of residual times e; e = (re, im). */
+/* Sums over the points of one mode, each with t^0, t^1, t^2 in it: e = (re, im) by itself, its products, the
+ * residual r. Even and odd points apart. */
 struct moments {
-	PAIR squared[3], single[2], right[2];
-	double mixed[3]; /* re times im */
-	double residual, squares;
+	PAIR re[2], im[2], re_re[3], re_im[3], im_im[3];
+	PAIR r_re[2], r_im[2], r, rr;
 };
+
+static inline void moments_add(struct moments *m, PAIR re, PAIR im, PAIR r, PAIR time)
+{
+	const PAIR late_re = time * re, late_im = time * im;
+
+	m->re[0] += re;
+	m->im[0] += im;
+	m->re[1] += late_re;
+	m->im[1] += late_im;
+	m->re_re[0] += re * re;
+	m->re_im[0] += re * im;
+	m->im_im[0] += im * im;
+	m->re_re[1] += late_re * re;
+	m->re_im[1] += late_re * im;
+	m->im_im[1] += late_im * im;
+	m->re_re[2] += late_re * late_re;
+	m->re_im[2] += late_re * late_im;
+	m->im_im[2] += late_im * late_im;
+	m->r_re[0] += r * re;
+	m->r_im[0] += r * im;
+	m->r_re[1] += r * late_re;
+	m->r_im[1] += r * late_im;
+	m->r += r;
+	m->rr += r * r;
+}
 
 static void moments_take(struct moments *sums, const struct series *series, const double *p)
 {
-	struct rotor r = rotor_start(p[MODES_DECAY], p[MODES_OMEGA], series);
-	double time = series->first_s;
-	struct moments m = {.squares = 0};
+	const bool whole = series->used == series->count;
+	struct rotor r = rotor_start(p[MODES_DECAY], p[MODES_OMEGA], series), next = r;
+	struct moments m = {.r = {0}};
+	PAIR re, im, time = {series->first_s, series->first_s + series->step_s};
+	double turn_re = r.turn_re * r.turn_re - r.turn_im * r.turn_im, turn_im = 2 * r.turn_re * r.turn_im;
 
-	for (unsigned k = 0; k < series->count; k++, time += series->step_s, rotor_turn(&r)) {
-		const double residual =
-		        series->value_g[k] - p[MODES_COSINE] * r.re - p[MODES_SINE] * r.im - p[MODES_OFFSET];
-		const PAIR e = {r.re, r.im}, late = time * e;
+	rotor_turn(&next);
+	re = (PAIR){r.re, next.re};
+	im = (PAIR){r.im, next.im};
+	for (unsigned k = 0; k < series->count; k += 2) {
+		const PAIR turned = re * turn_re - im * turn_im;
+		PAIR model = p[MODES_COSINE] * re + p[MODES_SINE] * im + p[MODES_OFFSET];
 
-		if (!series->good[k])
-			continue;
-		m.squares += residual * residual;
-		m.residual += residual;
-		m.right[0] += residual * e;
-		m.right[1] += residual * late;
-		m.single[0] += e;
-		m.single[1] += late;
-		m.squared[0] += e * e;
-		m.squared[1] += late * e;
-		m.squared[2] += late * late;
-		m.mixed[0] += r.re * r.im;
-		m.mixed[1] += late[0] * r.im;
-		m.mixed[2] += late[0] * late[1];
+		if (whole && k + 1 < series->count) {
+			moments_add(&m, re, im, pair_load(series->value_g + k) - model, time);
+		} else {
+			const bool second = k + 1 < series->count && series->good[k + 1];
+			const PAIR count = {series->good[k], second};
+			const PAIR value = {series->value_g[k], second ? series->value_g[k + 1] : 0};
+
+			moments_add(&m, count * re, count * im, count * (value - model), time);
+		}
+		time += 2 * series->step_s;
+		im = re * turn_im + im * turn_re;
+		re = turned;
 	}
 	*sums = m;
 }
@@ -99,35 +126,44 @@ static size_t plain(const void *context, const double *p, double normal[CHOLESKY
 {
 	const struct problem *problem = context;
 	const double c = p[MODES_COSINE], s = p[MODES_SINE];
+	double re[2], im[2], re_re[3], re_im[3], im_im[3], r_re[2], r_im[2];
 	struct moments m;
 
 	if (!possible(problem->modes, p))
 		return 0;
 	moments_take(&m, problem->series, p);
+	for (unsigned i = 0; i < 3; i++) {
+		re_re[i] = m.re_re[i][0] + m.re_re[i][1];
+		re_im[i] = m.re_im[i][0] + m.re_im[i][1];
+		im_im[i] = m.im_im[i][0] + m.im_im[i][1];
+	}
+	for (unsigned i = 0; i < 2; i++) {
+		re[i] = m.re[i][0] + m.re[i][1];
+		im[i] = m.im[i][0] + m.im[i][1];
+		r_re[i] = m.r_re[i][0] + m.r_re[i][1];
+		r_im[i] = m.r_im[i][0] + m.r_im[i][1];
+	}
 	normal[MODES_OFFSET][MODES_OFFSET] = problem->series->used;
-	normal[MODES_DECAY][MODES_OFFSET] = -c * m.single[1][0] - s * m.single[1][1];
-	normal[MODES_DECAY][MODES_DECAY] =
-	        c * c * m.squared[2][0] + 2 * c * s * m.mixed[2] + s * s * m.squared[2][1];
-	normal[MODES_OMEGA][MODES_OFFSET] = s * m.single[1][0] - c * m.single[1][1];
-	normal[MODES_OMEGA][MODES_DECAY] =
-	        c * s * (m.squared[2][1] - m.squared[2][0]) + (c * c - s * s) * m.mixed[2];
-	normal[MODES_OMEGA][MODES_OMEGA] =
-	        s * s * m.squared[2][0] - 2 * c * s * m.mixed[2] + c * c * m.squared[2][1];
-	normal[MODES_COSINE][MODES_OFFSET] = m.single[0][0];
-	normal[MODES_COSINE][MODES_DECAY] = -c * m.squared[1][0] - s * m.mixed[1];
-	normal[MODES_COSINE][MODES_OMEGA] = s * m.squared[1][0] - c * m.mixed[1];
-	normal[MODES_COSINE][MODES_COSINE] = m.squared[0][0];
-	normal[MODES_SINE][MODES_OFFSET] = m.single[0][1];
-	normal[MODES_SINE][MODES_DECAY] = -c * m.mixed[1] - s * m.squared[1][1];
-	normal[MODES_SINE][MODES_OMEGA] = s * m.mixed[1] - c * m.squared[1][1];
-	normal[MODES_SINE][MODES_COSINE] = m.mixed[0];
-	normal[MODES_SINE][MODES_SINE] = m.squared[0][1];
-	right[MODES_OFFSET] = m.residual;
-	right[MODES_DECAY] = -c * m.right[1][0] - s * m.right[1][1];
-	right[MODES_OMEGA] = s * m.right[1][0] - c * m.right[1][1];
-	right[MODES_COSINE] = m.right[0][0];
-	right[MODES_SINE] = m.right[0][1];
-	*squares = m.squares;
+	normal[MODES_DECAY][MODES_OFFSET] = -c * re[1] - s * im[1];
+	normal[MODES_DECAY][MODES_DECAY] = c * c * re_re[2] + 2 * c * s * re_im[2] + s * s * im_im[2];
+	normal[MODES_OMEGA][MODES_OFFSET] = s * re[1] - c * im[1];
+	normal[MODES_OMEGA][MODES_DECAY] = c * s * (im_im[2] - re_re[2]) + (c * c - s * s) * re_im[2];
+	normal[MODES_OMEGA][MODES_OMEGA] = s * s * re_re[2] - 2 * c * s * re_im[2] + c * c * im_im[2];
+	normal[MODES_COSINE][MODES_OFFSET] = re[0];
+	normal[MODES_COSINE][MODES_DECAY] = -c * re_re[1] - s * re_im[1];
+	normal[MODES_COSINE][MODES_OMEGA] = s * re_re[1] - c * re_im[1];
+	normal[MODES_COSINE][MODES_COSINE] = re_re[0];
+	normal[MODES_SINE][MODES_OFFSET] = im[0];
+	normal[MODES_SINE][MODES_DECAY] = -c * re_im[1] - s * im_im[1];
+	normal[MODES_SINE][MODES_OMEGA] = s * re_im[1] - c * im_im[1];
+	normal[MODES_SINE][MODES_COSINE] = re_im[0];
+	normal[MODES_SINE][MODES_SINE] = im_im[0];
+	right[MODES_OFFSET] = m.r[0] + m.r[1];
+	right[MODES_DECAY] = -c * r_re[1] - s * r_im[1];
+	right[MODES_OMEGA] = s * r_re[1] - c * r_im[1];
+	right[MODES_COSINE] = r_re[0];
+	right[MODES_SINE] = r_im[0];
+	*squares = m.rr[0] + m.rr[1];
 	return problem->series->used;
 }
 
@@ -215,7 +251,8 @@ static size_t bent(const void *context, const double *p, double normal[CHOLESKY_
 		                re,
 		                im,
 		                slope * law.h,
-		                residual};
+		                residual,
+		                0};
 
 		if (series->good[i])
 			gram_add(&gram, row);

@@ -11,6 +11,16 @@
 /* A hole at the summit wider than this part of the width may hide more than the fit can know. */
 #define HOLE_MAX 0.35
 
+/* A pulse whose middles at half and at a tenth of its height lie further apart than this part of its width,
+ * and this many times the noise's part of its height, is no symmetric one. */
+#define SKEW_LEVEL 0.1
+#define SKEW_MAX 0.06
+#define SKEW_NOISE 2.0
+
+/* Nor is one that goes this part of its height below zero, and so much noise, within half its width. */
+#define SWING_LEVEL 0.1
+#define SWING_NOISE 6.0
+
 /* A half-sine is two thirds of its base wide at half height. */
 #define BASE_PER_HALF_WIDTH 1.5
 
@@ -63,15 +73,43 @@ static size_t highest(const struct trace *trace)
 	for (size_t k = trace->first; k < trace->last && good < SAMPLES_MIN; k++)
 		good += trace_good(trace, k);
 	for (size_t k = trace->first; k < trace->last; k++) {
-		double value = fabs(trace->value_g[k]);
+		double value;
 
-		/* The mask last: hardly ever is it asked. */
+		if (!(trace_most(trace, k) > most)) {
+			k |= TRACE_BLOCK - 1;
+			continue;
+		}
+		value = fabs(trace->value_g[k]);
 		if (value > most && trace_good(trace, k)) {
 			most = value;
 			at = k;
 		}
 	}
 	return good < SAMPLES_MIN ? trace->count : at;
+}
+
+static bool swings_back(const struct trace *trace, const struct peak *peak, double from_s, double until_s)
+{
+	double level = SWING_LEVEL * fabs(trace->value_g[peak->at]) + SWING_NOISE * trace->noise_g;
+
+	for (size_t k = trace_index(trace, from_s), end = trace_index(trace, until_s); k < end; k++)
+		if (trace_good(trace, k) && peak->sign * trace->value_g[k] < -level)
+			return true;
+	return false;
+}
+
+/* Nobody can tell where an edge lies in a hole: then it is not. */
+static bool is_lopsided(const struct trace *trace, const struct peak *peak)
+{
+	double value = fabs(trace->value_g[peak->at]), from, until;
+
+	if (!trace_edge(trace, peak->at, -1, peak->sign, SKEW_LEVEL * value, &from) ||
+	    !trace_edge(trace, peak->at, 1, peak->sign, SKEW_LEVEL * value, &until) ||
+	    trace_any(trace, from, until, SAMPLE_LOST | SAMPLE_BAD | SAMPLE_SPIKE))
+		return false;
+	return swings_back(trace, peak, until, until + (until - from) / 2) ||
+	       fabs((until + from) / 2 - peak->start.peak_s) >
+	               (SKEW_MAX + SKEW_NOISE * trace->noise_g / value) * (until - from);
 }
 
 /* Half width and feet around the highest sample. A side cut off by the end of the trace is taken as wide
@@ -96,6 +134,7 @@ static bool measure_width(const struct trace *trace, struct peak *peak)
 	                                   INFINITY, -INFINITY};
 	trace_edge(trace, peak->at, -1, peak->sign, FOOT_LEVEL * value, &peak->span.from_s);
 	trace_edge(trace, peak->at, 1, peak->sign, FOOT_LEVEL * value, &peak->span.until_s);
+	peak->lopsided = has_left && has_right && is_lopsided(trace, peak);
 	return true;
 }
 
@@ -201,7 +240,11 @@ static void take_samples(const struct trace *trace, struct peak *peak)
 static bool fit(const struct trace *trace, enum estimate_family family, struct peak *peak)
 {
 	tried(&peak->result.how, estimate_family_name(family));
-	return shape_fit(&peak->shape, trace, family, &peak->start);
+	if (!shape_fit(&peak->shape, trace, family, &peak->start))
+		return false;
+	if (family == ESTIMATE_FAMILY_HALF_SINE)
+		peak->half_sine = peak->shape;
+	return true;
 }
 
 static void take_shape(struct peak *peak)
@@ -231,8 +274,8 @@ static void sharpen(const struct trace *trace, struct peak *peak)
 	struct estimate_peak local = peak->result;
 	double apart_g, apart_s, sigma_g;
 
-	/* Cheap, and enough to see that no symmetric family will do. */
-	if (fit(trace, ESTIMATE_FAMILY_HALF_SINE, peak) && shape_hopeless(&peak->shape))
+	/* Both are enough to see that no symmetric family will do. */
+	if (peak->lopsided || (fit(trace, ESTIMATE_FAMILY_HALF_SINE, peak) && shape_hopeless(&peak->shape)))
 		return;
 	if (!fit(trace, ESTIMATE_FAMILY_SINE_POWER, peak)) {
 		peak->shape.family = ESTIMATE_FAMILY_AUTO;

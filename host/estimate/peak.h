@@ -49,14 +49,16 @@ struct peak {
 	double sign;            /* +1 or -1 */
 	double width_s;         /* base of the half-sine as wide at half height */
 	struct local_span span; /* around it, above 5 % of it */
+	bool lopsided;          /* no symmetric family will do: its middle wanders, or it swings below zero */
 	/* for pulse_measure and resultant_find */
 	struct shape_start start;               /* of a family's fit */
 	double clipped_from_s, clipped_until_s; /* where samples only say "at least"; equal when nowhere */
 	enum peak_model model;                  /* what gave the value */
 	struct local local;
-	struct shape shape; /* the family's fit asked for last; its family is AUTO when there was none */
-	double noise_g;     /* of local */
-	double scale;       /* model to axis: 1 but for a weak axis */
+	struct shape shape;     /* the family's fit asked for last; its family is AUTO when there was none */
+	struct shape half_sine; /* that fit, likewise */
+	double noise_g;         /* of local */
+	double scale;           /* model to axis: 1 but for a weak axis */
 };
 
 /* Everything but result is meaningful unless the status is short or no_peak. */

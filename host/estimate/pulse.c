@@ -12,6 +12,9 @@
  * pulse may fall on the same place, so that their errors add up. */
 #define KINK 0.0372677996249965
 
+/* A pulse that has no kink at its foot, a haversine's or an elastic contact's, leaves this part of that. */
+#define NO_KINK 0.2
+
 struct edge {
 	double time_s;
 	double slope_g_s; /* magnitude */
@@ -143,7 +146,10 @@ static void velocity(const struct trace *trace, const struct peak *peak,
                      const struct estimate_baseline *baseline, const struct edge edge[2],
                      struct estimate_pulse *pulse)
 {
-	double from, until, length, hole, step = 1 / trace->rate_hz, sigma;
+	bool smooth =
+	        pulse->family == ESTIMATE_FAMILY_HAVERSINE || pulse->family == ESTIMATE_FAMILY_SINE_POWER;
+	double from, until, length, hole, step = 1 / trace->rate_hz, sigma,
+	                                  kink = smooth ? NO_KINK * KINK : KINK;
 
 	trace_edge(trace, peak->at, -1, peak->sign, 0, &from);
 	trace_edge(trace, peak->at, 1, peak->sign, 0, &until);
@@ -153,7 +159,7 @@ static void velocity(const struct trace *trace, const struct peak *peak,
 	pulse->velocity_change_m_s = UNITS_G_M_S2 * area(trace, peak, from, until, &hole);
 	sigma = hypot(trace->noise_g * sqrt(step * length), hole);
 	sigma = hypot(sigma, filled(trace, peak, from, until) * peak->result.sigma_g);
-	sigma = hypot(sigma, KINK * step * step * (edge[0].slope_g_s + edge[1].slope_g_s));
+	sigma = hypot(sigma, kink * step * step * (edge[0].slope_g_s + edge[1].slope_g_s));
 	sigma = hypot(sigma, trace->noise_g * length / sqrt((double)baseline->samples));
 	pulse->sigma_velocity_m_s = baseline->samples > 0 ? UNITS_G_M_S2 * sigma : NAN;
 }
@@ -174,8 +180,8 @@ enum { LADDER = sizeof(ladder) / sizeof(ladder[0]) };
 static bool fit(const struct trace *trace, const struct peak *peak, enum estimate_family family,
                 struct shape *shape)
 {
-	if (peak->shape.family == family) {
-		*shape = peak->shape;
+	if (peak->shape.family == family || peak->half_sine.family == family) {
+		*shape = peak->shape.family == family ? peak->shape : peak->half_sine;
 		return true;
 	}
 	return shape_fit(shape, trace, family, &peak->start);
@@ -195,6 +201,8 @@ static void choose(const struct trace *trace, const struct peak *peak, enum esti
 
 		if (family != ESTIMATE_FAMILY_AUTO && family != ladder[i])
 			continue;
+		if (family == ESTIMATE_FAMILY_AUTO && peak->lopsided)
+			return;
 		if (ladder[i] == ESTIMATE_FAMILY_SINE_POWER && best->family != ESTIMATE_FAMILY_AUTO)
 			return;
 		how->path[tried++] = estimate_family_name(ladder[i]);
@@ -283,9 +291,9 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	pulse->duration_s = pulse->end_s - pulse->start_s;
 	pulse->sigma_duration_s =
 	        hypot(hypot(edge[0].sigma_s, edge[1].sigma_s), EDGE_LEVEL * peak->result.sigma_g * tilt);
-	velocity(trace, peak, baseline, edge, pulse);
 	if (peak->model != PEAK_MODEL_NONE)
 		contact(trace, peak, family, pulse);
+	velocity(trace, peak, baseline, edge, pulse);
 }
 
 void pulse_of_weak(const struct peak *weak, const struct estimate_pulse *strong, struct estimate_pulse *pulse)

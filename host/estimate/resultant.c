@@ -40,16 +40,16 @@ static struct local_span reaching(const struct resultant_axes *axes, double leve
 
 	for (unsigned i = 0; i < 2; i++) {
 		const struct trace *trace = axes->trace[i];
-		size_t k = trace->first, last = trace->last;
+		size_t k = trace_reaches(trace, trace->first, trace->last, level_g), end = trace->last;
 
-		while (k < last && !(fabs(trace->value_g[k]) >= level_g && trace_good(trace, k)))
-			k++;
-		if (k == last)
+		if (k == end)
 			continue;
-		while (!(fabs(trace->value_g[last - 1]) >= level_g && trace_good(trace, last - 1)))
-			last--;
+		while (trace_most(trace, end - 1) < level_g)
+			end = (end - 1) / TRACE_BLOCK * TRACE_BLOCK;
+		while (!(fabs(trace->value_g[end - 1]) >= level_g && trace_good(trace, end - 1)))
+			end--;
 		span.from_s = fmin(span.from_s, trace_time(trace, k));
-		span.until_s = fmax(span.until_s, trace_time(trace, last - 1));
+		span.until_s = fmax(span.until_s, trace_time(trace, end - 1));
 	}
 	return span;
 }

@@ -69,6 +69,9 @@
 #define BACK_PAIR 2.0
 #define BACK_AGAIN 1.5
 
+/* Before the contact's end, where that is known, they count for so much more. */
+#define BACK_BEFORE 0.7
+
 /* Modes are apart when their frequencies are by this many standard deviations. */
 #define SEPARATION 3.0
 
@@ -552,10 +555,13 @@ static void escalate(struct job *job)
 static double off_by(const struct job *job, const struct modes *samples, size_t k, double noise)
 {
 	const struct trace *trace = job->trace;
+	double time = trace_time(trace, k), foot = job->span->foot_s;
 
 	if (!series_usable(trace, k))
 		return 0;
-	return (trace->value_g[k] - modes_at(samples, trace_time(trace, k) - job->span->from_s)) / noise;
+	if (foot > 0 && time < foot)
+		noise *= BACK_BEFORE;
+	return (trace->value_g[k] - modes_at(samples, time - job->span->from_s)) / noise;
 }
 
 /* Where the decay was free already: from first back to earliest, as long as the samples, one by one and each

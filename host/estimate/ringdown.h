@@ -51,6 +51,7 @@ struct ringdown_span {
 	double peak_g;    /* magnitude of the channel's peak, which says what is small */
 	double tolerance; /* part of the value; 0 = ESTIMATE_TOLERANCE */
 	double margin_s;  /* the decay may have been free this much before from_s; 0 = not looked for */
+	double foot_s; /* where the contact's family ends: before it a decay is hardly free; 0 = not known */
 };
 
 void ringdown_find(const struct trace *trace, const struct ringdown_span *span, struct ringdown *ringdown);

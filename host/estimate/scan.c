@@ -6,6 +6,7 @@
 
 #include "common/units.h"
 #include "host/estimate/cholesky.h"
+#include "host/estimate/pair.h"
 #include "host/estimate/series.h"
 
 /* Each frequency is looked at over this many of its cycles, and is given up when fewer than the least fit. */
@@ -97,7 +98,7 @@ bool scan_find(struct scan *scan, const struct trace *trace, size_t first, size_
 /* Sum and sum of squares of the usable samples [k, end). Returns how many there are. */
 static size_t add_up(const struct trace *trace, size_t k, size_t end, double *sum, double *squares)
 {
-	double sums[LANES] = {0}, squared[LANES] = {0};
+	PAIR sums[2] = {{0}, {0}}, squared[2] = {{0}, {0}};
 	size_t n = 0;
 
 	while (k < end) {
@@ -106,11 +107,14 @@ static size_t add_up(const struct trace *trace, size_t k, size_t end, double *su
 		if (end - k >= LANES)
 			memcpy(&marks, trace->sample + k, sizeof(marks));
 		if (marks == 0) {
-			for (unsigned i = 0; i < LANES; i++) {
-				double value = trace->value_g[k + i];
+			for (unsigned i = 0; i < LANES; i += 4) {
+				const PAIR a = pair_load(trace->value_g + k + i);
+				const PAIR b = pair_load(trace->value_g + k + i + 2);
 
-				sums[i] += value;
-				squared[i] += value * value;
+				sums[0] += a;
+				sums[1] += b;
+				squared[0] += a * a;
+				squared[1] += b * b;
 			}
 			n += LANES;
 			k += LANES;
@@ -123,10 +127,10 @@ static size_t add_up(const struct trace *trace, size_t k, size_t end, double *su
 		}
 		k++;
 	}
-	for (unsigned i = 0; i < LANES; i++) {
-		*sum += sums[i];
-		*squares += squared[i];
-	}
+	sums[0] += sums[1];
+	squared[0] += squared[1];
+	*sum += sums[0][0] + sums[0][1];
+	*squares += squared[0][0] + squared[0][1];
 	return n;
 }
 

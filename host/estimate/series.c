@@ -5,13 +5,17 @@
 
 static inline void take_point(struct series *series, const struct trace *trace, size_t first)
 {
+	const double *value = trace->value_g + first;
+	const uint8_t *sample = trace->sample + first;
+	unsigned marks = 0;
 	double sum = 0;
-	bool good = true;
+	bool good;
 
-	for (size_t k = first; k < first + series->block; k++) {
-		good = good && series_usable(trace, k);
-		sum += trace->value_g[k];
+	for (unsigned i = 0; i < series->block; i++) {
+		marks |= sample[i];
+		sum += value[i];
 	}
+	good = series_usable_mark(marks);
 	series->value_g[series->count] = good ? sum / series->block : 0;
 	series->good[series->count++] = good;
 	series->used += good;

@@ -4,6 +4,8 @@
 #include <math.h>
 
 #include "common/units.h"
+#include "host/estimate/gram.h"
+#include "host/estimate/pair.h"
 
 enum { PEAK, TIME, BASE, POWER, UNKNOWNS };
 
@@ -33,6 +35,9 @@ enum { PEAK, TIME, BASE, POWER, UNKNOWNS };
 /* On the kink at a foot the fit may stop this far from its bottom, in squares of sigma. */
 #define KINK_GAIN 1e-2
 
+/* At a foot rounding must not lead below zero. */
+#define COSINE_MIN 1e-12
+
 /* Without noise a limit is sharp. */
 #define SHARP 1e-6
 
@@ -40,38 +45,34 @@ struct problem {
 	const struct trace *trace;
 	enum estimate_family family;
 	size_t first, last;              /* [first, last) */
+	bool plain;                      /* none of these samples carries a mark */
 	double near_s;                   /* time is counted from here */
 	double base_s;                   /* at the start */
 	double noise_g;                  /* of censored samples, positive */
 	size_t limit_first, limit_count; /* samples that are as if at a limit */
 };
 
-/* The model along the samples: cos and sin of phi by recurrence. */
-struct run {
-	double phi, cosine, sine, step, turn_cosine, turn_sine;
+/* Of the samples those under the pulse, [first, last), and phi of the first and from one to the next. */
+struct under {
+	size_t first, last;
+	double phi, step;
 };
 
-static struct run run_start(const struct problem *m, const double *p)
+static struct under under_pulse(const struct problem *m, const double *p)
 {
-	double step = UNITS_PI / (p[BASE] * m->trace->rate_hz);
-	double phi = UNITS_PI * (trace_time(m->trace, m->first) - m->near_s - p[TIME]) / p[BASE];
+	double rate = m->trace->rate_hz, peak_s = m->near_s + p[TIME], step = UNITS_PI / (p[BASE] * rate);
+	double from = floor((peak_s - p[BASE] / 2 - trace_time(m->trace, m->first)) * rate) + 1;
+	double until = ceil((peak_s + p[BASE] / 2 - trace_time(m->trace, m->first)) * rate);
+	double count = (double)(m->last - m->first);
+	struct under under;
 
-	return (struct run){phi, cos(phi), sin(phi), step, cos(step), sin(step)};
-}
-
-static inline void run_on(struct run *run)
-{
-	double cosine = run->cosine * run->turn_cosine - run->sine * run->turn_sine;
-
-	run->sine = run->cosine * run->turn_sine + run->sine * run->turn_cosine;
-	run->cosine = cosine;
-	run->phi += run->step;
-}
-
-/* Inside the base; the test on the cosine is for rounding at its ends. */
-static inline bool run_inside(const struct run *run)
-{
-	return fabs(run->phi) < UNITS_PI / 2 && run->cosine > 0;
+	under.first = m->first + (size_t)fmin(fmax(from, 0), count);
+	under.last = m->first + (size_t)fmin(fmax(until, 0), count);
+	if (under.last < under.first)
+		under.last = under.first;
+	under.phi = UNITS_PI * (trace_time(m->trace, under.first) - peak_s) / p[BASE];
+	under.step = step;
+	return under;
 }
 
 /* The pulse of height 1, its derivative by phi, and by the power. */
@@ -141,16 +142,16 @@ static unsigned unknowns(enum estimate_family family)
 }
 
 /* Value and derivatives by the unknowns. */
-static inline double row_at(const struct problem *m, const double *p, const struct run *run,
+static inline double row_at(const struct problem *m, const double *p, double phi, double cosine, double sine,
                             double row[UNKNOWNS])
 {
 	double unit[3], slope;
 
-	unit_pulse(m->family, p[POWER], run->cosine, run->sine, unit);
+	unit_pulse(m->family, p[POWER], cosine, sine, unit);
 	slope = -p[PEAK] * unit[1] / p[BASE];
 	row[PEAK] = unit[0];
 	row[TIME] = UNITS_PI * slope;
-	row[BASE] = run->phi * slope;
+	row[BASE] = phi * slope;
 	row[POWER] = p[PEAK] * unit[2];
 	return p[PEAK] * unit[0];
 }
@@ -165,116 +166,232 @@ static void add_censored(unsigned size, const double *row, const struct share *s
 	}
 }
 
-/* Sums over the rows, square and of one even size whatever the family: such loops run in pairs. */
+/* Adds the samples that only say "at least". */
+static void censor(const struct problem *m, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
+                   double right[CHOLESKY_MAX], double *squares)
+{
+	const struct under under = under_pulse(m, p);
+
+	for (size_t k = m->first; k < m->last; k++) {
+		double phi = under.phi + ((double)k - (double)under.first) * under.step;
+		double row[UNKNOWNS] = {0}, residual = m->trace->value_g[k];
+		double sign = residual < 0 ? -1 : 1;
+		struct share share;
+
+		if (!trace_good(m->trace, k) || !is_censored(m, k))
+			continue;
+		if (k >= under.first && k < under.last)
+			residual -= row_at(m, p, phi, fmax(cos(phi), COSINE_MIN), sin(phi), row);
+		share = censored(sign * residual / m->noise_g, m->noise_g);
+		share.residual_g *= sign;
+		*squares += share.squares;
+		add_censored(unknowns(m->family), row, &share, matrix, right);
+	}
+}
+
+/* Sums over the samples under the pulse: of its unit u, the unit's slope v by phi, the unit's derivative w by
+ * the power, the residual r, and phi. Even and odd samples apart. */
 struct sums {
-	double product[UNKNOWNS][UNKNOWNS], right[UNKNOWNS];
+	PAIR uu, uv, vv, phi_uv, phi_vv, phi2_vv, uw, vw, phi_vw, ww, ru, rv, phi_rv, rw, rr;
 };
 
-static inline void add_row(struct sums *sums, const double row[UNKNOWNS], double residual)
+/* Two samples from k on, and which of them count: 1 or 0 each. */
+static inline PAIR two_samples(const struct problem *m, size_t k, size_t last, PAIR *count)
 {
-	for (unsigned i = 0; i < UNKNOWNS; i++)
-		for (unsigned j = 0; j < UNKNOWNS; j++)
-			sums->product[i][j] += row[i] * row[j];
-	for (unsigned i = 0; i < UNKNOWNS; i++)
-		sums->right[i] += row[i] * residual;
+	PAIR value = {0, 0};
+
+	*count = (PAIR){1, 1};
+	if (m->plain && k + 1 < last)
+		return pair_load(m->trace->value_g + k);
+	for (unsigned i = 0; i < 2; i++) {
+		bool counts = k + i < last && trace_good(m->trace, k + i) && !is_censored(m, k + i);
+
+		(*count)[i] = counts;
+		value[i] = counts ? m->trace->value_g[k + i] : 0;
+	}
+	return value;
+}
+
+static inline void add_up(struct sums *sums, PAIR phi, PAIR u, PAIR v, PAIR r)
+{
+	const PAIR late = phi * v;
+
+	sums->uu += u * u;
+	sums->uv += u * v;
+	sums->vv += v * v;
+	sums->phi_uv += u * late;
+	sums->phi_vv += v * late;
+	sums->phi2_vv += late * late;
+	sums->ru += r * u;
+	sums->rv += r * v;
+	sums->phi_rv += r * late;
+	sums->rr += r * r;
+}
+
+static inline void add_power(struct sums *sums, PAIR phi, PAIR u, PAIR v, PAIR w, PAIR r)
+{
+	sums->uw += u * w;
+	sums->vw += v * w;
+	sums->phi_vw += phi * v * w;
+	sums->ww += w * w;
+	sums->rw += r * w;
+}
+
+/* cos and sin of phi by recurrence. */
+static struct sums sum_under(const struct problem *m, const double *p, const struct under *under)
+{
+	const double turn_c = cos(2 * under->step), turn_s = sin(2 * under->step);
+	PAIR phi = {under->phi, under->phi + under->step};
+	PAIR c = {cos(phi[0]), cos(phi[1])}, s = {sin(phi[0]), sin(phi[1])};
+	struct sums sums = {.uu = {0}};
+
+	for (size_t k = under->first; k < under->last; k += 2) {
+		PAIR count, value = two_samples(m, k, under->last, &count), next = c * turn_c - s * turn_s;
+
+		if (m->family == ESTIMATE_FAMILY_SINE_POWER) {
+			PAIR u, v, w;
+
+			for (unsigned i = 0; i < 2; i++) {
+				double unit[3];
+
+				unit_pulse(m->family, p[POWER], c[i] > COSINE_MIN ? c[i] : COSINE_MIN, s[i],
+				           unit);
+				u[i] = unit[0];
+				v[i] = unit[1];
+				w[i] = unit[2];
+			}
+			u *= count;
+			v *= count;
+			w *= count;
+			add_up(&sums, phi, u, v, value - p[PEAK] * u);
+			add_power(&sums, phi, u, v, w, value - p[PEAK] * u);
+		} else {
+			PAIR u = m->family == ESTIMATE_FAMILY_HALF_SINE ? count * c : count * c * c;
+			PAIR v = m->family == ESTIMATE_FAMILY_HALF_SINE ? -count * s : -2 * count * c * s;
+
+			add_up(&sums, phi, u, v, value - p[PEAK] * u);
+		}
+		phi += 2 * under->step;
+		s = s * turn_c + c * turn_s;
+		c = next;
+	}
+	return sums;
+}
+
+static inline double both(PAIR pair)
+{
+	return pair[0] + pair[1];
+}
+
+static double squares_of(const struct problem *m, size_t from, size_t until)
+{
+	PAIR squares = {0, 0}, count;
+
+	for (size_t k = from; k < until; k += 2) {
+		PAIR value = two_samples(m, k, until, &count);
+
+		squares += value * value;
+	}
+	return both(squares);
+}
+
+/* Of the samples beyond the pulse's feet. */
+static double squares_beyond(const struct problem *m, const struct under *under)
+{
+	return squares_of(m, m->first, under->first) + squares_of(m, under->last, m->last);
+}
+
+static size_t count_used(const struct problem *m)
+{
+	size_t used = 0;
+
+	if (m->plain)
+		return m->last - m->first;
+	for (size_t k = m->first; k < m->last; k++)
+		used += trace_good(m->trace, k) && !is_censored(m, k);
+	return used;
 }
 
 static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
                      double right[CHOLESKY_MAX], double *squares)
 {
 	const struct problem *m = model;
-	const unsigned size = unknowns(m->family);
-	struct sums sums = {{{0}}, {0}};
-	size_t used = 0;
-	struct run run;
+	const double by_base = -p[PEAK] / p[BASE], by_time = UNITS_PI * by_base;
+	struct under under;
+	struct sums sums;
 
 	if (!possible(m, p))
 		return 0;
-	run = run_start(m, p);
-	for (size_t k = m->first; k < m->last; k++, run_on(&run)) {
-		const bool inside = run_inside(&run);
-		double row[UNKNOWNS] = {0}, residual = m->trace->value_g[k];
-
-		if (!trace_good(m->trace, k))
-			continue;
-		if (inside)
-			residual -= row_at(m, p, &run, row);
-		if (is_censored(m, k)) {
-			double sign = m->trace->value_g[k] < 0 ? -1 : 1;
-			struct share share = censored(sign * residual / m->noise_g, m->noise_g);
-
-			share.residual_g *= sign;
-			*squares += share.squares;
-			add_censored(size, row, &share, matrix, right);
-			continue;
-		}
-		used++;
-		*squares += residual * residual;
-		if (inside)
-			add_row(&sums, row, residual);
-	}
-	for (unsigned i = 0; i < size; i++) {
-		for (unsigned j = 0; j <= i; j++)
-			matrix[i][j] += sums.product[i][j];
-		right[i] += sums.right[i];
-	}
-	return used;
+	under = under_pulse(m, p);
+	sums = sum_under(m, p, &under);
+	matrix[PEAK][PEAK] = both(sums.uu);
+	matrix[TIME][PEAK] = by_time * both(sums.uv);
+	matrix[TIME][TIME] = by_time * by_time * both(sums.vv);
+	matrix[BASE][PEAK] = by_base * both(sums.phi_uv);
+	matrix[BASE][TIME] = by_base * by_time * both(sums.phi_vv);
+	matrix[BASE][BASE] = by_base * by_base * both(sums.phi2_vv);
+	matrix[POWER][PEAK] = p[PEAK] * both(sums.uw);
+	matrix[POWER][TIME] = p[PEAK] * by_time * both(sums.vw);
+	matrix[POWER][BASE] = p[PEAK] * by_base * both(sums.phi_vw);
+	matrix[POWER][POWER] = p[PEAK] * p[PEAK] * both(sums.ww);
+	right[PEAK] = both(sums.ru);
+	right[TIME] = by_time * both(sums.rv);
+	right[BASE] = by_base * both(sums.phi_rv);
+	right[POWER] = p[PEAK] * both(sums.rw);
+	*squares = both(sums.rr) + squares_beyond(m, &under);
+	if (!m->plain)
+		censor(m, p, matrix, right, squares);
+	return count_used(m);
 }
 
-/* Sums for one question: direction d against the residual, itself and the unknowns. */
-struct score {
-	double residual, square, cross[CHOLESKY_MAX];
-};
-
-static void score_add(struct score *score, unsigned size, double d, double residual, const double *row)
+/* How much the residual asks for a direction, in standard deviations: number q of the columns, against the
+ * unknowns before. */
+static double score(const struct shape *shape, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
+                    const double right[CHOLESKY_MAX], unsigned q)
 {
-	score->residual += d * residual;
-	score->square += d * d;
-	for (unsigned i = 0; i < size; i++)
-		score->cross[i] += d * row[i];
-}
+	double square = matrix[q][q], rest = square - cholesky_variance(&shape->factor, matrix[q]);
 
-static double score_z(const struct score *score, const struct cholesky *factor, double noise_g)
-{
-	double rest = score->square - cholesky_variance(factor, score->cross);
-
-	return rest > 1e-9 * score->square ? score->residual / (noise_g * sqrt(rest)) : 0;
+	return rest > 1e-9 * square ? right[q] / (shape->noise_g * sqrt(rest)) : 0;
 }
 
 /* Chi-square of the samples that were read, and the scores. False when hardly one lies inside the base. */
 static bool question(const struct problem *m, const double *p, struct shape *shape)
 {
-	struct score skew = {0, 0, {0}}, power = {0, 0, {0}};
-	struct run run = run_start(m, p);
-	unsigned size = unknowns(m->family);
-	double squares = 0;
-	size_t used = 0, inside = 0;
+	double matrix[CHOLESKY_MAX][CHOLESKY_MAX] = {{0}}, right[CHOLESKY_MAX] = {0}, squares;
+	const unsigned size = unknowns(m->family), skew = size, power = size + 1;
+	const bool asks_power = size == POWER;
+	struct under under = under_pulse(m, p);
+	const double turn_c = cos(under.step), turn_s = sin(under.step);
+	double phi = under.phi, c = cos(phi), s = sin(phi);
+	struct gram gram;
 
-	for (size_t k = m->first; k < m->last; k++, run_on(&run)) {
-		double row[UNKNOWNS] = {0}, residual = m->trace->value_g[k];
+	gram_start(&gram, asks_power ? size + 2 : size + 1);
+	for (size_t k = under.first; k < under.last; k++, phi += under.step) {
+		double row[GRAM_COMMON], residual = m->trace->value_g[k];
+		double cosine = c > COSINE_MIN ? c : COSINE_MIN, sine = s;
 
+		c = c * turn_c - s * turn_s;
+		s = s * turn_c + cosine * turn_s;
 		if (!trace_good(m->trace, k) || is_censored(m, k))
 			continue;
-		used++;
-		if (run_inside(&run)) {
-			inside++;
-			residual -= row_at(m, p, &run, row);
-			score_add(&skew, size, row[BASE] * run.phi, residual, row);
-			if (size == POWER)
-				score_add(&power, size, row[PEAK] * log(run.cosine), residual, row);
-		}
-		squares += residual * residual;
+		residual -= row_at(m, p, phi, cosine, sine, row);
+		row[skew] = row[BASE] * phi;
+		if (asks_power)
+			row[power] = row[PEAK] * log(cosine);
+		row[GRAM_COMMON - 1] = residual;
+		gram_add(&gram, row);
 	}
-	if (inside <= size)
+	squares = squares_beyond(m, &under);
+	if (gram_finish(&gram, matrix, right, &squares) <= size)
 		return false;
-	shape->freedom = (unsigned)(used - size);
+	shape->freedom = (unsigned)(count_used(m) - size);
 	shape->noise_g = sqrt(squares / shape->freedom);
 	if (!(m->trace->noise_g > 0))
 		return true;
 	shape->chi_square = squares / shape->freedom / (m->trace->noise_g * m->trace->noise_g);
 	shape->noise_g = m->trace->noise_g;
-	shape->skew_z = score_z(&skew, &shape->factor, shape->noise_g);
-	shape->power_z = score_z(&power, &shape->factor, shape->noise_g);
+	shape->skew_z = score(shape, matrix, right, skew);
+	shape->power_z = asks_power ? score(shape, matrix, right, power) : 0;
 	return true;
 }
 
@@ -343,6 +460,8 @@ bool shape_fit(struct shape *shape, const struct trace *trace, enum estimate_fam
 
 	if (start->limit_from_s <= start->limit_until_s)
 		problem.limit_count = trace_index(trace, start->limit_until_s) - problem.limit_first;
+	problem.plain = problem.limit_count == 0 && !trace_any(trace, trace_time(trace, problem.first),
+	                                                       trace_time(trace, problem.last - 1), ~0u);
 	if (!(base > 0) || !lm_fit(&lm, p, &result) || !(p[PEAK] * start->peak_g > 0))
 		return false;
 	found.factor = result.factor;

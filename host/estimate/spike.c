@@ -3,8 +3,11 @@
 
 #include <math.h>
 
+#include "host/estimate/pair.h"
+
 enum {
 	SIDE = 4,   /* neighbours looked at on each side */
+	RUN = 8,    /* samples looked at together */
 	REACH = 10, /* how far for them, where some are missing */
 };
 
@@ -117,9 +120,6 @@ static size_t spike_at(const struct trace *trace, size_t k, double noise_g)
 
 	if (!trace_good(trace, k))
 		return 0;
-	/* A spike bends by no less than it stands off. */
-	if (trace_good(trace, k - 1) && trace_good(trace, k + 1) && !(bend(v) > SIGMAS * noise_g))
-		return 0;
 	if (!all_good(trace, k - SIDE, k + SIDE + 1))
 		return stands_alone_by_hole(trace, k, noise_g) ? 1 : 0;
 	if (stands_alone(v, noise_g))
@@ -129,20 +129,45 @@ static size_t spike_at(const struct trace *trace, size_t k, double noise_g)
 	return 0;
 }
 
-bool spike_mark(struct trace *trace, double noise_g)
+static bool is_whole(const struct trace *trace, size_t i)
 {
+	return i >= trace_blocks(trace) || trace->block[i].whole;
+}
+
+/* Whether none of RUN samples from v on bends by more. */
+static bool is_calm(const double *v, double bend_g)
+{
+	PAIR most = {0, 0};
+
+	for (unsigned i = 0; i < RUN; i += 2) {
+		PAIR off = pair_load(v - 1 + i) - 2 * pair_load(v + i) + pair_load(v + i + 1);
+
+		most = pair_more(most, off * off);
+	}
+	return !(most[0] > bend_g * bend_g) && !(most[1] > bend_g * bend_g);
+}
+
+/* In block i. */
+static bool mark_in(struct trace *trace, size_t i, double noise_g)
+{
+	const size_t from = i * TRACE_BLOCK;
+	const size_t until =
+	        from + TRACE_BLOCK + SIDE < trace->count ? from + TRACE_BLOCK : trace->count - SIDE;
+	const bool whole = is_whole(trace, i - 1) && is_whole(trace, i) && is_whole(trace, i + 1);
+	const double *value = trace->value_g, calm_g = SIGMAS * noise_g;
 	bool marked = false;
 
-	if (!isfinite(noise_g))
-		return false;
-	for (size_t k = SIDE; k + SIDE < trace->count; k++) {
-		const struct trace_block *block = &trace->block[k / TRACE_BLOCK];
+	for (size_t k = from < SIDE ? SIDE : from; k < until; k++) {
 		size_t wide;
 
-		if (!(block->high_g - block->low_g > SIGMAS * noise_g)) {
-			k |= TRACE_BLOCK - 1;
+		if (whole && k % RUN == 0 && k + RUN <= until && is_calm(value + k, calm_g)) {
+			k += RUN - 1;
 			continue;
 		}
+		/* A spike bends by no less than it stands off. */
+		if ((whole || (trace_good(trace, k - 1) && trace_good(trace, k + 1))) &&
+		    !(bend(value + k) > calm_g))
+			continue;
 		wide = spike_at(trace, k, noise_g);
 		if (wide == 0)
 			continue;
@@ -150,6 +175,21 @@ bool spike_mark(struct trace *trace, double noise_g)
 		trace->sample[k + wide - 1] |= SAMPLE_SPIKE;
 		marked = true;
 		k += wide - 1;
+	}
+	return marked;
+}
+
+bool spike_mark(struct trace *trace, double noise_g)
+{
+	bool marked = false;
+
+	if (!isfinite(noise_g) || trace->count < SIDE)
+		return false;
+	for (size_t i = 0; i < trace_blocks(trace); i++) {
+		const struct trace_block *block = &trace->block[i];
+
+		if (block->high_g - block->low_g > SIGMAS * noise_g)
+			marked |= mark_in(trace, i, noise_g);
 	}
 	if (marked)
 		trace->flags |= RECORD_FLAG_SPIKE;

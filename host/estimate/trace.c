@@ -6,9 +6,15 @@
 #include <string.h>
 
 #include "host/estimate/clip.h"
+#include "host/estimate/pair.h"
 
 /* Beyond any sensor; keeps squares and sums far from overflow. */
 #define VALUE_MAX_G 1e9
+
+static size_t smaller(size_t a, size_t b)
+{
+	return a < b ? a : b;
+}
 
 static double less(double a, double b)
 {
@@ -20,36 +26,38 @@ static double more(double a, double b)
 	return a > b ? a : b;
 }
 
-/* Of TRACE_BLOCK good values, in strands that need not wait for each other. False, and nothing is known, when
- * one of them is no acceleration. */
-static bool extremes(const double *v, struct trace_block *block)
+/* Copies TRACE_BLOCK good values, in strands that need not wait for each other. False, and nothing else is
+ * known, when one of them is no acceleration. */
+static bool take_block(double *to, const double *from, struct trace_block *block)
 {
-	double l0 = v[0], l1 = v[1], l2 = v[2], l3 = v[3], h0 = l0, h1 = l1, h2 = l2, h3 = l3;
-	double s0 = 0, s1 = 0, sum; /* finite unless a value is not */
+	PAIR low[2] = {pair_load(from), pair_load(from + 2)}, high[2] = {low[0], low[1]};
+	PAIR sum[2] = {{0}, {0}}; /* finite unless a value is not */
 
 	for (unsigned i = 0; i < TRACE_BLOCK; i += 4) {
-		l0 = less(l0, v[i]);
-		h0 = more(h0, v[i]);
-		l1 = less(l1, v[i + 1]);
-		h1 = more(h1, v[i + 1]);
-		l2 = less(l2, v[i + 2]);
-		h2 = more(h2, v[i + 2]);
-		l3 = less(l3, v[i + 3]);
-		h3 = more(h3, v[i + 3]);
-		s0 += v[i] + v[i + 2];
-		s1 += v[i + 1] + v[i + 3];
+		const PAIR a = pair_load(from + i), b = pair_load(from + i + 2);
+
+		pair_store(to + i, a);
+		pair_store(to + i + 2, b);
+		low[0] = pair_less(low[0], a);
+		low[1] = pair_less(low[1], b);
+		high[0] = pair_more(high[0], a);
+		high[1] = pair_more(high[1], b);
+		sum[0] += a;
+		sum[1] += b;
 	}
-	sum = s0 + s1;
-	block->low_g = less(less(l0, l1), less(l2, l3));
-	block->high_g = more(more(h0, h1), more(h2, h3));
+	low[0] = pair_less(low[0], low[1]);
+	high[0] = pair_more(high[0], high[1]);
+	sum[0] += sum[1];
+	block->low_g = less(low[0][0], low[0][1]);
+	block->high_g = more(high[0][0], high[0][1]);
 	block->whole = true;
-	return !isnan(sum) && block->low_g >= -VALUE_MAX_G && block->high_g <= VALUE_MAX_G;
+	return !isnan(sum[0][0] + sum[0][1]) && block->low_g >= -VALUE_MAX_G && block->high_g <= VALUE_MAX_G;
 }
 
 /* Sample by sample, from sample k on, marking what is bad. */
 static void look_closely(struct trace *trace, size_t k, struct trace_block *block)
 {
-	size_t end = k + TRACE_BLOCK < trace->count ? k + TRACE_BLOCK : trace->count;
+	size_t end = k + smaller(TRACE_BLOCK, trace->count - k);
 
 	*block = (struct trace_block){INFINITY, -INFINITY, true};
 	for (; k < end; k++) {
@@ -73,33 +81,47 @@ static void look_closely(struct trace *trace, size_t k, struct trace_block *bloc
 
 static bool all_good(const uint8_t *sample)
 {
-	uint64_t word[TRACE_BLOCK / 8], any = 0;
+	uint64_t any = 0;
 
-	memcpy(word, sample, TRACE_BLOCK);
-	for (unsigned i = 0; i < TRACE_BLOCK / 8; i++)
-		any |= word[i];
+	for (unsigned i = 0; i < TRACE_BLOCK; i += sizeof(any)) {
+		uint64_t word;
+
+		memcpy(&word, sample + i, sizeof(word));
+		any |= word;
+	}
 	return any == 0;
+}
+
+/* The block that begins at sample k, from values that lie elsewhere or in the trace itself. */
+static void look(struct trace *trace, size_t k, const double *from)
+{
+	struct trace_block *block = &trace->block[k / TRACE_BLOCK];
+	double *to = trace->value_g + k;
+
+	if (trace->count - k >= TRACE_BLOCK && all_good(trace->sample + k) && take_block(to, from, block))
+		return;
+	if (from != to)
+		memcpy(to, from, smaller(TRACE_BLOCK, trace->count - k) * sizeof(*to));
+	look_closely(trace, k, block);
 }
 
 static void copy(struct trace *trace, const struct channel *channel)
 {
-	if (trace->count == 0)
-		return;
-	memcpy(trace->value_g, channel->value_g, trace->count * sizeof(*trace->value_g));
-	memcpy(trace->sample, channel->sample, trace->count);
-	for (size_t k = 0; k < trace->count; k += TRACE_BLOCK) {
-		struct trace_block *block = &trace->block[k / TRACE_BLOCK];
+	if (trace->count > 0)
+		memcpy(trace->sample, channel->sample, trace->count);
+	for (size_t k = 0; k < trace->count; k += TRACE_BLOCK)
+		look(trace, k, channel->value_g + k);
+}
 
-		if (trace->count - k < TRACE_BLOCK || !all_good(trace->sample + k) ||
-		    !extremes(trace->value_g + k, block))
-			look_closely(trace, k, block);
-	}
+void trace_changed(struct trace *trace)
+{
+	for (size_t k = 0; k < trace->count; k += TRACE_BLOCK)
+		look(trace, k, trace->value_g + k);
 }
 
 void trace_marked(struct trace *trace)
 {
-	for (size_t k = 0; k < trace->count; k += TRACE_BLOCK)
-		look_closely(trace, k, &trace->block[k / TRACE_BLOCK]);
+	trace_changed(trace);
 	clip_mark(trace);
 }
 
@@ -156,6 +178,20 @@ void trace_close(struct trace *trace)
 	trace->sample = NULL;
 }
 
+size_t trace_reaches(const struct trace *trace, size_t k, size_t last, double level_g)
+{
+	while (k < last) {
+		if (trace_most(trace, k) < level_g) {
+			k += TRACE_BLOCK - k % TRACE_BLOCK;
+			continue;
+		}
+		if (fabs(trace->value_g[k]) >= level_g && trace_good(trace, k))
+			return k;
+		k++;
+	}
+	return last;
+}
+
 size_t trace_index(const struct trace *trace, double time_s)
 {
 	double k = ceil((time_s - trace->start_s) * trace->rate_hz - 1e-6);
@@ -208,11 +244,12 @@ bool trace_edge(const struct trace *trace, size_t k, int step, double sign, doub
 
 bool trace_any(const struct trace *trace, double from_s, double until_s, unsigned bits)
 {
-	for (size_t k = trace_index(trace, from_s); k < trace->count; k++) {
-		if (trace_time(trace, k) > until_s)
-			return false;
-		if (trace->sample[k] & bits)
-			return true;
-	}
-	return false;
+	size_t end = trace_index(trace, until_s);
+	unsigned marks = 0;
+
+	if (end < trace->count && trace_time(trace, end) <= until_s)
+		end++;
+	for (size_t k = trace_index(trace, from_s); k < end; k++)
+		marks |= trace->sample[k];
+	return (marks & bits) != 0;
 }

@@ -8,7 +8,8 @@
  *
  * Opening copies and marks: a sample that is not finite, or larger than any accelerometer reads, is bad;
  * groups of equal extreme samples are clipped and at the limit (clip.h). The extremes of each run of
- * TRACE_BLOCK samples are kept, so that a search need not look at what is quiet.
+ * TRACE_BLOCK samples are kept, so that a search need not look at what is quiet: who changes values says so
+ * (trace_changed).
  *
  * trace_open allocates and trace_close frees. trace_lay uses the caller's memory, aligned for a double and
  * trace_bytes long, that must outlive the trace; such a trace is not closed.
@@ -23,7 +24,7 @@ enum { TRACE_LIMIT = 1u << 7 };
 
 enum { TRACE_BLOCK = 64 };
 
-/* No good sample of the block lies outside, as opened; low > high where none is good. */
+/* No good sample of the block lies outside; low > high where none is good. */
 struct trace_block {
 	double low_g, high_g;
 	bool whole; /* every sample of it is good */
@@ -41,7 +42,7 @@ struct trace {
 	double hum_hz;  /* its frequency; NAN if none */
 	unsigned flags; /* RECORD_FLAG_* */
 	double range_g; /* the channel's */
-	struct trace_block *block; /* [trace_blocks] of the values as opened */
+	struct trace_block *block; /* [trace_blocks] */
 	void *memory;              /* of trace_open */
 };
 
@@ -53,7 +54,8 @@ size_t trace_bytes(const struct channel *channel); /* a multiple of a double's s
 void trace_lay(struct trace *trace, const struct channel *channel, double from_s, double until_s,
                void *memory);
 
-/* After good samples were marked bad: blocks and limits anew. */
+/* After values changed: blocks anew. After good samples were marked bad: limits too. */
+void trace_changed(struct trace *trace);
 void trace_marked(struct trace *trace);
 
 static inline size_t trace_blocks(const struct trace *trace)
@@ -70,6 +72,17 @@ static inline double trace_time(const struct trace *trace, size_t k)
 {
 	return trace->start_s + (double)k / trace->rate_hz;
 }
+
+/* No good sample of sample k's block is larger in magnitude; negative where none is good. */
+static inline double trace_most(const struct trace *trace, size_t k)
+{
+	const struct trace_block *block = &trace->block[k / TRACE_BLOCK];
+
+	return block->high_g > -block->low_g ? block->high_g : -block->low_g;
+}
+
+/* The first good sample of [k, last) whose magnitude reaches level_g; last when there is none. */
+size_t trace_reaches(const struct trace *trace, size_t k, size_t last, double level_g);
 
 /* The first sample at or after time_s; count when there is none. */
 size_t trace_index(const struct trace *trace, double time_s);

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "host/estimate/baseline.h"
 #include "host/estimate/trace.h"
 #include "tests/unit/near.h"
 #include "tests/unit/synth.h"
@@ -217,12 +218,48 @@ static void edges(void **state)
 	synth_free(&channel);
 }
 
+/* What is known of the blocks follows the values, and a search by blocks finds what a plain one does. */
+static void follows_changes(void **state)
+{
+	static const struct estimate_baseline moved[] = {
+	        {.offset_g = 7.5, .hum_hz = NAN},
+	        {.offset_g = -3, .drift_g_s = 40, .hum_g = 6, .hum_hz = 50, .from_s = 0, .until_s = 0.2},
+	};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(moved) / sizeof(moved[0]); i++) {
+		struct channel channel = synth_channel("a", 1000, 0, 333);
+		struct trace trace;
+
+		fill(&channel, 5 + i);
+		synth_lose(&channel, 100, 20);
+		trace = open_trace(&channel);
+		baseline_remove(&trace, &moved[i]);
+		for (size_t k = 0; k < trace.count; k++) {
+			const struct trace_block *block = &trace.block[k / TRACE_BLOCK];
+
+			assert_true(!trace_good(&trace, k) ||
+			            (block->low_g <= trace.value_g[k] && trace.value_g[k] <= block->high_g));
+		}
+		for (double level_g = 0; level_g < 60; level_g += 0.7) {
+			size_t k = 17;
+
+			while (k < 300 && !(trace_good(&trace, k) && fabs(trace.value_g[k]) >= level_g))
+				k++;
+			assert_int_equal(trace_reaches(&trace, 17, 300, level_g), k);
+		}
+		trace_close(&trace);
+		synth_free(&channel);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(copies), cmocka_unit_test(extremes),       cmocka_unit_test(no_acceleration),
-	        cmocka_unit_test(limits), cmocka_unit_test(without_a_rate), cmocka_unit_test(laid),
-	        cmocka_unit_test(edges),
+	        cmocka_unit_test(copies),          cmocka_unit_test(extremes),
+	        cmocka_unit_test(no_acceleration), cmocka_unit_test(limits),
+	        cmocka_unit_test(without_a_rate),  cmocka_unit_test(laid),
+	        cmocka_unit_test(edges),           cmocka_unit_test(follows_changes),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
