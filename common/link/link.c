@@ -183,6 +183,11 @@ const char *link_url(const struct link *link)
 	return link->url;
 }
 
+int link_flush(struct link *link)
+{
+	return link->ops->flush != NULL ? link->ops->flush(link) : 0;
+}
+
 int link_close(struct link *link)
 {
 	char *url;

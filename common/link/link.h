@@ -66,6 +66,10 @@ uint64_t link_line(const struct link *link);
 const struct link_counters *link_counters(const struct link *link);
 const char *link_url(const struct link *link);
 
+/* Hands what was written so far to the system, so that it outlives this program, not a power failure. 0, or
+ * DT_E_SYSTEM if it cannot be kept. Links that hold nothing back do nothing. */
+DT_MUST_USE int link_flush(struct link *link);
+
 /* Flushes and frees; NULL is allowed. 0 or DT_E_SYSTEM if what was written could not be kept. */
 int link_close(struct link *link);
 

@@ -51,6 +51,13 @@ static const char *open_output(struct log *log, const char *path)
 	return NULL;
 }
 
+static int log_flush(struct link *link)
+{
+	struct log *log = (struct log *)link;
+
+	return log->output == NULL || fflush(log->output) == 0 ? 0 : DT_E_SYSTEM;
+}
+
 static int log_close(struct link *link)
 {
 	struct log *log = (struct log *)link;
@@ -203,4 +210,5 @@ static int log_descriptor(const struct link *link)
 	return -1;
 }
 
-const struct link_ops link_log = {"log", log_open, log_send, log_receive, log_descriptor, log_close};
+const struct link_ops link_log = {"log",          log_open,  log_send, log_receive,
+                                  log_descriptor, log_close, log_flush};

@@ -269,5 +269,5 @@ static int slcan_descriptor(const struct link *link)
 	return ((const struct slcan *)link)->poller;
 }
 
-const struct link_ops link_slcan = {"slcan",       slcan_open,       slcan_send,
-                                    slcan_receive, slcan_descriptor, slcan_close};
+const struct link_ops link_slcan = {"slcan",          slcan_open,  slcan_send, slcan_receive,
+                                    slcan_descriptor, slcan_close, NULL};

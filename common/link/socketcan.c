@@ -364,4 +364,4 @@ static int can_descriptor(const struct link *link)
 	return ((const struct socketcan *)link)->socket;
 }
 
-const struct link_ops link_can = {"can", can_open, can_send, can_receive, can_descriptor, can_close};
+const struct link_ops link_can = {"can", can_open, can_send, can_receive, can_descriptor, can_close, NULL};

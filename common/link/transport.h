@@ -31,6 +31,7 @@ struct link_ops {
 	int (*receive)(struct link *link, struct frame *frame, int64_t deadline_us);
 	int (*descriptor)(const struct link *link);
 	int (*close)(struct link *link);
+	int (*flush)(struct link *link); /* NULL: nothing is held back */
 };
 
 struct link {

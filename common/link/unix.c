@@ -339,4 +339,4 @@ static int bus_descriptor(const struct link *link)
 	return ((const struct bus *)link)->poller;
 }
 
-const struct link_ops link_unix = {"unix", bus_open, bus_send, bus_receive, bus_descriptor, bus_close};
+const struct link_ops link_unix = {"unix", bus_open, bus_send, bus_receive, bus_descriptor, bus_close, NULL};

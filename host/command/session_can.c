@@ -91,10 +91,14 @@ static int send_verdict(struct session *session)
 	return send_op(session, way->verdict, 0, way->verdict == WIRE_OP_ACCEPT ? way->end.crc32 : 0);
 }
 
+/* After it the tower forgets: a host that is killed then must have the samples in its log. */
 static int judge(struct session *session, enum wire_op verdict)
 {
 	struct can_way *way = session->way;
+	int result = session->options.log != NULL ? link_flush(session->options.log) : 0;
 
+	if (result != 0)
+		return result;
 	way->sequence++;
 	way->verdict = verdict;
 	way->judged = true;

@@ -147,6 +147,9 @@ static void test_writing_appends_and_stamps(void **state)
 	assert_int_equal(link_send(link, &frame), 0);
 	assert_int_equal(link_send(link, &negative), DT_E_ARGUMENT);
 	assert_int_equal(link_receive(link, &got, 0), DT_E_STATE);
+	expect_contents(1, 0, 1);
+	assert_int_equal(link_flush(link), 0); /* what was sent is there for others before the end */
+	expect_contents(2, 0, 2);
 	assert_int_equal(link_close(link), 0);
 	expect_contents(2, 0, 2);
 	link = open_log(LINK_READ);
@@ -278,6 +281,7 @@ static void test_full_disk_is_reported(void **state)
 	link = link_open("log:/dev/full", LINK_WRITE, message, sizeof(message));
 	assert_non_null(link);
 	assert_int_equal(link_send(link, &frame), 0); /* still in the buffer */
+	assert_int_equal(link_flush(link), DT_E_SYSTEM);
 	assert_int_equal(link_close(link), DT_E_SYSTEM);
 	link = link_open("log:/dev/full", LINK_WRITE, message, sizeof(message));
 	for (int i = 0; i < 1000 && error == 0; i++)
