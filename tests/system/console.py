@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What tests of the console share: `droptower serve` as a child, its requests, and its stream of events."""
+import atexit
 import base64
 import http.client
 import json
@@ -87,6 +88,7 @@ class Console:
         self.process = subprocess.Popen([os.path.join(build or BUILD, "droptower"), "serve", "--port", "0", *map(str, words)],
                                         cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE, **more)
+        atexit.register(self.process.kill)  # whatever becomes of the test
         self.holding, self.streams = None, []
         ready, _, _ = select.select([self.process.stdout], [], [], 20)
         line = self.process.stdout.readline().decode().strip() if ready else ""
