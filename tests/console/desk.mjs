@@ -171,6 +171,7 @@ export class Desk {
 				if (tries === 3)
 					throw error;
 				note(`tried again: ${error.message.split("\n")[0]}`);
+				this.errors = this.errors.filter((text) => !/status of 4\d\d .*api\/(arm|release)/.test(text));
 			}
 		}
 	}
