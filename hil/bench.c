@@ -29,6 +29,17 @@ void bench_say(const char *format, ...)
 	va_end(arguments);
 }
 
+void bench_tell(const struct bench_options *options, const char *format, ...)
+{
+	va_list arguments;
+
+	if (options->quiet)
+		return;
+	va_start(arguments, format);
+	say(format, arguments);
+	va_end(arguments);
+}
+
 void bench_fail(struct bench *bench, int status, const char *format, ...)
 {
 	va_list arguments;
@@ -190,10 +201,10 @@ static void start(struct bench *bench)
 
 	start_target(bench, 0);
 	if (!bench->stop)
-		bench_say("%s at %g deg, seed %llu, %s, %s", options->scene.name,
-		          options->scene.drop_angle_deg, (unsigned long long)options->seed,
-		          options->realtime ? "paced by the clock" : "as fast as it goes",
-		          options->link ? options->link : "scripted operator");
+		bench_tell(options, "%s at %g deg, seed %llu, %s, %s", options->scene.name,
+		           options->scene.drop_angle_deg, (unsigned long long)options->seed,
+		           options->realtime ? "paced by the clock" : "as fast as it goes",
+		           options->link ? options->link : "scripted operator");
 }
 
 /* Each step only if those before it went well. */
@@ -249,36 +260,38 @@ static void tear_down(struct bench *bench)
 	tower_destroy(bench->tower);
 }
 
-static void say_bus(const char *way, const struct busfault *fault)
+static void say_bus(const struct bench *bench, const char *way, const struct busfault *fault)
 {
 	const struct busfault_counters *c = &fault->counters;
 
 	if (c->taken == c->given && c->duplicated == 0 && c->reordered == 0)
 		return; /* a bus that did nothing to its frames is not worth a line */
-	bench_say("%s: %llu frames sent, %llu arrived; lost %llu at random, %llu in bursts, %llu resent, "
-	          "%llu in silence; "
-	          "doubled %llu, reordered %llu, held %u",
-	          way, (unsigned long long)c->taken, (unsigned long long)c->given,
-	          (unsigned long long)c->lost, (unsigned long long)c->burst_lost, (unsigned long long)c->cut,
-	          (unsigned long long)c->silenced, (unsigned long long)c->duplicated,
-	          (unsigned long long)c->reordered, busfault_held(fault));
+	bench_tell(bench->options,
+	           "%s: %llu frames sent, %llu arrived; lost %llu at random, %llu in bursts, %llu resent, "
+	           "%llu in silence; "
+	           "doubled %llu, reordered %llu, held %u",
+	           way, (unsigned long long)c->taken, (unsigned long long)c->given,
+	           (unsigned long long)c->lost, (unsigned long long)c->burst_lost, (unsigned long long)c->cut,
+	           (unsigned long long)c->silenced, (unsigned long long)c->duplicated,
+	           (unsigned long long)c->reordered, busfault_held(fault));
 }
 
 static void say_summary(const struct bench *bench, double wall_s)
 {
 	double virtual_s = bench_now_s(bench);
 
-	say_bus("tower to host", &bench->to_host);
-	say_bus("host to tower", &bench->to_tower);
+	say_bus(bench, "tower to host", &bench->to_host);
+	say_bus(bench, "host to tower", &bench->to_tower);
 	if (bench->edges_outside || bench->queue_lost || bench->not_carried || bench->link_full)
 		bench_say(
 		        "not as it should be: %llu output edges outside their span, %llu frames to the tower "
 		        "without room, %llu not for it, %llu the link did not take",
 		        (unsigned long long)bench->edges_outside, (unsigned long long)bench->queue_lost,
 		        (unsigned long long)bench->not_carried, (unsigned long long)bench->link_full);
-	bench_say("%u drop%s, seed %llu, %.3f s of virtual time in %.3f s, %.2f times real time",
-	          bench->impacts, bench->impacts == 1 ? "" : "s", (unsigned long long)bench->options->seed,
-	          virtual_s, wall_s, wall_s > 0 ? virtual_s / wall_s : 0.0);
+	bench_tell(bench->options,
+	           "%u drop%s, seed %llu, %.3f s of virtual time in %.3f s, %.2f times real time",
+	           bench->impacts, bench->impacts == 1 ? "" : "s", (unsigned long long)bench->options->seed,
+	           virtual_s, wall_s, wall_s > 0 ? virtual_s / wall_s : 0.0);
 }
 
 static double bus_error(const struct busfault *fault)

@@ -37,6 +37,7 @@ struct bench_options {
 	const char *link;     /* NULL: the script is the host */
 	const char *firmware; /* NULL: droptower-firmware beside this program */
 	uint64_t seed;
+	bool quiet;    /* nothing is said of how it goes on */
 	bool realtime; /* paced by the clock, else as fast as it goes */
 	struct script_options script;
 	bool ideal;
@@ -69,5 +70,9 @@ int bench_run(const struct bench_options *options);
 
 /* "droptower-bench: ..." and a newline on stderr. */
 void bench_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+/* The same for how it goes on: nothing when quiet. */
+void bench_tell(const struct bench_options *options, const char *format, ...)
+        __attribute__((format(printf, 2, 3)));
 
 #endif

@@ -44,8 +44,8 @@ static void watch_status(struct bench *bench, const struct frame *frame)
 	if (frame->id != WIRE_ID_STATUS || wire_unpack_status(frame, &status) != 0)
 		return;
 	if (status.fault != bench->fault)
-		bench_say("fault %s in state %s at %.3f s", wire_fault_name(status.fault),
-		          wire_state_name(status.state), bench_now_s(bench));
+		bench_tell(bench->options, "fault %s in state %s at %.3f s", wire_fault_name(status.fault),
+		           wire_state_name(status.state), bench_now_s(bench));
 	bench->state = status.state;
 	bench->fault = status.fault;
 }

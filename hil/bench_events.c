@@ -18,8 +18,9 @@ void bench_event(struct bench *bench, const struct event *event)
 	case EVENT_FAULT:
 	case EVENT_REPAIR:
 		tower_fault(bench->tower, (enum tower_fault)event->number, event->action == EVENT_FAULT);
-		bench_say("%s%s at %.3f s", tower_fault_name((enum tower_fault)event->number),
-		          event->action == EVENT_FAULT ? "" : " repaired", bench_now_s(bench));
+		bench_tell(bench->options, "%s%s at %.3f s",
+		           tower_fault_name((enum tower_fault)event->number),
+		           event->action == EVENT_FAULT ? "" : " repaired", bench_now_s(bench));
 		break;
 	case EVENT_SEND:
 		bench_from_host(bench, &event->frame);

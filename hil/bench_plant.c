@@ -129,9 +129,10 @@ static void watch_impact(struct bench *bench)
 		bench->impact_s = truth->impact_s;
 		bench->impacts++;
 		bench->burst_waiting = bench->options->burst > 0;
-		bench_say("drop %u: separated at %.1f mm, impact at %.6f s with %.3f m/s, %.2f deg",
-		          bench->impacts, 1e3 * truth->separation_travel_m, truth->impact_s,
-		          truth->impact_speed_m_s, truth->angle_deg);
+		bench_tell(bench->options,
+		           "drop %u: separated at %.1f mm, impact at %.6f s with %.3f m/s, %.2f deg",
+		           bench->impacts, 1e3 * truth->separation_travel_m, truth->impact_s,
+		           truth->impact_speed_m_s, truth->angle_deg);
 	}
 	if (bench->burst_waiting &&
 	    bench_tower_s(bench, bench->now_grid) >= bench->impact_s + bench->options->burst_after_s) {

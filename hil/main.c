@@ -62,6 +62,7 @@ enum {
 	OPTION_LOG,
 	OPTION_TRUTH,
 	OPTION_READY_FD,
+	OPTION_QUIET,
 	OPTION_HELP,
 };
 
@@ -87,6 +88,7 @@ static const struct option options_long[] = {
         {"log", required_argument, NULL, OPTION_LOG},
         {"truth", required_argument, NULL, OPTION_TRUTH},
         {"ready-fd", required_argument, NULL, OPTION_READY_FD},
+        {"quiet", no_argument, NULL, OPTION_QUIET},
         {"help", no_argument, NULL, OPTION_HELP},
         {0},
 };
@@ -126,6 +128,7 @@ static void help(void)
 	      "  --log FILE           frames on the host's side, candump text in virtual time\n"
 	      "  --truth FILE         converter codes: tick sensor x0..x6 y0..y9 z0..z9\n"
 	      "  --ready-fd N         gets one byte when the firmware runs\n"
+	      "  --quiet              says only what is wrong\n"
 	      "\n"
 	      "Exit: 0 done, 1 a drop of the operator did not end complete and SAFE, or the scenario\n"
 	      "not as expected, 2 usage, 3 scene or scenario unusable, 4 link or firmware\n",
@@ -259,6 +262,9 @@ static bool take_link_option(struct line *line, int option, const char *text)
 		return true;
 	case OPTION_CONTROL:
 		bench->control = text;
+		return true;
+	case OPTION_QUIET:
+		bench->quiet = true;
 		return true;
 	case OPTION_READY_FD:
 		bench->ready_fd = (int)whole("ready-fd", text, 0, 1023);

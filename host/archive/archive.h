@@ -74,9 +74,10 @@ struct archive_recording {
 	int lock;                        /* held while it is being recorded */
 };
 
-/* Makes the next drop of series, its empty log included. ending: ".log". DT_E_UNKNOWN: no such series. */
+/* Makes the next drop of series, its empty log included. ending: ".log". simulated: on a simulated tower, so
+ * that no product falls; false when that is not known. DT_E_UNKNOWN: no such series. */
 DT_MUST_USE int archive_begin(struct archive *archive, const char *series, const char *operator_name,
-                              const char *ending, struct archive_recording *recording);
+                              const char *ending, bool simulated, struct archive_recording *recording);
 
 /* The log is complete and closed. time_s: of the drop, since the epoch; 0 = when it was begun. note: may be
  * "". On an error the drop stays partial. Ends the recording in any case. */
@@ -154,6 +155,7 @@ struct archive_drop {
 	const char *reason, *operator_name, *note;
 	const char *raw, *sha256, *time;
 	int64_t bytes;
+	bool simulated;                    /* known to be from a simulated tower; false: not known */
 	const char *version;               /* of the result; NULL: there is none */
 	double value[ARCHIVE_VALUE_COUNT]; /* NAN: none */
 	double sigma[ARCHIVE_VALUE_COUNT];
@@ -164,10 +166,13 @@ struct archive_drop {
 /* NULL, NAN and 0 take anything. */
 struct archive_filter {
 	const char *series, *campaign, *scene_name;
+	const char *text; /* words: each in a name of series, campaign or operator, a note or a reason; of a
+	                     series, all in one of its drops. Of ASCII letters, small and capital are one */
 	double angle_deg;
 	const char *from, *to; /* times of drops, or the beginnings of them: "2026-11" */
 	const char *version;   /* of the results; NULL: the newest of each drop */
 	unsigned number;       /* within the series */
+	unsigned limit;        /* no more than so many, and the newest first */
 };
 struct archive_filter archive_filter_none(void);
 
@@ -179,7 +184,8 @@ struct archive_dates {
 bool archive_parse_dates(const char *text, struct archive_dates *dates, struct archive_filter *filter);
 
 /* Calls each for what passes, in the order of names and numbers, until it returns other than 0, which is
- * then returned. Texts are valid during the call. from and to take series that have a drop in between. */
+ * then returned. Texts are valid during the call. from and to take series that have a drop in between. With
+ * a limit the newest come first: of a series its last drop counts, else when it was made. */
 DT_MUST_USE int archive_each_series(struct archive *archive, const struct archive_filter *filter,
                                     int (*each)(void *context, const struct archive_series *series),
                                     void *context);

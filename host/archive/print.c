@@ -67,6 +67,28 @@ void csv_mean(FILE *out, const struct archive_mean *mean)
 	fprintf(out, "%u,", mean->n);
 }
 
+struct archive_filter print_begin(struct print *p, const struct archive_filter *filter)
+{
+	struct archive_filter wider = *filter;
+
+	p->limit = filter->limit;
+	if (p->limit != 0)
+		wider.limit++;
+	return wider;
+}
+
+bool print_is_full(struct print *p)
+{
+	p->more = p->limit != 0 && p->lines == p->limit;
+	return p->more;
+}
+
+void print_more(const struct print *p)
+{
+	if (p->more)
+		fprintf(p->out, "there are more: these are the newest %zu\n", p->lines);
+}
+
 /* ---- series ---- */
 
 void put_series_keys(struct builder *b, cJSON *object, const struct archive_series *series)
@@ -83,8 +105,12 @@ void put_series_keys(struct builder *b, cJSON *object, const struct archive_seri
 static int series_json(void *context, const struct archive_series *series)
 {
 	struct print *p = context;
-	cJSON *item = put_append(&p->builder, p->array);
+	cJSON *item;
 
+	if (print_is_full(p))
+		return 0;
+	p->lines++;
+	item = put_append(&p->builder, p->array);
 	put_series_keys(&p->builder, item, series);
 	put_number(&p->builder, item, "recorded", series->recorded);
 	put_number(&p->builder, item, "accepted", series->accepted);
@@ -98,6 +124,9 @@ static int series_csv(void *context, const struct archive_series *series)
 {
 	struct print *p = context;
 
+	if (print_is_full(p))
+		return 0;
+	p->lines++;
 	csv_text(p->out, series->name);
 	csv_text(p->out, series->campaign);
 	csv_text(p->out, series->scene_name);
@@ -112,6 +141,8 @@ static int series_text(void *context, const struct archive_series *series)
 {
 	struct print *p = context;
 
+	if (print_is_full(p))
+		return 0;
 	if (p->lines++ == 0)
 		fprintf(p->out, "%-20s %-11s %-16s %5s %7s %8s %8s %8s %7s  %s\n", "series", "campaign",
 		        "scene", "deg", "planned", "recorded", "accepted", "rejected", "partial",
@@ -126,6 +157,7 @@ int print_series(struct archive *archive, const struct archive_filter *filter, e
                  FILE *out)
 {
 	struct print p = {.out = out, .archive = archive};
+	struct archive_filter asked = print_begin(&p, filter);
 	cJSON *root;
 	int result;
 
@@ -133,18 +165,20 @@ int print_series(struct archive *archive, const struct archive_filter *filter, e
 		fputs("series,campaign,scene,angle_deg,height_m,planned,recorded,accepted,rejected,partial,"
 		      "created,last\n",
 		      out);
-		result = archive_each_series(archive, filter, series_csv, &p);
+		result = archive_each_series(archive, &asked, series_csv, &p);
 		return result != 0 ? result : print_done(out);
 	}
 	if (format == PRINT_TEXT) {
-		result = archive_each_series(archive, filter, series_text, &p);
+		result = archive_each_series(archive, &asked, series_text, &p);
 		if (p.lines == 0 && result == 0)
 			fputs("no series\n", out);
+		print_more(&p);
 		return result != 0 ? result : print_done(out);
 	}
 	root = cJSON_CreateObject();
 	p.array = put_array(&p.builder, root, "series");
-	result = archive_each_series(archive, filter, series_json, &p);
+	result = archive_each_series(archive, &asked, series_json, &p);
+	put_item(&p.builder, root, "more", cJSON_CreateBool(p.more));
 	if (result == 0)
 		return put_out(&p.builder, root, out);
 	cJSON_Delete(root);

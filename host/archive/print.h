@@ -3,7 +3,8 @@
 #define DT_HOST_ARCHIVE_PRINT_H
 /*
  * An archive for people (text), programs (JSON) and spreadsheets (CSV). Each prints to out; 0, DT_E_SYSTEM
- * when out did not take it, or what looking into the archive returned.
+ * when out did not take it, or what looking into the archive returned. Below a limit of the filter, text and
+ * JSON say whether there are more; means are of what is printed.
  */
 #include <stdio.h>
 

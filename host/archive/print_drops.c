@@ -53,9 +53,12 @@ static int drop_json(void *context, const struct archive_drop *drop)
 {
 	struct print *p = context;
 	struct builder *b = &p->builder;
-	cJSON *item = cJSON_CreateObject();
+	cJSON *item;
 	int result;
 
+	if (print_is_full(p))
+		return 0;
+	item = cJSON_CreateObject();
 	if (archive_counts(drop, p->undecided))
 		archive_cell_add(&p->total, drop);
 	put_text(b, item, "series", drop->series.name);
@@ -73,6 +76,7 @@ static int drop_json(void *context, const struct archive_drop *drop)
 	put_text(b, item, "raw", drop->raw);
 	put_number(b, item, "bytes", (double)drop->bytes);
 	put_text(b, item, "sha256", drop->sha256);
+	put_item(b, item, "simulated", drop->simulated ? cJSON_CreateTrue() : cJSON_CreateNull());
 	if (drop->version != NULL)
 		put_text(b, item, "version", drop->version);
 	else
@@ -127,7 +131,7 @@ static int drops_json(struct print *p, const struct archive_filter *filter)
 	fputs("\"drops\":[", p->out);
 	if (result == 0)
 		result = archive_each_drop(p->archive, filter, drop_json, p);
-	fputs("],\"means\":", p->out);
+	fprintf(p->out, "],\"more\":%s,\"means\":", p->more ? "true" : "false");
 	if (result == 0)
 		result = put_total(p);
 	fputs("}\n", p->out);
@@ -140,6 +144,9 @@ static int drop_csv(void *context, const struct archive_drop *drop)
 {
 	struct print *p = context;
 
+	if (print_is_full(p))
+		return 0;
+	p->lines++;
 	csv_text(p->out, drop->series.name);
 	fprintf(p->out, "%u,", drop->number);
 	csv_text(p->out, drop->series.campaign);
@@ -154,6 +161,7 @@ static int drop_csv(void *context, const struct archive_drop *drop)
 	csv_text(p->out, drop->note);
 	csv_text(p->out, drop->version != NULL ? drop->version : "");
 	csv_text(p->out, drop->flags);
+	fputs(drop->simulated ? "yes," : ",", p->out);
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
 		csv_number(p->out, drop->value[i]);
 		csv_number(p->out, drop->sigma[i]);
@@ -168,7 +176,7 @@ static int drops_csv(struct print *p, const struct archive_filter *filter)
 
 	fputs("series,number,campaign,scene,angle_deg,height_m,time,state,decision,reason,operator,note,"
 	      "version,"
-	      "flags,",
+	      "flags,simulated,",
 	      p->out);
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
 		print_key(key, (enum archive_value)i, "");
@@ -212,6 +220,8 @@ static int drop_text(void *context, const struct archive_drop *drop)
 	bool partial = drop->sha256[0] == '\0';
 	char name[ARCHIVE_NAME_MAX + 16];
 
+	if (print_is_full(p))
+		return 0;
 	if (archive_counts(drop, p->undecided))
 		archive_cell_add(&p->total, drop);
 	if (p->lines++ == 0) {
@@ -227,6 +237,8 @@ static int drop_text(void *context, const struct archive_drop *drop)
 		         (drop->not_ok >> columns[i].value & 1u) != 0 ? '*' : ' ');
 	if (strcmp(drop->state, "missing") == 0)
 		fputs(" raw log missing", p->out);
+	if (drop->simulated)
+		fputs(" simulated tower", p->out);
 	fprintf(p->out, "%s%s%s%s%s%s\n", drop->flags[0] != '\0' ? " " : "", drop->flags,
 	        drop->reason[0] != '\0' ? "; " : "", drop->reason, drop->note[0] != '\0' ? "; " : "",
 	        drop->note);
@@ -275,6 +287,7 @@ static int drops_text(struct print *p, const struct archive_filter *filter)
 		total_text(p);
 	else if (filter->series != NULL)
 		fputs("\nnone accepted yet: no mean\n", p->out);
+	print_more(p);
 	return 0;
 }
 
@@ -282,10 +295,10 @@ int print_drops(struct archive *archive, const struct archive_filter *filter, bo
                 enum print_format format, FILE *out)
 {
 	struct print p = {.out = out, .archive = archive, .undecided = undecided};
-	int result;
+	struct archive_filter asked = print_begin(&p, filter);
+	int result = format == PRINT_JSON  ? drops_json(&p, &asked)
+	             : format == PRINT_CSV ? drops_csv(&p, &asked)
+	                                   : drops_text(&p, &asked);
 
-	result = format == PRINT_JSON  ? drops_json(&p, filter)
-	         : format == PRINT_CSV ? drops_csv(&p, filter)
-	                               : drops_text(&p, filter);
 	return result != 0 ? result : print_done(out);
 }

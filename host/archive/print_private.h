@@ -13,10 +13,20 @@ struct print {
 	struct archive *archive;
 	bool undecided, with_events;
 	struct builder builder;
-	cJSON *array; /* of what is printed as JSON */
-	size_t lines;
+	cJSON *array;              /* of what is printed as JSON */
+	size_t lines, limit;       /* limit 0: none */
+	bool more;                 /* than limit */
 	struct archive_cell total; /* of the drops that count */
 };
+
+/* The filter of a list: one more than its limit is asked for, so that more can be told. */
+struct archive_filter print_begin(struct print *p, const struct archive_filter *filter);
+
+/* There is no room for another: for the head of each call. */
+bool print_is_full(struct print *p);
+
+/* Says in a line of text that there are more. */
+void print_more(const struct print *p);
 
 /* "name_unit", or "name_sigma_unit". */
 enum { PRINT_KEY_MAX = 48 };

@@ -76,6 +76,12 @@ struct archive_place {
 /* "SERIES/NUMBER" to its row. */
 DT_MUST_USE int archive_locate(struct archive *archive, const char *drop, struct archive_place *place);
 
+/* As archive_each_drop, of each drop only what means are made of: series, number, decision, values, not_ok,
+ * and of sha256 whether there is one. */
+DT_MUST_USE int archive_each_numbers(struct archive *archive, const struct archive_filter *filter,
+                                     int (*each)(void *context, const struct archive_drop *drop),
+                                     void *context);
+
 /* ---- sidecars: the scene as it was given, then what the index knows ---- */
 
 #define SIDECAR_SECTION "[archive]"

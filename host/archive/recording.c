@@ -152,7 +152,7 @@ static int take_number(struct archive *archive, const char *year, const char *en
 	return archive_refuse(archive, DT_E_FULL, "series '%s' has %d drops already", r->series, NUMBER_MAX);
 }
 
-static int insert_drop(struct archive *archive, const char *operator_name, const char *ending,
+static int insert_drop(struct archive *archive, const char *operator_name, const char *ending, bool simulated,
                        struct archive_recording *r)
 {
 	char now[ARCHIVE_TIME_CHARS];
@@ -173,10 +173,11 @@ static int insert_drop(struct archive *archive, const char *operator_name, const
 	r->number = (unsigned)last + 1;
 	result = take_number(archive, now, ending, r);
 	if (result == 0)
-		result = sql_run(archive,
-		                 "INSERT INTO drops (series_id, number, state, operator, raw, time)"
-		                 " VALUES (?, ?, 'recording', ?, ?, ?)",
-		                 "iisss", series, (int64_t)r->number, operator_name, r->raw, now);
+		result = sql_run(
+		        archive,
+		        "INSERT INTO drops (series_id, number, state, operator, raw, time, simulated)"
+		        " VALUES (?, ?, 'recording', ?, ?, ?, ?)",
+		        "iisssi", series, (int64_t)r->number, operator_name, r->raw, now, (int64_t)simulated);
 	r->drop = sqlite3_last_insert_rowid(archive->index);
 	return result != 0 ? result : sidecar_write_drop(archive, r->drop);
 }
@@ -192,7 +193,7 @@ static void remove_files(const struct archive *archive, const char *raw)
 }
 
 int archive_begin(struct archive *archive, const char *series, const char *operator_name, const char *ending,
-                  struct archive_recording *recording)
+                  bool simulated, struct archive_recording *recording)
 {
 	struct archive_recording r = {.lock = -1};
 	int result = archive_check_name(archive, "series", series);
@@ -205,7 +206,7 @@ int archive_begin(struct archive *archive, const char *series, const char *opera
 	result = archive_start(archive);
 	if (result != 0)
 		return result;
-	result = archive_end(archive, insert_drop(archive, operator_name, ending, &r));
+	result = archive_end(archive, insert_drop(archive, operator_name, ending, simulated, &r));
 	if (result == 0) {
 		*recording = r;
 		return 0;

@@ -50,7 +50,11 @@ static const char second[] =
         "CREATE TABLE calibrations (id INTEGER PRIMARY KEY, sensor TEXT NOT NULL, gain REAL NOT NULL,"
         " date TEXT NOT NULL, note TEXT NOT NULL, UNIQUE (sensor, date));";
 
-static const char *const steps[] = {first, second};
+/* Whether nothing fell; 0 where nobody said so. */
+static const char third[] = "ALTER TABLE drops ADD COLUMN simulated INTEGER NOT NULL DEFAULT 0"
+                            " CHECK (simulated IN (0, 1));";
+
+static const char *const steps[] = {first, second, third};
 enum { STEPS = sizeof(steps) / sizeof(steps[0]) };
 
 static int version_of(struct archive *archive, int64_t *version)

@@ -29,8 +29,8 @@ static void put_series(FILE *out, sqlite3_stmt *s)
 
 static void put_drop(FILE *out, sqlite3_stmt *s)
 {
-	static const char *const keys[] = {"drop",     "state",  "time", "operator", "note",
-	                                   "decision", "reason", "raw",  "bytes",    "sha256"};
+	static const char *const keys[] = {"drop",   "state", "time",  "operator", "note",     "decision",
+	                                   "reason", "raw",   "bytes", "sha256",   "simulated"};
 
 	for (int i = 0; i < (int)(sizeof(keys) / sizeof(keys[0])); i++)
 		fprintf(out, "%s = %s\n", keys[i], sql_text(s, SERIES_COLUMN_COUNT + i));
@@ -97,7 +97,7 @@ int sidecar_write_drop(struct archive *archive, int64_t drop)
 	sqlite3_stmt *s;
 	int result = sql_query(archive, &s,
 	                       "SELECT " SERIES_COLUMNS ", d.number, d.state, d.time, d.operator, d.note,"
-	                       " d.decision, d.reason, d.raw, d.bytes, d.sha256" SERIES_TABLES
+	                       " d.decision, d.reason, d.raw, d.bytes, d.sha256, d.simulated" SERIES_TABLES
 	                       "JOIN drops d ON d.series_id = s.id WHERE d.id = ?",
 	                       "i", drop);
 
@@ -295,11 +295,12 @@ static int take_drop(struct archive *archive, const struct sidecar *sidecar, int
 		state = "missing";
 	result = sql_run(archive,
 	                 "INSERT INTO drops (series_id, number, state, decision, reason, operator, note, raw,"
-	                 " bytes, sha256, time) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-	                 "iissssssiss", series, (int64_t)strtol(value(sidecar, "drop"), NULL, 10), state,
+	                 " bytes, sha256, time, simulated) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+	                 "iissssssissi", series, (int64_t)strtol(value(sidecar, "drop"), NULL, 10), state,
 	                 value(sidecar, "decision"), value(sidecar, "reason"), value(sidecar, "operator"),
 	                 value(sidecar, "note"), raw, (int64_t)strtoll(value(sidecar, "bytes"), NULL, 10),
-	                 value(sidecar, "sha256"), value(sidecar, "time"));
+	                 value(sidecar, "sha256"), value(sidecar, "time"),
+	                 (int64_t)(strcmp(value(sidecar, "simulated"), "1") == 0));
 	*drop = sqlite3_last_insert_rowid(archive->index);
 	return result != 0 ? result : take_events(archive, sidecar, *drop);
 }

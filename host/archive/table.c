@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/archive/private.h"
+
 static void mean_add(struct archive_mean *m, double value, bool not_ok)
 {
 	double before = m->n > 0 ? value - m->mean : value;
@@ -85,7 +87,7 @@ int archive_table(struct archive *archive, const struct archive_filter *filter, 
                   struct archive_table *table)
 {
 	struct growing g = {.undecided = undecided};
-	int result = archive_each_drop(archive, filter, add_drop, &g);
+	int result = archive_each_numbers(archive, filter, add_drop, &g);
 
 	if (result == 0)
 		*table = g.table;

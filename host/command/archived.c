@@ -53,6 +53,8 @@ int archived_scene_file(struct archive *archive, const char *series, char file[A
 	filter.series = series;
 	if (fd < 0 || archive_each_series(archive, &filter, write_scene, &fd) != 0) {
 		command_error("the scene of %s: %s", series, strerror(errno));
+		if (fd >= 0)
+			close(fd);
 		return COMMAND_INPUT;
 	}
 	snprintf(file, ARCHIVED_SCENE_MAX, "/proc/%ld/fd/%d", (long)getpid(), fd);

@@ -17,7 +17,8 @@ int archived_failed(const struct archive *archive);
 
 enum { ARCHIVED_SCENE_MAX = 48 };
 
-/* A name under which this program and its children can read the scene of a series as a file. */
+/* A name under which this program and its children can read the scene of a series as a file, as long as this
+ * one runs: it stays open for a command that ends with its drop. */
 int archived_scene_file(struct archive *archive, const char *series, char file[ARCHIVED_SCENE_MAX]);
 
 /* As archived_analyse, with what is wrong in message, and 0 or DT_E_*. */

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "host/command/command.h"
 #include "host/record/dbc.h"
@@ -19,13 +21,21 @@ static const char help[] =
         "Foreign recordings become CSV, universal files or HDF5; foreign text needs --columns.\n"
         "\n"
         "  --columns SPEC  for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\"\n"
-        "  --dbc OUT       the wire as a DBC file for other CAN tools\n";
+        "  --dbc OUT       the wire as a DBC file for other CAN tools; - is standard output\n";
 
 static int write_dbc(const char *file)
 {
 	char message[READ_MESSAGE_MAX];
 	struct whole whole;
-	int result = whole_open(&whole, file, message, sizeof(message));
+	int result;
+
+	if (strcmp(file, "-") == 0) {
+		if (dbc_write(stdout) == 0 && fflush(stdout) == 0)
+			return COMMAND_DONE;
+		command_error("standard output: %s", strerror(errno));
+		return COMMAND_INPUT;
+	}
+	result = whole_open(&whole, file, message, sizeof(message));
 
 	if (result == 0)
 		result = whole_close(&whole, dbc_write(whole.out), message, sizeof(message));

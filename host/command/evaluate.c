@@ -125,8 +125,11 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 	result = estimate_record(record, &estimate, &e->analysis);
 	if (result != 0)
 		return result;
-	e->report = (struct report){
-	        .record = record, .analysis = &e->analysis, .scene = scene, .version = DT_VERSION};
+	e->report = (struct report){.record = record,
+	                            .analysis = &e->analysis,
+	                            .scene = scene,
+	                            .version = DT_VERSION,
+	                            .simulated = options->simulated};
 	result = find_shocks(e, options, &estimate);
 	if (result != 0) {
 		evaluate_close(e);

@@ -26,6 +26,7 @@ struct evaluate_options {
 	const char *html;             /* page to write; NULL: none */
 	const char *json_file;        /* JSON beside it; NULL: none */
 	bool strict;                  /* a flag is a failure */
+	bool simulated;               /* the page says so */
 };
 
 /* A record with all that is found of it. */

@@ -303,6 +303,8 @@ static int check(const struct arguments *a, int rest)
 		                     ENSEMBLE_POINTS_MAX);
 	if ((a->draws > 0) != (a->vary != NULL))
 		return command_usage("model", "--monte-carlo and --vary need each other");
+	if (!isnan(a->seed) && a->draws == 0)
+		return command_usage("model", "--seed needs --monte-carlo N");
 	if (a->span_ms / a->step_us * 1e3 > HISTORY_MAX)
 		return command_usage("model",
 		                     "--span over --step makes too many samples, expected %d at most",
@@ -471,7 +473,7 @@ static int sensitivity(const struct arguments *a)
 
 int command_model(int argc, char **argv)
 {
-	struct arguments a = {.angle_deg = NAN, .step_us = 10, .span_ms = 12, .seed = 1};
+	struct arguments a = {.angle_deg = NAN, .step_us = 10, .span_ms = 12, .seed = NAN};
 	struct scene scene;
 	int code;
 
@@ -488,7 +490,7 @@ int command_model(int argc, char **argv)
 	if (code != COMMAND_DONE)
 		return code;
 	a.ensemble.scene = &scene;
-	a.ensemble.seed = (unsigned long)a.seed;
+	a.ensemble.seed = isnan(a.seed) ? 1 : (unsigned long)a.seed;
 	if (a.vary)
 		code = parse_vary(&a.ensemble, a.vary);
 	if (code != COMMAND_DONE)

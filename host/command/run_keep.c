@@ -64,7 +64,8 @@ static int begin_in_archive(struct run *run)
 		return COMMAND_INPUT;
 	}
 	if (archive_scene(run->archive, run->series, &run->scene) != 0 ||
-	    archive_begin(run->archive, run->series, run->operator_name, ".log", &run->recording) != 0)
+	    archive_begin(run->archive, run->series, run->operator_name, ".log", run->link == NULL,
+	                  &run->recording) != 0)
 		return archived_failed(run->archive);
 	snprintf(run->log, sizeof(run->log), "%s", run->recording.log);
 	run->scene_file = run->series_scene;
@@ -120,7 +121,8 @@ static int report_files(struct run *run, struct record *record)
 	                                   .json = run->json,
 	                                   .html = html,
 	                                   .json_file = json,
-	                                   .strict = run->strict};
+	                                   .strict = run->strict,
+	                                   .simulated = run->link == NULL};
 	int code;
 
 	snprintf(csv, sizeof(csv), "%s.csv", run->stem);

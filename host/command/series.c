@@ -44,8 +44,13 @@ static const char help[] =
         "  --version V      look at the results of this version, not at the newest of each drop\n"
         "  --undecided      means count drops that are not decided, too\n"
         "  --reference NAME for tables: the scene to divide by; without it the one without a plate\n"
+        "  --text WORDS     for list and drops: each word in a name of series, campaign or operator, a "
+        "note,\n"
+        "                   a reason or a flag of one drop\n"
+        "  --limit N        for list and drops: the newest N, and whether there are more\n"
         "  --reason TEXT    of a decision\n"
         "  --note TEXT      for add and calibrate\n"
+        "  --simulated      for add: made on a simulated tower\n"
         "  --operator NAME  who decides ($USER)\n"
         "  --json           JSON on standard output\n"
         "  --csv FILE       a table for spreadsheets, instead\n";
@@ -62,8 +67,11 @@ enum {
 	OPTION_VERSION,
 	OPTION_UNDECIDED,
 	OPTION_REFERENCE,
+	OPTION_TEXT,
+	OPTION_LIMIT,
 	OPTION_REASON,
 	OPTION_NOTE,
+	OPTION_SIMULATED,
 	OPTION_OPERATOR,
 	OPTION_JSON,
 	OPTION_CSV
@@ -81,8 +89,11 @@ static const struct option long_options[] = {
         {"version", required_argument, NULL, OPTION_VERSION},
         {"undecided", no_argument, NULL, OPTION_UNDECIDED},
         {"reference", required_argument, NULL, OPTION_REFERENCE},
+        {"text", required_argument, NULL, OPTION_TEXT},
+        {"limit", required_argument, NULL, OPTION_LIMIT},
         {"reason", required_argument, NULL, OPTION_REASON},
         {"note", required_argument, NULL, OPTION_NOTE},
+        {"simulated", no_argument, NULL, OPTION_SIMULATED},
         {"operator", required_argument, NULL, OPTION_OPERATOR},
         {"json", no_argument, NULL, OPTION_JSON},
         {"csv", required_argument, NULL, OPTION_CSV},
@@ -120,6 +131,9 @@ static int parse_text(struct series_arguments *a, int option, const char *unknow
 	case OPTION_VERSION:
 		to = &a->filter.version;
 		break;
+	case OPTION_TEXT:
+		to = &a->filter.text;
+		break;
 	case OPTION_REFERENCE:
 		to = &a->reference;
 		break;
@@ -154,6 +168,11 @@ static int parse_one(struct series_arguments *a, int option, const char *unknown
 	case OPTION_JSON:
 		a->json = true;
 		return COMMAND_DONE;
+	case OPTION_SIMULATED:
+		a->simulated = true;
+		return COMMAND_DONE;
+	case OPTION_LIMIT:
+		return command_number("series", "limit", optarg, 1, 1e6, &a->limit);
 	case 'h':
 		a->help = true;
 		return COMMAND_DONE;
@@ -179,6 +198,10 @@ static int parse(struct series_arguments *a, int argc, char **argv)
 		code = parse_one(a, option, argv[optind - 1]);
 	if (code == COMMAND_DONE && a->json && a->csv != NULL)
 		code = command_usage("series", "--json and --csv exclude each other");
+	if (code == COMMAND_DONE && a->limit > 0 && a->csv != NULL)
+		code = command_usage("series",
+		                     "--limit goes without --csv, which cannot say that there are more");
+	a->filter.limit = (unsigned)a->limit;
 	a->operator_name = archived_operator(a->operator_name);
 	return code;
 }
@@ -223,6 +246,12 @@ static int check(const struct verb *verb, struct series_arguments *a)
 	}
 	if (!isnan(a->height_m))
 		return command_usage("series", "--height goes with new, not with %s", name);
+	if (a->simulated && verb->run != series_verb_add)
+		return command_usage("series", "--simulated goes with add, not with %s", name);
+	if ((a->filter.text != NULL || a->limit > 0) && verb->run != series_verb_list &&
+	    verb->run != series_verb_drops)
+		return command_usage("series", "--text and --limit go with list and drops, not with %s",
+		                     name);
 	a->filter.scene_name = a->scene;
 	if ((verb->run == series_verb_reject || verb->run == series_verb_reopen) && a->reason == NULL)
 		return command_usage("series", "%s: expected --reason TEXT", name);

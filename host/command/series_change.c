@@ -96,7 +96,7 @@ static int add_log(struct archive *archive, const struct series_arguments *a, co
 
 	if (code != COMMAND_DONE)
 		return code;
-	if (archive_begin(archive, a->word[0], a->operator_name, ending, &r) != 0)
+	if (archive_begin(archive, a->word[0], a->operator_name, ending, a->simulated, &r) != 0)
 		return archived_failed(archive);
 	if (copy_log(file, &r, &time_s) != 0) {
 		archive_discard(archive, &r);

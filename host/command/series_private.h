@@ -11,8 +11,8 @@
 
 struct series_arguments {
 	const char *archive, *csv, *reason, *note, *operator_name, *reference, *scene, *date;
-	bool json, rebuild, undecided, help;
-	double drops, height_m;
+	bool json, rebuild, undecided, simulated, help;
+	double drops, height_m, limit;
 	struct archive_filter filter;
 	struct archive_dates dates;
 	int count;

@@ -19,7 +19,7 @@ PAGE_O = $(BUILD)/obj/page_parts.o
 $(UPLOT_FILES) &: $(CONSOLE_IN)/page/package.json $(CONSOLE_IN)/page/package-lock.json
 	$(call say,NPM,$<)
 	$(Q)mkdir -p $(BUILD)/npm && cp $^ $(BUILD)/npm/
-	$(Q)cd $(BUILD)/npm && npm ci --ignore-scripts --no-audit --no-fund --silent
+	$(Q)cd $(BUILD)/npm && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error >/dev/null
 	$(Q)cp $(BUILD)/npm/node_modules/uplot/dist/uPlot.esm.js $(BUILD)/npm/uplot.js
 	$(Q)cp $(BUILD)/npm/node_modules/uplot/dist/uPlot.min.css $(BUILD)/npm/uplot.css
 

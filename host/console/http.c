@@ -317,6 +317,16 @@ static struct request *new_request(struct http *http, struct MHD_Connection *con
 	return request;
 }
 
+static const char *allowed(const char *path)
+{
+	const char *rest;
+	bool other;
+
+	if (route_find("GET", path, &rest, &other) == NULL)
+		return "POST";
+	return route_find("POST", path, &rest, &other) != NULL ? "GET, POST" : "GET";
+}
+
 /* What is behind /api/, for who has the token. */
 static enum MHD_Result open_request(struct http *http, struct MHD_Connection *connection, const char *method,
                                     const char *path, void **context)
@@ -327,7 +337,7 @@ static enum MHD_Result open_request(struct http *http, struct MHD_Connection *co
 
 	if (route == NULL && other_method)
 		return refuse(connection, 405, "another method is expected here", MHD_HTTP_HEADER_ALLOW,
-		              strcmp(method, "POST") == 0 ? "GET" : "POST");
+		              allowed(path));
 	if (route == NULL)
 		return refuse(connection, 404, "no such request, or no such name", NULL, NULL);
 	if (!route->always && !guard_take(&http->asked, session_now_ms()))

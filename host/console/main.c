@@ -366,6 +366,18 @@ static bool loopback(const char *address)
 	return strncmp(address, "127.", 4) == 0 || strcmp(address, "::1") == 0;
 }
 
+/* For who started it by hand; standard output has the address alone. */
+static void tell_what_to_do(const struct serve *serve)
+{
+	char folder[PATH_MAX];
+
+	fprintf(stderr,
+	        "\nThe technician's page is ready%s. Open this address in a browser; Ctrl-C ends it.\n"
+	        "Drops are kept in %s\n\n",
+	        serve->tower.link == NULL ? ", with a simulated tower" : "",
+	        realpath(serve->work.archive, folder) != NULL ? folder : serve->work.archive);
+}
+
 /* The token stands behind #, which a browser sends to nobody. */
 static void tell_address(const struct serve *serve)
 {
@@ -454,6 +466,8 @@ static void stop(struct serve *serve)
 {
 	struct console *console = &serve->console;
 
+	if (console->tower != NULL)
+		tower_disarm(console->tower);
 	if (serve->server != NULL)
 		http_stop(serve->server);
 	if (console->tower != NULL)
@@ -494,6 +508,7 @@ int main(int argc, char **argv)
 	if (code == COMMAND_DONE)
 		code = select_series(&serve);
 	if (code == COMMAND_DONE) {
+		tell_what_to_do(&serve);
 		tell_address(&serve);
 		notify("READY=1");
 		serve_until_stopped(&serve);

@@ -249,6 +249,7 @@ static void *run(void *user)
 static bool begin(struct tower *tower, const struct tower_options *options)
 {
 	tower->own = options->link == NULL;
+	tower->is_simulated = tower->own || options->control != NULL;
 	tower->bench_words = options->bench_words;
 	tower->control = tower->scene_fd = -1;
 	tower->angle_deg = NAN;

@@ -101,6 +101,10 @@ void tower_simulate(struct job *job);
  * when the link has just been opened and nothing is known of the tower. */
 void tower_abort(struct job *job);
 
+/* Aborts what is armed, or about to be, and does not wait for it; on any thread. The console ends, and other
+ * requests may take a while yet. */
+void tower_disarm(struct tower *tower);
+
 /* ---- for work ---- */
 
 /* A drop, from arm to archive: malloc, with the recording's lock -1 until work_begin has made one. */
@@ -111,6 +115,7 @@ struct tower_drop {
 	char series[ARCHIVE_NAME_MAX + 1];
 	char note[ARCHIVE_TEXT_MAX];
 	bool released;    /* work_discard leaves it partial: something may have fallen */
+	bool simulated;   /* nothing has */
 	unsigned aborted; /* the tower's own */
 	struct job way;   /* work's own */
 };

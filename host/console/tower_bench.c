@@ -24,8 +24,8 @@ enum {
 
 int tower_bench_start(struct tower *tower)
 {
-	const char *words[WORDS_MAX + 1] = {"--scene", tower->scene_file};
-	unsigned count = 2;
+	const char *words[WORDS_MAX + 1] = {"--quiet", "--scene", tower->scene_file};
+	unsigned count = 3;
 	char angle[32];
 
 	if (simulated_alive(&tower->simulated))

@@ -18,7 +18,7 @@ enum {
 	        100, /* a state is believed: the last blocks on their way may still carry the one before */
 };
 
-struct tower_drop *tower_drop_new(const char *series)
+struct tower_drop *tower_drop_new(const struct tower *tower, const char *series)
 {
 	struct tower_drop *drop = calloc(1, sizeof(*drop));
 
@@ -26,6 +26,7 @@ struct tower_drop *tower_drop_new(const char *series)
 		return NULL;
 	drop->recording.lock = -1;
 	record_init(&drop->record);
+	drop->simulated = tower->is_simulated;
 	snprintf(drop->series, sizeof(drop->series), "%s", series);
 	return drop;
 }
@@ -149,7 +150,7 @@ static void __attribute__((format(printf, 2, 3))) give_up(struct tower *tower, c
 /* A drop that we did not release. */
 static struct tower_drop *without_recording(const struct tower *tower)
 {
-	struct tower_drop *drop = tower_drop_new(tower->series);
+	struct tower_drop *drop = tower_drop_new(tower, tower->series);
 
 	if (drop == NULL)
 		return NULL;

@@ -21,7 +21,8 @@ struct tower {
 	struct console *console;
 	char url[256];
 	const char *const *bench_words;
-	bool own; /* a simulated tower of our own */
+	bool own;          /* a simulated tower of our own */
+	bool is_simulated; /* that, or one whose control socket we were given */
 	pthread_t thread;
 	sem_t started; /* the thread is at work, or has failed to begin */
 	bool failed;
@@ -113,7 +114,7 @@ bool tower_check_select(struct job *job);
 /* ---- tower_drop.c ---- */
 
 /* NULL without memory. */
-struct tower_drop *tower_drop_new(const char *series);
+struct tower_drop *tower_drop_new(const struct tower *tower, const char *series);
 
 /* Takes drop over and opens its log. False with drop_trouble. */
 bool tower_drop_begin(struct tower *tower, struct tower_drop *drop);

@@ -114,7 +114,7 @@ void tower_arm(struct job *job)
 		return;
 	}
 	pthread_mutex_lock(&tower->lock);
-	drop = tower_drop_new(tower->view.series);
+	drop = tower_drop_new(tower, tower->view.series);
 	pthread_mutex_unlock(&tower->lock);
 	if (drop == NULL) {
 		job_refuse(job, 500, "%s", error_text(DT_E_MEMORY));
@@ -240,7 +240,20 @@ static void answer_abort(struct job *job)
 void tower_abort(struct job *job)
 {
 	atomic_fetch_add(&job->console->tower->aborts, 1);
-	(void)hand_on(job, &job->console->tower_queue, answer_abort);
+	job->run = answer_abort;
+	if (job_put_first(&job->console->tower_queue, job) == 0)
+		return;
+	job_refuse(job, 503, "the console is ending");
+	job_done(job);
+}
+
+void tower_disarm(struct tower *tower)
+{
+	struct tower_view view;
+
+	tower_look(tower, &view);
+	if (view.phase == TOWER_ARMING || view.phase == TOWER_ARMED)
+		atomic_fetch_add(&tower->aborts, 1);
 }
 
 /* ---- select ---- */
@@ -329,11 +342,16 @@ static void send_line(struct job *job)
 	tower_bench_say(job->console->tower, job, job_text(job, "line", NULL));
 }
 
+/* What breaks the tower; not what commands it, which only who holds the arm may. */
 static bool is_line(const char *text)
 {
+	static const char command[] = "send";
 	size_t length = strlen(text);
 
-	for (size_t i = 0; i < length; i++)
+	text += strspn(text, " ,"); /* what parts words there */
+	if (strncmp(text, command, sizeof(command) - 1) == 0)
+		return false;
+	for (size_t i = 0; text[i] != '\0'; i++)
 		if (text[i] < ' ' || text[i] > '~')
 			return false;
 	return length > 0 && length <= LINE_MAX_CHARACTERS;
@@ -362,6 +380,7 @@ void tower_simulate(struct job *job)
 		return;
 	}
 	if (line != NULL)
-		job_refuse(job, 400, "\"line\": expected 1 to %d printable characters", LINE_MAX_CHARACTERS);
+		job_refuse(job, 400, "\"line\": expected a fault in 1 to %d printable characters, no command",
+		           LINE_MAX_CHARACTERS);
 	job_done(job);
 }

@@ -3,11 +3,13 @@
  * A drop's way into the archive. What was collected is not lost: where the archive does not take it, its
  * frames go into a file of their own, and the view tells which.
  */
+#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "common/link/link.h"
 #include "host/command/archived.h"
@@ -28,7 +30,7 @@ void work_begin(struct job *job, void (*then)(struct job *job))
 		           work->view.disk_free_bytes / 1e6, WORK_RESERVE_BYTES / 1e6);
 	} else {
 		result = archive_begin(work->archive, drop->series, work->options.operator_name, ".log",
-		                       &drop->recording);
+		                       drop->simulated, &drop->recording);
 		if (result != 0)
 			job_refuse(job, work_status(result), "%s", archive_message(work->archive));
 	}
@@ -60,6 +62,10 @@ static int write_log(struct tower_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
 	struct link *log;
 	int result;
 
+	if (truncate(drop->recording.log, 0) != 0) {
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%.500s: %s", drop->recording.log, strerror(errno));
+		return DT_E_SYSTEM;
+	}
 	snprintf(url, sizeof(url), "log:%s", drop->recording.log);
 	log = link_open(url, LINK_WRITE, message, ARCHIVE_MESSAGE_MAX);
 	if (log == NULL)
@@ -93,7 +99,7 @@ static int record_drop(struct work *work, struct tower_drop *drop, char message[
 
 	if (drop->recording.lock < 0)
 		result = archive_begin(work->archive, drop->series, work->options.operator_name, ".log",
-		                       &drop->recording);
+		                       drop->simulated, &drop->recording);
 	if (result == 0 && !log_is_whole(drop) && write_log(drop, message) != 0) {
 		archive_abandon(&drop->recording);
 		return DT_E_SYSTEM;
@@ -108,11 +114,15 @@ static int record_drop(struct work *work, struct tower_drop *drop, char message[
 /* The frames to where there is room; message is what the archive said, and then also where they are. */
 static void rescue(const struct work *work, const struct tower_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
 {
-	const char *folder[] = {archive_folder(work->archive), "/var/tmp", "/tmp"};
+	/* a service's own /tmp goes with it; what stays is its folder in memory */
+	const char *folder[] = {archive_folder(work->archive), getenv("RUNTIME_DIRECTORY"), "/var/tmp",
+	                        "/tmp"};
 	char path[ARCHIVE_PATH_MAX], why[READ_MESSAGE_MAX];
 	size_t length;
 
 	for (size_t i = 0; i < sizeof(folder) / sizeof(folder[0]); i++) {
+		if (folder[i] == NULL)
+			continue;
 		snprintf(path, sizeof(path), "%s/rescued-%" PRId64 "-drop-%u.log", folder[i],
 		         (int64_t)time(NULL), drop->record.drop_id);
 		if (write_record(&drop->record, path, why) != 0)

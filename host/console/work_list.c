@@ -10,11 +10,29 @@
 #include "host/archive/print.h"
 #include "host/console/work_private.h"
 
+enum { COUNT_MAX = 1000000 };
+
 struct wanted {
 	struct archive_filter filter;
 	struct archive_dates dates;
 	bool undecided;
 };
+
+/* A whole number from 1, or what there is in to when it was not given. False with the job refused. */
+static bool read_count(struct job *job, const char *name, unsigned *to)
+{
+	const char *text = job->query(job, name);
+	unsigned long count = text != NULL ? strtoul(text, NULL, 10) : 1;
+
+	if (text != NULL && (text[strspn(text, "0123456789")] != '\0' || count < 1 || count > COUNT_MAX)) {
+		job_refuse(job, 400, "%s is '%.40s', expected a whole number from 1 to %d", name, text,
+		           COUNT_MAX);
+		return false;
+	}
+	if (text != NULL)
+		*to = (unsigned)count;
+	return true;
+}
 
 /* False with the job refused. */
 static bool read_query(struct job *job, struct wanted *w)
@@ -27,6 +45,7 @@ static bool read_query(struct job *job, struct wanted *w)
 	w->filter.series = job->query(job, "series");
 	w->filter.campaign = job->query(job, "campaign");
 	w->filter.scene_name = job->query(job, "scene");
+	w->filter.text = job->query(job, "text");
 	w->undecided = undecided != NULL && strcmp(undecided, "1") == 0;
 	if (angle != NULL) {
 		w->filter.angle_deg = strtod(angle, &end);
@@ -35,6 +54,8 @@ static bool read_query(struct job *job, struct wanted *w)
 			return false;
 		}
 	}
+	if (!read_count(job, "limit", &w->filter.limit) || !read_count(job, "number", &w->filter.number))
+		return false;
 	if (date == NULL || archive_parse_dates(date, &w->dates, &w->filter))
 		return true;
 	job_refuse(job, 400, "date is '%.40s', expected YYYY, YYYY-MM, YYYY-MM-DD, or two of them with ..",

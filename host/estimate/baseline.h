@@ -11,6 +11,14 @@
  * white as the samples' noise asks: motion before the pulse is neither. Drift needs 40 ms, hum 80 ms, both
  * at least four samples to the mean.
  *
+ * Hum is 50 or 60 Hz where that explains it. Where the means still scatter by more than chance, mains get
+ * their true frequency, and up to three tones of any are added, from 15 Hz and three cycles on to what the
+ * means show folded once.
+ *
+ * Doubtful is a zero without a quiet part, and one whose quiet part holds more than all this: means that are
+ * coloured still, or runs of samples far quieter than the whole. Of these the longest is then taken for the
+ * quiet part. Flagged RECORD_FLAG_ZERO_UNSURE where there is one.
+ *
  * Outliers are what lies beyond six standard deviations: told at first from the median and the median
  * deviation of a few samples, then from those inside. Offset and noise are mean and deviation of all the
  * rest, which are nearly twice as certain as medians.

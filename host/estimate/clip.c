@@ -9,6 +9,10 @@ enum {
 	COARSENESS_WINDOW = 256, /* samples the step of the numbers is looked for in */
 };
 
+/* Twins are a limit when the parabola through their neighbours passes them by this many standard deviations;
+ * a summit that is none stays below it. */
+#define TWINS_SIGMAS 2.5
+
 /* Where samples tremble by so many steps of their numbers, two do not come out equal by chance. */
 #define TREMBLE_STEPS 200.0
 
@@ -78,6 +82,8 @@ static void mark_groups(struct trace *trace, double extreme_g)
 			last = k;
 			n++;
 		}
+		if (n == 2 && last - first == 1)
+			trace->twins = first;
 		if (!enough(trace, extreme_g, n) || 2 * n <= last - first)
 			continue;
 		trace->flags |= RECORD_FLAG_CLIPPED;
@@ -91,6 +97,7 @@ void clip_mark(struct trace *trace)
 {
 	double low = INFINITY, high = -INFINITY;
 
+	trace->twins = trace->count;
 	for (size_t i = 0; i < trace_blocks(trace); i++) {
 		low = trace->block[i].low_g < low ? trace->block[i].low_g : low;
 		high = trace->block[i].high_g > high ? trace->block[i].high_g : high;
@@ -101,4 +108,24 @@ void clip_mark(struct trace *trace)
 		mark_groups(trace, high);
 	if (-low >= high / 2)
 		mark_groups(trace, low);
+}
+
+void clip_judge_twins(struct trace *trace, double noise_g)
+{
+	size_t k = trace->twins;
+	const double *v = trace->value_g + k;
+	double near, far, beyond;
+
+	if (k < 2 || k + 4 > trace->count || trace->sample[k] & TRACE_LIMIT || !trace_good(trace, k - 2) ||
+	    !trace_good(trace, k - 1) || !trace_good(trace, k + 2) || !trace_good(trace, k + 3))
+		return;
+	/* Means of the pairs 1.5 and 2.5 samples from the middle; the twins are 0.5 from it. */
+	near = (v[-1] + v[2]) / 2;
+	far = (v[-2] + v[3]) / 2;
+	beyond = near + (near - far) / 2 - v[0];
+	if (!(beyond * (v[0] - near) > 0) || !(fabs(beyond) > TWINS_SIGMAS * sqrt(1.75) * noise_g))
+		return;
+	trace->flags |= RECORD_FLAG_CLIPPED;
+	trace->sample[k] |= SAMPLE_CLIPPED | TRACE_LIMIT;
+	trace->sample[k + 1] |= SAMPLE_CLIPPED | TRACE_LIMIT;
 }

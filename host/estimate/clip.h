@@ -7,9 +7,13 @@
  * span; two where chance does not make samples equal; one at the channel's known range. Only extremes on the
  * outside count: half the largest magnitude or more, so that the small side of a one-sided shock is not taken
  * for one. trace_open calls it.
+ *
+ * Two neighbours that may be equal by chance (trace->twins) are marked by clip_judge_twins, once the noise is
+ * known, if the two samples to either side foretell more than they show.
  */
 #include "host/estimate/trace.h"
 
 void clip_mark(struct trace *trace);
+void clip_judge_twins(struct trace *trace, double noise_g);
 
 #endif

@@ -46,6 +46,9 @@
 /* A lag less certain than this part of S2's pulse says nothing. */
 #define UNCERTAIN_MAX 0.1
 
+/* What the peak may be off, as part of it, before the residual shows that the plate is none such. */
+#define UNSEEN 1e-3
+
 /* A residual beyond this part of S1's sum of squares: no oscillator. */
 #define UNEXPLAINED_MAX 0.05
 
@@ -258,7 +261,8 @@ struct solution {
 	double p[PARAMETERS];
 	double peak_s, spread_s; /* of S1, spread for unit noise */
 	double input_spread_s;
-	double chi_square; /* reduced */
+	double peak_g, peak_spread_g; /* likewise */
+	double chi_square;            /* reduced */
 	double noise_g;
 	bool refused;
 };
@@ -268,7 +272,9 @@ static bool judge(const struct driven_axis *axis, const struct scene *scene, con
 {
 	double row[PARAMETERS] = {0, 0, 1, 0, 0}, freedom = (double)(result->used - PARAMETERS);
 	double noise = fmax(axis->trace[0]->noise_g, MISFIT * fabs(axis->peak[0]->result.value_g));
+	double height[PARAMETERS] = {0};
 	struct respond_crest crest;
+	struct respond_point top;
 
 	if (result->squares > UNEXPLAINED_MAX * scene->squares ||
 	    !respond_crest(respond, axis->peak[1]->sign, &crest))
@@ -278,10 +284,32 @@ static bool judge(const struct driven_axis *axis, const struct scene *scene, con
 	solution->peak_s = crest.time_s + solution->p[DELAY];
 	solution->spread_s = sqrt(cholesky_variance(&result->factor, row));
 	solution->input_spread_s = input_spread(respond, 1 / axis->trace[1]->rate_hz);
+	respond_at(respond, crest.time_s, &top);
+	height[DECAY] = solution->p[GAIN] * top.by_decay;
+	height[OMEGA] = solution->p[GAIN] * top.by_omega;
+	height[GAIN] = top.value;
+	solution->peak_g = solution->p[GAIN] * top.value;
+	solution->peak_spread_g = sqrt(cholesky_variance(&result->factor, height));
 	solution->noise_g = noise;
 	solution->chi_square = result->squares / freedom / (noise * noise);
 	solution->refused = solution->chi_square > 1 + REFUSE * sqrt(2 / freedom);
 	return isfinite(solution->spread_s);
+}
+
+/* Delay and gain by S1's peak; a clipped one may have been taken from the other side, as high as the limit
+ * too. */
+static void start_by_peak(const struct driven_axis *axis, const struct respond_crest *crest, double *p)
+{
+	const struct estimate_peak *peak = &axis->peak[0]->result;
+	double reading;
+
+	p[DELAY] = peak->time_s - crest->time_s;
+	p[GAIN] = peak->value_g / crest->value;
+	if (peak->how.status != ESTIMATE_CLIPPED || !trace_at(axis->trace[0], crest->time_s, &reading) ||
+	    reading * peak->value_g > 0)
+		return;
+	p[DELAY] = 0;
+	p[GAIN] *= -1;
 }
 
 /* From the ring-down's frequency and damping, and S1's peak. */
@@ -300,8 +328,7 @@ static bool solve(const struct driven_axis *axis, struct scene *scene, double cy
 	respond_make(&respond, &scene->input, p[DECAY], p[OMEGA]);
 	if (!respond_crest(&respond, axis->peak[1]->sign, &crest))
 		return false;
-	p[DELAY] = axis->peak[0]->result.time_s - crest.time_s;
-	p[GAIN] = axis->peak[0]->result.value_g / crest.value;
+	start_by_peak(axis, &crest, p);
 	p[OFFSET] = 0;
 	collect(axis, p[DELAY], cycles * 2 * UNITS_PI / p[OMEGA], p[OMEGA], scene);
 	if (!lm_fit(&problem, p, &result))
@@ -384,6 +411,10 @@ static void express(const struct driven_axis *axis, const struct solution *solut
 	driven->chi_square = solution->chi_square;
 	driven->lag_s = solution->peak_s - from_s;
 	driven->sigma_s = sigma;
+	if (solution->refused)
+		return;
+	driven->peak_g = solution->peak_g;
+	driven->sigma_peak_g = hypot(solution->peak_spread_g * solution->noise_g, UNSEEN * solution->peak_g);
 }
 
 void driven_find(const struct driven_axis *axis, struct driven *driven)
@@ -395,7 +426,12 @@ void driven_find(const struct driven_axis *axis, struct driven *driven)
 	struct bell bell;
 	bool has_smooth, has_sampled = false;
 
-	*driven = (struct driven){.lag_s = NAN, .sigma_s = NAN, .chi_square = NAN, .status = ESTIMATE_SHORT};
+	*driven = (struct driven){.lag_s = NAN,
+	                          .sigma_s = NAN,
+	                          .peak_g = NAN,
+	                          .sigma_peak_g = NAN,
+	                          .chi_square = NAN,
+	                          .status = ESTIMATE_SHORT};
 	if (!possible(axis, &driven->status))
 		return;
 	driven->status = ESTIMATE_NOT_CONVERGED;

@@ -30,8 +30,9 @@ struct driven_axis {
 
 struct driven {
 	double lag_s, sigma_s;
-	bool smooth, sampled; /* inputs tried */
-	double chi_square;    /* reduced */
+	double peak_g, sigma_peak_g; /* S1's by the fitted response; NAN unless ok and not refused */
+	bool smooth, sampled;        /* inputs tried */
+	double chi_square;           /* reduced */
 	unsigned flags;
 	enum estimate_status status;
 };

@@ -8,6 +8,7 @@
 #include "host/estimate/baseline.h"
 #include "host/estimate/bump.h"
 #include "host/estimate/cfc.h"
+#include "host/estimate/clip.h"
 #include "host/estimate/dropout.h"
 #include "host/estimate/filter.h"
 #include "host/estimate/iepe.h"
@@ -42,6 +43,9 @@
  * this many times the case's. */
 #define PLATE_LEVEL 0.1
 #define PLATE_OVER_CASE 2.0
+
+/* Standard deviations between an axis' damping and the plate's that chance makes. */
+#define PLATE_AGREE 3.0
 
 struct work {
 	struct trace trace;
@@ -81,7 +85,9 @@ const char *estimate_flag_name(unsigned flags)
 	                                    "tolerance_not_met",
 	                                    "model_refused",
 	                                    "weak_axis",
-	                                    "not_separable"};
+	                                    "not_separable",
+	                                    "zero_unsure",
+	                                    "rival"};
 
 	for (unsigned i = 0; i < sizeof(names) / sizeof(names[0]); i++)
 		if (flags & 1u << i)
@@ -120,10 +126,11 @@ static void clean(struct trace *trace, double *scratch, struct estimate_baseline
 	baseline_find(trace, scratch, baseline);
 	marked = spike_mark(trace, baseline->noise_g);
 	marked |= dropout_mark(trace, baseline->noise_g);
-	if (!marked)
-		return;
-	trace_marked(trace);
-	baseline_find(trace, scratch, baseline);
+	if (marked) {
+		trace_marked(trace);
+		baseline_find(trace, scratch, baseline);
+	}
+	clip_judge_twins(trace, baseline->noise_g);
 }
 
 static int prepare(const struct desk *desk, size_t i, const struct estimate_options *options,
@@ -367,12 +374,37 @@ static void widen_by_driven(const struct desk *desk, struct analysis *analysis)
 	}
 }
 
+/* The flanks of a clipped S1 tell less of its peak than the oscillator that S2 drives. */
+static void unclip_by_driven(const struct desk *desk, struct analysis *analysis)
+{
+	const struct estimate_lag *lag = &analysis->lag;
+	static const char axes[2] = {'X', 'Y'};
+
+	for (unsigned i = 0; i < 2; i++) {
+		struct estimate_peak *s1 = &analysis->channels[find(desk, "S1", axes[i])].peak;
+		const struct estimate_peak *s2 = &analysis->channels[find(desk, "S2", axes[i])].peak;
+
+		if (!(s1->how.flags & ESTIMATE_FLAG_EXTRAPOLATED) || s2->how.status == ESTIMATE_CLIPPED ||
+		    !(lag->sigma_driven_peak_g[i] < s1->sigma_g))
+			continue;
+		s1->value_g = lag->driven_peak_g[i];
+		s1->sigma_g = lag->sigma_driven_peak_g[i];
+		s1->time_s = s2->time_s + lag->driven_axis_s[i];
+		s1->sigma_time_s = lag->sigma_driven_axis_s[i];
+		s1->how.method = "driven-oscillator";
+		s1->how.chi_square = lag->driven.chi_square;
+		s1->how.flags &= ~(unsigned)(ESTIMATE_FLAG_MODEL | ESTIMATE_FLAG_TOLERANCE);
+	}
+}
+
 /* The resultants of the sensors that have X and Y, and the lag when both have. */
-static void analyse_sensors(const struct desk *desk, struct analysis *analysis)
+static void analyse_sensors(const struct desk *desk, const struct estimate_options *options,
+                            struct analysis *analysis)
 {
 	static const char *const names[ESTIMATE_SENSORS_MAX] = {"S1", "S2"};
 	struct resultant resultant[ESTIMATE_SENSORS_MAX];
 	struct lag_sensor sensor[ESTIMATE_SENSORS_MAX];
+	double tolerance = options->tolerance > 0 ? options->tolerance : ESTIMATE_TOLERANCE;
 
 	analysis->resultant_count = 0;
 	for (unsigned i = 0; i < ESTIMATE_SENSORS_MAX; i++) {
@@ -395,7 +427,11 @@ static void analyse_sensors(const struct desk *desk, struct analysis *analysis)
 	if (!analysis->has_lag)
 		return;
 	lag_find(&sensor[0], &sensor[1], &analysis->lag);
+	if (!(analysis->lag.driven.flags & ESTIMATE_FLAG_MODEL) &&
+	    analysis->lag.sigma_driven_s > tolerance * resultant[1].width_s)
+		analysis->lag.driven.flags |= ESTIMATE_FLAG_TOLERANCE;
 	widen_by_driven(desk, analysis);
+	unclip_by_driven(desk, analysis);
 }
 
 /* Whether that axis of S1 rings on its own. */
@@ -413,6 +449,16 @@ static bool rings(const struct desk *desk, char axis)
 	return box == none || amplitude >= PLATE_OVER_CASE * desk->work[box].ringdown.amplitude_g;
 }
 
+/* An axis whose law gives it another damping than the plate's tells what it exchanged with the other one. */
+static void widen_by_plate(const struct desk *desk, char axis, struct analysis *analysis)
+{
+	struct estimate_ringdown *ring = &analysis->channels[find(desk, "S1", axis)].ringdown;
+	double apart = fabs(ring->damping_ratio - analysis->plate.damping_ratio);
+
+	if (ring->how.flags & ESTIMATE_FLAG_AMPLITUDE && apart > PLATE_AGREE * ring->sigma_damping)
+		ring->sigma_damping = hypot(ring->sigma_damping, apart);
+}
+
 static void analyse_plate(const struct desk *desk, struct analysis *analysis)
 {
 	bool x = rings(desk, 'X'), y = rings(desk, 'Y');
@@ -420,10 +466,13 @@ static void analyse_plate(const struct desk *desk, struct analysis *analysis)
 	const struct ringdown *ry = y ? &desk->work[find(desk, "S1", 'Y')].ringdown : NULL;
 
 	analysis->has_plate = x || y;
-	if (x && y)
+	if (x && y) {
 		ringdown_combine(rx, ry, &analysis->plate);
-	else if (x || y)
+		widen_by_plate(desk, 'X', analysis);
+		widen_by_plate(desk, 'Y', analysis);
+	} else if (x || y) {
 		analysis->plate = x ? rx->result : ry->result;
+	}
 }
 
 static bool has_good_sample(const struct desk *desk)
@@ -453,7 +502,7 @@ static int analyse(const struct desk *desk, const struct estimate_options *optio
 	flag_short(desk, analysis);
 	for (size_t i = 0; i < analysis->channel_count; i++)
 		analyse_ringdown(desk, i, options, &contact, analysis);
-	analyse_sensors(desk, analysis);
+	analyse_sensors(desk, options, analysis);
 	analyse_plate(desk, analysis);
 	if (options->impact_speed_m_s > 0)
 		analyse_rebound(desk, options->impact_speed_m_s, analysis);

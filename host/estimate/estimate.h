@@ -38,6 +38,8 @@ enum {
 	                                      another value stands */
 	ESTIMATE_FLAG_WEAK = 1u << 8,      /* "weak_axis": by the strong axis' shape */
 	ESTIMATE_FLAG_NOT_SEPARABLE = 1u << 9, /* "not_separable": two modes nearer than their width */
+	ESTIMATE_FLAG_ZERO = 1u << 10,         /* "zero_unsure": the baseline is doubtful */
+	ESTIMATE_FLAG_RIVAL = 1u << 11, /* "rival": another extreme is as high, as far as noise lets tell */
 };
 
 /* Name of the lowest flag bit in flags; "" for 0. */
@@ -68,19 +70,29 @@ enum estimate_family {
 const char *estimate_family_name(enum estimate_family family);
 DT_MUST_USE int estimate_family_parse(const char *name, enum estimate_family *family);
 
-/* offset_g + drift_g_s u + hum_g cos(2 pi hum_hz u + hum_phase), u from the middle of from_s..until_s, is
- * what the quiet part before the pulse says of zero; all of it is taken off. */
+enum { ESTIMATE_TONES_MAX = 2 };
+
+/* amplitude_g cos(2 pi hz u + phase) */
+struct estimate_tone {
+	double amplitude_g, hz, phase;
+};
+
+/* offset_g + drift_g_s u + hum_g cos(2 pi hum_hz u + hum_phase) + tones, u from the middle of
+ * from_s..until_s, is what the quiet part before the pulse says of zero; all of it is taken off. */
 struct estimate_baseline {
 	double offset_g;    /* 0 when the record starts inside its pulse (samples 0) */
 	double noise_g;     /* standard deviation per sample as read, without what the median deviation calls
 	                       an outlier; drift and hum taken off */
 	double deviation_g; /* plain standard deviation: larger with spikes, drift or hum */
 	double drift_g_s;   /* slope, 0 unless significant */
-	double hum_g;       /* amplitude of the mains term, 0 unless significant */
-	double hum_hz;      /* 50 or 60; NAN when there is none */
+	double hum_g;       /* amplitude of the strongest hum, 0 unless significant */
+	double hum_hz;      /* 50 or 60 where that explains it, else fitted; NAN when there is none */
 	double hum_phase;
+	unsigned tones; /* weaker ones: harmonics */
+	struct estimate_tone tone[ESTIMATE_TONES_MAX];
 	double from_s, until_s; /* the quiet part; NAN when there is none */
 	size_t samples;         /* of it that were used */
+	bool doubtful;          /* there is none, or it holds more than noise, hum and a slope */
 };
 
 struct estimate_peak {
@@ -90,7 +102,7 @@ struct estimate_peak {
 	double time_s;
 	double sigma_time_s;
 	struct estimate_how how; /* "poly4/poly6" "sine-power" "half-sine" "haversine" "strong-axis"
-	                            "parabola" "sample" */
+	                            "parabola" "sample"; of a clipped S1 "driven-oscillator" */
 };
 
 struct estimate_pulse {
@@ -99,6 +111,7 @@ struct estimate_pulse {
 	double velocity_change_m_s; /* integral over the pulse, signed */
 	double sigma_velocity_m_s;
 	double start_s, end_s; /* where the pulse leaves and meets 10 % */
+	unsigned flags;        /* ESTIMATE_FLAG_* of the above */
 	enum estimate_status status;
 	/* the fitted pulse of a named family: foot to foot, and its area; NAN unless one fits */
 	enum estimate_family family;
@@ -156,6 +169,8 @@ struct estimate_lag {
 	double sigma_driven_s;
 	double driven_axis_s[2]; /* X, Y; NAN when that axis does not follow the oscillator */
 	double sigma_driven_axis_s[2];
+	double driven_peak_g[2]; /* S1's, by the same fit; NAN where its residual refuses it */
+	double sigma_driven_peak_g[2];
 	struct estimate_how driven; /* "driven-oscillator" */
 	enum estimate_status status;
 };

@@ -102,6 +102,8 @@ static void combine(const struct driven axis[2], struct estimate_lag *lag)
 	for (unsigned i = 0; i < 2; i++) {
 		lag->driven_axis_s[i] = axis[i].lag_s;
 		lag->sigma_driven_axis_s[i] = axis[i].sigma_s;
+		lag->driven_peak_g[i] = axis[i].peak_g;
+		lag->sigma_driven_peak_g[i] = axis[i].sigma_peak_g;
 		if (axis[i].status == ESTIMATE_OK && axis[i].sigma_s > 0) {
 			weight[i] = 1 / (axis[i].sigma_s * axis[i].sigma_s);
 			sum += weight[i] * axis[i].lag_s;
@@ -156,6 +158,8 @@ void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct e
 	        .sigma_driven_s = NAN,
 	        .driven_axis_s = {NAN, NAN},
 	        .sigma_driven_axis_s = {NAN, NAN},
+	        .driven_peak_g = {NAN, NAN},
+	        .sigma_driven_peak_g = {NAN, NAN},
 	        .driven = {.method = "", .chi_square = NAN, .status = ESTIMATE_SHORT},
 	        .status = r2->result.how.status,
 	};

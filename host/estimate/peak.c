@@ -49,6 +49,10 @@
  * as there are samples. */
 #define WEAK_SIGNIFICANT 3.5
 
+/* Another extreme is as high when it lies below by less than this part and this many sigma. */
+#define RIVAL_PART 0.01
+#define RIVAL_SIGMAS 3.0
+
 /* How far from its centre a local model is believed, in half widths of its window. */
 #define LOCAL_REACH 0.95
 
@@ -456,6 +460,19 @@ static void find_clipped(const struct trace *trace, const struct estimate_option
 	result->how.status = ESTIMATE_CLIPPED;
 }
 
+/* Whether another pulse of the event is as high: sampling and noise then decided which one was taken. */
+static bool has_rival(const struct trace *trace, const struct peak *peak)
+{
+	double noise = trace->noise_g > 0 ? trace->noise_g : 0, height = fabs(trace->value_g[peak->at]);
+	double level = (1 - RIVAL_PART) * height - RIVAL_SIGMAS * noise;
+	size_t from = trace_index(trace, peak->span.from_s), until = trace_index(trace, peak->span.until_s);
+
+	if (!(height > WEAK_SIGMAS * noise))
+		return false;
+	return (trace->first < from && trace_reaches(trace, trace->first, from, level) < from) ||
+	       (until < trace->last && trace_reaches(trace, until, trace->last, level) < trace->last);
+}
+
 void peak_find(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
 {
 	struct peak found = {
@@ -480,6 +497,8 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 		peak->result.how.flags |= ESTIMATE_FLAG_GAPS;
 	if (trace_any(trace, peak->span.from_s, peak->span.until_s, SAMPLE_SPIKE))
 		peak->result.how.flags |= ESTIMATE_FLAG_SPIKE;
+	if (has_rival(trace, peak))
+		peak->result.how.flags |= ESTIMATE_FLAG_RIVAL;
 	clipped = clipped_under(trace, peak);
 	if (clipped.n > 0)
 		find_clipped(trace, options, &clipped, peak);

@@ -29,6 +29,8 @@
  * Weak: an axis below 10 sigma of noise, whose largest sample is mostly noise, takes the shape of its
  * sensor's strongest axis and fits one amplitude to it, signed ("strong-axis", peak_weak).
  *
+ * Flagged "rival" where another pulse of the event is as high, as far as noise and sampling let tell.
+ *
  * Status besides: short below three good samples, or when the pulse falls to half on neither side; no_peak
  * below 5 sigma of noise, value NAN; ambiguous when the summit may hide in a hole, or beyond the end of the
  * trace.

@@ -289,6 +289,8 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	pulse->start_s = edge[0].time_s;
 	pulse->end_s = edge[1].time_s;
 	pulse->duration_s = pulse->end_s - pulse->start_s;
+	pulse->flags = (peak->result.how.flags & (ESTIMATE_FLAG_GAPS | ESTIMATE_FLAG_SPIKE)) |
+	               (baseline->doubtful ? ESTIMATE_FLAG_ZERO : 0u);
 	pulse->sigma_duration_s =
 	        hypot(hypot(edge[0].sigma_s, edge[1].sigma_s), EDGE_LEVEL * peak->result.sigma_g * tilt);
 	if (peak->model != PEAK_MODEL_NONE)

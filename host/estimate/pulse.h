@@ -14,7 +14,7 @@
  * and the flag says "model_refused": another pulse than a symmetric contact's, or no contact at all.
  *
  * The status is the peak's; short when the trace ends inside the pulse. sigma_velocity_m_s is NAN without a
- * baseline.
+ * baseline, and flags say so where that is doubtful ("zero_unsure").
  */
 #include "host/estimate/peak.h"
 

@@ -245,11 +245,14 @@ static void compare_axes(const struct resultant_axes *axes, unsigned strong, str
 static void find_first(const struct resultant_axes *axes, unsigned fast, unsigned strong, size_t at,
                        double top, struct resultant *found)
 {
-	size_t first = first_local(axes, fast, at, top);
 	struct local_span span;
 	struct crest crest;
+	size_t first;
 
 	found->first_peak_s = found->result.time_s;
+	if (at == axes->trace[fast]->count)
+		return;
+	first = first_local(axes, fast, at, top);
 	if (first == at)
 		return;
 	found->first_peak_s = trace_time(axes->trace[fast], first);
@@ -271,6 +274,7 @@ void resultant_find(const struct resultant_axes *axes, struct resultant *resulta
 	                                     .axes_apart_s = NAN,
 	                                     .how = {.method = "", .chi_square = NAN}},
 	                          .first_peak_s = NAN};
+	bool two = usable(x) && usable(y);
 	double top, near;
 	size_t at;
 
@@ -281,12 +285,11 @@ void resultant_find(const struct resultant_axes *axes, struct resultant *resulta
 	resultant->result.how.status = ESTIMATE_SHORT;
 	found.width_s = lead->width_s;
 	at = largest(axes, fast, fabs(axes->trace[strong]->value_g[lead->at]), &top);
-	if (at == axes->trace[fast]->count)
-		return;
-	near = trace_time(axes->trace[fast], at);
+	/* Where no instant has both axes, their models may meet all the same. */
+	near = at < axes->trace[fast]->count ? trace_time(axes->trace[fast], at) : lead->result.time_s;
 	found.span = span_around(axes, strong, near);
-	if (!(usable(axes->peak[1 - strong]) && combine(axes, lead, near, &found)) &&
-	    !refit(axes, near, &found))
+	if (!(two && combine(axes, lead, near, &found)) && !refit(axes, near, &found) &&
+	    !(two && combine(axes, lead, lead->result.time_s, &found)))
 		return;
 	found.result.how.path[0] = found.result.how.method;
 	find_first(axes, fast, strong, at, top, &found);

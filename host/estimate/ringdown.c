@@ -63,6 +63,14 @@
 #define APART_MAX 0.05
 #define AGREE 3.0
 
+/* What exchange between the axes leaves of a law's damping in doubt, as part of it, and how far apart it may
+ * lead them. */
+#define LAW_DAMPING 0.01
+#define LAW_APART 0.15
+
+/* What the contact's last force leaves in a damping, as part of its uncertainty: both axes have it. */
+#define COMMON 0.25
+
 /* Samples before the window that lie this far from what the fit foretells, in standard deviations of one,
  * were still driven: one alone, two together, if the next earlier one is off too. */
 #define BACK_ALONE 2.2
@@ -76,8 +84,6 @@
 #define SEPARATION 3.0
 
 enum { MEAN_CYCLES = 3, SAMPLES_MIN = 10, WINDOWS = 4, OUTLIER_ROUNDS = 3, THIN_MIN = 48 };
-
-static const double mains_hz[] = {50, 60};
 
 /* One channel's decay on its way through the methods. */
 struct job {
@@ -312,12 +318,14 @@ static void consider(struct job *job, const struct modes *candidate)
 
 static void try_hum(struct job *job)
 {
+	const double hz[] = {50, 60, job->trace->hum_hz};
+
 	try_method(job, "full+hum");
-	for (size_t i = 0; i < sizeof(mains_hz) / sizeof(mains_hz[0]); i++) {
+	for (size_t i = 0; i < sizeof(hz) / sizeof(hz[0]); i++) {
 		struct modes modes = job->single;
 
-		modes.hum_hz = mains_hz[i];
-		if (modes_linear(&modes, &job->series) && modes_fit(&modes, &job->series))
+		modes.hum_hz = hz[i];
+		if (hz[i] > 0 && modes_linear(&modes, &job->series) && modes_fit(&modes, &job->series))
 			consider(job, &modes);
 	}
 }
@@ -802,17 +810,29 @@ struct value {
 	bool agree;
 };
 
-/* Where the two disagree by more than their uncertainties say, that of the mean is widened. */
+/* By the inverse squares of their own uncertainties. Where the two disagree, half of what they are apart is
+ * added. One difference says little of its own size, so chance does not widen. */
 static struct value weighted_mean(double a, double sigma_a, double b, double sigma_b)
 {
 	/* Data without noise must not divide by zero. */
 	double sa = fmax(sigma_a, 1e-12 * fabs(a)), sb = fmax(sigma_b, 1e-12 * fabs(b));
 	double wa = 1 / (sa * sa), wb = 1 / (sb * sb);
-	struct value mean = {(wa * a + wb * b) / (wa + wb), 0, false};
-	double chi2 = wa * pow(a - mean.value, 2) + wb * pow(b - mean.value, 2);
+	struct value mean = {(wa * a + wb * b) / (wa + wb), 0, fabs(a - b) < AGREE * hypot(sa, sb)};
 
-	mean.sigma = sqrt(fmax(1, chi2) / (wa + wb));
-	mean.agree = chi2 < AGREE * AGREE;
+	mean.sigma = hypot(sqrt(1 / (wa + wb)), mean.agree ? 0 : (a - b) / 2);
+	return mean;
+}
+
+/* Mounts that stiffen or soften hand swing from one axis to the other: what one seems to lose the other seems
+ * to keep. The weights go as the swings' squares, as their energy does, so that the mean is hardly touched.
+ */
+static struct value mean_of_laws(double a, double sigma_a, double b, double sigma_b)
+{
+	struct value mean = weighted_mean(a, sigma_a, b, sigma_b);
+
+	mean.agree = mean.agree || fabs(a - b) < LAW_APART * mean.value;
+	if (mean.agree)
+		mean.sigma = hypot(1 / hypot(1 / sigma_a, 1 / sigma_b), LAW_DAMPING * mean.value);
 	return mean;
 }
 
@@ -826,6 +846,8 @@ void ringdown_combine(const struct ringdown *x, const struct ringdown *y, struct
 	const struct estimate_ringdown *a = &x->result, *b = &y->result;
 	struct estimate_ringdown found = b->sigma_hz < a->sigma_hz ? *b : *a;
 	struct value mean;
+	unsigned flags = a->how.flags | b->how.flags;
+	bool agree;
 
 	if (a->how.status != ESTIMATE_OK || b->how.status != ESTIMATE_OK) {
 		*combined = b->how.status == ESTIMATE_OK ? *b : *a;
@@ -834,18 +856,21 @@ void ringdown_combine(const struct ringdown *x, const struct ringdown *y, struct
 	mean = weighted_mean(a->frequency_hz, a->sigma_hz, b->frequency_hz, b->sigma_hz);
 	found.frequency_hz = mean.value;
 	found.sigma_hz = mean.sigma;
+	agree = mean.agree;
 	if (!mean.agree && fabs(a->frequency_hz - b->frequency_hz) > APART_MAX * mean.value)
 		found.how.status = ESTIMATE_AMBIGUOUS;
 	mean = weighted_mean(a->natural_frequency_hz, a->sigma_natural_hz, b->natural_frequency_hz,
 	                     b->sigma_natural_hz);
 	found.natural_frequency_hz = mean.value;
 	found.sigma_natural_hz = mean.sigma;
-	mean = weighted_mean(a->damping_ratio, a->sigma_damping, b->damping_ratio, b->sigma_damping);
+	mean = (flags & ESTIMATE_FLAG_AMPLITUDE ? mean_of_laws : weighted_mean)(
+	        a->damping_ratio, a->sigma_damping, b->damping_ratio, b->sigma_damping);
 	found.damping_ratio = mean.value;
-	found.sigma_damping = mean.sigma;
+	found.sigma_damping = hypot(mean.sigma, COMMON * fmin(a->sigma_damping, b->sigma_damping));
+	agree = agree && mean.agree;
 	found.small_swing_hz = mean_of(a->small_swing_hz, b->small_swing_hz);
 	found.amplitude_g = hypot(a->amplitude_g, b->amplitude_g);
 	found.three_cycle_frequency_hz = mean_of(a->three_cycle_frequency_hz, b->three_cycle_frequency_hz);
-	found.how.flags = a->how.flags | b->how.flags;
+	found.how.flags = flags | (agree ? 0u : ESTIMATE_FLAG_MODEL);
 	*combined = found;
 }

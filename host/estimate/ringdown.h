@@ -57,9 +57,10 @@ struct ringdown_span {
 void ringdown_find(const struct trace *trace, const struct ringdown_span *span, struct ringdown *ringdown);
 
 /* X's and Y's decay of the same thing as one, by the inverse squares of their uncertainties; where they
- * disagree by more than these say, the uncertainty grows to cover it. Only what is ok counts: the result is
- * x's when neither is. Method, path, chi-square and second mode are the more certain axis'; flags are both's.
- * Ambiguous when they lie more than 5 % and three standard deviations apart. */
+ * disagree by three standard deviations, half of what they are apart is added to the uncertainty, flagged.
+ * Only what is ok counts: the result is x's when neither is. Method, path, chi-square and second mode are the
+ * more certain axis'; flags are both's. Ambiguous when they lie more than 5 % and three standard deviations
+ * apart. */
 void ringdown_combine(const struct ringdown *x, const struct ringdown *y, struct estimate_ringdown *combined);
 
 #endif

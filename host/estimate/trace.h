@@ -42,6 +42,7 @@ struct trace {
 	double hum_hz;  /* its frequency; NAN if none */
 	unsigned flags; /* RECORD_FLAG_* */
 	double range_g; /* the channel's */
+	size_t twins;   /* the first of two extremes that are equal, perhaps by chance; count if none */
 	struct trace_block *block; /* [trace_blocks] */
 	void *memory;              /* of trace_open */
 };

@@ -123,7 +123,7 @@ const char *record_flag_name(unsigned flags)
 	        "lost_samples", "bad_samples", "clipped",         "incomplete", "crc_unknown", "slow_frame",
 	        "no_impact",    "fault",       "uneven_sampling", "full_scale", "overrun",     "zero_shift",
 	        "cable",        "stuck",       "spike",           "zeroed",     "offset",      "drift",
-	        "hum",          "too_short",
+	        "hum",          "too_short",   "zero_unsure",
 	};
 
 	for (size_t bit = 0; bit < sizeof(names) / sizeof(names[0]); bit++)

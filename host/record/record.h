@@ -43,8 +43,9 @@ enum {
 	RECORD_FLAG_ZEROED = 1u << 15, /* "zeroed": a run of exact zeros in a signal that is not; left out */
 	RECORD_FLAG_OFFSET = 1u << 16, /* "offset": zero is far from zero before the pulse; taken off */
 	RECORD_FLAG_DRIFT = 1u << 17,  /* "drift": zero moves before the pulse; taken off */
-	RECORD_FLAG_HUM = 1u << 18,    /* "hum": the mains shows before the pulse; taken off */
+	RECORD_FLAG_HUM = 1u << 18,    /* "hum": mains or another hum shows before the pulse; taken off */
 	RECORD_FLAG_SHORT = 1u << 19,  /* "too_short": ends inside its pulse, or has hardly a sample */
+	RECORD_FLAG_ZERO_UNSURE = 1u << 20, /* "zero_unsure": more than noise before the pulse */
 };
 
 struct channel {

@@ -142,9 +142,12 @@ const char *report_flag_words(unsigned flag)
 	case RECORD_FLAG_DRIFT:
 		return "zero moved before the pulse; its straight line was taken off";
 	case RECORD_FLAG_HUM:
-		return "the mains shows before the pulse; it was taken off: check screen and earth";
+		return "the mains or another hum shows before the pulse; it was taken off: check screen and "
+		       "earth";
 	case RECORD_FLAG_SHORT:
 		return "the record begins or ends inside its pulse, or has hardly a sample";
+	case RECORD_FLAG_ZERO_UNSURE:
+		return "more than noise before the pulse: zero, and what hangs on it, is unsure";
 	default:
 		return record_flag_name(flag);
 	}
@@ -173,6 +176,10 @@ const char *report_note_words(unsigned flag)
 		return "weak; by the shape of the sensor's strong axis";
 	case ESTIMATE_FLAG_NOT_SEPARABLE:
 		return "two modes lie too near each other to be told apart";
+	case ESTIMATE_FLAG_ZERO:
+		return "nothing quiet before the pulse, or more than noise: it hangs on an unsure zero";
+	case ESTIMATE_FLAG_RIVAL:
+		return "another extreme is as high, as far as noise lets tell";
 	default:
 		return estimate_flag_name(flag);
 	}
@@ -207,6 +214,8 @@ size_t report_notes(const struct report *report, struct report_note notes[REPORT
 			const char *name = report->record->channels[i].name;
 
 			note(&noting, e->peak.value_g, e->peak.how.flags, name, "peak");
+			note(&noting, e->pulse.velocity_change_m_s, e->pulse.flags & ESTIMATE_FLAG_ZERO, name,
+			     "velocity change");
 			note(&noting, e->pulse.contact_time_s, e->pulse.contact.flags, name, "contact");
 		}
 		for (size_t i = 0; i < a->resultant_count; i++)

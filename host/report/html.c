@@ -38,6 +38,8 @@ static void head(struct page *page)
 	page_text(out, r->file);
 	fprintf(out, " (%s)</span></p>\n<div class=\"verdict %s\">%s %s</div>\n", r->format,
 	        good ? "good" : "bad", good ? "&#10003;" : "&#9888;", verdict);
+	if (report->simulated)
+		fputs("<p><b>Simulated tower: no product fell.</b></p>\n", out);
 }
 
 static const char *unless_ok(enum estimate_status status, const char *note)

@@ -74,6 +74,7 @@ static void put_pulse(struct builder *b, cJSON *object, const struct estimate_pu
 	put_number(b, item, "sigma_velocity_m_s", pulse->sigma_velocity_m_s);
 	put_number(b, item, "start_s", pulse->start_s);
 	put_number(b, item, "end_s", pulse->end_s);
+	put_flags(b, item, pulse->flags, estimate_flag_name);
 	put_status(b, item, pulse->status);
 	contact = put_object(b, item, "contact");
 	put_text(b, contact, "family", estimate_family_name(pulse->family));

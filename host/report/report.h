@@ -25,6 +25,7 @@ struct report {
 	const struct free_falls *falls;            /* as events */
 	const struct band *band;                   /* NULL: no band was given */
 	bool show_events;                          /* in the table too */
+	bool simulated;                            /* no product fell: the page says so */
 	const char *version;                       /* of the program, for the page's foot; NULL: not said */
 };
 

@@ -108,6 +108,27 @@ static bool verdict(const struct series_page *page, char line[240])
 	return counted && counted >= planned && all_whole(page) && !any_remark(page);
 }
 
+/* What is known of it: of drops whose origin nobody noted nothing is said. */
+static void simulated(const struct series_page *page)
+{
+	FILE *out = page->page.out;
+	size_t count = 0, named = 0;
+
+	for (size_t i = 0; i < page->count; i++)
+		count += page->drop[i]->a.simulated;
+	if (!count)
+		return;
+	fputs("<p><b>Simulated tower: no product fell", out);
+	for (size_t i = 0; i < page->count && count < page->count; i++)
+		if (page->drop[i]->a.simulated)
+			fprintf(out, "%s %u",
+			        named++     ? ","
+			        : count > 1 ? " in drops"
+			                    : " in drop",
+			        page->drop[i]->a.number);
+	fputs(".</b></p>\n", out);
+}
+
 /* ---- the means that matter most ---- */
 
 static void card(struct series_page *page, const char *label, enum archive_value value, double scale,
@@ -163,6 +184,7 @@ void series_head(struct series_page *page)
 	page_text(out, page->series.campaign);
 	fprintf(out, "</span></p>\n<div class=\"verdict %s\">%s %s</div>\n", good ? "good" : "bad",
 	        good ? "&#10003;" : "&#9888;", line);
+	simulated(page);
 	cards(page);
 }
 

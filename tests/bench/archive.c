@@ -83,6 +83,27 @@ void bench_archive_filter(void *context)
 	must(archive, print_drops(archive, &filter, false, PRINT_TEXT, nowhere));
 }
 
+void bench_archive_text(void *context)
+{
+	struct archive_filter filter = archive_filter_none();
+	struct archive *archive = open_it(ARCHIVE_READ);
+
+	(void)context;
+	filter.text = "CABLE bench";
+	must(archive, print_drops(archive, &filter, false, PRINT_JSON, nowhere));
+}
+
+void bench_archive_newest(void *context)
+{
+	struct archive_filter filter = archive_filter_none();
+	struct archive *archive = open_it(ARCHIVE_READ);
+
+	(void)context;
+	filter.text = "cable";
+	filter.limit = 100;
+	must(archive, print_series(archive, &filter, PRINT_JSON, nowhere));
+}
+
 void bench_archive_tables(void *context)
 {
 	struct archive_filter filter = archive_filter_none();

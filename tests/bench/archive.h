@@ -13,6 +13,8 @@ void bench_archive_remove(void);
 
 void bench_archive_list(void *context);   /* 2 000 series with their counts, as text */
 void bench_archive_filter(void *context); /* the drops of one angle and three days */
+void bench_archive_text(void *context);   /* those with words that one drop in five has */
+void bench_archive_newest(void *context); /* the newest 100 series with a word, as the page asks */
 void bench_archive_tables(void *context); /* means and SDs of everything */
 
 #endif

@@ -201,6 +201,8 @@ static const struct row {
         {"spectra, 6 x 1 s x 104, up-sampled", spectra, &upsampled, 30000},
         {"archive of 10 000 drops: series listed", bench_archive_list, NULL, 100e3},
         {"  its drops at one angle on three days", bench_archive_filter, NULL, 100e3},
+        {"  the 2 000 drops with two words", bench_archive_text, NULL, 100e3},
+        {"  the newest 100 series with a word", bench_archive_newest, NULL, 100e3},
         {"  means and SDs of all", bench_archive_tables, NULL, 100e3},
         {"decay of 5 unknowns, our solver", own_fit, own_solution, 0},
         {"decay of 5 unknowns, GSL's", gsl_fit, gsl_solution, 0},

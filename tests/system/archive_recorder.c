@@ -41,7 +41,7 @@ static int record(struct archive *archive, const char *series, const char *log)
 	                           "\"value_g\":300,\"sigma_g\":1,\"status\":\"ok\"}}]}";
 	struct archive_recording r;
 	char drop[ARCHIVE_NAME_MAX + 16];
-	int result = archive_begin(archive, series, "recorder", ".log", &r);
+	int result = archive_begin(archive, series, "recorder", ".log", false, &r);
 
 	if (result != 0)
 		return result;

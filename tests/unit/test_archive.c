@@ -73,7 +73,7 @@ static unsigned record_one(struct archive *archive, const char *series, const ch
 {
 	struct archive_recording r;
 
-	assert_int_equal(archive_begin(archive, series, "Ann", ".log", &r), 0);
+	assert_int_equal(archive_begin(archive, series, "Ann", ".log", false, &r), 0);
 	write_log(&r, text);
 	assert_int_equal(archive_finish(archive, &r, 0, ""), 0);
 	return r.number;
@@ -102,6 +102,7 @@ struct seen {
 	char state[16], decision[16], hash[72], raw[160], version[64], flags[64], reason[64];
 	double s1x, s2x, s2r, sigma;
 	unsigned not_ok;
+	bool simulated;
 };
 
 static int see(void *context, const struct archive_drop *drop)
@@ -122,6 +123,7 @@ static int see(void *context, const struct archive_drop *drop)
 	seen->s2r = drop->value[ARCHIVE_S2_R];
 	seen->sigma = drop->sigma[ARCHIVE_S1_X];
 	seen->not_ok = drop->not_ok;
+	seen->simulated = drop->simulated;
 	return 0;
 }
 
@@ -145,7 +147,7 @@ static void test_a_drop_is_partial_until_it_is_whole(void **state)
 	struct archive_recording r;
 
 	(void)state;
-	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", &r), 0);
+	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", false, &r), 0);
 	assert_string_equal(look(other, "one", 1, NULL).state, "recording");
 	write_log(&r, "abc");
 	archive_abandon(&r);
@@ -182,7 +184,7 @@ static void test_nothing_stays_of_what_was_discarded(void **state)
 	char path[ARCHIVE_PATH_MAX];
 
 	(void)state;
-	assert_int_equal(archive_begin(archive, "one", "", ".log", &r), 0);
+	assert_int_equal(archive_begin(archive, "one", "", ".log", false, &r), 0);
 	strcpy(path, r.log);
 	archive_discard(archive, &r);
 	assert_int_equal(access(path, F_OK), -1);
@@ -199,7 +201,7 @@ static void test_a_log_that_stands_there_is_not_written_over(void **state)
 	FILE *out;
 
 	(void)state;
-	assert_int_equal(archive_begin(archive, "one", "", ".log", &r), 0);
+	assert_int_equal(archive_begin(archive, "one", "", ".log", false, &r), 0);
 	strcpy(path, r.log);
 	archive_discard(archive, &r);
 	out = fopen(path, "w");
@@ -207,6 +209,63 @@ static void test_a_log_that_stands_there_is_not_written_over(void **state)
 	fputs("somebody's", out);
 	fclose(out);
 	assert_int_equal(record_one(archive, "one", "abc"), 2);
+	archive_close(archive);
+}
+
+static unsigned record_simulated(struct archive *archive, const char *series, const char *text)
+{
+	struct archive_recording r;
+
+	assert_int_equal(archive_begin(archive, series, "Ann", ".log", true, &r), 0);
+	write_log(&r, text);
+	assert_int_equal(archive_finish(archive, &r, 0, ""), 0);
+	return r.number;
+}
+
+/* What `series drops` prints, else `series list`; to be freed. */
+static char *printed(struct archive *archive, const struct archive_filter *filter, enum print_format format,
+                     bool drops)
+{
+	char *text = NULL;
+	size_t size;
+	FILE *out = open_memstream(&text, &size);
+
+	assert_non_null(out);
+	if (drops)
+		assert_int_equal(print_drops(archive, filter, true, format, out), 0);
+	else
+		assert_int_equal(print_series(archive, filter, format, out), 0);
+	fclose(out);
+	return text;
+}
+
+static const cJSON *nth(const cJSON *root, const char *list, int number, const char *key)
+{
+	return cJSON_GetObjectItem(cJSON_GetArrayItem(cJSON_GetObjectItem(root, list), number), key);
+}
+
+static void test_a_simulated_drop_says_so(void **state)
+{
+	struct archive_filter filter = archive_filter_none();
+	struct archive *archive = with_series("one");
+	char *text;
+	cJSON *root;
+
+	(void)state;
+	record_one(archive, "one", "abc");
+	record_simulated(archive, "one", "def");
+	assert_false(look(archive, "one", 1, NULL).simulated);
+	assert_true(look(archive, "one", 2, NULL).simulated);
+	text = printed(archive, &filter, PRINT_JSON, true);
+	root = cJSON_Parse(text);
+	assert_true(cJSON_IsNull(nth(root, "drops", 0, "simulated")));
+	assert_true(cJSON_IsTrue(nth(root, "drops", 1, "simulated")));
+	cJSON_Delete(root);
+	free(text);
+	text = printed(archive, &filter, PRINT_TEXT, true);
+	assert_non_null(strstr(text, "simulated tower"));
+	assert_null(strstr(strstr(text, "simulated tower") + 1, "simulated tower"));
+	free(text);
 	archive_close(archive);
 }
 
@@ -248,7 +307,7 @@ static void test_what_is_not_whole_is_not_decided(void **state)
 	struct archive_recording r;
 
 	(void)state;
-	assert_int_equal(archive_begin(archive, "one", "", ".log", &r), 0);
+	assert_int_equal(archive_begin(archive, "one", "", ".log", false, &r), 0);
 	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "", ""), DT_E_STATE);
 	archive_abandon(&r);
 	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "", ""), DT_E_STATE);
@@ -567,11 +626,12 @@ static void test_a_version_1_index_is_migrated(void **state)
 	(void)state;
 	run_sql(version_1);
 	archive = open_it(ARCHIVE_READ);
-	assert_int_equal(schema_version(), 2);
+	assert_int_equal(schema_version(), 3);
 	seen = look(archive, "one", 1, NULL);
 	assert_string_equal(seen.decision, "accepted");
 	assert_string_equal(seen.version, "v0");
 	assert_near(seen.s1x, -345.5, 0);
+	assert_false(seen.simulated);
 	archive_close(archive);
 	archive = open_it(ARCHIVE_WRITE);
 	assert_int_equal(archive_note(archive, "one/1", "Ann", "still here"), 0);
@@ -634,7 +694,7 @@ static void make_many_things(void)
 	                 0);
 	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "", ""), 0);
 	assert_int_equal(archive_note(archive, "one/2", "J\xc3\xbcrg", "  blanks kept  "), 0);
-	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", &r), 0);
+	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", true, &r), 0);
 	archive_abandon(&r);
 	assert_int_equal(archive_calibrate(archive, "S1", 1.0 / 0.97, "2026-11-02", "by hand"), 0);
 	archive_close(archive);
@@ -757,6 +817,134 @@ static void test_ten_thousand_drops(void **state)
 	archive_close(archive);
 }
 
+/* ---- text and limit ---- */
+
+/* The names of the drops or series of a list, in its order. */
+static void check_found(struct archive *archive, const char *text, unsigned limit, const char *list,
+                        const char *expected)
+{
+	bool drops = strcmp(list, "drops") == 0;
+	struct archive_filter filter = archive_filter_none();
+	char names[200] = "", *json;
+	const cJSON *item;
+	cJSON *root;
+
+	filter.text = text;
+	filter.limit = limit;
+	json = printed(archive, &filter, PRINT_JSON, drops);
+	root = cJSON_Parse(json);
+	assert_non_null(root);
+	cJSON_ArrayForEach(item, cJSON_GetObjectItem(root, list))
+	{
+		size_t at = strlen(names);
+		const char *name = cJSON_GetStringValue(cJSON_GetObjectItem(item, drops ? "series" : "name"));
+
+		if (drops)
+			snprintf(names + at, sizeof(names) - at, "%s/%g ", name,
+			         cJSON_GetNumberValue(cJSON_GetObjectItem(item, "number")));
+		else
+			snprintf(names + at, sizeof(names) - at, "%s ", name);
+	}
+	if (cJSON_IsTrue(cJSON_GetObjectItem(root, "more")))
+		strcat(names, "more");
+	else
+		assert_true(cJSON_IsFalse(cJSON_GetObjectItem(root, "more")));
+	if (strcmp(names, expected) != 0)
+		fail_msg("text '%s', limit %u: %s: '%s', expected '%s'", text != NULL ? text : "", limit,
+		         list, names, expected);
+	cJSON_Delete(root);
+	free(json);
+}
+
+/* box/1: Ann, a note, clipped; box/2: rejected; rig_b/1: nothing; empty: no drops. */
+static struct archive *with_words(void)
+{
+	struct archive *archive = with_series("box");
+
+	assert_int_equal(archive_new_series(archive, "rig_b", "winter", SCENE, 25, NAN, 5), 0);
+	assert_int_equal(archive_new_series(archive, "empty", "winter", BARE, 25, NAN, 5), 0);
+	record_one(archive, "box", "abc");
+	record_one(archive, "box", "def");
+	record_one(archive, "rig_b", "ghi");
+	assert_int_equal(archive_note(archive, "box/1", "", "100% of J\xc3\xbcrg's \\ load_cell"), 0);
+	assert_int_equal(archive_decide(archive, "box/2", ARCHIVE_REJECTED, "", "hit the Wrong corner"), 0);
+	give_result(archive, "box/1", "v1", 1, 2);
+	return archive;
+}
+
+static void test_words_find_drops(void **state)
+{
+	static const struct {
+		const char *text, *drops, *series;
+	} rows[] = {
+	        {"", "box/1 box/2 rig_b/1 ", "box empty rig_b "},
+	        {"wrong CORNER", "box/2 ", "box "},
+	        {"  corner\twrong ", "box/2 ", "box "},
+	        {"corner load_cell", "", ""}, /* not of one drop */
+	        {"box J\xc3\xbcrg", "box/1 ", "box "},
+	        {"WINTER", "rig_b/1 ", "empty rig_b "},
+	        {"empty", "", "empty "},
+	        {"geometry-2a ann", "box/1 box/2 rig_b/1 ", "box rig_b "},
+	        {"clipped", "box/1 ", "box "},
+	        {"100%", "box/1 ", "box "},
+	        {"%", "box/1 ", "box "},
+	        {"_", "box/1 rig_b/1 ", "box rig_b "},
+	        {"\\", "box/1 ", "box "},
+	        {"ad_ce", "box/1 ", "box "},
+	        {"loadXcell", "", ""},
+	        {"' OR 1 --", "", ""},
+	        {"a b c d e f g h", "", ""},
+	};
+	struct archive_filter filter = archive_filter_none();
+	struct archive *archive = with_words();
+	struct seen seen = {.count = 0};
+	char longer[62];
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+		check_found(archive, rows[i].text, 0, "drops", rows[i].drops);
+		check_found(archive, rows[i].text, 0, "series", rows[i].series);
+	}
+	filter.text = "a b c d e f g h i";
+	assert_int_equal(archive_each_drop(archive, &filter, see, &seen), DT_E_ARGUMENT);
+	memset(longer, 'x', 61);
+	longer[61] = '\0';
+	filter.text = longer;
+	assert_int_equal(archive_each_drop(archive, &filter, see, &seen), DT_E_ARGUMENT);
+	assert_non_null(strstr(archive_message(archive), "60 characters"));
+	filter.text = longer + 1;
+	assert_int_equal(archive_each_drop(archive, &filter, see, &seen), 0);
+	assert_int_equal(seen.count, 0);
+	archive_close(archive);
+}
+
+static void test_a_limit_takes_the_newest_and_tells_of_more(void **state)
+{
+	struct archive *archive = with_words();
+	struct archive_filter filter = archive_filter_none();
+	char *text;
+
+	(void)state;
+	run_sql("UPDATE drops SET time = '2026-01-0' || (7 - id) || 'T08:00:00Z';"
+	        "UPDATE series SET created = '2026-01-05T09:00:00Z' WHERE name = 'empty'");
+	check_found(archive, NULL, 0, "drops", "box/1 box/2 rig_b/1 ");
+	check_found(archive, NULL, 1, "drops", "box/1 more");
+	check_found(archive, NULL, 2, "drops", "box/1 box/2 more");
+	check_found(archive, NULL, 3, "drops", "box/1 box/2 rig_b/1 ");
+	check_found(archive, NULL, 4, "drops", "box/1 box/2 rig_b/1 ");
+	check_found(archive, NULL, 1, "series", "box more");
+	check_found(archive, NULL, 2, "series", "box empty more");
+	check_found(archive, NULL, 3, "series", "box empty rig_b ");
+	check_found(archive, "winter", 1, "series", "empty more");
+	run_sql("UPDATE drops SET time = '2026-01-09T08:00:00Z' WHERE id = 3");
+	check_found(archive, NULL, 2, "drops", "rig_b/1 box/1 more");
+	filter.limit = 2;
+	text = printed(archive, &filter, PRINT_TEXT, false);
+	assert_non_null(strstr(text, "there are more: these are the newest 2"));
+	free(text);
+	archive_close(archive);
+}
+
 #define IN_A_FOLDER(test) cmocka_unit_test_setup_teardown(test, make_folder, remove_folder)
 
 int main(void)
@@ -766,6 +954,7 @@ int main(void)
 	        IN_A_FOLDER(test_changes_by_others_are_seen),
 	        IN_A_FOLDER(test_nothing_stays_of_what_was_discarded),
 	        IN_A_FOLDER(test_a_log_that_stands_there_is_not_written_over),
+	        IN_A_FOLDER(test_a_simulated_drop_says_so),
 	        IN_A_FOLDER(test_a_rejection_needs_a_reason),
 	        IN_A_FOLDER(test_what_is_not_whole_is_not_decided),
 	        IN_A_FOLDER(test_names_stay_inside_the_folder),
@@ -780,6 +969,8 @@ int main(void)
 	        IN_A_FOLDER(test_a_damaged_sidecar_is_left_out_and_told),
 	        IN_A_FOLDER(test_raw_files_are_verified),
 	        IN_A_FOLDER(test_ten_thousand_drops),
+	        IN_A_FOLDER(test_words_find_drops),
+	        IN_A_FOLDER(test_a_limit_takes_the_newest_and_tells_of_more),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

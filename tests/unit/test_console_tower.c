@@ -679,6 +679,12 @@ static void disarmed_without_a_release_leaves_no_drop(void **state)
 	must(tower_abort, "{}");
 	wait_view(is_idle);
 	assert_int_equal(heard(WIRE_OP_ABORT), 1);
+	tower_disarm(console.tower); /* there is nothing to */
+	(void)arm();
+	assert_int_equal(heard(WIRE_OP_ABORT), 1);
+	tower_disarm(console.tower);
+	wait_view(is_idle);
+	assert_int_equal(heard(WIRE_OP_ABORT), 2);
 	assert_int_equal(archived().count, 0);
 }
 
@@ -740,6 +746,29 @@ static void an_arm_from_before_an_abort_is_void(void **state)
 	assert_int_equal(take_answer(&aborted, text), 200);
 	assert_int_equal(heard(WIRE_OP_ARM), 0);
 	assert_int_equal(archived().count, 0);
+}
+
+static void abort_goes_past_a_full_queue(void **state)
+{
+	enum { MANY = 200 };
+	static struct asked cleared[MANY];
+	struct asked aborted;
+	char text[512];
+
+	(void)state;
+	select_box();
+	behave(1u << WIRE_OP_CLEAR, 0, true);
+	for (unsigned i = 0; i < MANY; i++)
+		ask(&cleared[i], tower_clear, "{}");
+	ask(&aborted, tower_abort, "{}");
+	for (unsigned i = 0; i < MANY + 1; i++)
+		wait_answer();
+	assert_int_equal(take_answer(&cleared[0], text), 409);
+	assert_int_equal(take_answer(&cleared[MANY - 1], text), 503);
+	assert_int_equal(take_answer(&aborted, text), 200);
+	for (unsigned i = 1; i < MANY - 1; i++)
+		(void)take_answer(&cleared[i], text);
+	assert_int_equal(heard(WIRE_OP_ABORT), 1);
 }
 
 static void abort_goes_to_a_tower_that_was_never_heard(void **state)
@@ -862,6 +891,7 @@ int main(void)
 	        TEST(disarmed_without_a_release_leaves_no_drop),
 	        TEST(abort_does_not_wait_for_an_unanswered_arm),
 	        TEST(an_arm_from_before_an_abort_is_void),
+	        TEST(abort_goes_past_a_full_queue),
 	        TEST(abort_goes_to_a_tower_that_was_never_heard),
 	        TEST(an_abort_in_motion_is_kept_with_its_note),
 	        TEST(a_fault_in_motion_is_kept_with_its_text),

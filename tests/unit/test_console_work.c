@@ -278,7 +278,7 @@ static void record_hand(struct archive *archive, const char *series, int lost_ti
 {
 	struct archive_recording r;
 
-	assert_int_equal(archive_begin(archive, series, "Ann", ".log", &r), 0);
+	assert_int_equal(archive_begin(archive, series, "Ann", ".log", false, &r), 0);
 	write_hand(r.log, lost_tick);
 	assert_int_equal(archive_finish(archive, &r, 0, ""), 0);
 }
@@ -293,7 +293,7 @@ static void start_with_drops(void)
 	assert_int_equal(archive_new_series(archive, "one", "trial", SCENE, 27, NAN, 5), 0);
 	record_hand(archive, "one", -1);
 	record_hand(archive, "one", 200);
-	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", &r), 0);
+	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", false, &r), 0);
 	archive_abandon(&r);
 	archive_close(archive);
 	start();
@@ -569,7 +569,7 @@ static void check_list(void (*run)(struct job *job), const char *asked, const ch
 
 static void test_lists_are_those_of_the_command(void **state)
 {
-	struct archive_filter all = archive_filter_none(), some = all, none = all;
+	struct archive_filter all = archive_filter_none(), some = all, none = all, words = all, second = all;
 
 	(void)state;
 	start_with_drops();
@@ -582,12 +582,23 @@ static void test_lists_are_those_of_the_command(void **state)
 	check_list(work_series, "date=2001-02", "application/json", &none, false, 0);
 	check_list(work_drops, "series=one&campaign=trial&angle_deg=27&scene=geometry-2A&undecided=1",
 	           "application/json", &some, true, 1);
+	words.text = "geometry trial";
+	words.limit = 2;
+	check_list(work_drops, "text=geometry trial&limit=2", "application/json", &words, false, 1);
+	check_list(work_series, "text=geometry trial&limit=2", "application/json", &words, false, 0);
+	second.number = 2;
+	check_list(work_drops, "number=2", "application/json", &second, false, 1);
 	check_list(work_tables, "campaign=trial&undecided=1", "application/json",
 	           &(struct archive_filter){.campaign = "trial", .angle_deg = NAN}, true, 2);
 	check_list(work_csv, NULL, "text/csv; charset=utf-8", &all, false, 3);
 	expect(400, work_drops, NULL, "angle_deg=flat", NULL);
 	expect(400, work_drops, NULL, "angle_deg=nan", NULL);
 	expect(400, work_drops, NULL, "date=2026-13", NULL);
+	expect(400, work_drops, NULL, "limit=0", NULL);
+	expect(400, work_drops, NULL, "limit=-1", NULL);
+	expect(400, work_drops, NULL, "limit=5 OR 1", NULL);
+	expect(400, work_drops, NULL, "limit=99999999999999999999", NULL);
+	expect(400, work_drops, NULL, "text=a b c d e f g h i", NULL);
 	expect(404, work_drops, NULL, "series=two", NULL);
 	expect(404, work_drops, NULL, "series=' OR 1", NULL);
 }
@@ -741,6 +752,7 @@ static struct tower_drop *new_drop(const char *series)
 	assert_non_null(drop);
 	record_init(&drop->record);
 	drop->recording.lock = -1;
+	drop->simulated = true;
 	snprintf(drop->series, sizeof(drop->series), "%s", series);
 	return drop;
 }
@@ -805,6 +817,21 @@ static void wait_saved(const char *drop)
 	assert_string_equal(saved_drop, drop);
 }
 
+static bool is_simulated(const char *series, int number)
+{
+	char words[64];
+	cJSON *tree;
+	bool yes;
+
+	snprintf(words, sizeof(words), "series=%s&number=%d", series, number);
+	tree = ask_json(work_drops, NULL, words, NULL);
+	assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(tree, "drops")), 1);
+	yes = cJSON_IsTrue(
+	        cJSON_GetObjectItem(cJSON_GetArrayItem(cJSON_GetObjectItem(tree, "drops"), 0), "simulated"));
+	cJSON_Delete(tree);
+	return yes;
+}
+
 static void test_a_drop_is_kept_and_analysed(void **state)
 {
 	struct tower_drop *drop;
@@ -829,6 +856,8 @@ static void test_a_drop_is_kept_and_analysed(void **state)
 	                    "a note");
 	assert_near(number_of(cJSON_GetArrayItem(cJSON_GetObjectItem(tree, "drops"), 3), "s2_x_g"), S2X_G, 2);
 	cJSON_Delete(tree);
+	assert_false(is_simulated("one", 1));
+	assert_true(is_simulated("one", 4));
 	work_look(console.work, &view);
 	assert_string_equal(view.result, "one/4");
 	assert_string_equal(view.trouble, "");
@@ -882,9 +911,23 @@ static void test_a_drop_goes_first(void **state)
 	sem_destroy(&all);
 }
 
+static unsigned frames_in(const char *log)
+{
+	FILE *in = fopen(log, "r");
+	unsigned count = 0;
+	int c;
+
+	assert_non_null(in);
+	while ((c = fgetc(in)) != EOF)
+		count += c == '\n';
+	fclose(in);
+	return count;
+}
+
 /* A drop from a tower that fell behind, and a log that a full disk has left with holes. */
 static void test_a_log_that_lacks_frames_is_written_again(void **state)
 {
+	char log[ARCHIVE_PATH_MAX];
 	struct tower_drop *drop;
 	struct curves c;
 
@@ -894,11 +937,15 @@ static void test_a_log_that_lacks_frames_is_written_again(void **state)
 	read_hand(&drop->record, -1);
 	work_keep(console.work, drop);
 	wait_saved("one/4");
+	assert_true(is_simulated("one", 4));
 	drop = begin("one");
-	write_hand(drop->recording.log, 150);
+	strcpy(log, drop->recording.log);
+	write_hand(log, 150);
+	assert_int_equal(frames_in(log), 2 * TICKS);
 	read_hand(&drop->record, -1);
 	work_keep(console.work, drop);
 	wait_saved("one/5");
+	assert_int_equal(frames_in(log), 2 * TICKS + 1); /* nothing is left of what was there */
 	drop = begin("one");
 	write_hand(drop->recording.log, 150);
 	read_hand(&drop->record, 150);

@@ -13,6 +13,7 @@
 #include "tests/unit/near.h"
 #include "tests/unit/synth.h"
 
+#define PI 3.14159265358979323846
 #define HEIGHT_G 485.1
 #define BASE_S 3e-3
 #define RATE_HZ 7000.0
@@ -529,6 +530,27 @@ static void many_samples(void **state)
 	synth_free(&channel);
 }
 
+/* Ringing that hardly decays has many extremes of one height; a plate has one. */
+static void rivals(void **state)
+{
+	static const double damping[] = {0.0005, 0.1};
+	struct synth_random random = {91};
+	struct channel channel = synth_channel("a", 10000, 0, 1500);
+
+	(void)state;
+	for (int i = 0; i < 20; i++) {
+		for (size_t k = 0; k < channel.count; k++) {
+			double t = (double)k / 10000 - 0.05, w = 2 * PI * 130;
+
+			channel.value_g[k] = synth_normal(&random) +
+			                     (t < 0 ? 0 : 300 * exp(-damping[i % 2] * w * t) * sin(w * t));
+		}
+		assert_int_equal(find(&channel, 1).how.flags & ESTIMATE_FLAG_RIVAL,
+		                 i % 2 ? 0 : ESTIMATE_FLAG_RIVAL);
+	}
+	synth_free(&channel);
+}
+
 static void no_peak(void **state)
 {
 	struct synth_random random = {3};
@@ -585,6 +607,7 @@ int main(void)
 	        cmocka_unit_test(few_samples),
 	        cmocka_unit_test(many_samples),
 	        cmocka_unit_test(no_peak),
+	        cmocka_unit_test(rivals),
 	        cmocka_unit_test(degenerate),
 	};
 

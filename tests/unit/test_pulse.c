@@ -314,6 +314,10 @@ static void starts_inside(void **state)
 	assert_near(baseline.noise_g, 1, 0.2);
 	assert_near(pulse.velocity_change_m_s, 9.81 * HEIGHT_G * BASE_S * 2 / PI, 0.05);
 	assert_true(isnan(pulse.sigma_velocity_m_s));
+	assert_int_equal(pulse.flags, ESTIMATE_FLAG_ZERO);
+	pulse = measure(&channel, &baseline);
+	assert_true(pulse.sigma_velocity_m_s > 0);
+	assert_int_equal(pulse.flags, 0);
 	synth_free(&channel);
 }
 

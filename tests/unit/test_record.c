@@ -124,6 +124,7 @@ static void test_names(void **state)
 	        {RECORD_FLAG_DRIFT, "drift"},
 	        {RECORD_FLAG_HUM, "hum"},
 	        {RECORD_FLAG_SHORT, "too_short"},
+	        {RECORD_FLAG_ZERO_UNSURE, "zero_unsure"},
 	        {0, ""},
 	        {1u << 31, ""},
 	};

@@ -269,11 +269,56 @@ static void flawed(void **state)
 	drop(&s);
 }
 
+/* Where samples of one axis or the other are missing at every instant around the summit the axes' own models
+ * still meet: whenever both peaks are there, so is the resultant. */
+static void never_both(void **state)
+{
+	struct synth_random random = {71};
+	int both = 0;
+
+	(void)state;
+	for (int run = 0; run < 200; run++) {
+		struct resultant r;
+		struct scene s;
+
+		make(&s, 0.3, run % 4 * 1e-4, 1, &random);
+		for (size_t k = 0; k < s.x.count; k++)
+			if (synth_uniform(&random) < 0.1 * (run % 6))
+				s.x.sample[k] |= SAMPLE_LOST;
+		for (size_t k = 0; k < s.y.count; k++)
+			if (synth_uniform(&random) < 0.1 * (run % 6))
+				s.y.sample[k] |= SAMPLE_LOST;
+		if (run % 2) {
+			synth_lose(&s.x, 146, 4);
+			synth_lose(&s.y, 218, 4);
+			for (size_t k = 206; k < 228; k += 2)
+				s.y.sample[k] |= SAMPLE_LOST;
+		}
+		r = find(&s, 1);
+		if (!isfinite(r.result.peak_g))
+			assert_true(r.result.how.status != ESTIMATE_OK);
+		/* A parabola through three samples reaches nowhere. */
+		if (s.peak[0].model != PEAK_MODEL_NONE && s.peak[1].model != PEAK_MODEL_NONE &&
+		    s.peak[0].result.how.status == ESTIMATE_OK &&
+		    s.peak[1].result.how.status == ESTIMATE_OK) {
+			double peak, time;
+
+			truth(0.3, run % 4 * 1e-4, &peak, &time);
+			assert_near(r.result.peak_g, peak, fmax(5 * r.result.sigma_g, 3));
+			assert_near(r.result.time_s, time, fmax(5 * r.result.sigma_time_s, 3e-5));
+			assert_true(r.result.how.flags & ESTIMATE_FLAG_GAPS || run % 6 < 3);
+			both++;
+		}
+		drop(&s);
+	}
+	assert_true(both > 100);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(continuous_time), cmocka_unit_test(noise),  cmocka_unit_test(first_peak),
-	        cmocka_unit_test(weak_axis),       cmocka_unit_test(flawed),
+	        cmocka_unit_test(weak_axis),       cmocka_unit_test(flawed), cmocka_unit_test(never_both),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

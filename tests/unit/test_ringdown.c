@@ -639,8 +639,31 @@ static void combined(void **state)
 	ringdown_combine(&x, &y, &both);
 	assert_int_equal(both.how.status, ESTIMATE_OK);
 	assert_near(both.frequency_hz, 129 + 0.06 / 5, 1e-9);
-	/* 1/sqrt(1/.02^2 + 1/.04^2), widened by sqrt(chi2) = 0.06 / hypot(.02, .04). */
-	assert_near(both.sigma_hz, 0.0178885438 * 0.06 / 0.0447213595, 1e-8);
+	/* 1/sqrt(1/.02^2 + 1/.04^2): they are 1.3 sigma apart, as chance has it. */
+	assert_near(both.sigma_hz, 0.0178885438, 1e-9);
+	assert_int_equal(both.how.flags, 0);
+	/* 4.5 sigma apart: half of that is doubt. */
+	y.result.frequency_hz = 129.2;
+	ringdown_combine(&x, &y, &both);
+	assert_near(both.sigma_hz, hypot(0.0178885438, 0.1), 1e-9);
+	assert_int_equal(both.how.status, ESTIMATE_OK);
+	assert_int_equal(both.how.flags, ESTIMATE_FLAG_MODEL);
+	y.result.frequency_hz = 129.06;
+	/* Damping: 1e-4/sqrt(2); a law leaves a hundredth in doubt, whatever the two happen to differ by. */
+	ringdown_combine(&x, &y, &both);
+	assert_near(both.sigma_damping, hypot(1e-4 / sqrt(2.0), 0.25e-4), 1e-9);
+	x.result.how.flags = ESTIMATE_FLAG_AMPLITUDE;
+	y.result.damping_ratio = 0.102;
+	ringdown_combine(&x, &y, &both);
+	assert_near(both.damping_ratio, 0.101, 1e-9);
+	assert_near(both.sigma_damping, hypot(1e-4 / sqrt(2.0), hypot(0.25e-4, 1.01e-3)), 1e-9);
+	assert_int_equal(both.how.flags, ESTIMATE_FLAG_AMPLITUDE);
+	y.result.damping_ratio = 0.13;
+	ringdown_combine(&x, &y, &both);
+	assert_near(both.sigma_damping, hypot(1e-4 / sqrt(2.0), hypot(0.25e-4, 0.015)), 1e-9);
+	assert_int_equal(both.how.flags, ESTIMATE_FLAG_AMPLITUDE | ESTIMATE_FLAG_MODEL);
+	x.result.how.flags = 0;
+	y.result.damping_ratio = 0.1;
 	assert_near(both.three_cycle_frequency_hz, 128.5, 1e-9);
 	y.result.how.status = ESTIMATE_NO_PEAK;
 	ringdown_combine(&x, &y, &both);

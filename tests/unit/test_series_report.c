@@ -23,6 +23,7 @@
 
 static char folder[64], message[ARCHIVE_MESSAGE_MAX];
 static struct archive *archive;
+static bool simulated; /* the drops that are added */
 
 /* ---- an archive by hand ---- */
 
@@ -44,6 +45,7 @@ static int set_up(void **state)
 	char scene[96];
 
 	(void)state;
+	simulated = false;
 	strcpy(folder, "/tmp/droptower-series-XXXXXX");
 	if (!mkdtemp(folder))
 		return 1;
@@ -94,7 +96,7 @@ static unsigned add_drop(double peak_g)
 {
 	struct archive_recording r;
 
-	assert_int_equal(archive_begin(archive, "by-hand", "<i>Ann</i>", ".csv", &r), 0);
+	assert_int_equal(archive_begin(archive, "by-hand", "<i>Ann</i>", ".csv", simulated, &r), 0);
 	write_log(r.log, peak_g);
 	assert_int_equal(archive_finish(archive, &r, 1000000000, "note & <u>more</u>"), 0);
 	return r.number;
@@ -527,7 +529,7 @@ static void test_without_result_and_interrupted(void **state)
 	make_series();
 	assert_int_equal(add_drop(300), 5);
 	decide("by-hand/5", ARCHIVE_ACCEPTED, "");
-	assert_int_equal(archive_begin(archive, "by-hand", "Ann", ".csv", &r), 0);
+	assert_int_equal(archive_begin(archive, "by-hand", "Ann", ".csv", false, &r), 0);
 	archive_abandon(&r);
 	page = report();
 	assert_has(page,
@@ -538,6 +540,35 @@ static void test_without_result_and_interrupted(void **state)
 	assert_cell(page, "<h2>Peaks", "mean", 2, "320.4");
 	assert_has(page, "its recording was never finished");
 	assert_has(page, "it has no result to lay its time by");
+	free(page);
+}
+
+static void test_a_simulated_tower_is_named(void **state)
+{
+	char *page;
+
+	(void)state;
+	add_drop(300);
+	page = report();
+	assert_has_not(page, "imulated");
+	free(page);
+	simulated = true;
+	add_drop(310);
+	add_drop(320);
+	page = report();
+	assert_has(page, "<p><b>Simulated tower: no product fell in drops 2, 3.</b></p>");
+	free(page);
+}
+
+static void test_all_on_a_simulated_tower(void **state)
+{
+	char *page;
+
+	(void)state;
+	simulated = true;
+	make_series();
+	page = report();
+	assert_has(page, "<p><b>Simulated tower: no product fell.</b></p>");
 	free(page);
 }
 
@@ -597,6 +628,8 @@ int main(void)
 	        cmocka_unit_test_setup_teardown(test_undecided_counts_when_asked, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_log_missing_or_changed, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_without_result_and_interrupted, set_up, tear_down),
+	        cmocka_unit_test_setup_teardown(test_a_simulated_tower_is_named, set_up, tear_down),
+	        cmocka_unit_test_setup_teardown(test_all_on_a_simulated_tower, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_unknown_series, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_no_gnuplot, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_full_disk, set_up, tear_down),

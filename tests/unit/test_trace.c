@@ -4,11 +4,13 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <cmocka.h>
 
 #include "host/estimate/baseline.h"
+#include "host/estimate/clip.h"
 #include "host/estimate/trace.h"
 #include "tests/unit/near.h"
 #include "tests/unit/synth.h"
@@ -149,6 +151,44 @@ static void limits(void **state)
 	synth_free(&channel);
 }
 
+/* Two equal extremes in coarse numbers: a limit where their neighbours say so, chance otherwise. */
+static void twins(void **state)
+{
+	struct channel channel = synth_channel("a", 7000, 0, 200);
+	struct synth_random random = {41};
+	int seen[2] = {0, 0}, equal = 0;
+
+	(void)state;
+	for (int run = 0; run < 4000; run++) {
+		/* 2 and 3 are the highest by far enough, or not. */
+		double limit = run % 2 ? 490 : 1000, phase = synth_uniform(&random) - 0.5;
+		struct trace trace;
+
+		for (size_t k = 0; k < 200; k++) {
+			double v = 500 * synth_pulse(SYNTH_HALF_SINE, ((double)k - 100 + 0.25 * phase) / 21) +
+			           synth_normal(&random);
+
+			channel.value_g[k] = fmin(round(v * 4) / 4, limit);
+			if (run % 2 && channel.value_g[k] > 489 && k != 110 && k != 111)
+				channel.value_g[k] = 488.5;
+		}
+		trace = open_trace(&channel);
+		equal += run % 2 == 0 && trace.twins < trace.count;
+		if (!(run % 2 && trace.twins == trace.count)) {
+			clip_judge_twins(&trace, 1);
+			seen[run % 2] += trace.flags & RECORD_FLAG_CLIPPED ? 1 : 0;
+			if (run % 2 && trace.flags)
+				assert_int_equal(trace.sample[110] & trace.sample[111],
+				                 SAMPLE_CLIPPED | TRACE_LIMIT);
+		}
+		trace_close(&trace);
+	}
+	printf("%d equal by chance, %d of them marked; %d of 2000 limits\n", equal, seen[0], seen[1]);
+	assert_true(equal > 50 && seen[0] <= 2);
+	assert_true(seen[1] > 1500);
+	synth_free(&channel);
+}
+
 /* In the caller's memory, and not a byte beyond it: the sanitizer looks on. */
 static void laid(void **state)
 {
@@ -256,10 +296,9 @@ static void follows_changes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(copies),          cmocka_unit_test(extremes),
-	        cmocka_unit_test(no_acceleration), cmocka_unit_test(limits),
-	        cmocka_unit_test(without_a_rate),  cmocka_unit_test(laid),
-	        cmocka_unit_test(edges),           cmocka_unit_test(follows_changes),
+	        cmocka_unit_test(copies), cmocka_unit_test(extremes), cmocka_unit_test(no_acceleration),
+	        cmocka_unit_test(limits), cmocka_unit_test(twins),    cmocka_unit_test(without_a_rate),
+	        cmocka_unit_test(laid),   cmocka_unit_test(edges),    cmocka_unit_test(follows_changes),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -16,7 +16,11 @@ function tell(text, level) {
 }
 
 async function send() {
-	const answer = await request("POST", "/api/abort", { body: "{}", signal: AbortSignal.timeout(ANSWER_MS) });
+	const answer = await request("POST", "/api/abort", {
+		body: "{}",
+		priority: "high",
+		signal: AbortSignal.timeout(ANSWER_MS),
+	});
 	if (answer.ok) return { done: true, text: "" };
 	let text = `answer ${answer.status}`;
 	try {
@@ -30,6 +34,7 @@ async function send() {
 
 export async function abort() {
 	const mine = ++round;
+	document.dispatchEvent(new Event("aborted"));
 	tell("ABORT: sending …", "warn");
 	for (let tries = 1; mine === round; tries++) {
 		let outcome;
@@ -50,14 +55,34 @@ export async function abort() {
 	}
 }
 
-/* Anywhere on the page, before anything else sees the key. */
+/* An input method gives the key another name, not another place. */
+const isEscape = (event) => event.key === "Escape" || event.code === "Escape";
+
+/* Anywhere on the page, before anything else sees the key. A list that is open keeps the key's press to itself: of that
+ * one only the release is heard. */
 export function listen() {
+	let pressed = false;
+
 	byId("abort").addEventListener("click", abort);
 	addEventListener(
 		"keydown",
 		(event) => {
-			if (event.key === "Escape" && !event.repeat) abort();
+			if (!isEscape(event) || event.repeat) return;
+			pressed = true;
+			abort();
 		},
 		{ capture: true },
 	);
+	addEventListener(
+		"keyup",
+		(event) => {
+			if (!isEscape(event)) return;
+			if (!pressed) abort();
+			pressed = false;
+		},
+		{ capture: true },
+	);
+	addEventListener("blur", () => {
+		pressed = false;
+	});
 }

@@ -30,11 +30,11 @@ function newId() {
 	return Array.from(bytes, (b) => b.toString(16).padStart(2, "0")).join("");
 }
 
-/* A tab that is duplicated has the other's storage too, and must not pass for it: each holds a lock on its id. */
-async function isOurs(id) {
+/* Whether this page has the name now, among all pages of the console in this browser; it keeps it until it goes. */
+export async function keepName(name) {
 	if (!navigator.locks) return true;
 	return new Promise((resolve) => {
-		navigator.locks.request(`droptower.${id}`, { ifAvailable: true }, (lock) => {
+		navigator.locks.request(`droptower.${name}`, { ifAvailable: true }, (lock) => {
 			resolve(lock !== null);
 			return lock ? new Promise(() => {}) : undefined;
 		});
@@ -45,9 +45,10 @@ let consoleId = "";
 
 export async function takeId() {
 	consoleId = sessionStorage.getItem(CONSOLE) ?? newId();
-	if (!(await isOurs(consoleId))) {
+	/* a tab that is duplicated has the other's storage too, and must not pass for it */
+	if (!(await keepName(consoleId))) {
 		consoleId = newId();
-		await isOurs(consoleId);
+		await keepName(consoleId);
 	}
 	sessionStorage.setItem(CONSOLE, consoleId);
 }
@@ -89,10 +90,19 @@ async function answered(method, path, options) {
 	return answer;
 }
 
-export async function get(path, query = {}) {
+const last = {};
+
+/* A browser has six connections to one server, for all its pages together. What may take its time goes one by one, so
+ * that there is always one left for ABORT. */
+function inTurn(name, action) {
+	if (navigator.locks) return navigator.locks.request(`droptower.${name}`, action);
+	return (last[name] = (last[name] ?? Promise.resolve()).then(action, action));
+}
+
+export async function get(path, query = {}, turn = "get") {
 	const given = Object.entries(query).filter(([, value]) => value !== "" && value != null);
 	const text = new URLSearchParams(given).toString();
-	return answered("GET", text ? `${path}?${text}` : path, {});
+	return inTurn(turn, () => answered("GET", text ? `${path}?${text}` : path, {}));
 }
 
 export const getJson = async (path, query) => (await get(path, query)).json();
@@ -103,7 +113,7 @@ export async function post(path, body = {}) {
 
 /* A link cannot send the token, so the file goes through the page. */
 export async function download(path, query, name) {
-	const url = URL.createObjectURL(await (await get(path, query)).blob());
+	const url = URL.createObjectURL(await (await get(path, query, "file")).blob());
 	const link = document.createElement("a");
 	link.href = url;
 	link.download = name;

@@ -4,16 +4,31 @@
 import { post } from "./api.js";
 import { attempt, byId, setText, show } from "./dom.js";
 import { holding } from "./hold.js";
+import { degrees, number } from "./words.js";
 
 let token = null; /* of our own arming, while it can be used */
 let wasArmed = false;
 let until = 0; /* performance.now() at which the tower disarms by itself */
 let whole = 10;
 
+const under = (node, { clientX: x, clientY: y }) => {
+	const { left, right, top, bottom } = node.getBoundingClientRect();
+	return x >= left && x <= right && y >= top && y <= bottom;
+};
+
 function ask(open) {
 	show(byId("arm-dialog"), open);
 	show(byId("arm"), !open);
-	if (open) byId("arm-cancel").focus();
+}
+
+/* All of the question can be seen; where ARM was pressed is never "Yes". */
+function open(press) {
+	const answers = byId("arm-dialog").querySelector(".answers");
+	answers.classList.remove("turned");
+	ask(true);
+	byId("arm-cancel").focus({ preventScroll: true });
+	byId("arm-dialog").scrollIntoView({ block: "nearest" });
+	answers.classList.toggle("turned", under(byId("arm-confirm"), press));
 }
 
 async function arm() {
@@ -73,27 +88,29 @@ export function showArm(state) {
 	setText(
 		byId("arm-say"),
 		done
-			? `All ${series.planned} drops are accepted: the series is complete. Another one can still be made.`
+			? `All ${series.planned} drops are accepted. Go on with the next series, or make one more drop of this one.`
 			: `Drop ${series.accepted + 1} of ${series.planned}. All checks are green.`,
 	);
+	setText(byId("arm-head"), done ? "Series complete" : "Arm");
+	show(byId("next-series"), done);
+	byId("arm").classList.toggle("primary", !done);
 	setText(
 		byId("arm-what"),
-		`The frame with the product is at ${series.height_m} m, angle ${series.angle_deg}°. ` +
+		`Frame and product are at ${number(series.height_m, 3)} m, ${degrees(series.angle_deg)}°. ` +
 			"After arming there are 10 s to release. Keep hands and heads out of the tower.",
 	);
 	byId("arm-confirm").dataset.tower = tower.url;
 }
 
 export function listen() {
-	byId("arm").addEventListener("click", () => ask(true));
+	byId("arm").addEventListener("click", open);
 	byId("arm-cancel").addEventListener("click", () => {
 		ask(false);
 		byId("arm").focus();
 	});
 	byId("arm-confirm").addEventListener("click", arm);
 	/* An ABORT takes the question back as well. */
-	byId("abort").addEventListener("click", forget);
-	addEventListener("keydown", (event) => event.key === "Escape" && forget(), { capture: true });
+	document.addEventListener("aborted", forget);
 	byId("release").addEventListener("click", release);
 	setInterval(tick, 100);
 }

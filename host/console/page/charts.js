@@ -27,23 +27,21 @@ function align(series) {
 	return uPlot.join(series.map(({ x, y }) => [x, y]));
 }
 
-function axes(unit, log) {
+const plainNumber = (value) => (value == null ? "" : String(value).replace("-", "−"));
+
+function axes(unit, xUnit) {
 	const common = {
 		stroke: colour("--ink"),
 		font: "14px sans-serif",
 		grid: { stroke: colour("--line"), width: 1 },
 		ticks: { stroke: colour("--line"), width: 1 },
+		values: (_, values) => values.map(plainNumber),
+		labelSize: 20,
+		labelFont: "14px sans-serif",
 	};
 	return [
-		{ ...common, size: 34 },
-		{
-			...common,
-			size: 58,
-			label: unit,
-			labelSize: 20,
-			labelFont: "14px sans-serif",
-			...(log ? {} : { values: (_, values) => values.map((value) => String(value).replace("-", "−")) }),
-		},
+		{ ...common, size: 28, label: xUnit },
+		{ ...common, size: 58, label: unit },
 	];
 }
 
@@ -91,6 +89,24 @@ function drawBeyond(chart, limit) {
 	ctx.restore();
 }
 
+/* Line and dash of each series in the legend: colour alone tells too few apart. */
+function legendLines(chart) {
+	const markers = chart.root.querySelectorAll(".u-legend .u-series");
+	chart.series.forEach(({ lineStyle }, i) => {
+		const marker = markers[i]?.querySelector(".u-marker");
+		if (!lineStyle || !marker) return;
+		const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+		const line = document.createElementNS("http://www.w3.org/2000/svg", "path");
+		const { stroke, width, dash = [] } = lineStyle;
+		const attributes = { d: "M0 6H36", stroke, "stroke-width": width, "stroke-dasharray": dash.join(" ") };
+		for (const [name, value] of Object.entries(attributes)) line.setAttribute(name, value);
+		svg.setAttribute("class", "line");
+		svg.setAttribute("aria-hidden", "true");
+		svg.append(line);
+		marker.replaceWith(svg);
+	});
+}
+
 /* The legend switches series with a click; let it do so by key as well. */
 function keyLegend(chart) {
 	for (const head of chart.root.querySelectorAll(".u-legend .u-series:not(:first-child) th")) {
@@ -121,12 +137,13 @@ function toSeries({ label, stroke, dash, width = 2, unit = "g", decimals = 1, me
 		stroke,
 		dash,
 		width,
+		lineStyle: { stroke, dash, width },
 		measured,
 		show: visible,
 		points: { show: false },
 		spanGaps: false,
-		value: (_, value) =>
-			value === undefined ? "" : value === null ? "–" : `${number(value, decimals)} ${unit}`,
+		value: (chart, value) =>
+			value === undefined || chart.cursor.idx == null ? "" : value === null ? "–" : `${number(value, decimals)} ${unit}`,
 	};
 }
 
@@ -141,6 +158,8 @@ export class Group {
 	 * log, xUnit}. Replaces what the host showed. */
 	add(host, series, options) {
 		const { title, unit = "g", height = 210, limit, log = false, xUnit = "ms", xDecimals = 3 } = options;
+		/* uPlot would go on to the next power of ten */
+		const fit = log ? { range: (_, min, max) => (min > 0 ? [min / 1.1, max * 1.1] : [1, 10]) } : {};
 		host.replaceChildren();
 		const chart = new uPlot(
 			{
@@ -152,19 +171,19 @@ export class Group {
 					drag: { x: true, y: false },
 					points: { size: 7 },
 				},
-				scales: { x: { time: false, distr: log ? 3 : 1 }, y: { distr: log ? 3 : 1 } },
-				axes: axes(unit, log),
+				scales: { x: { time: false, distr: log ? 3 : 1, ...fit }, y: { distr: log ? 3 : 1, ...fit } },
+				axes: axes(unit, xUnit),
 				series: [
 					{
-						label: "at",
-						value: (_, value) => (value == null ? "–" : `${number(value, xDecimals)} ${xUnit}`),
+						label: log ? "frequency" : "time",
+						value: (_, value) => (value == null ? "" : `${number(value, xDecimals)} ${xUnit}`),
 					},
 					...series.map(toSeries),
 				],
 				hooks: {
 					draw: limit ? [(u) => drawLimit(u, limit), (u) => drawBeyond(u, limit)] : [],
 					setScale: [(u, key) => key === "x" && this.#follow(u)],
-					ready: [keyLegend],
+					ready: [legendLines, keyLegend],
 				},
 			},
 			align(series),
@@ -192,6 +211,12 @@ export class Group {
 			if (chart !== from && (chart.scales.x.min !== min || chart.scales.x.max !== max))
 				chart.setScale("x", { min, max });
 		this.#busy = false;
+	}
+
+	/* What is seen of x, to be seen again after drawing anew. */
+	get span() {
+		const { min, max } = this.#charts[0]?.chart.scales.x ?? {};
+		return min == null ? null : [min, max];
 	}
 
 	zoom(min, max) {

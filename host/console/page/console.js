@@ -3,7 +3,7 @@
 import * as abort from "./abort.js";
 import { keepToken, post, takeId, takeToken } from "./api.js";
 import * as arm from "./arm.js";
-import { resultOf, traceOf } from "./drops.js";
+import { resultOf, rowOf, traceOf } from "./drops.js";
 import { attempt, byId, message, setData, show } from "./dom.js";
 import * as history from "./history.js";
 import { give, holding, retake, take } from "./hold.js";
@@ -69,16 +69,21 @@ function tabKeys(event) {
 
 async function openDrop(name) {
 	await attempt(async () => {
-		traceOf(name).catch(() => {}); /* at the same time; told below, where it is used */
-		const result = await resultOf(name).catch((error) => {
+		/* asked for in the order in which it is shown; what fails is told below, where it is used */
+		const found = resultOf(name).catch((error) => {
 			if (error.status !== 404) throw error;
 			return null;
 		});
-		if (result) showResult(name, result);
+		const trace = traceOf(name),
+			row = rowOf(name);
+		for (const asked of [trace, row]) asked.catch(() => {});
+		const result = await found;
+		if (result) showResult(name, result, false);
 		else hideResult();
 		openView("drop");
 		openTab("traces");
 		await traces.showTraces(name, result);
+		if (result && (await row)?.simulated) showResult(name, result, true);
 		setData(root, "result", name);
 	});
 }
@@ -169,7 +174,7 @@ function onEvent(name, data) {
 	}
 }
 
-function onConnected(is) {
+function onConnected(is, why) {
 	model.connected = is;
 	setData(root, "connected", is ? "yes" : "no");
 	show(byId("connection"), !is);
@@ -178,7 +183,7 @@ function onConnected(is) {
 		seen.step = "";
 		return;
 	}
-	showDisconnected(clock());
+	showDisconnected(clock(), why);
 	steps.disableAll();
 }
 
@@ -189,7 +194,9 @@ function listenDecide() {
 		show(byId("reject-form"), open);
 		show(byId("decide"), !open);
 		show(byId("decide-later"), !open);
-		if (open) byId("reason").focus();
+		if (!open) return;
+		byId("reason").focus({ preventScroll: true });
+		byId("reject-form").scrollIntoView({ block: "nearest" });
 	};
 	byId("reasons").replaceChildren(...reasonButtons(byId("reason")));
 	byId("accept").addEventListener("click", () => attempt(() => decide(model.pending, "accepted")));
@@ -229,7 +236,7 @@ function listen() {
 	for (const tab of TABS) byId(`tab-${tab}`).addEventListener("click", () => openTab(tab));
 	byId("tab-live").parentElement.addEventListener("keydown", tabKeys);
 	for (const view of ["drop", "history"]) byId(`view-${view}`).addEventListener("click", () => openView(view));
-	byId("change-series").addEventListener("click", () => openSetup(true));
+	for (const id of ["change-series", "next-series"]) byId(id).addEventListener("click", () => openSetup(true));
 	byId("setup-back").addEventListener("click", () => openSetup(false));
 	byId("clear").addEventListener("click", () => attempt(() => holding(() => post("/api/clear"))));
 	byId("hold-take").addEventListener("click", () => attempt(take));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Traces and model of drops, as the console keeps them: fetched once, decoded from its binary form. */
-import { get } from "./api.js";
+import { get, getJson } from "./api.js";
 
 const KEPT = 60;
 const cache = new Map();
@@ -45,6 +45,12 @@ export const modelOf = (drop) =>
 	});
 
 export const resultOf = async (drop) => (await get(`/api/drop/${path(drop)}`)).json();
+
+/* What the archive says of it. */
+export async function rowOf(drop) {
+	const [series, number] = drop.split("/");
+	return (await getJson("/api/drops", { series, number })).drops[0];
+}
 
 export const spectrumOf = (drop, kind) =>
 	keep(`spectrum ${kind} ${drop}`, async () => (await get(`/api/spectrum/${path(drop)}`, { kind })).json());

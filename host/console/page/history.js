@@ -4,38 +4,23 @@ import { download, getJson } from "./api.js";
 import { attempt, button, byId, el, setText, show, table } from "./dom.js";
 import { Overlay } from "./overlay.js";
 import { dropTable, isBusy } from "./table.js";
-import { COLUMNS, number, time } from "./words.js";
+import { COLUMNS, degrees, number, time, withSigma } from "./words.js";
 
-const ROWS = 100; /* of series, then a button for more */
+const ROWS = 100; /* of series, the newest, then a button for more */
 const PLATE = COLUMNS.slice(8); /* what is not of one sensor */
 
 const chosen = new Set();
 let overlay = null;
 let openSeries = "";
 let openDrop = () => {};
-let found = [];
 
 const query = () => ({
 	campaign: byId("history-campaign").value.trim(),
 	scene: byId("history-scene").value,
 	angle_deg: byId("history-angle").value,
 	date: byId("history-date").value.trim(),
+	text: byId("history-text").value.trim(),
 });
-
-const has = (text, words) => words.every((word) => text.toLowerCase().includes(word));
-
-/* By what the series is called, and by what was written about its drops. */
-async function byText(series, filter) {
-	const words = byId("history-text").value.toLowerCase().split(/\s+/).filter(Boolean);
-	if (!words.length) return series;
-	const { drops } = await getJson("/api/drops", filter);
-	const hit = new Set(
-		drops
-			.filter((d) => has([d.series, d.note, d.reason, d.operator, d.flags, d.decision].join(" "), words))
-			.map((d) => d.series),
-	);
-	return series.filter((one) => hit.has(one.name) || has([one.name, one.campaign, one.scene].join(" "), words));
-}
 
 const HEAD = [
 	"series",
@@ -53,7 +38,7 @@ function seriesRow(one) {
 	const texts = [
 		one.campaign,
 		one.scene,
-		number(one.angle_deg, 0),
+		degrees(one.angle_deg),
 		number(one.height_m, 3),
 		`${one.accepted} of ${one.planned}`,
 		String(one.rejected),
@@ -70,20 +55,13 @@ function seriesRow(one) {
 	);
 }
 
-function showFound(most) {
-	const host = byId("history-list");
-	host.replaceChildren(table(HEAD, found.slice(0, most).map(seriesRow)));
-	if (found.length > most) host.append(button(`Show more of ${found.length}`, () => showFound(most + ROWS)));
-	setText(byId("history-count"), found.length === 1 ? "1 series" : `${found.length} series`);
-}
-
-export async function search() {
+export async function search(most = ROWS) {
 	await attempt(async () => {
-		const filter = query();
-		const { series } = await getJson("/api/series", filter);
-		found = await byText(series, filter);
-		found.sort((a, b) => (b.last || b.created).localeCompare(a.last || a.created));
-		showFound(ROWS);
+		const { series, more } = await getJson("/api/series", { ...query(), limit: most });
+		const host = byId("history-list");
+		host.replaceChildren(table(HEAD, series.map(seriesRow)));
+		if (more) host.append(button("Show more", () => search(most + ROWS)));
+		setText(byId("history-count"), more ? `the newest ${series.length} series` : `${series.length} series`);
 		if (!byId("tables").hidden) await tables();
 	});
 }
@@ -138,12 +116,12 @@ export async function load() {
 function meanText(mean, unit, scale, decimals) {
 	if (!mean?.n) return "–";
 	const sd = mean[`sd_${unit}`];
-	return `${number(mean[`mean_${unit}`] * scale, decimals)} ± ${number(sd === null ? NaN : sd * scale, decimals)}`;
+	return withSigma(mean[`mean_${unit}`] * scale, sd === null ? NaN : sd * scale, decimals);
 }
 
 const ratio = (of) => (of ? ["x", "y", "r"].map((axis) => number(of[axis], 2)).join(" / ") : "–");
 
-const place = (one) => [one.scene, one.campaign, `${number(one.angle_deg, 0)}°`];
+const place = (one) => [one.scene, one.campaign, `${degrees(one.angle_deg)}°`];
 
 function textTable(head, rows) {
 	const cell = (text, i) => el(i ? "td" : "th", { "data-label": head[i] }, text);

@@ -3,6 +3,7 @@
 import { Group, colour, gaps, onScheme, times } from "./charts.js";
 import { modelOf, traceOf } from "./drops.js";
 import { el, setText } from "./dom.js";
+import { brief } from "./words.js";
 
 const AXES = [
 	["R", "XY, resultant"],
@@ -17,6 +18,7 @@ const MOST = 20;
 export class Overlay {
 	#group = new Group();
 	#drops = [];
+	#given = 0;
 	#round = 0;
 
 	constructor(host, id) {
@@ -53,8 +55,10 @@ export class Overlay {
 
 	/* drops: ["box-30/1", ...]; drawn when it can be seen. */
 	set(drops) {
-		if (drops.join() === this.#drops.join()) return;
-		this.#drops = drops.slice(-MOST);
+		const newest = drops.slice(-MOST);
+		if (newest.join() === this.#drops.join()) return;
+		this.#drops = newest;
+		this.#given = drops.length;
 		this.draw();
 	}
 
@@ -71,10 +75,12 @@ export class Overlay {
 		if (round !== this.#round) return;
 		this.#group.clear();
 		const missing = this.#drops.filter((_, i) => !traces[i]);
-		setText(
-			this.say,
-			!this.#drops.length ? "No drop yet." : missing.length ? `No traces of ${missing.join(", ")}.` : "",
-		);
+		const say = [
+			!this.#drops.length && "No drop yet.",
+			this.#given > MOST && `The last ${MOST} of ${this.#given} drops.`,
+			missing.length > 0 && `No traces of ${missing.join(", ")}.`,
+		];
+		setText(this.say, say.filter(Boolean).join(" "));
 		["S1", "S2"].forEach((sensor, i) => this.chart(this.hosts[i], sensor, traces, model));
 		this.#group.zoom(-5, 60);
 	}
@@ -87,7 +93,7 @@ export class Overlay {
 			return channel
 				? [
 						{
-							label: this.#drops[i],
+							label: brief(this.#drops[i]),
 							x: times(channel),
 							y: gaps(channel.samples),
 							measured: true,

@@ -3,12 +3,18 @@
 import { byId, el, show } from "./dom.js";
 import { FLAGS, number, plain, statusWords, withSigma } from "./words.js";
 
+/* The value is what is read from afar. */
+function valueAndSigma(text) {
+	const [value, sigma] = text.split(" ± ");
+	return sigma ? [value, el("span", { class: "sigma" }, ` ± ${sigma}`)] : [value];
+}
+
 function cell(key, value, sigma, status, decimals = 1) {
 	const ok = !status || status === "ok";
 	return el(
 		"td",
 		{ class: "number", data: { key, value: value ?? "" } },
-		withSigma(value, sigma, decimals),
+		...valueAndSigma(withSigma(value, sigma, decimals)),
 		ok ? null : el("b", { class: "warn" }, ` ⚠ ${statusWords(status)}`),
 	);
 }
@@ -47,7 +53,7 @@ function peaks(result) {
 			el(
 				"tr",
 				{},
-				el("th", {}, "peak, g"),
+				el("th", { class: "number" }, "peak, g"),
 				el("th", { class: "s1", scope: "col" }, "S1"),
 				el("th", { class: "s2", scope: "col" }, "S2"),
 			),
@@ -64,13 +70,18 @@ function withStatus(text, status) {
 	return !status || status === "ok" ? text : `${text} (${statusWords(status)})`;
 }
 
+/* JSON's null is no number, but times 1000 it is 0. */
+const milli = (seconds) => (Number.isFinite(seconds) ? 1000 * seconds : NaN);
+
+const inUnit = (text, unit) => (text === "–" ? text : `${text} ${unit}`);
+
 function velocity(result, sensor) {
 	const pulse = result.channels.find((c) => c.name === `${sensor}X`)?.pulse;
 	return fact(
 		`Velocity change, ${sensor} X`,
 		`${sensor.toLowerCase()}_velocity`,
 		pulse?.velocity_change_m_s,
-		pulse ? `${withSigma(pulse.velocity_change_m_s, pulse.sigma_velocity_m_s, 2)} m/s` : "–",
+		inUnit(withSigma(pulse?.velocity_change_m_s, pulse?.sigma_velocity_m_s, 2), "m/s"),
 	);
 }
 
@@ -83,7 +94,7 @@ function facts(result) {
 				"S1 after S2",
 				"lag_largest_peak",
 				lag.largest_peak_s,
-				withStatus(`${withSigma(lag.largest_peak_s * 1000, lag.sigma_s * 1000, 3)} ms`, lag.status),
+				withStatus(inUnit(withSigma(milli(lag.largest_peak_s), milli(lag.sigma_s), 3), "ms"), lag.status),
 			),
 		);
 	if (plate)
@@ -92,7 +103,7 @@ function facts(result) {
 				"Plate",
 				"frequency",
 				plate.frequency_hz,
-				withStatus(`${withSigma(plate.frequency_hz, plate.sigma_hz, 1)} Hz`, plate.status),
+				withStatus(inUnit(withSigma(plate.frequency_hz, plate.sigma_hz, 1), "Hz"), plate.status),
 			),
 			fact(
 				"Damping ratio",
@@ -144,10 +155,11 @@ function verdict(result) {
 	);
 }
 
-export function showResult(name, result) {
+export function showResult(name, result, simulated) {
 	const lines = flagLines(result);
 	byId("result").replaceChildren(
 		el("h2", {}, `Drop ${name}`),
+		...(simulated ? [el("p", { class: "soft", data: { key: "simulated" } }, "Simulated tower: no product fell.")] : []),
 		verdict(result),
 		peaks(result),
 		facts(result),

@@ -4,7 +4,7 @@ import { download, getJson } from "./api.js";
 import { attempt, byId, setText, show } from "./dom.js";
 import { Overlay } from "./overlay.js";
 import { dropTable, isBusy } from "./table.js";
-import { number } from "./words.js";
+import { degrees, number } from "./words.js";
 
 let overlay = null;
 let name = "";
@@ -36,7 +36,7 @@ export function showHead(series, underWay) {
 		byId("series-say"),
 		[
 			series.title || series.scene,
-			`${number(series.angle_deg, 0)}°`,
+			`${degrees(series.angle_deg)}°`,
 			`${number(series.height_m, 3)} m`,
 			`campaign ${series.campaign}`,
 		].join(", "),

@@ -3,7 +3,7 @@
 import { getJson, post } from "./api.js";
 import { attempt, byId, el, setText, show } from "./dom.js";
 import { holding, take } from "./hold.js";
-import { number } from "./words.js";
+import { degrees, number } from "./words.js";
 
 const PRESETS = 4,
 	UNFINISHED = 40;
@@ -51,7 +51,7 @@ function showPresets(presets) {
 			el(
 				"button",
 				{ type: "button", on: { click: () => usePreset(preset) } },
-				`${preset.scene}, ${number(preset.angle_deg, 0)}°, ${number(preset.height_m, 3)} m, ${preset.planned} drops`,
+				`${preset.scene}, ${degrees(preset.angle_deg)}°, ${number(preset.height_m, 3)} m, ${preset.planned} drops`,
 			),
 		),
 	);
@@ -70,7 +70,7 @@ function showUnfinished(series) {
 				el(
 					"option",
 					{ value: one.name },
-					`${one.name}: ${one.accepted} of ${one.planned} accepted, ${number(one.angle_deg, 0)}°`,
+					`${one.name}: ${one.accepted} of ${one.planned} accepted, ${degrees(one.angle_deg)}°`,
 				),
 			),
 	);

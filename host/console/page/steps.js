@@ -95,7 +95,7 @@ function enable(model) {
 	for (const button of document.querySelectorAll("[data-command]"))
 		if (button.disabled === may) button.disabled = !may;
 	byId("hold-give").disabled = !model.connected;
-	byId("change-series").disabled = !model.connected || !atRest(tower);
+	for (const id of ["change-series", "next-series"]) byId(id).disabled = !model.connected || !atRest(tower);
 	for (const id of ["setup-go", "continue-go"]) byId(id).disabled = !may || !atRest(tower) || !tower.open;
 	setData(document.documentElement, "hold", hold.mine ? "mine" : hold.taken ? "other" : "free");
 }

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The console's events. EventSource cannot send the token, so the stream is read by hand. */
-import { refusal, request } from "./api.js";
+import { keepName, refusal, request } from "./api.js";
 
 const SILENT_MS = 1500; /* then what the page shows is old */
 const GIVE_UP_MS = 4000; /* then the connection is made anew */
 const BACKOFF_MS = [250, 500, 1000, 2000];
+const PAGES = 3; /* of one browser: each takes one of its six connections, and ABORT must find one */
+const PLACE_MS = 500;
 
 function parse(text, on) {
 	let name = "message",
@@ -30,17 +32,29 @@ async function read(answer, on) {
 	}
 }
 
-/* on(name, data) for each event; connected(bool) whenever that changes. */
+const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+/* crowded() as long as there is no place. */
+async function takePlace(crowded) {
+	for (;;) {
+		for (let i = 0; i < PAGES; i++) if (await keepName(`stream.${i}`)) return;
+		crowded();
+		await wait(PLACE_MS);
+	}
+}
+
+/* on(name, data) for each event; connected(bool, why not) whenever that changes. */
 export function follow(on, connected) {
 	let heard = -Infinity,
 		begun = 0,
 		failures = 0,
 		is = null,
+		why = "",
 		attempt = null,
 		stopped = false;
 
 	const tell = (value) => {
-		if (value !== is) connected((is = value));
+		if (value !== is) connected((is = value), why);
 	};
 	const event = (name, data) => {
 		heard = performance.now();
@@ -56,6 +70,11 @@ export function follow(on, connected) {
 		await read(answer, event);
 	}
 	async function forever() {
+		await takePlace(() => {
+			why = `${PAGES} other pages of this browser show the tower. Close one.`;
+			tell(false);
+		});
+		why = "";
 		while (!stopped) {
 			try {
 				await once();
@@ -64,7 +83,7 @@ export function follow(on, connected) {
 			}
 			attempt = null;
 			const pause = BACKOFF_MS[Math.min(failures++, BACKOFF_MS.length - 1)];
-			await new Promise((resolve) => setTimeout(resolve, pause));
+			await wait(pause);
 		}
 	}
 	setInterval(() => {

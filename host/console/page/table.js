@@ -3,7 +3,7 @@
 import { post } from "./api.js";
 import { attempt, button, el, table } from "./dom.js";
 import { holding } from "./hold.js";
-import { COLUMNS, number, plain, time } from "./words.js";
+import { COLUMNS, decimalsOf, number, plain, time } from "./words.js";
 
 export const REASONS = [
 	"hit the wrong corner",
@@ -74,14 +74,15 @@ function decisionCell(drop) {
 	const text = partial ? drop.state : drop.decision === "open" ? "undecided" : drop.decision;
 	const sign = partial ? { recording: "… " }[drop.state] ?? "⚠ " : { accepted: "✓ ", rejected: "✗ ", open: "? " }[drop.decision];
 	const cell = el("td", { class: "decision", "data-label": "decision" }, el("b", {}, sign + text));
-	for (const line of [drop.reason, drop.note && `“${drop.note}”`])
+	for (const line of [drop.simulated && "simulated tower", drop.reason, drop.note && `“${drop.note}”`])
 		if (line) cell.append(el("div", { class: "soft" }, line));
 	return cell;
 }
 
 const unitHead = (column) => (column.shown ? `${column.head} ${column.shown}` : column.head);
 
-const scaled = (value, column) => number(value == null ? NaN : value * column.scale, column.decimals);
+const scaled = (value, column, decimals = column.decimals) =>
+	number(value == null ? NaN : value * column.scale, decimals);
 
 function numberCell(column, value, text) {
 	const data = { key: column.mean, value: value ?? "" };
@@ -130,7 +131,8 @@ function meanRow(kind, head, means) {
 		const mean = means[column.mean];
 		if (kind === "n") return numberCell(column, mean?.n, number(mean?.n, 0));
 		const value = mean?.[`${kind}_${column.unit}`];
-		return numberCell(column, value, scaled(value, column));
+		const places = decimalsOf(mean?.[`sd_${column.unit}`] * column.scale, column.decimals);
+		return numberCell(column, value, scaled(value, column, places));
 	};
 	const cells = [el("th", { scope: "row", colspan: 2 }, head), ...COLUMNS.map(cell)];
 	return el("tr", { data: { row: kind } }, ...cells, el("td", { colspan: 3, class: "pad" }));

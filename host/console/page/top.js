@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* What is always visible: state, interlocks, heartbeat, bus, losses, disk, who may arm. */
 import { byId, el, setData, setText, show, sign } from "./dom.js";
-import { bytes, inputWords, number, plain } from "./words.js";
+import { STATES, bytes, inputWords, number, plain } from "./words.js";
 import { atRest } from "./workflow.js";
 
 const SIGNS = {
@@ -91,7 +91,7 @@ function stateWords(tower) {
 	if (!tower.open) return ["NO LINK", tower.trouble || "the link to the tower is not open"];
 	if (!tower.seen) return ["NO TOWER", tower.trouble || "nothing was heard of the tower yet"];
 	const fault = tower.fault && tower.fault !== "NONE" ? tower.fault_text : "";
-	return [tower.state.replace("_", " "), [fault || tower.text, tower.trouble].filter(Boolean).join(". ")];
+	return [tower.state.replace("_", " "), [fault || (STATES[tower.state] ?? tower.text), tower.trouble].filter(Boolean).join(". ")];
 }
 
 function stateTile(tower) {
@@ -100,6 +100,7 @@ function stateTile(tower) {
 	const changed = byId("state").textContent !== name;
 	setText(byId("state"), name);
 	setText(byId("state-text"), text);
+	byId("state-text").title = text;
 	setData(byId("state-tile"), "state", known ? tower.state : "NONE");
 	byId("state-sign").setAttribute("href", `#sign-${(known && SIGNS[tower.state]) || "unknown"}`);
 	if (changed) setText(byId("announce"), `${name}: ${text}`);
@@ -143,14 +144,14 @@ export function showTop(state) {
 }
 
 /* What stood there is old: it must not pass for the tower's state. */
-export function showDisconnected(since) {
+export function showDisconnected(since, why) {
 	setText(byId("state"), "UNKNOWN");
 	setText(byId("state-text"), "what is shown is old");
 	setData(byId("state-tile"), "state", "NONE");
 	byId("state-sign").setAttribute("href", "#sign-unknown");
 	setText(
 		byId("connection"),
-		`NOT CONNECTED since ${since}. Trying again. Use the emergency stop at the tower.`,
+		`NOT CONNECTED since ${since}. ${why || "Trying again."} Use the emergency stop at the tower.`,
 	);
 	setText(byId("announce"), "Not connected");
 	document.title = "NOT CONNECTED – drop tower";

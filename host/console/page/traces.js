@@ -3,6 +3,7 @@
 import { Group, colour, gaps, onScheme, times } from "./charts.js";
 import { modelOf, spectrumOf, traceOf } from "./drops.js";
 import { byId, message, setText } from "./dom.js";
+import { brief } from "./words.js";
 
 const PULSE_MS = [-5, 60];
 
@@ -56,13 +57,13 @@ function chart(id, title, names) {
 	if (series.length) group.add(byId(id), series, { title: `${title}, ${rate(names)}`, limit });
 }
 
-function drawTraces() {
+function drawTraces(span = PULSE_MS) {
 	if (!shown.trace) return;
 	group.clear();
 	chart("chart-x", "X", ["S1X", "S2X"]);
 	chart("chart-yz", "Y and Z (dotted)", ["S1Y", "S2Y", "S1Z", "S2Z"]);
 	chart("chart-r", "Resultant of X and Y", ["S1R", "S2R"]);
-	group.zoom(...PULSE_MS);
+	group.zoom(...span);
 	setText(byId("traces-say"), `Drop ${shown.drop}. Zero: ${shown.trace.zero}.`);
 }
 
@@ -70,7 +71,7 @@ async function drawModel(drop) {
 	const model = await modelOf(drop).catch(() => null);
 	if (shown.drop !== drop || !model) return;
 	shown.model = model;
-	drawTraces();
+	drawTraces(group.span ?? PULSE_MS);
 }
 
 /* The traces first, the model when it is computed. */
@@ -101,7 +102,7 @@ export async function drawSpectrum() {
 			dash: { Y: [8, 4], Z: [3, 3], R: [1, 2] }[name[2]],
 		})),
 		{
-			title: `Drop ${drop}, Q ${spectrum.q}`,
+			title: `Drop ${brief(drop)}, Q ${spectrum.q}`,
 			unit: spectrum.unit,
 			height: 420,
 			log: true,
@@ -120,7 +121,7 @@ export function listen() {
 	);
 	byId("spectrum-kind").addEventListener("change", drawSpectrum);
 	onScheme(() => {
-		drawTraces();
+		drawTraces(group.span ?? PULSE_MS);
 		drawSpectrum();
 	});
 }

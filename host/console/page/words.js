@@ -17,6 +17,9 @@ const INPUTS = {
 	OVERRUN: ["samples missed", "no sample missed", false],
 };
 
+/* What the tower says of a state, where that is not a technician's word. */
+export const STATES = { ARMED: "ready to drop: 10 s to release" };
+
 /* A check that is green, in words; what to do for one that is not comes from the tower. */
 export const GREEN = {
 	LATCH: "frame latched",
@@ -68,8 +71,9 @@ export const FLAGS = {
 	zeroed: "runs of exact zeros were left out: data were lost on the way",
 	offset: "zero was far off before the pulse; it was taken off",
 	drift: "zero moved before the pulse; that was taken off",
-	hum: "the mains shows before the pulse; it was taken off: check screen and earth",
+	hum: "mains or another hum shows before the pulse; it was taken off: check screen and earth",
 	too_short: "the record begins or ends inside its pulse",
+	zero_unsure: "more than noise before the pulse: zero is unsure",
 };
 
 const STATUS = {
@@ -123,13 +127,29 @@ export const COLUMNS = [
 
 export function number(value, decimals = 1) {
 	if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-	return value.toFixed(decimals).replace("-", "−");
+	const text = value.toFixed(decimals);
+	return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
 
-export function withSigma(value, sigma, decimals) {
+/* As it was set: 30, 37.5. */
+export const degrees = (value) => (Number.isFinite(value) ? String(Math.round(100 * value) / 100) : "–");
+
+/* Decimals that show two significant digits of an uncertainty; otherwise as many as given. */
+export function decimalsOf(sigma, otherwise) {
+	if (!(sigma > 0) || !Number.isFinite(sigma)) return otherwise;
+	const [, exponent] = sigma.toExponential(1).split("e");
+	return Math.max(0, Math.min(9, 1 - Number(exponent)));
+}
+
+/* Both to the same place: that of the uncertainty's second digit. */
+export function withSigma(value, sigma, otherwise) {
+	const decimals = decimalsOf(sigma, otherwise);
 	const text = number(value, decimals);
 	return text === "–" || !Number.isFinite(sigma) ? text : `${text} ± ${number(sigma, decimals)}`;
 }
+
+/* A drop's name where there is little room: its end tells drops apart. */
+export const brief = (name) => (name.length > 26 ? `${name.slice(0, 11)}…${name.slice(-13)}` : name);
 
 export function bytes(count) {
 	if (!Number.isFinite(count)) return "–";
