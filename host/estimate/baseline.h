@@ -7,13 +7,8 @@
  * that starts inside its event has no quiet part: offset 0, samples 0, and the noise from second differences
  * over the whole trace (a smooth signal nearly vanishes in them). Noise NAN: too few samples even for that.
  *
- * Drift and hum are least squares over means of 2 ms, each by an F-test, and only where what is left is as
- * white as the samples' noise asks: motion before the pulse is neither. Drift needs 40 ms, hum 80 ms, both
- * at least four samples to the mean.
- *
- * Hum is 50 or 60 Hz where that explains it. Where the means still scatter by more than chance, mains get
- * their true frequency, and up to three tones of any are added, from 15 Hz and three cycles on to what the
- * means show folded once.
+ * Drift and hum are fitted to means of 2 ms and taken off (hum.h), where what is left then is as white as the
+ * samples' noise asks: motion before the pulse is neither.
  *
  * Doubtful is a zero without a quiet part, and one whose quiet part holds more than all this: means that are
  * coloured still, or runs of samples far quieter than the whole. Of these the longest is then taken for the
@@ -32,9 +27,7 @@
 /* scratch holds trace->count doubles. */
 void baseline_find(const struct trace *trace, double *scratch, struct estimate_baseline *baseline);
 
-/* Takes offset, drift and hum off every sample, flags them, and notes noise and hum in the trace. A drift is
- * followed for DRIFT_REACH_S beyond the quiet part; zero stays where it is from there on. */
-#define DRIFT_REACH_S 0.5
+/* Takes offset, drift and hum off every sample (zero.h), flags them, and notes noise and hum in the trace. */
 void baseline_remove(struct trace *trace, const struct estimate_baseline *baseline);
 
 #endif

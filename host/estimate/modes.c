@@ -376,6 +376,16 @@ void modes_unblock(struct modes *modes, const struct series *series)
 	}
 }
 
+double modes_swing_g(const struct modes *modes, unsigned m)
+{
+	return hypot(modes->p[MODES_COSINE + MODES_EACH * m], modes->p[MODES_SINE + MODES_EACH * m]);
+}
+
+unsigned modes_stronger(const struct modes *modes)
+{
+	return modes->count > 1 && modes_swing_g(modes, 1) > modes_swing_g(modes, 0);
+}
+
 double modes_mean_hz(const struct modes *modes, unsigned cycles)
 {
 	double decay = modes->p[MODES_DECAY], omega = modes->p[MODES_OMEGA], span, turned;

@@ -58,6 +58,10 @@ double modes_at(const struct modes *modes, double time_s);
 /* What the points of the series, good or not, lie off plain modes by, without a law or hum. */
 void modes_residual(const struct modes *modes, const struct series *series, double *residual_g);
 
+/* How far mode m, 0 or 1, swings where times begin, and which swings more. */
+double modes_swing_g(const struct modes *modes, unsigned m);
+unsigned modes_stronger(const struct modes *modes);
+
 /* Mean damped frequency of a law's first cycles. */
 double modes_mean_hz(const struct modes *modes, unsigned cycles);
 

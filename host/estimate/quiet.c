@@ -1,0 +1,229 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/estimate/quiet.h"
+
+#include <math.h>
+
+#include "host/estimate/median.h"
+#include "host/estimate/pair.h"
+#include "host/estimate/zero.h"
+
+/* As long as the study's pre-trigger and more; longer reaches into what happened before the fall. */
+#define QUIET_S 0.25
+#define RISE_LEVEL 0.1
+
+enum { GLANCE = 31 }; /* samples that tell roughly where the middle is, and how wide */
+
+/* Noise spreads each block of samples by more than this in its standard deviations, and no block by so much
+ * more than another. */
+#define QUIET_SPREAD 2.0
+#define QUIET_UNLIKE 8.0
+#define QUIET_ALIKE 3.0
+
+double quiet_glance(const struct trace *trace, size_t from, size_t until, double *sigma_g)
+{
+	double seen[GLANCE], middle;
+	size_t step = (until - from) / GLANCE + 1, n = 0;
+
+	for (size_t k = from; k < until; k += step)
+		if (trace_good(trace, k))
+			seen[n++] = trace->value_g[k];
+	if (n == 0)
+		return 0;
+	middle = median_find(seen, n);
+	for (size_t i = 0; sigma_g && i < n; i++)
+		seen[i] = fabs(seen[i] - middle);
+	if (sigma_g)
+		*sigma_g = MAD_TO_SIGMA * median_find(seen, n);
+	return middle;
+}
+
+/* The largest good sample about middle_g; count when none differs from it. */
+static size_t largest(const struct trace *trace, double middle_g)
+{
+	size_t at = trace->count;
+	double most = 0;
+
+	for (size_t k = trace->first; k < trace->last; k++) {
+		const struct trace_block *block = &trace->block[k / TRACE_BLOCK];
+		double value;
+
+		if (!(fmax(block->high_g - middle_g, middle_g - block->low_g) > most)) {
+			k |= TRACE_BLOCK - 1;
+			continue;
+		}
+		value = fabs(trace->value_g[k] - middle_g);
+		if (value > most && trace_good(trace, k)) {
+			most = value;
+			at = k;
+		}
+	}
+	return at;
+}
+
+void quiet_find(const struct trace *trace, size_t *from, size_t *until)
+{
+	double middle = quiet_glance(trace, 0, trace->count, NULL), quiet = floor(QUIET_S * trace->rate_hz),
+	       level;
+	size_t peak = largest(trace, middle), k = peak, rise;
+
+	*from = 0;
+	*until = (double)trace->count > quiet ? (size_t)quiet : trace->count;
+	if (peak == trace->count)
+		return;
+	level = RISE_LEVEL * fabs(trace->value_g[peak] - middle);
+	while (k > 0 && (!trace_good(trace, k) || fabs(trace->value_g[k] - middle) >= level))
+		k--;
+	rise = peak - k + 2;
+	*until = k > rise ? k - rise : 0;
+	*from = (double)*until > quiet ? *until - (size_t)quiet : 0;
+}
+
+/* Of samples, taken from about, so that nothing cancels. */
+struct sums {
+	size_t good, used;
+	double first, second;
+};
+
+/* Whether all of [from, until) is good and within reach of about. */
+static bool is_plain(const struct quiet *quiet, size_t from, size_t until, double about, double reach)
+{
+	const struct trace_block *block = quiet->trace->block;
+
+	for (size_t i = from / TRACE_BLOCK; i * TRACE_BLOCK < until; i++)
+		if (!block[i].whole || block[i].high_g - about > reach || about - block[i].low_g > reach)
+			return false;
+	return quiet->zero == NULL;
+}
+
+static void add_plain(const struct quiet *quiet, size_t from, size_t until, double about, struct sums *sums)
+{
+	const double *value = quiet->trace->value_g;
+	PAIR first = {0}, second = {0};
+	size_t k = from;
+
+	for (; k + 2 <= until; k += 2) {
+		const PAIR d = pair_load(value + k) - about;
+
+		first += d;
+		second += d * d;
+	}
+	if (k < until) {
+		double d = value[k] - about;
+
+		first[0] += d;
+		second[0] += d * d;
+	}
+	sums->good += until - from;
+	sums->used += until - from;
+	sums->first += first[0] + first[1];
+	sums->second += second[0] + second[1];
+}
+
+/* Adds the samples [from, until) that lie within reach of about. */
+static void add_up(const struct quiet *quiet, size_t from, size_t until, double about, double reach,
+                   struct sums *sums)
+{
+	const double *value = quiet->trace->value_g;
+	struct sums s = *sums;
+	struct zero zero = {0};
+
+	if (quiet->zero)
+		zero = zero_from(quiet->zero, quiet->trace, from);
+	for (size_t k = from; k < until; k++) {
+		size_t good = trace_good(quiet->trace, k), used;
+		double d = value[k] - about;
+
+		if (quiet->zero)
+			d -= zero_next(&zero);
+		used = good & (fabs(d) <= reach);
+		d = used ? d : 0;
+		s.good += good;
+		s.used += used;
+		s.first += d;
+		s.second += d * d;
+	}
+	*sums = s;
+}
+
+struct quiet_moments quiet_take(struct quiet *quiet, double about, double reach)
+{
+	double all = (double)(quiet->until - quiet->from), n, mean;
+	bool plain = is_plain(quiet, quiet->from, quiet->until, about, reach);
+	struct sums sums = {0};
+
+	quiet->count = 0;
+	for (size_t k = quiet->from; k < quiet->until && quiet->count < QUIET_BLOCKS_MAX;
+	     k += quiet->length) {
+		size_t end = k + quiet->length < quiet->until ? k + quiet->length : quiet->until;
+		struct quiet_block *block = &quiet->block[quiet->count++];
+		struct sums before = sums;
+
+		if (plain || is_plain(quiet, k, end, about, reach))
+			add_plain(quiet, k, end, about, &sums);
+		else
+			add_up(quiet, k, end, about, reach, &sums);
+		n = (double)(sums.used - before.used);
+		block->weight = n;
+		block->mean = n > 0 ? about + (sums.first - before.first) / n : about;
+		block->place = (double)(k + end - 2 * quiet->from) / all - 1;
+	}
+	if ((quiet->until - quiet->from) % quiet->length != 0)
+		quiet->count--; /* the last one is not full: no place among the others */
+	n = (double)sums.used;
+	mean = sums.first / n;
+	return (struct quiet_moments){about + mean,
+	                              n > 1 ? sqrt(fmax(sums.second - n * mean * mean, 0) / (n - 1)) : 0,
+	                              sums.used, sums.good};
+}
+
+/* What noise there is in the samples of a block, by their extremes; 0 where nobody can tell. */
+static double spread_of(const struct trace *trace, size_t block)
+{
+	const struct trace_block *b = &trace->block[block];
+
+	return b->whole ? b->high_g - b->low_g : 0;
+}
+
+bool quiet_restless(const struct quiet *quiet, double noise_g)
+{
+	for (size_t i = quiet->from / TRACE_BLOCK + 1; (i + 1) * TRACE_BLOCK <= quiet->until; i++) {
+		double spread = spread_of(quiet->trace, i);
+
+		if (spread > 0 && spread < QUIET_SPREAD * noise_g)
+			return true;
+	}
+	return false;
+}
+
+bool quiet_narrow(struct quiet *quiet)
+{
+	size_t first = quiet->from / TRACE_BLOCK + 1, last = quiet->until / TRACE_BLOCK, run = 0, longest = 0;
+	double least = INFINITY, most = 0;
+
+	for (size_t i = first; i < last; i++) {
+		double spread = spread_of(quiet->trace, i);
+
+		least = spread > 0 ? fmin(least, spread) : least;
+		most = fmax(most, spread);
+	}
+	if (!(most > QUIET_UNLIKE * least))
+		return false;
+	for (size_t i = first; i < last; i++) {
+		run = spread_of(quiet->trace, i) <= QUIET_ALIKE * least ? run + 1 : 0;
+		if (run > longest) {
+			longest = run;
+			quiet->from = (i + 1 - run) * TRACE_BLOCK;
+			quiet->until = (i + 1) * TRACE_BLOCK;
+		}
+	}
+	return true;
+}
+
+bool quiet_enough(const struct quiet *quiet)
+{
+	size_t n = 0;
+
+	for (size_t k = quiet->from; k < quiet->until && n < QUIET_SAMPLES_MIN; k++)
+		n += trace_good(quiet->trace, k);
+	return n >= QUIET_SAMPLES_MIN;
+}

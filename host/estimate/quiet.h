@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ESTIMATE_QUIET_H
+#define DT_HOST_ESTIMATE_QUIET_H
+/*
+ * The quiet part of a trace: the samples before the largest pulse of its event window, the last 250 ms of
+ * them that end one rise time before the pulse leaves 10 %; which of them are quiet indeed; and their mean,
+ * deviation and means of blocks, values in g. No memory but the caller's; the trace is borrowed.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "host/estimate/estimate.h"
+#include "host/estimate/trace.h"
+
+/* A Gaussian's standard deviation over its median absolute deviation. */
+#define MAD_TO_SIGMA 1.482602218505602
+
+enum {
+	QUIET_SAMPLES_MIN = 32,
+	QUIET_BLOCKS_MAX = 128, /* 250 ms of 2 ms each, and one that is not full */
+};
+
+struct quiet_block {
+	double mean, weight;
+	double place; /* -1..1 over the quiet part */
+};
+
+/* The quiet part in blocks. */
+struct quiet {
+	const struct trace *trace;
+	const struct estimate_baseline *zero; /* is taken off each sample; NULL: nothing is */
+	size_t from, until;                   /* [from, until) */
+	size_t length;                        /* of a block */
+	size_t count;
+	bool doubtful;
+	struct quiet_block block[QUIET_BLOCKS_MAX];
+};
+
+struct quiet_moments {
+	double mean, deviation;
+	size_t count, good; /* used, of so many */
+};
+
+/* The samples [from, until) of the quiet part before the largest. */
+void quiet_find(const struct trace *trace, size_t *from, size_t *until);
+
+/* Whether at least QUIET_SAMPLES_MIN of its samples are good. */
+bool quiet_enough(const struct quiet *quiet);
+
+/* Roughly where the middle of samples [from, until) is, from a few of them; *sigma_g, unless NULL, is the
+ * standard deviation from their distances. */
+double quiet_glance(const struct trace *trace, size_t from, size_t until, double *sigma_g);
+
+/* Moments of what lies within reach of about, and the means of the blocks. */
+struct quiet_moments quiet_take(struct quiet *quiet, double about, double reach);
+
+/* Whether it holds more than noise: some of it is far quieter than the whole. */
+bool quiet_restless(const struct quiet *quiet, double noise_g);
+
+/* To the longest run of samples as quiet as the quietest, where others are not by far; false, and unchanged,
+ * where there is none. */
+bool quiet_narrow(struct quiet *quiet);
+
+#endif

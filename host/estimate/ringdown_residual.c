@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/estimate/ringdown_private.h"
+
+#include <math.h>
+
+/* Standard deviations of chi-square, and how well the noise itself is known. */
+#define CHI_LIMIT 3.3
+#define NOISE_KNOWN 0.05
+
+unsigned ringdown_freedom(const struct ringdown_job *job, const struct modes *modes)
+{
+	return job->series.used - modes_size(modes);
+}
+
+double ringdown_chi_square(const struct ringdown_job *job, const struct modes *modes)
+{
+	double noise = hypot(job->trace->noise_g, RINGDOWN_SWING_MODEL * modes_swing_g(modes, 0));
+
+	return modes->fit.squares * job->series.block / (noise * noise * ringdown_freedom(job, modes));
+}
+
+bool ringdown_passes(const struct ringdown_job *job, const struct modes *modes)
+{
+	double spread = sqrt(2.0 / ringdown_freedom(job, modes) + 2 * NOISE_KNOWN * NOISE_KNOWN);
+
+	return !(ringdown_chi_square(job, modes) > 1 + CHI_LIMIT * spread);
+}
+
+double ringdown_sigma_point(const struct ringdown_job *job, const struct modes *modes)
+{
+	double residual = sqrt(modes->fit.squares / ringdown_freedom(job, modes));
+
+	return fmax(residual, job->trace->noise_g / sqrt(job->series.block));
+}
+
+double ringdown_explained(const struct ringdown_job *job)
+{
+	double noise = job->trace->noise_g, expected = 0, total = series_squares(&job->series);
+
+	if (isfinite(noise))
+		expected = noise * noise / job->series.block;
+	total -= expected * (job->series.used - 1);
+	return 1 - fmax(0, job->modes.fit.squares - expected * ringdown_freedom(job, &job->modes)) / total;
+}
+
+double ringdown_gain(const struct ringdown_job *job)
+{
+	double noise = job->trace->noise_g;
+
+	return (series_squares(&job->series) - job->modes.fit.squares) * job->series.block / (noise * noise);
+}

@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/estimate/ringdown_private.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "host/estimate/outlier.h"
+#include "host/estimate/pencil.h"
+
+#define CHI_GROSS 3.0
+
+#define F_LIMIT 7.0
+
+/* B of a spring to start from. */
+#define SPRING_SOFT 0.3
+#define SPRING_STIFF -0.2
+
+/* Modes are apart when their frequencies are by this many standard deviations. */
+#define SEPARATION 3.0
+
+enum { OUTLIER_ROUNDS = 3, THIN_MIN = 48 };
+
+bool ringdown_full(struct ringdown_job *job)
+{
+	struct modes modes = job->single;
+	struct series *series = &job->series;
+	struct series blocks = *series;
+	bool usable[SERIES_MAX];
+	unsigned out = 0;
+
+	series_take(series, job->trace, job->first, job->first + (size_t)series->count * series->block,
+	            job->span->from_s, 1);
+	memcpy(usable, series->good, series->count);
+	if (!modes_fit(&modes, series))
+		return false;
+	for (int i = 0; i < OUTLIER_ROUNDS; i++) {
+		unsigned before = out;
+
+		out = outlier_drop(series, &modes, usable);
+		if ((out > 0 || before > 0) && !modes_fit(&modes, series))
+			return false;
+		if (out == before)
+			break;
+	}
+	if (out > 0)
+		job->flags |= ESTIMATE_FLAG_SPIKE;
+	if (out == 0 && !ringdown_passes(job, &modes)) {
+		/* Nothing gained: what follows is cheaper on blocks. */
+		*series = blocks;
+		if (!modes_fit(&job->single, series))
+			return false;
+		modes = job->single;
+	}
+	job->modes = modes;
+	job->single = modes;
+	return true;
+}
+
+/* By how much the richer fit is better than one mode, per unknown and in its own residual. */
+static double f_test(const struct ringdown_job *job, const struct modes *richer)
+{
+	double more = modes_size(richer) - modes_size(&job->single);
+
+	return (job->single.fit.squares - richer->fit.squares) / more /
+	       (richer->fit.squares / ringdown_freedom(job, richer));
+}
+
+static double information(const struct ringdown_job *job, const struct modes *modes)
+{
+	double n = job->series.used;
+
+	return n * log(modes->fit.squares) + modes_size(modes) * log(n);
+}
+
+/* Takes the candidate for the best so far if it is. */
+static void consider(struct ringdown_job *job, const struct modes *candidate)
+{
+	if (f_test(job, candidate) > F_LIMIT && information(job, candidate) < information(job, &job->modes))
+		job->modes = *candidate;
+}
+
+static void fit_hum(struct ringdown_job *job)
+{
+	const double hz[] = {50, 60, job->trace->hum_hz};
+
+	ringdown_try(job, "full+hum");
+	for (size_t i = 0; i < sizeof(hz) / sizeof(hz[0]); i++) {
+		struct modes modes = job->single;
+
+		modes.hum_hz = hz[i];
+		if (hz[i] > 0 && modes_linear(&modes, &job->series) && modes_fit(&modes, &job->series))
+			consider(job, &modes);
+	}
+}
+
+/* Returns k of the quadratic law; 0 when it cannot be fitted. */
+static double try_square(struct ringdown_job *job)
+{
+	struct modes modes = job->single;
+
+	modes.law = MODES_LAW_SQUARE;
+	modes.p[MODES_LAW] = 0;
+	if (!modes_fit(&modes, &job->series))
+		return 0;
+	consider(job, &modes);
+	return modes.p[MODES_LAW];
+}
+
+/* The mount that softens, or stiffens, as the quadratic law has it. */
+static void try_spring(struct ringdown_job *job, double k)
+{
+	struct modes modes = job->single;
+	double swing = modes_swing_g(&modes, 0);
+
+	modes.law = MODES_LAW_SPRING;
+	modes.p[MODES_OMEGA] -= k / 2;
+	modes.p[MODES_COSINE] *= -1;
+	modes.p[MODES_SINE] *= -1;
+	modes.p[MODES_LAW] = 1 / (swing * swing);
+	modes.p[MODES_LAW + 1] = k < 0 ? SPRING_SOFT : SPRING_STIFF;
+	if (modes_fit(&modes, &job->series))
+		consider(job, &modes);
+}
+
+static bool real_mode(const struct modes *modes, unsigned m)
+{
+	double decay = modes->p[MODES_DECAY + MODES_EACH * m], omega = modes->p[MODES_OMEGA + MODES_EACH * m];
+
+	return decay > 0 && decay < RINGDOWN_DAMPING_MAX * hypot(decay, omega);
+}
+
+/* Two modes from a start; false unless both come out as decays. */
+static bool fit_two(struct modes *modes, const struct series *series, const struct pencil_pole pole[2])
+{
+	*modes = (struct modes){.count = 2};
+	for (unsigned m = 0; m < 2; m++) {
+		modes->p[MODES_DECAY + MODES_EACH * m] = pole[m].decay;
+		modes->p[MODES_OMEGA + MODES_EACH * m] = pole[m].omega;
+	}
+	return modes_linear(modes, series) && modes_fit(modes, series) && real_mode(modes, 0) &&
+	       real_mode(modes, 1);
+}
+
+static bool start_two(const struct ringdown_job *job, struct pencil_pole pole[2])
+{
+	const struct series *series = &job->series;
+	double filled[SERIES_MAX];
+
+	for (unsigned k = 0; k < series->count; k++)
+		filled[k] = series->good[k] ? series->value_g[k]
+		                            : modes_at(&job->single, series->first_s + k * series->step_s);
+	return pencil_find(pole, filled, series->count, series->step_s);
+}
+
+/* Two modes that are surely nearer than the stronger's width, or not surely apart, are one as far as anyone
+ * can tell. */
+static bool separable(const struct ringdown_job *job, const struct modes *modes)
+{
+	const double *p = modes->p, *own = p + MODES_EACH * modes_stronger(modes);
+	double row[CHOLESKY_MAX] = {0}, apart, unsure;
+
+	row[MODES_OMEGA] = 1;
+	row[MODES_OMEGA + MODES_EACH] = -1;
+	apart = fabs(p[MODES_OMEGA] - p[MODES_OMEGA + MODES_EACH]);
+	unsure = ringdown_sigma_point(job, modes) * sqrt(cholesky_variance(&modes->fit.factor, row));
+	return apart + 2 * unsure >= own[MODES_DECAY] && apart >= SEPARATION * unsure;
+}
+
+/* The same minimum, as far as two fits of it agree. */
+#define SAME 1e-3
+
+/* By the pencil; where noise hides the weaker pole from it, from either side of the one mode. */
+static void try_two(struct ringdown_job *job)
+{
+	static const double aside[] = {0.85, 1.15};
+	struct modes modes, best = job->single;
+	struct pencil_pole pole[2];
+
+	ringdown_try(job, "two-modes");
+	if (start_two(job, pole) && fit_two(&modes, &job->series, pole))
+		best = modes;
+	for (size_t i = 0; i < sizeof(aside) / sizeof(aside[0]) && !ringdown_passes(job, &best); i++) {
+		pole[0] = (struct pencil_pole){job->single.p[MODES_OMEGA], job->single.p[MODES_DECAY]};
+		pole[1] = (struct pencil_pole){aside[i] * pole[0].omega, pole[0].decay};
+		if (!fit_two(&modes, &job->series, pole))
+			continue;
+		/* Two starts that meet leave little hope for a third. */
+		if (best.count == 2 && fabs(modes.fit.squares - best.fit.squares) < SAME * best.fit.squares)
+			break;
+		if (modes.fit.squares < best.fit.squares)
+			best = modes;
+	}
+	if (best.count < 2)
+		return;
+	if (separable(job, &best))
+		consider(job, &best);
+	else if (!ringdown_passes(job, &job->modes))
+		job->flags |= ESTIMATE_FLAG_NOT_SEPARABLE;
+}
+
+/* Two modes or a law that are grossly refused are no ground to say where the frequency goes as the swing
+ * vanishes, or what the modes are: the mean of the window stays, and how far the other would have led from it
+ * is doubt. */
+static void distrust(struct ringdown_job *job)
+{
+	const double *other = job->modes.p + MODES_EACH * modes_stronger(&job->modes);
+
+	job->doubt_omega = fabs(other[MODES_OMEGA] - job->single.p[MODES_OMEGA]);
+	job->doubt_decay = fabs(other[MODES_DECAY] - job->single.p[MODES_DECAY]);
+	job->modes = job->single;
+}
+
+/* What was found before, but the path that has been gone since. */
+static void restore(struct ringdown_job *job, const struct ringdown_job *before)
+{
+	const char *path[ESTIMATE_PATH_MAX];
+	unsigned tried = job->tried;
+
+	memcpy(path, job->path, sizeof(path));
+	*job = *before;
+	memcpy(job->path, path, sizeof(path));
+	job->tried = tried;
+}
+
+/* Whatever is more than one mode; into job->modes if it is better. */
+static void search(struct ringdown_job *job)
+{
+	double k;
+
+	ringdown_try(job, "amplitude");
+	k = try_square(job);
+	try_two(job);
+	if (!ringdown_passes(job, &job->modes) && fabs(k) > 0)
+		try_spring(job, k);
+}
+
+/* Where holes leave no blocks but many whole ones, these are enough to look for more than one mode, and what
+ * is found is a start for all samples. */
+static void look_on_blocks(struct ringdown_job *job, void (*look)(struct ringdown_job *job))
+{
+	const unsigned points =
+	        ringdown_block(job, job->single.p[MODES_OMEGA] * RINGDOWN_FINER) / job->series.block;
+	const struct modes single = job->single;
+	struct series all;
+	struct modes found;
+
+	if (points < 2) {
+		look(job);
+		return;
+	}
+	all = job->series;
+	series_thin(&job->series, &all, points);
+	if (job->series.used < THIN_MIN || !modes_fit(&job->single, &job->series)) {
+		job->series = all;
+		job->single = single;
+		look(job);
+		return;
+	}
+	job->modes = job->single;
+	look(job);
+	found = job->modes;
+	modes_unblock(&found, &job->series);
+	job->series = all;
+	job->single = job->modes = single;
+	if (modes_size(&found) > modes_size(&single) && modes_fit(&found, &all))
+		job->modes = found;
+}
+
+void ringdown_try_hum(struct ringdown_job *job)
+{
+	look_on_blocks(job, fit_hum);
+}
+
+void ringdown_try_richer(struct ringdown_job *job)
+{
+	const struct ringdown_job before = *job;
+
+	if (!ringdown_lengthen(job))
+		return;
+	look_on_blocks(job, search);
+	if (ringdown_passes(job, &job->modes))
+		job->flags &= ~(unsigned)ESTIMATE_FLAG_NOT_SEPARABLE;
+	else if (ringdown_chi_square(&before, &before.modes) < ringdown_chi_square(job, &job->modes))
+		restore(job, &before);
+	else if (ringdown_chi_square(job, &job->modes) > CHI_GROSS)
+		distrust(job);
+}

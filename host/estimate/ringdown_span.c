@@ -1,0 +1,192 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/estimate/ringdown_private.h"
+
+#include <math.h>
+
+#include "common/units.h"
+#include "host/estimate/crossings.h"
+#include "host/estimate/scan.h"
+
+/* The window: cycles, or time constants if that is longer, but no more cycles than the most, and
+ * from a mere start no more than a start is good for. */
+#define CYCLES 5.0
+#define TIME_CONSTANTS 4.4
+#define CYCLES_MOST 80.0
+#define CYCLES_START 7.0
+
+/* For two modes or a law. */
+#define LONG_TIME_CONSTANTS 6.5
+
+/* Fewer points per cycle would cost accuracy. */
+#define POINTS_PER_CYCLE 13.0
+
+/* Window and block are chosen anew when the fit's wish differs from them by more than this. */
+#define WINDOW_CHANGE 0.1
+
+/* A start by zero crossings that explains less than this of the variance is doubted. */
+#define EXPLAINED_SURE 0.8
+
+/* Samples before the window that lie this far from what the fit foretells, in standard deviations of one,
+ * were still driven: one alone, two together, if the next earlier one is off too. */
+#define BACK_ALONE 2.2
+#define BACK_PAIR 2.0
+#define BACK_AGAIN 1.5
+
+/* Before the contact's end, where that is known, they count for so much more. */
+#define BACK_BEFORE 0.7
+
+enum { WINDOWS = 4 };
+
+static size_t window_end(const struct ringdown_job *job, double omega, double decay, double most_s)
+{
+	double cycle = 2 * UNITS_PI / omega, length = CYCLES * cycle;
+	size_t end;
+
+	if (decay * length < TIME_CONSTANTS)
+		length = fmin(CYCLES_MOST * cycle, TIME_CONSTANTS / fmax(decay, 1e-9 * omega));
+	end = trace_index(job->trace, job->span->from_s + fmin(length, most_s));
+	return end < job->last ? end : job->last;
+}
+
+unsigned ringdown_block(const struct ringdown_job *job, double omega)
+{
+	double samples = job->trace->rate_hz * 2 * UNITS_PI / (POINTS_PER_CYCLE * omega);
+
+	return samples > 1 ? (unsigned)fmin(samples, 1e6) : 1;
+}
+
+/* Blocks, unless a sample is missing. */
+static void take(struct ringdown_job *job, size_t end, unsigned block)
+{
+	series_take(&job->series, job->trace, job->first, end, job->span->from_s, block);
+	if (job->series.used < job->series.count && block > 1)
+		series_take(&job->series, job->trace, job->first, end, job->span->from_s, 1);
+}
+
+/* One mode from a start, over a window that follows it: a start is good for a few cycles only. */
+static bool settle(struct ringdown_job *job, double omega, double decay)
+{
+	double most_s = CYCLES_START * 2 * UNITS_PI / omega;
+	struct modes *modes = &job->modes;
+	size_t end = window_end(job, omega, 0, most_s);
+	unsigned block = ringdown_block(job, omega);
+
+	*modes = (struct modes){.count = 1, .p = {0, decay, omega}};
+	for (int i = 0; i < WINDOWS; i++) {
+		size_t wish;
+
+		take(job, end, block);
+		if (job->series.used < 2 * modes_size(modes) ||
+		    (i == 0 && !modes_linear(modes, &job->series)) || !modes_fit(modes, &job->series))
+			return false;
+		most_s *= 4;
+		wish = window_end(job, modes->p[MODES_OMEGA], modes->p[MODES_DECAY], most_s);
+		if (fabs((double)wish - (double)end) < WINDOW_CHANGE * (double)(end - job->first) &&
+		    block <= ringdown_block(job, modes->p[MODES_OMEGA] * (1 - WINDOW_CHANGE)))
+			break;
+		end = wish;
+		block = ringdown_block(job, modes->p[MODES_OMEGA]);
+	}
+	job->single = *modes;
+	return true;
+}
+
+static bool settle_by_scan(struct ringdown_job *job)
+{
+	struct scan scan;
+
+	return scan_find(&scan, job->trace, job->first, job->last) && settle(job, scan.omega, scan.decay);
+}
+
+enum estimate_status ringdown_start(struct ringdown_job *job)
+{
+	double noise = isfinite(job->trace->noise_g) ? job->trace->noise_g : 0, omega, decay;
+	double threshold = fmax(RINGDOWN_SWING_NOISE * noise, RINGDOWN_SWING_LEVEL * job->span->peak_g);
+	struct crossings crossings;
+	bool begun;
+
+	if (noise > 0 && !scan_worth(job->trace, job->first, job->last, noise))
+		return ESTIMATE_NO_PEAK;
+	crossings_find(&crossings, job->trace, job->first, job->last, 0, threshold);
+	begun = crossings_start(&crossings, &omega, &decay);
+	if (!begun && crossings.ended)
+		return ESTIMATE_SHORT;
+	if (!begun && !(noise > 0))
+		return ESTIMATE_NO_PEAK;
+	if (begun && settle(job, omega, decay) && ringdown_explained(job) > EXPLAINED_SURE)
+		return ESTIMATE_OK;
+	return settle_by_scan(job) ? ESTIMATE_OK : begun ? ESTIMATE_NOT_CONVERGED : ESTIMATE_NO_PEAK;
+}
+
+bool ringdown_lengthen(struct ringdown_job *job)
+{
+	double decay = job->single.p[MODES_DECAY], omega = job->single.p[MODES_OMEGA];
+	size_t end;
+
+	if (job->flags & ESTIMATE_FLAG_SPIKE)
+		return true;
+	end = trace_index(job->trace, job->span->from_s + fmin(LONG_TIME_CONSTANTS / decay,
+	                                                       CYCLES_MOST * 2 * UNITS_PI / omega));
+	take(job, end < job->last ? end : job->last, ringdown_block(job, omega * RINGDOWN_FINER));
+	if (!modes_fit(&job->single, &job->series))
+		return false;
+	job->modes = job->single;
+	return true;
+}
+
+/* How far a sample lies from what the fit foretells, in noise; 0 where there is none. */
+static double off_by(const struct ringdown_job *job, const struct modes *samples, size_t k, double noise)
+{
+	const struct trace *trace = job->trace;
+	double time = trace_time(trace, k), foot = job->span->foot_s;
+
+	if (!series_usable(trace, k))
+		return 0;
+	if (foot > 0 && time < foot)
+		noise *= BACK_BEFORE;
+	return (trace->value_g[k] - modes_at(samples, time - job->span->from_s)) / noise;
+}
+
+/* Where the decay was free already: from first back to earliest, as long as the samples, one by one and each
+ * with the one after it, lie where the fit foretells them. Chance strays and comes back; the contact's force
+ * leads further astray the earlier it is. */
+static size_t free_since(const struct ringdown_job *job, const struct modes *samples, size_t earliest,
+                         double noise)
+{
+	double after = 0;
+	size_t k;
+
+	for (k = job->first; k > earliest; k--) {
+		double off = off_by(job, samples, k - 1, noise);
+
+		if ((fabs(off) > BACK_ALONE || fabs(off + after) > BACK_PAIR) &&
+		    (k - 1 == earliest || fabs(off_by(job, samples, k - 2, noise)) > BACK_AGAIN))
+			return k;
+		after = off;
+	}
+	return k;
+}
+
+void ringdown_reach_back(struct ringdown_job *job)
+{
+	const struct trace *trace = job->trace;
+	size_t end = job->first + (size_t)job->series.count * job->series.block, first;
+	double noise = trace->noise_g;
+	struct modes modes = job->modes;
+
+	if (!(noise > 0))
+		noise = ringdown_sigma_point(job, &job->modes) * sqrt(job->series.block);
+	modes_unblock(&modes, &job->series);
+	first = free_since(job, &modes, trace_index(trace, job->span->from_s - job->span->margin_s),
+	                   hypot(noise, RINGDOWN_SWING_MODEL * modes_swing_g(&modes, 0)));
+	if (first >= job->first)
+		return;
+	modes = job->modes;
+	if (job->series.block > 1)
+		series_take(&job->series, trace, first, end, job->span->from_s, job->series.block);
+	else if (!series_lengthen(&job->series, trace, first, (unsigned)(job->first - first)))
+		return;
+	job->first = first;
+	if (modes_fit(&modes, &job->series))
+		job->modes = modes;
+}
