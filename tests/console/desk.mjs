@@ -125,6 +125,14 @@ export class Desk {
 		await this.page.keyboard.type(text);
 	}
 
+	/* Escape, and the console's answer */
+	async abort(where) {
+		const answer = this.page.waitForResponse((response) => response.url().endsWith("/api/abort"));
+		await this.key("Escape");
+		assert.equal((await answer).status(), 200, where);
+		await this.untilText("#abort-outcome", /ABORT done/);
+	}
+
 	/* ---- the workflow, by mouse ---- */
 
 	async setUp({ name, scene, angle, planned }) {

@@ -4,6 +4,7 @@
 import assert from "node:assert/strict";
 import { found } from "./looks.mjs";
 import restart from "./restart.mjs";
+import tabs from "./tabs.mjs";
 import { run } from "./tap.mjs";
 import workflow from "./workflow.mjs";
 
@@ -18,4 +19,4 @@ const looks = {
 	],
 };
 
-process.exit(await run([workflow, restart, looks]));
+process.exit(await run([workflow, tabs, restart, looks]));

@@ -37,9 +37,9 @@ export async function give() {
 	await post("/api/hold", { take: false });
 }
 
-/* What only the holder may do. */
+/* What only the holder may do. Taking it again renews it; a console that was started again has forgotten it. */
 export async function holding(action) {
-	if (!timer) await take();
+	await take();
 	return action();
 }
 

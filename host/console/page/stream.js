@@ -43,18 +43,19 @@ async function takePlace(crowded) {
 	}
 }
 
-/* on(name, data) for each event; connected(bool, why not) whenever that changes. */
+/* on(name, data) for each event; connected(bool, why not) whenever one of these changes. */
 export function follow(on, connected) {
 	let heard = -Infinity,
 		begun = 0,
 		failures = 0,
 		is = null,
 		why = "",
+		told = "",
 		attempt = null,
 		stopped = false;
 
 	const tell = (value) => {
-		if (value !== is) connected((is = value), why);
+		if (value !== is || why !== told) connected((is = value), (told = why));
 	};
 	const event = (name, data) => {
 		heard = performance.now();
