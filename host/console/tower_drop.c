@@ -302,8 +302,10 @@ static void follow_phase(struct tower *tower, const struct session_view *view)
 static void watch_time(struct tower *tower)
 {
 	int64_t now_ms = session_now_ms();
+	/* after a stall of this machine it may just be heard again, at rest, and not be believed yet */
+	bool heard = tower->rest_ms != 0 && now_ms - tower->rest_ms < ARM_LATE_MS;
 
-	if (tower->phase == TOWER_ARMED && now_ms > tower->armed_until_ms + ARM_LATE_MS)
+	if (tower->phase == TOWER_ARMED && !heard && now_ms > tower->armed_until_ms + ARM_LATE_MS)
 		give_up(tower, "armed, and then nothing was heard of the tower");
 	else if ((tower->phase == TOWER_MOVING || tower->phase == TOWER_COLLECTING) &&
 	         now_ms > tower->phase_ms + DROP_MS)
