@@ -473,6 +473,11 @@ static bool is_idle(const struct tower_view *view)
 	return view->phase == TOWER_IDLE;
 }
 
+static bool is_ready(const struct tower_view *view)
+{
+	return is_idle(view) && view->session.state == WIRE_STATE_READY;
+}
+
 static bool is_armed(const struct tower_view *view)
 {
 	return view->phase == TOWER_ARMED && view->session.state == WIRE_STATE_ARMED;
@@ -632,6 +637,7 @@ static void a_drop_is_collected_and_kept(void **state)
 	assert_true(fake.resends > 0);
 	assert_true(heard(WIRE_OP_ACCEPT) >= 1); /* twice, if the tower asked again meanwhile */
 	assert_int_equal(heard(WIRE_OP_DISCARD), 0);
+	wait_view(is_ready);
 	release(arm());
 	wait_recorded("box/2");
 	found = archived();
