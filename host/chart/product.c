@@ -135,6 +135,7 @@ void product_decays(struct product *product)
 void product_lag(struct product *product)
 {
 	struct estimate_lag lag;
+	double free_s[2];
 
-	lag_find(&product->sensor[0], &product->sensor[1], &lag);
+	lag_find(&product->sensor[0], &product->sensor[1], &lag, free_s);
 }

@@ -52,6 +52,9 @@
 /* A residual beyond this part of S1's sum of squares: no oscillator. */
 #define UNEXPLAINED_MAX 0.05
 
+/* A decay is free when what still drives it moves it by less than this part of its noise. */
+#define DRIVE_LEFT 0.2
+
 enum {
 	BELL_STEPS = 16,
 	SINGLES = 512,
@@ -264,6 +267,7 @@ struct solution {
 	double peak_g, peak_spread_g; /* likewise */
 	double chi_square;            /* reduced */
 	double noise_g;
+	double free_s; /* S1's decay, from then on */
 	bool refused;
 };
 
@@ -291,6 +295,8 @@ static bool judge(const struct driven_axis *axis, const struct scene *scene, con
 	solution->peak_g = solution->p[GAIN] * top.value;
 	solution->peak_spread_g = sqrt(cholesky_variance(&result->factor, height));
 	solution->noise_g = noise;
+	solution->free_s = respond_free_since(respond, DRIVE_LEFT * noise / fabs(solution->p[GAIN])) +
+	                   solution->p[DELAY];
 	solution->chi_square = result->squares / freedom / (noise * noise);
 	solution->refused = solution->chi_square > 1 + REFUSE * sqrt(2 / freedom);
 	return isfinite(solution->spread_s);
@@ -430,6 +436,7 @@ void driven_find(const struct driven_axis *axis, struct driven *driven)
 	                          .sigma_s = NAN,
 	                          .peak_g = NAN,
 	                          .sigma_peak_g = NAN,
+	                          .free_s = NAN,
 	                          .chi_square = NAN,
 	                          .status = ESTIMATE_SHORT};
 	if (!possible(axis, &driven->status))
@@ -452,4 +459,6 @@ void driven_find(const struct driven_axis *axis, struct driven *driven)
 		        hypot(sampled.input_spread_s * s2->noise_g, peak->result.sigma_time_s), driven);
 	else if (has_smooth)
 		express(axis, &smooth, bell.centre_s, bell.sigma_centre_s, driven);
+	if (isfinite(driven->peak_g) && !has_sampled)
+		driven->free_s = smooth.free_s;
 }

@@ -31,8 +31,10 @@ struct driven_axis {
 struct driven {
 	double lag_s, sigma_s;
 	double peak_g, sigma_peak_g; /* S1's by the fitted response; NAN unless ok and not refused */
-	bool smooth, sampled;        /* inputs tried */
-	double chi_square;           /* reduced */
+	double free_s; /* from when on S1's decay is as good as free; NAN likewise, or where S2 is no smooth
+	                  pulse */
+	bool smooth, sampled; /* inputs tried */
+	double chi_square;    /* reduced */
 	unsigned flags;
 	enum estimate_status status;
 };

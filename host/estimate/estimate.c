@@ -287,8 +287,6 @@ static void window_by_pulse(const struct estimate_pulse *pulse, struct ringdown_
 {
 	span->from_s = pulse->end_s + TAIL_WIDTHS * pulse->duration_s;
 	span->margin_s = MARGIN_WIDTHS * pulse->duration_s;
-	if (pulse->contact.status == ESTIMATE_OK && !(pulse->contact.flags & ESTIMATE_FLAG_MODEL))
-		span->foot_s = pulse->contact_start_s + pulse->contact_time_s;
 }
 
 static bool window_by_bump(const struct trace *trace, struct ringdown_span *span)
@@ -397,14 +395,36 @@ static void unclip_by_driven(const struct desk *desk, struct analysis *analysis)
 	}
 }
 
-/* The resultants of the sensors that have X and Y, and the lag when both have. */
+/* The driven oscillator knows better than the contact's pulse alone when S1's decay is free. */
+static void refine_ringdowns(const struct desk *desk, const struct estimate_options *options,
+                             double contact_again_s, const double free_s[2], struct analysis *analysis)
+{
+	static const char axes[2] = {'X', 'Y'};
+
+	for (unsigned i = 0; i < 2; i++) {
+		size_t s1 = find(desk, "S1", axes[i]);
+		struct work *work = &desk->work[s1];
+		struct ringdown_span span = {.from_s = free_s[i],
+		                             .until_s = contact_again_s,
+		                             .peak_g = fabs(work->peak.result.value_g),
+		                             .tolerance = options->tolerance};
+
+		if (isnan(free_s[i]))
+			continue;
+		ringdown_refine(&work->trace, &span, &work->ringdown);
+		analysis->channels[s1].ringdown = work->ringdown.result;
+	}
+}
+
+/* The resultants of the sensors that have X and Y, and where both have the lag, and what it says of S1's
+ * decay. */
 static void analyse_sensors(const struct desk *desk, const struct estimate_options *options,
-                            struct analysis *analysis)
+                            double contact_again_s, struct analysis *analysis)
 {
 	static const char *const names[ESTIMATE_SENSORS_MAX] = {"S1", "S2"};
 	struct resultant resultant[ESTIMATE_SENSORS_MAX];
 	struct lag_sensor sensor[ESTIMATE_SENSORS_MAX];
-	double tolerance = options->tolerance > 0 ? options->tolerance : ESTIMATE_TOLERANCE;
+	double tolerance = options->tolerance > 0 ? options->tolerance : ESTIMATE_TOLERANCE, free_s[2];
 
 	analysis->resultant_count = 0;
 	for (unsigned i = 0; i < ESTIMATE_SENSORS_MAX; i++) {
@@ -426,12 +446,13 @@ static void analyse_sensors(const struct desk *desk, const struct estimate_optio
 	analysis->has_lag = analysis->resultant_count == ESTIMATE_SENSORS_MAX;
 	if (!analysis->has_lag)
 		return;
-	lag_find(&sensor[0], &sensor[1], &analysis->lag);
+	lag_find(&sensor[0], &sensor[1], &analysis->lag, free_s);
 	if (!(analysis->lag.driven.flags & ESTIMATE_FLAG_MODEL) &&
 	    analysis->lag.sigma_driven_s > tolerance * resultant[1].width_s)
 		analysis->lag.driven.flags |= ESTIMATE_FLAG_TOLERANCE;
 	widen_by_driven(desk, analysis);
 	unclip_by_driven(desk, analysis);
+	refine_ringdowns(desk, options, contact_again_s, free_s, analysis);
 }
 
 /* Whether that axis of S1 rings on its own. */
@@ -502,7 +523,7 @@ static int analyse(const struct desk *desk, const struct estimate_options *optio
 	flag_short(desk, analysis);
 	for (size_t i = 0; i < analysis->channel_count; i++)
 		analyse_ringdown(desk, i, options, &contact, analysis);
-	analyse_sensors(desk, options, analysis);
+	analyse_sensors(desk, options, contact.again_s, analysis);
 	analyse_plate(desk, analysis);
 	if (options->impact_speed_m_s > 0)
 		analyse_rebound(desk, options->impact_speed_m_s, analysis);

@@ -126,7 +126,8 @@ static void combine(const struct driven axis[2], struct estimate_lag *lag)
 		lag->sigma_driven_s *= apart;
 }
 
-static void drive(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag)
+static void drive(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag,
+                  double free_s[2])
 {
 	struct driven axis[2];
 	unsigned tried = 0;
@@ -137,6 +138,7 @@ static void drive(const struct lag_sensor *s1, const struct lag_sensor *s2, stru
 		                                 s1->ringdown[i]};
 
 		driven_find(&pair, &axis[i]);
+		free_s[i] = axis[i].free_s;
 	}
 	if (axis[0].smooth || axis[1].smooth)
 		lag->driven.path[tried++] = "pulse";
@@ -145,7 +147,8 @@ static void drive(const struct lag_sensor *s1, const struct lag_sensor *s2, stru
 	combine(axis, lag);
 }
 
-void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag)
+void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag,
+              double free_s[2])
 {
 	const struct resultant *r1 = s1->resultant, *r2 = s2->resultant;
 	struct estimate_lag found = {
@@ -167,7 +170,7 @@ void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct e
 	if (found.status == ESTIMATE_OK || !usable(r1))
 		found.status = r1->result.how.status;
 	*lag = found;
-	drive(s1, s2, lag);
+	drive(s1, s2, lag, free_s);
 	if (!usable(r1) || !usable(r2))
 		return;
 	lag->largest_peak_s = r1->result.time_s - r2->result.time_s;

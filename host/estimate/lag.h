@@ -31,6 +31,8 @@ struct lag_sensor {
 	const struct ringdown *ringdown[2]; /* X, Y; of S1 */
 };
 
-void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag);
+/* free_s: when S1's decay on X and on Y begins, by the driven oscillator; NAN where that does not tell. */
+void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag,
+              double free_s[2]);
 
 #endif

@@ -5,7 +5,12 @@
 
 #include "common/units.h"
 
-enum { TERMS = 12, NEWTON = 5 };
+enum {
+	TERMS = 12,
+	NEWTON = 5,
+	FREE_STEPS = 2, /* before the input's end are looked at, each in so many parts */
+	FREE_PARTS = 8,
+};
 
 /* What one step adds to the state: its input's start, middle and end times these. */
 struct hold {
@@ -148,6 +153,24 @@ void respond_at(const struct respond *respond, double time_s, struct respond_poi
 	}
 	k = (unsigned)place;
 	between(&respond->knot[k], &respond->knot[k + 1], place - k, step, point);
+}
+
+double respond_free_since(const struct respond *respond, double level)
+{
+	double back_s = respond->input->step_s / FREE_PARTS;
+	double complex turn = cexp(-respond->pole * back_s), swing = respond->swing;
+	double since_s = respond->end_s;
+
+	for (unsigned i = 0; i < FREE_STEPS * FREE_PARTS; i++) {
+		struct respond_point point;
+
+		swing *= turn;
+		respond_at(respond, since_s - back_s, &point);
+		if (!(fabs(point.value - creal(swing)) < level))
+			break;
+		since_s -= back_s;
+	}
+	return since_s;
 }
 
 /* The free decay's first maximum of sign times the response. */

@@ -57,4 +57,8 @@ struct respond_crest {
 /* False when there is none inside or after the input. */
 bool respond_crest(const struct respond *respond, double sign, struct respond_crest *crest);
 
+/* From when on the response lies within level of the free decay it ends in, since the last of an input hardly
+ * counts: at most two steps before the input's end, to an eighth of a step. */
+double respond_free_since(const struct respond *respond, double level);
+
 #endif

@@ -18,6 +18,9 @@
 /* Every sample is this much more certain than blocks, at most. */
 #define FULL_GAIN 1.05
 
+/* Of these the plain decay is not the whole. */
+#define RICHER (ESTIMATE_FLAG_TWO_MODES | ESTIMATE_FLAG_AMPLITUDE | ESTIMATE_FLAG_HUM | ESTIMATE_FLAG_MODEL)
+
 enum { MEAN_CYCLES = 3, SAMPLES_MIN = 10 };
 
 void ringdown_try(struct ringdown_job *job, const char *method)
@@ -204,7 +207,37 @@ static void conclude(struct ringdown_job *job, struct ringdown *ringdown)
 	how->flags = shape_flags(job);
 	how->status = ESTIMATE_OK;
 	memcpy(how->path, job->path, sizeof(how->path));
-	ringdown->result.three_cycle_frequency_hz = three_cycles(job);
+}
+
+static void begin(struct ringdown_job *job, const struct trace *trace, const struct ringdown_span *span)
+{
+	memset(job, 0, offsetof(struct ringdown_job, series));
+	job->trace = trace;
+	job->span = span;
+	job->first = trace_index(trace, span->from_s);
+	job->last = trace_index(trace, span->until_s);
+}
+
+void ringdown_refine(const struct trace *trace, const struct ringdown_span *span, struct ringdown *ringdown)
+{
+	const struct estimate_ringdown *before = &ringdown->result;
+	double omega = 2 * UNITS_PI * before->frequency_hz, part = before->damping_ratio;
+	struct ringdown_job job;
+
+	if (before->how.status != ESTIMATE_OK || before->how.flags & RICHER)
+		return;
+	begin(&job, trace, span);
+	if (job.first + SAMPLES_MIN > job.last ||
+	    !ringdown_restart(&job, omega, omega * part / sqrt(1 - part * part)))
+		return;
+	while (job.tried < ESTIMATE_PATH_MAX && before->how.path[job.tried]) {
+		job.path[job.tried] = before->how.path[job.tried];
+		job.tried++;
+	}
+	if (strcmp(before->how.method, "full") == 0 && !ringdown_full(&job))
+		return;
+	if (ringdown_passes(&job, &job.modes))
+		conclude(&job, ringdown);
 }
 
 void ringdown_find(const struct trace *trace, const struct ringdown_span *span, struct ringdown *ringdown)
@@ -224,11 +257,7 @@ void ringdown_find(const struct trace *trace, const struct ringdown_span *span, 
 	struct ringdown_job job;
 	enum estimate_status *status = &found.result.how.status;
 
-	memset(&job, 0, offsetof(struct ringdown_job, series));
-	job.trace = trace;
-	job.span = span;
-	job.first = trace_index(trace, span->from_s);
-	job.last = trace_index(trace, span->until_s);
+	begin(&job, trace, span);
 	*status = ESTIMATE_SHORT;
 	if (isfinite(span->from_s) && job.first + SAMPLES_MIN <= job.last &&
 	    (span->peak_g > 0 || trace->noise_g > 0)) {
@@ -239,6 +268,7 @@ void ringdown_find(const struct trace *trace, const struct ringdown_span *span, 
 			escalate(&job);
 			ringdown_reach_back(&job);
 			conclude(&job, &found);
+			found.result.three_cycle_frequency_hz = three_cycles(&job);
 		}
 	}
 	*ringdown = found;

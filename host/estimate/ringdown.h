@@ -51,10 +51,13 @@ struct ringdown_span {
 	double peak_g;    /* magnitude of the channel's peak, which says what is small */
 	double tolerance; /* part of the value; 0 = ESTIMATE_TOLERANCE */
 	double margin_s;  /* the decay may have been free this much before from_s; 0 = not looked for */
-	double foot_s; /* where the contact's family ends: before it a decay is hardly free; 0 = not known */
 };
 
 void ringdown_find(const struct trace *trace, const struct ringdown_span *span, struct ringdown *ringdown);
+
+/* Once more from span->from_s, where the decay is known to begin: a plain one starts from its last answer and
+ * stays what it was where the residual refuses that. Of what needed more than one mode nothing changes. */
+void ringdown_refine(const struct trace *trace, const struct ringdown_span *span, struct ringdown *ringdown);
 
 /* X's and Y's decay of the same thing as one, by the inverse squares of their uncertainties; where they
  * disagree by three standard deviations, half of what they are apart is added to the uncertainty, flagged.

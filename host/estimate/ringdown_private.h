@@ -22,7 +22,7 @@
 /* No decay is damped more, as a ratio. */
 #define RINGDOWN_DAMPING_MAX 0.95
 
-/* So many blocks more to a cycle for two modes or a law. */
+/* So many blocks more to a cycle where the start is known, and for two modes or a law. */
 #define RINGDOWN_FINER 1.3
 
 struct ringdown_job {
@@ -50,6 +50,10 @@ unsigned ringdown_block(const struct ringdown_job *job, double omega);
 
 /* One mode, from crossings, or where these are doubtful from a scan. */
 enum estimate_status ringdown_start(struct ringdown_job *job);
+
+/* One mode from where the span says, where the decay is known to begin; the window a little longer, the
+ * blocks finer. */
+bool ringdown_restart(struct ringdown_job *job, double omega, double decay);
 
 /* More unknowns need a longer look and finer blocks. Not once outliers are out: they would be back. False
  * when one mode does not fit there. */

@@ -14,7 +14,8 @@
 #define CYCLES_MOST 80.0
 #define CYCLES_START 7.0
 
-/* For two modes or a law. */
+/* Where the start is known, and for two modes or a law. */
+#define SURE_TIME_CONSTANTS 5.2
 #define LONG_TIME_CONSTANTS 6.5
 
 /* Fewer points per cycle would cost accuracy. */
@@ -32,18 +33,16 @@
 #define BACK_PAIR 2.0
 #define BACK_AGAIN 1.5
 
-/* Before the contact's end, where that is known, they count for so much more. */
-#define BACK_BEFORE 0.7
-
 enum { WINDOWS = 4 };
 
-static size_t window_end(const struct ringdown_job *job, double omega, double decay, double most_s)
+static size_t window_end(const struct ringdown_job *job, double omega, double decay, double constants,
+                         double most_s)
 {
 	double cycle = 2 * UNITS_PI / omega, length = CYCLES * cycle;
 	size_t end;
 
-	if (decay * length < TIME_CONSTANTS)
-		length = fmin(CYCLES_MOST * cycle, TIME_CONSTANTS / fmax(decay, 1e-9 * omega));
+	if (decay * length < constants)
+		length = fmin(CYCLES_MOST * cycle, constants / fmax(decay, 1e-9 * omega));
 	end = trace_index(job->trace, job->span->from_s + fmin(length, most_s));
 	return end < job->last ? end : job->last;
 }
@@ -68,7 +67,7 @@ static bool settle(struct ringdown_job *job, double omega, double decay)
 {
 	double most_s = CYCLES_START * 2 * UNITS_PI / omega;
 	struct modes *modes = &job->modes;
-	size_t end = window_end(job, omega, 0, most_s);
+	size_t end = window_end(job, omega, 0, TIME_CONSTANTS, most_s);
 	unsigned block = ringdown_block(job, omega);
 
 	*modes = (struct modes){.count = 1, .p = {0, decay, omega}};
@@ -80,7 +79,7 @@ static bool settle(struct ringdown_job *job, double omega, double decay)
 		    (i == 0 && !modes_linear(modes, &job->series)) || !modes_fit(modes, &job->series))
 			return false;
 		most_s *= 4;
-		wish = window_end(job, modes->p[MODES_OMEGA], modes->p[MODES_DECAY], most_s);
+		wish = window_end(job, modes->p[MODES_OMEGA], modes->p[MODES_DECAY], TIME_CONSTANTS, most_s);
 		if (fabs((double)wish - (double)end) < WINDOW_CHANGE * (double)(end - job->first) &&
 		    block <= ringdown_block(job, modes->p[MODES_OMEGA] * (1 - WINDOW_CHANGE)))
 			break;
@@ -118,6 +117,20 @@ enum estimate_status ringdown_start(struct ringdown_job *job)
 	return settle_by_scan(job) ? ESTIMATE_OK : begun ? ESTIMATE_NOT_CONVERGED : ESTIMATE_NO_PEAK;
 }
 
+bool ringdown_restart(struct ringdown_job *job, double omega, double decay)
+{
+	struct modes *modes = &job->modes;
+
+	*modes = (struct modes){.count = 1, .p = {0, decay, omega}};
+	take(job, window_end(job, omega, decay, SURE_TIME_CONSTANTS, INFINITY),
+	     ringdown_block(job, omega * RINGDOWN_FINER));
+	if (job->series.used < 2 * modes_size(modes) || !modes_linear(modes, &job->series) ||
+	    !modes_fit(modes, &job->series))
+		return false;
+	job->single = *modes;
+	return true;
+}
+
 bool ringdown_lengthen(struct ringdown_job *job)
 {
 	double decay = job->single.p[MODES_DECAY], omega = job->single.p[MODES_OMEGA];
@@ -138,13 +151,10 @@ bool ringdown_lengthen(struct ringdown_job *job)
 static double off_by(const struct ringdown_job *job, const struct modes *samples, size_t k, double noise)
 {
 	const struct trace *trace = job->trace;
-	double time = trace_time(trace, k), foot = job->span->foot_s;
 
 	if (!series_usable(trace, k))
 		return 0;
-	if (foot > 0 && time < foot)
-		noise *= BACK_BEFORE;
-	return (trace->value_g[k] - modes_at(samples, time - job->span->from_s)) / noise;
+	return (trace->value_g[k] - modes_at(samples, trace_time(trace, k) - job->span->from_s)) / noise;
 }
 
 /* Where the decay was free already: from first back to earliest, as long as the samples, one by one and each

@@ -59,6 +59,7 @@ static void make(struct bench *b, enum synth_shape shape, bool on_plate, double 
 static void analyse(struct bench *b, double noise_g, double hz)
 {
 	struct lag_sensor sensor[2];
+	double free_s[2];
 
 	for (int i = 0; i < 4; i++) {
 		assert_int_equal(trace_open(&b->trace[i], &b->channel[i], -INFINITY, INFINITY), 0);
@@ -78,7 +79,7 @@ static void analyse(struct bench *b, double noise_g, double hz)
 		        .how.status = isnan(hz) ? ESTIMATE_NO_PEAK : ESTIMATE_OK};
 		resultant_find(&sensor[i].axes, &b->resultant[i]);
 	}
-	lag_find(&sensor[0], &sensor[1], &b->lag);
+	lag_find(&sensor[0], &sensor[1], &b->lag, free_s);
 	for (int i = 0; i < 4; i++)
 		trace_close(&b->trace[i]);
 }

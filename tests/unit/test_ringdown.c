@@ -467,6 +467,52 @@ static void reaches_back(void **state)
 	assert_true(there >= 12);
 }
 
+/* Begun anew where the decay is known to begin: what was lost at the start is gained, to the sample. From
+ * where the contact still drives nothing is taken, and nothing of two modes. */
+static void refines(void **state)
+{
+	struct synth_random random = {810};
+	struct decay d = plain;
+	struct channel channel;
+	struct trace trace;
+	struct ringdown late, r;
+
+	(void)state;
+	d.noise_g = 1;
+	channel = make(&d, &random);
+	for (size_t k = 0; k < 10; k++)
+		channel.value_g[k] += 30.0 * (double)(10 - k);
+	assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+	trace.noise_g = 1;
+	ringdown_find(&trace,
+	              &(struct ringdown_span){.from_s = 25.0 / 7000, .until_s = INFINITY, .peak_g = 600},
+	              &late);
+	r = late;
+	ringdown_refine(&trace,
+	                &(struct ringdown_span){.from_s = 9.9 / 7000, .until_s = INFINITY, .peak_g = 600},
+	                &r);
+	assert_near(r.start_s, 10.0 / 7000, 1e-9);
+	assert_near(r.result.frequency_hz, 129, 4 * r.result.sigma_hz);
+	assert_near(r.result.damping_ratio, 0.1, 4 * r.result.sigma_damping);
+	/* Of a long decay e^(a d), a = 81.5 and d = 15 samples, and more since the phase is lost too. */
+	assert_true(r.result.sigma_damping < 0.85 * late.result.sigma_damping);
+	assert_string_equal(r.result.how.method, "block");
+	assert_null(r.result.how.path[1]);
+	assert_near(r.result.three_cycle_frequency_hz, late.result.three_cycle_frequency_hz, 0);
+	r = late;
+	ringdown_refine(&trace, &(struct ringdown_span){.from_s = 0, .until_s = INFINITY, .peak_g = 600}, &r);
+	assert_near(r.start_s, late.start_s, 0);
+	assert_near(r.result.frequency_hz, late.result.frequency_hz, 0);
+	late.result.how.flags = ESTIMATE_FLAG_TWO_MODES;
+	r = late;
+	ringdown_refine(&trace,
+	                &(struct ringdown_span){.from_s = 9.9 / 7000, .until_s = INFINITY, .peak_g = 600},
+	                &r);
+	assert_near(r.start_s, late.start_s, 0);
+	trace_close(&trace);
+	synth_free(&channel);
+}
+
 /* Tolerance decides only where the residual does not: every sample, and a flag when that is no help. */
 static void tolerance(void **state)
 {
@@ -684,9 +730,9 @@ int main(void)
 	        cmocka_unit_test(offset),        cmocka_unit_test(holes),
 	        cmocka_unit_test(follows_swing), cmocka_unit_test(softening_mount),
 	        cmocka_unit_test(refused),       cmocka_unit_test(reaches_back),
-	        cmocka_unit_test(tolerance),     cmocka_unit_test(against_gsl),
-	        cmocka_unit_test(nothing),       cmocka_unit_test(too_short),
-	        cmocka_unit_test(combined),
+	        cmocka_unit_test(refines),       cmocka_unit_test(tolerance),
+	        cmocka_unit_test(against_gsl),   cmocka_unit_test(nothing),
+	        cmocka_unit_test(too_short),     cmocka_unit_test(combined),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
