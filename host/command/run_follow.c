@@ -90,13 +90,6 @@ static void tell_state(const struct run *run, unsigned state, uint32_t *told)
 	*told |= bit;
 }
 
-/* No drop can come of this state. */
-static bool at_rest(unsigned state)
-{
-	return !wire_state_moving(state) && state != WIRE_STATE_ARMED && state != WIRE_STATE_CAPTURED &&
-	       state != WIRE_STATE_UPLOADED;
-}
-
 /* Follows the drop until it is collected. */
 static int follow_to_end(struct run *run, struct record *record)
 {
@@ -113,7 +106,7 @@ static int follow_to_end(struct run *run, struct record *record)
 		if (taken < 0)
 			return command_link_failed("following the drop", taken);
 		tell_state(run, view->state, &told);
-		if (run->aborted && at_rest(view->state))
+		if (run->aborted && session_at_rest(view->state))
 			return command_stopped();
 		if (view->state == WIRE_STATE_FAULT_HELD && view->fault != WIRE_FAULT_NONE) {
 			command_error("nothing to capture, the frame did not move: %s",
@@ -177,8 +170,7 @@ static int drop(struct run *run, struct record *record)
 
 	if (code != COMMAND_DONE)
 		command_error("%s", message);
-	run->earlier = code == COMMAND_DONE &&
-	               (taken == 1 || wire_state_moving(view->state) || view->state == WIRE_STATE_CAPTURED);
+	run->earlier = code == COMMAND_DONE && (taken == 1 || session_drops(view->state));
 	if (run->earlier)
 		run_progress(run, "held      drop of an earlier run, to be fetched first");
 	if (taken < 0)

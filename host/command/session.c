@@ -7,6 +7,7 @@
 #include <sys/random.h>
 #include <time.h>
 
+#include "common/wire_table.h"
 #include "host/command/command.h"
 #include "host/command/session_private.h"
 
@@ -86,6 +87,16 @@ uint16_t session_token(void)
 		if (getrandom(&token, sizeof(token), 0) != sizeof(token))
 			token = (uint16_t)(session_utime() | 1);
 	return token;
+}
+
+bool session_drops(unsigned state)
+{
+	return wire_state_moving(state) || state == WIRE_STATE_CAPTURED;
+}
+
+bool session_at_rest(unsigned state)
+{
+	return !session_drops(state) && state != WIRE_STATE_ARMED && state != WIRE_STATE_UPLOADED;
 }
 
 int64_t session_now_ms(void)

@@ -83,6 +83,11 @@ DT_MUST_USE int session_take_drop(struct session *session, struct record *record
 /* A token for ARM from the kernel's generator, never 0. */
 uint16_t session_token(void);
 
+/* A state of the tower: it drops, or holds a drop that nobody has fetched. */
+bool session_drops(unsigned state);
+/* No drop can come of it. */
+bool session_at_rest(unsigned state);
+
 /* Monotonic milliseconds, and microseconds since the epoch. */
 int64_t session_now_ms(void);
 int64_t session_utime(void);

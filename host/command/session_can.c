@@ -310,7 +310,7 @@ static bool worked(enum wire_op op, unsigned state)
 	case WIRE_OP_ARM:
 		return state == WIRE_STATE_ARMED;
 	case WIRE_OP_RELEASE:
-		return wire_state_moving(state) || state == WIRE_STATE_CAPTURED;
+		return session_drops(state);
 	case WIRE_OP_ABORT:
 		return true;
 	case WIRE_OP_CLEAR:

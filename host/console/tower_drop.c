@@ -223,11 +223,6 @@ static void take_saved(struct tower *tower)
 
 /* ---- following ---- */
 
-static bool drops(unsigned state)
-{
-	return wire_state_moving(state) || state == WIRE_STATE_CAPTURED;
-}
-
 /* Whether what is there of the tower's state has been so for long enough to be believed. */
 static bool settled(struct tower *tower, bool now)
 {
@@ -238,19 +233,13 @@ static bool settled(struct tower *tower, bool now)
 	return now && session_now_ms() - tower->rest_ms >= SETTLE_MS;
 }
 
-/* No drop can come of this state. */
-static bool at_rest(unsigned state)
-{
-	return !drops(state) && state != WIRE_STATE_ARMED && state != WIRE_STATE_UPLOADED;
-}
-
 static void follow_idle(struct tower *tower, unsigned state)
 {
 	struct tower_drop *drop;
 
-	if (at_rest(state))
+	if (session_at_rest(state))
 		tower->origin = "was not released from the console";
-	if (!settled(tower, drops(state) && tower->series[0] != '\0'))
+	if (!settled(tower, session_drops(state) && tower->series[0] != '\0'))
 		return;
 	drop = without_recording(tower);
 	if (drop == NULL)
@@ -261,9 +250,9 @@ static void follow_idle(struct tower *tower, unsigned state)
 
 static void follow_armed(struct tower *tower, unsigned state)
 {
-	if (drops(state))
+	if (session_drops(state))
 		tower_drop_released(tower);
-	else if (settled(tower, at_rest(state)))
+	else if (settled(tower, session_at_rest(state)))
 		tower_drop_end(tower);
 }
 
@@ -273,7 +262,7 @@ static void follow_drop(struct tower *tower, const struct session_view *view)
 		tower->fault = view->fault;
 	if (tower->phase == TOWER_MOVING && view->state == WIRE_STATE_CAPTURED)
 		enter(tower, TOWER_COLLECTING);
-	if (settled(tower, at_rest(view->state)))
+	if (settled(tower, session_at_rest(view->state)))
 		give_up(tower, "nothing was captured: %s",
 		        tower->fault != WIRE_FAULT_NONE ? wire_fault_text(tower->fault)
 		                                        : "the frame did not move");
