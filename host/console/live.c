@@ -10,14 +10,14 @@
 #include "common/link/canbits.h"
 #include "common/segment.h"
 #include "common/wire.h"
+#include "host/record/join.h"
 
 enum {
 	SPANS = 20, /* of the last second */
 	SPAN_US = 50000,
 	SECOND_US = SPANS * SPAN_US,
 	PATIENCE_TICKS = 20,    /* a block that is later did not come */
-	BACKWARDS_TICKS = 100,  /* further back is no late block: the tower started anew */
-	FORWARDS_TICKS = 60000, /* nor is further ahead a gap */
+	FORWARDS_TICKS = 60000, /* further ahead is no gap */
 	IDS = 0x800,
 };
 
@@ -162,12 +162,13 @@ static void settle(struct live *live)
 	}
 }
 
-/* The tick's place, or NULL of one that is no longer waited for. */
-static struct tick *place(struct live *live, uint32_t tick_ms)
+/* The tick's place, NULL of one that is no longer waited for. *anew: the tower of it started anew. */
+static struct tick *place(struct live *live, uint32_t tick_ms, bool *anew)
 {
 	int64_t ahead = live->started ? (int64_t)tick_ms - live->head_ms : 1;
 
-	if (ahead < -BACKWARDS_TICKS || ahead > FORWARDS_TICKS) {
+	*anew = ahead < -JOIN_FAR_TICKS;
+	if (*anew || ahead > FORWARDS_TICKS) {
 		restart(live);
 		ahead = 1;
 	}
@@ -185,58 +186,70 @@ static struct tick *place(struct live *live, uint32_t tick_ms)
 	return tick_at(live, live->head - 1 - (uint64_t)-ahead);
 }
 
-static void span_samples(const uint8_t *bytes, unsigned count, int16_t *low, int16_t *high)
+static void span_samples(const int16_t *sample, unsigned count, int16_t *low, int16_t *high)
 {
 	int16_t least = INT16_MAX, largest = WIRE_SAMPLE_NOT_TAKEN;
 
 	for (unsigned i = 0; i < count; i++) {
-		int16_t value = (int16_t)(bytes[2 * i] | bytes[2 * i + 1] << 8);
-
-		if (value == WIRE_SAMPLE_NOT_TAKEN)
+		if (sample[i] == WIRE_SAMPLE_NOT_TAKEN)
 			continue;
-		if (value < least)
-			least = value;
-		if (value > largest)
-			largest = value;
+		if (sample[i] < least)
+			least = sample[i];
+		if (sample[i] > largest)
+			largest = sample[i];
 	}
 	*low = largest == WIRE_SAMPLE_NOT_TAKEN ? largest : least;
 	*high = largest;
 }
 
-static void take_block(struct live *live, const struct frame *frame)
+static bool take_block(struct live *live, const struct frame *frame, int64_t now_us)
 {
-	const uint8_t *d = frame->data, *samples = d + WIRE_SAMPLE_OFFSET;
 	unsigned sensor = frame->id == WIRE_ID_BLOCK_S2, channel = 3 * sensor;
-	uint32_t tick_ms = (uint32_t)d[2] | (uint32_t)d[3] << 8 | (uint32_t)d[4] << 16 | (uint32_t)d[5] << 24;
-	struct tick *tick = place(live, tick_ms);
-	struct live_tick *envelope;
+	struct wire_block block;
+	struct tick *tick;
+	int16_t *low, *high;
+	bool anew;
 
+	if (wire_check_block(frame) != 0 || wire_unpack_block(frame, &block) != 0)
+		return false;
+	live->block_us = now_us;
+	tick = place(live, block.tick_ms, &anew);
 	if (tick == NULL || (tick->heard >> sensor & 1u) != 0)
-		return;
+		return anew;
 	tick->heard |= 1u << sensor;
-	envelope = &tick->envelope;
-	span_samples(samples, WIRE_X_PER_TICK, &envelope->low[channel], &envelope->high[channel]);
-	samples += 2 * WIRE_X_PER_TICK;
-	span_samples(samples, WIRE_YZ_PER_TICK, &envelope->low[channel + 1], &envelope->high[channel + 1]);
-	samples += 2 * WIRE_YZ_PER_TICK;
-	span_samples(samples, WIRE_YZ_PER_TICK, &envelope->low[channel + 2], &envelope->high[channel + 2]);
+	low = &tick->envelope.low[channel];
+	high = &tick->envelope.high[channel];
+	span_samples(block.x, WIRE_X_PER_TICK, &low[0], &high[0]);
+	span_samples(block.y, WIRE_YZ_PER_TICK, &low[1], &high[1]);
+	span_samples(block.z, WIRE_YZ_PER_TICK, &low[2], &high[2]);
 	live->blocks++;
 	settle(live);
+	return anew;
 }
 
-void live_feed(struct live *live, const struct frame *frame, int64_t now_us)
+static bool take_heartbeat(struct live *live, const struct frame *frame, int64_t now_us)
 {
-	bool block = frame->id == WIRE_ID_BLOCK_S1 || frame->id == WIRE_ID_BLOCK_S2;
+	struct wire_heartbeat heartbeat;
+	bool anew = wire_unpack_heartbeat(frame, &heartbeat) == 0 && heartbeat.nmt_state == 0;
+
+	live->heartbeat_us = now_us;
+	if (anew)
+		restart(live);
+	return anew;
+}
+
+bool live_feed(struct live *live, const struct frame *frame, int64_t now_us)
+{
+	bool anew = false;
 
 	pthread_mutex_lock(&live->lock);
 	count_frame(live, frame, now_us);
-	if (frame->id == WIRE_ID_HEARTBEAT_TOWER)
-		live->heartbeat_us = now_us;
-	if (block && wire_check_block(frame) == 0) {
-		live->block_us = now_us;
-		take_block(live, frame);
-	}
+	if (frame->id == WIRE_ID_BLOCK_S1 || frame->id == WIRE_ID_BLOCK_S2)
+		anew = take_block(live, frame, now_us);
+	else if (frame->id == WIRE_ID_HEARTBEAT_TOWER)
+		anew = take_heartbeat(live, frame, now_us);
 	pthread_mutex_unlock(&live->lock);
+	return anew;
 }
 
 void live_restart(struct live *live)

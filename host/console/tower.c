@@ -17,7 +17,6 @@ enum {
 	OPEN_AGAIN_MS = 1000,
 	SETUP_AGAIN_MS = 1000,
 	JOBS_AT_ONCE = 16,
-	RESTART_TICKS = 100, /* a block that is further behind is of a tower that started again */
 };
 
 const char *tower_phase_name(enum tower_phase phase)
@@ -38,26 +37,11 @@ static bool cancelled(void *user)
 	return atomic_load(&tower->stopping) || atomic_load(&tower->aborts) != tower->wanted;
 }
 
-static bool is_restart(struct tower *tower, const struct frame *frame)
-{
-	const uint8_t *d = frame->data;
-	uint32_t tick_ms, before_ms = tower->newest_ms;
-
-	if (frame->id == WIRE_ID_HEARTBEAT_TOWER)
-		return frame->length > 0 && d[0] == 0; /* boot-up */
-	if ((frame->id != WIRE_ID_BLOCK_S1 && frame->id != WIRE_ID_BLOCK_S2) || wire_check_block(frame) != 0)
-		return false;
-	tick_ms = (uint32_t)d[2] | (uint32_t)d[3] << 8 | (uint32_t)d[4] << 16 | (uint32_t)d[5] << 24;
-	tower->newest_ms = tick_ms;
-	return before_ms > tick_ms && before_ms - tick_ms > RESTART_TICKS;
-}
-
 static void on_frame(void *user, const struct frame *frame)
 {
 	struct tower *tower = user;
 
-	live_feed(tower->console->live, frame, live_now_us());
-	if (is_restart(tower, frame)) /* it has forgotten its parameters */
+	if (live_feed(tower->console->live, frame, live_now_us())) /* it has forgotten its parameters */
 		tower->setup_due = tower->series[0] != '\0';
 }
 
@@ -74,7 +58,6 @@ static void open_link(struct tower *tower)
 		return;
 	tower->link_trouble[0] = '\0';
 	session_hold(tower->session, tower->series[0] == '\0'); /* before the first frame is heard */
-	tower->newest_ms = 0;
 	tower->setup_due = tower->series[0] != '\0';
 }
 

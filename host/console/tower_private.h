@@ -40,10 +40,9 @@ struct tower {
 	struct session *session; /* NULL: not open */
 	int64_t open_due_ms;
 	char link_trouble[SESSION_MESSAGE_MAX];
-	unsigned aborted;   /* aborts that were sent */
-	int abort_result;   /* of the last one */
-	unsigned wanted;    /* what is under way is given up when aborts is beyond this */
-	uint32_t newest_ms; /* tick of the newest block */
+	unsigned aborted; /* aborts that were sent */
+	int abort_result; /* of the last one */
+	unsigned wanted;  /* what is under way is given up when aborts is beyond this */
 
 	/* set-up */
 	char series[ARCHIVE_NAME_MAX + 1];

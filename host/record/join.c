@@ -10,12 +10,7 @@
 #include "common/wire.h"
 #include "host/record/drop.h"
 
-enum {
-	RING_TICKS = DROP_TICKS_MAX, /* a power of two, as ticks wrap */
-	/* A live block this much older than the newest did not overtake: the tower started again. A hole of
-	 * this many ticks ends a run. */
-	FAR_TICKS = 100,
-};
+enum { RING_TICKS = DROP_TICKS_MAX }; /* a power of two, as ticks wrap */
 _Static_assert((RING_TICKS & (RING_TICKS - 1)) == 0, "ticks wrap");
 
 struct slot {
@@ -120,7 +115,7 @@ static void put_in_window(struct join *join, unsigned s, uint32_t tick_ms, const
 {
 	uint32_t tick = tick_ms - join->end.first_tick_ms;
 
-	if (!resent && join->settling && (int32_t)(tick_ms - join->end.last_tick_ms) > FAR_TICKS)
+	if (!resent && join->settling && (int32_t)(tick_ms - join->end.last_tick_ms) > JOIN_FAR_TICKS)
 		join->settling = false;
 	if (!join->has_capture || tick >= join->ticks || !(resent || join->settling))
 		return;
@@ -134,7 +129,7 @@ static void put_in_window(struct join *join, unsigned s, uint32_t tick_ms, const
 /* Keeps up with the tower's clock; true if a newer live block of the sensor was there before. */
 static bool follow_live(struct join *join, unsigned s, uint32_t tick_ms)
 {
-	if (join->any && (int32_t)(join->newest_ms - tick_ms) > FAR_TICKS)
+	if (join->any && (int32_t)(join->newest_ms - tick_ms) > JOIN_FAR_TICKS)
 		restart(join);
 	if (join->any_live[s] && (int32_t)(join->newest_live_ms[s] - tick_ms) > 0)
 		return true;
@@ -290,7 +285,7 @@ void join_forget(struct join *join)
 	join->crc_agrees = false;
 }
 
-/* The longest run of ticks that at least one sensor holds, over holes of less than FAR_TICKS. */
+/* The longest run of ticks that at least one sensor holds, over holes of less than JOIN_FAR_TICKS. */
 static uint32_t find_run(const struct join *join, uint32_t *first_ms)
 {
 	uint32_t first = 0, last = 0, best = 0;
@@ -303,7 +298,7 @@ static uint32_t find_run(const struct join *join, uint32_t *first_ms)
 
 		if (!(s1->held && s1->tick_ms == tick_ms) && !(s2->held && s2->tick_ms == tick_ms))
 			continue;
-		if (!any || tick_ms - last > FAR_TICKS)
+		if (!any || tick_ms - last > JOIN_FAR_TICKS)
 			first = tick_ms;
 		any = true;
 		last = tick_ms;

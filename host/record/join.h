@@ -16,10 +16,14 @@
 
 struct join;
 
+/* A live block this much older than the newest did not overtake: the tower started again. A hole of this many
+ * ticks ends a run. */
+enum { JOIN_FAR_TICKS = 100 };
+
 /* NULL without memory. The join keeps the last 2 048 ticks until a capture end says which count; repeats,
  * reorders and resends are counted for these, corrupt blocks since the last take. A capture end that comes
- * again is the same capture. A boot-up heartbeat, or a live block more than 100 ticks behind, is a tower that
- * started again: what came before belongs to no capture to come. */
+ * again is the same capture. A boot-up heartbeat, or a live block more than JOIN_FAR_TICKS behind, is a tower
+ * that started again: what came before belongs to no capture to come. */
 struct join *join_create(void);
 void join_destroy(struct join *join);
 
@@ -46,8 +50,8 @@ void join_forget(struct join *join);
 uint32_t join_crc32(const struct join *join);
 
 /* Moves the capture, complete or not, into *record (initialised by the call) and makes room for the next
- * one. Without a capture end the longest run of ticks held, over holes of less than 100, is taken and
- * flagged crc_unknown. DT_E_EMPTY when no block of it is held. */
+ * one. Without a capture end the longest run of ticks held, over holes of less than JOIN_FAR_TICKS, is taken
+ * and flagged crc_unknown. DT_E_EMPTY when no block of it is held. */
 DT_MUST_USE int join_take(struct join *join, struct record *record);
 
 #endif

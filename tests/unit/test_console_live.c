@@ -42,19 +42,28 @@ static int tear_down(void **state)
 	return 0;
 }
 
-/* The drop's block i of a sensor, as if it were tick tick_ms. */
-static void feed_as(unsigned sensor, uint32_t i, uint32_t tick_ms)
+/* The drop's block i of a sensor, as if it were tick tick_ms; what live_feed says. */
+static bool feed_as(unsigned sensor, uint32_t i, uint32_t tick_ms)
 {
 	struct frame frame;
 
 	drop.first_tick_ms = tick_ms - i;
 	hand_block(&drop, sensor, i, false, &frame);
-	live_feed(live, &frame, now_us);
+	return live_feed(live, &frame, now_us);
 }
 
 static void feed(unsigned sensor, uint32_t i)
 {
-	feed_as(sensor, i, 1000 + i);
+	assert_false(feed_as(sensor, i, 1000 + i));
+}
+
+static bool feed_heartbeat(uint8_t nmt_state)
+{
+	struct frame frame;
+
+	wire_pack_heartbeat(&frame, WIRE_ID_HEARTBEAT_TOWER,
+	                    &(struct wire_heartbeat){.nmt_state = nmt_state});
+	return live_feed(live, &frame, now_us);
 }
 
 static void feed_both(uint32_t from, uint32_t to)
@@ -179,7 +188,7 @@ static void repeats_and_damage_count_for_nothing(void **state)
 	feed(1, 1);
 	hand_block(&drop, 1, 2, false, &frame);
 	frame.data[20] ^= 1;
-	live_feed(live, &frame, now_us);
+	assert_false(live_feed(live, &frame, now_us));
 	assert_int_equal(look().blocks, 4);
 	assert_int_equal(look().missing, 0);
 }
@@ -201,8 +210,8 @@ static void a_slow_reader_gets_what_is_left(void **state)
 
 	(void)state;
 	for (uint32_t tick = 0; tick < LIVE_TICKS + 500; tick++) {
-		feed_as(1, tick % 1000, 7000 + tick);
-		feed_as(2, tick % 1000, 7000 + tick);
+		assert_false(feed_as(1, tick % 1000, 7000 + tick));
+		assert_false(feed_as(2, tick % 1000, 7000 + tick));
 	}
 	assert_int_equal(live_read(live, &next, &first, out, 10), 10);
 	assert_int_equal(first, 500);
@@ -226,8 +235,8 @@ static void a_tower_that_starts_again_begins_anew(void **state)
 	(void)live_read(live, &next, &first, out, 16);
 	before = next;
 	for (uint32_t i = 0; i < 4; i++) {
-		feed_as(1, i, 5 + i);
-		feed_as(2, i, 5 + i);
+		assert_int_equal(feed_as(1, i, 5 + i), i == 0); /* it says so once */
+		assert_false(feed_as(2, i, 5 + i));
 	}
 	assert_int_equal(live_read(live, &next, &first, out, 16), 4);
 	assert_true(first >= before);
@@ -238,6 +247,28 @@ static void a_tower_that_starts_again_begins_anew(void **state)
 	assert_int_equal(live_read(live, &next, &first, out, 16), 0);
 	feed_both(3, 4);
 	assert_int_equal(live_read(live, &next, &first, out, 16), 1);
+	assert_int_equal(look().missing, 0);
+}
+
+/* A block that is late, if at all, and a tower that was not heard for long, are no start. */
+static void only_a_tick_far_behind_is_a_start(void **state)
+{
+	(void)state;
+	assert_false(feed_as(1, 0, 5000));
+	assert_false(feed_as(1, 0, 4900));
+	assert_false(feed_as(1, 0, 5000 + 70000));
+	assert_false(feed_as(2, 0, 75000 - 100));
+	assert_true(feed_as(2, 0, 75000 - 101));
+}
+
+static void a_boot_up_heartbeat_is_a_start(void **state)
+{
+	(void)state;
+	assert_true(feed_heartbeat(0));
+	assert_false(feed_heartbeat(5));
+	feed_both(0, 10);
+	assert_true(feed_heartbeat(0));
+	assert_false(feed_as(1, 0, 3)); /* which was said already */
 	assert_int_equal(look().missing, 0);
 }
 
@@ -275,21 +306,20 @@ static void bus_load_is_that_of_the_worst_bits(void **state)
  * stuff bit, RTR IDE r0 3, DLC 4, data and CRC 79 with 1 + (79 - 2) / 4 = 20 stuff bits, end 13: 132 us. */
 static void a_tower_on_classic_can_is_known_by_its_silence(void **state)
 {
-	struct frame heartbeat, block;
+	struct frame block;
 	double before;
 
 	(void)state;
-	wire_pack_heartbeat(&heartbeat, WIRE_ID_HEARTBEAT_TOWER, &(struct wire_heartbeat){.nmt_state = 5});
 	for (unsigned i = 0; i <= 11; i++) {
 		assert_false(look().classic);
-		live_feed(live, &heartbeat, now_us);
+		assert_false(feed_heartbeat(5));
 		now_us += 100000;
 	}
 	assert_true(look().classic);
 	before = look().bus_load_percent;
 	hand_block(&drop, 1, 0, true, &block);
-	live_feed(live, &block, now_us);
-	live_feed(live, &heartbeat, now_us);
+	assert_false(live_feed(live, &block, now_us));
+	assert_false(feed_heartbeat(5));
 	now_us += 100000;
 	assert_true(fabs(look().bus_load_percent - before - 10 * 132 / 1e4) < 0.0001);
 	now_us += 1000000;
@@ -298,12 +328,9 @@ static void a_tower_on_classic_can_is_known_by_its_silence(void **state)
 
 static void the_heartbeat_grows_old(void **state)
 {
-	struct frame frame;
-
 	(void)state;
 	assert_true(isnan(look().heartbeat_age_s));
-	wire_pack_heartbeat(&frame, WIRE_ID_HEARTBEAT_TOWER, &(struct wire_heartbeat){.nmt_state = 5});
-	live_feed(live, &frame, now_us);
+	assert_false(feed_heartbeat(5));
 	now_us += 130000;
 	feed(1, 0);
 	assert_true(fabs(look().heartbeat_age_s - 0.13) < 1e-9);
@@ -321,6 +348,8 @@ int main(void)
 	        TEST(the_first_tick_may_be_half),
 	        TEST(a_slow_reader_gets_what_is_left),
 	        TEST(a_tower_that_starts_again_begins_anew),
+	        TEST(only_a_tick_far_behind_is_a_start),
+	        TEST(a_boot_up_heartbeat_is_a_start),
 	        TEST(bus_load_is_that_of_the_worst_bits),
 	        TEST(a_tower_on_classic_can_is_known_by_its_silence),
 	        TEST(the_heartbeat_grows_old),

@@ -41,6 +41,7 @@ static struct {
 	bool stop;
 	/* how it behaves */
 	bool dumb;      /* says nothing at all */
+	bool boots;     /* its next heartbeat is that of a tower that has just started */
 	unsigned deaf;  /* ops that are not answered, a bit each */
 	int8_t refusal; /* what ARM is answered with */
 	unsigned hole;  /* live blocks of S2 that are lost */
@@ -71,8 +72,10 @@ static void send_status(void)
 	wire_pack_status(&frame, WIRE_ID_STATUS,
 	                 &(struct wire_status){.state = fake.state, .fault = fake.fault, .drop_id = 1});
 	send(frame);
-	wire_pack_heartbeat(&frame, WIRE_ID_HEARTBEAT_TOWER,
-	                    &(struct wire_heartbeat){.nmt_state = 5, .wire_hash = wire_hash()});
+	wire_pack_heartbeat(
+	        &frame, WIRE_ID_HEARTBEAT_TOWER,
+	        &(struct wire_heartbeat){.nmt_state = fake.boots ? 0 : 5, .wire_hash = wire_hash()});
+	fake.boots = false;
 	send(frame);
 }
 
@@ -877,6 +880,27 @@ static void a_drop_survives_the_loss_of_the_link(void **state)
 	assert_int_equal(found.count, 2);
 }
 
+static void a_tower_that_starts_again_is_set_up_again(void **state)
+{
+	int64_t until_ms = session_now_ms() + WAIT_MS;
+	unsigned parameters = 0;
+
+	(void)state;
+	select_box();
+	pthread_mutex_lock(&fake.lock);
+	fake.parameters = 0;
+	fake.boots = true;
+	pthread_mutex_unlock(&fake.lock);
+	while (parameters < PARAMETERS && session_now_ms() < until_ms) {
+		nap();
+		pthread_mutex_lock(&fake.lock);
+		parameters = fake.parameters;
+		pthread_mutex_unlock(&fake.lock);
+	}
+	assert_int_equal(parameters, PARAMETERS);
+	wait_view(is_set_up);
+}
+
 static void the_end_aborts_what_is_armed(void **state)
 {
 	(void)state;
@@ -904,6 +928,7 @@ int main(void)
 	        cmocka_unit_test_setup_teardown(a_drop_from_before_waits_for_a_series, set_up_holding,
 	                                        tear_down),
 	        TEST(a_drop_survives_the_loss_of_the_link),
+	        TEST(a_tower_that_starts_again_is_set_up_again),
 	        TEST(the_end_aborts_what_is_armed),
 	};
 
