@@ -413,7 +413,7 @@ static void on_completed(void *user, struct MHD_Connection *connection, void **c
 
 /* ---- start and end ---- */
 
-static int make_address(const struct http_options *options, struct sockaddr_storage *address)
+static int make_address(const char *text, unsigned port, struct sockaddr_storage *address)
 {
 	union {
 		struct sockaddr_storage *stored;
@@ -422,17 +422,24 @@ static int make_address(const struct http_options *options, struct sockaddr_stor
 	} place = {.stored = address};
 
 	memset(address, 0, sizeof(*address));
-	if (inet_pton(AF_INET, options->address, &place.four->sin_addr) == 1) {
+	if (inet_pton(AF_INET, text, &place.four->sin_addr) == 1) {
 		place.four->sin_family = AF_INET;
-		place.four->sin_port = htons((uint16_t)options->port);
+		place.four->sin_port = htons((uint16_t)port);
 		return 0;
 	}
-	if (inet_pton(AF_INET6, options->address, &place.six->sin6_addr) == 1) {
+	if (inet_pton(AF_INET6, text, &place.six->sin6_addr) == 1) {
 		place.six->sin6_family = AF_INET6;
-		place.six->sin6_port = htons((uint16_t)options->port);
+		place.six->sin6_port = htons((uint16_t)port);
 		return 0;
 	}
 	return DT_E_ARGUMENT;
+}
+
+bool http_is_address(const char *text)
+{
+	struct sockaddr_storage address;
+
+	return make_address(text, 0, &address) == 0;
 }
 
 static struct MHD_Daemon *start_daemon(struct http *http, const struct sockaddr_storage *address)
@@ -452,13 +459,12 @@ struct http *http_start(struct console *console, const struct http_options *opti
                         char message[HTTP_MESSAGE_MAX])
 {
 	struct sockaddr_storage address;
-	struct http *http = calloc(1, sizeof(*http));
-	int why;
+	int why = make_address(options->address, options->port, &address);
+	struct http *http = why == 0 ? calloc(1, sizeof(*http)) : NULL;
 
-	if (http == NULL || make_address(options, &address) != 0) {
-		snprintf(message, HTTP_MESSAGE_MAX,
-		         "--bind %.100s: expected an address in numbers, like 127.0.0.1", options->address);
-		free(http);
+	if (http == NULL) {
+		snprintf(message, HTTP_MESSAGE_MAX, "%.100s: %s", options->address,
+		         error_text(why != 0 ? why : DT_E_MEMORY));
 		return NULL;
 	}
 	http->console = console;

@@ -16,7 +16,7 @@
 enum { HTTP_MESSAGE_MAX = 256, HTTP_CONNECTIONS = 256 };
 
 struct http_options {
-	const char *address; /* numeric, of either family */
+	const char *address; /* one of http_is_address */
 	unsigned port;       /* 0: any */
 	const char *token;
 	const struct page_part *parts;
@@ -24,6 +24,9 @@ struct http_options {
 };
 
 struct http;
+
+/* In numbers, of either family: a name may stand for more than one. */
+bool http_is_address(const char *text);
 
 /* NULL and one line in message. Tower and work must be there. */
 struct http *http_start(struct console *console, const struct http_options *options,

@@ -3,7 +3,6 @@
  * droptower-console: options, and the start and end of the threads. `droptower serve` becomes this
  * program, and its --help tells the options.
  */
-#include <arpa/inet.h>
 #include <errno.h>
 #include <getopt.h>
 #include <glob.h>
@@ -168,14 +167,6 @@ static bool is_link(const char *url)
 	       strncmp(url, "slcan:", 6) == 0;
 }
 
-/* In numbers, of either family: a name may stand for more than one. */
-static bool is_address(const char *text)
-{
-	struct in6_addr address;
-
-	return inet_pton(AF_INET, text, &address) == 1 || inet_pton(AF_INET6, text, &address) == 1;
-}
-
 static int parse(struct serve *serve, int argc, char **argv)
 {
 	int option, code = COMMAND_DONE;
@@ -194,7 +185,7 @@ static int parse(struct serve *serve, int argc, char **argv)
 	if (serve->tower.link != NULL && !is_link(serve->tower.link))
 		return command_usage("serve", "--link %.80s: expected unix:PATH, can:IF or slcan:DEV",
 		                     serve->tower.link);
-	if (!is_address(serve->http.address))
+	if (!http_is_address(serve->http.address))
 		return command_usage("serve", "--bind %.80s: expected an address in numbers, like 127.0.0.1",
 		                     serve->http.address);
 	serve->work.archive = archived_folder(serve->work.archive);
