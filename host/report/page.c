@@ -58,7 +58,20 @@ void page_with_sigma(FILE *out, int decimals, double value, double sigma)
 	}
 }
 
-/* "S1X" as "S1 X"; other names as they are. */
+void page_begin_compared(FILE *out, const struct report_row *row)
+{
+	fprintf(out, "<tr><td>%s%s%s</td><td>", row->label, row->unit[0] ? ", " : "", row->unit);
+	page_with_sigma(out, row->decimals, row->predicted * row->scale, row->rungs_apart * row->scale);
+	fputs("</td><td>", out);
+}
+
+void page_end_compared(FILE *out, const struct report_row *row)
+{
+	fprintf(out, "</td><td>%s", row->difference_percent > 0.0 ? "+" : "");
+	page_number(out, 1, row->difference_percent);
+	fputs(isfinite(row->difference_percent) ? " %</td></tr>\n" : "</td></tr>\n", out);
+}
+
 void page_channel_name(FILE *out, const char *name)
 {
 	if (strlen(name) == 3 && name[0] == 'S')

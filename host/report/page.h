@@ -26,6 +26,10 @@ void page_text_part(FILE *out, const char *text, size_t length);
 void page_number(FILE *out, int decimals, double value);
 void page_with_sigma(FILE *out, int decimals, double value, double sigma);
 
+/* A row of model against measured: up to the measured value's cell, which is open, and from its end on. */
+void page_begin_compared(FILE *out, const struct report_row *row);
+void page_end_compared(FILE *out, const struct report_row *row);
+
 /* "S1X" as "S1 X"; other names as they are. */
 void page_channel_name(FILE *out, const char *name);
 

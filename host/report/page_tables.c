@@ -134,16 +134,10 @@ static void model(struct page *page)
 	      "<th>difference</th></tr>\n",
 	      out);
 	for (size_t i = 0; i < count; i++) {
-		fprintf(out, "<tr><td>%s%s%s</td><td>", rows[i].label, rows[i].unit[0] ? ", " : "",
-		        rows[i].unit);
-		page_with_sigma(out, rows[i].decimals, rows[i].predicted * rows[i].scale,
-		                rows[i].rungs_apart * rows[i].scale);
-		fputs("</td><td>", out);
+		page_begin_compared(out, &rows[i]);
 		page_with_sigma(out, rows[i].decimals, rows[i].measured * rows[i].scale,
 		                rows[i].sigma * rows[i].scale);
-		fprintf(out, "</td><td>%s", rows[i].difference_percent > 0.0 ? "+" : "");
-		page_number(out, 1, rows[i].difference_percent);
-		fputs(isfinite(rows[i].difference_percent) ? " %</td></tr>\n" : "</td></tr>\n", out);
+		page_end_compared(out, &rows[i]);
 	}
 	fputs("</table></div>\n<p class=\"note\">Difference: model less measured, over measured. A dash: not "
 	      "known well enough to compare.",
