@@ -2,6 +2,7 @@
 #include "host/command/beside.h"
 
 #include <errno.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/types.h>
 #include <unistd.h>
@@ -21,4 +22,16 @@ int beside(const char *relative, char path[PATH_MAX])
 	}
 	memcpy(path + length, relative, size);
 	return 0;
+}
+
+int beside_scene(const char *name, char path[PATH_MAX])
+{
+	char relative[NAME_MAX];
+
+	if (access("common/scenes/geometry-2A.ini", R_OK) == 0) {
+		snprintf(path, PATH_MAX, "common/scenes/%s", name);
+		return 0;
+	}
+	snprintf(relative, sizeof(relative), "../share/droptower/scenes/%s", name);
+	return beside(relative, path);
 }

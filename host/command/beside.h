@@ -10,4 +10,8 @@
  * is something is not looked at. */
 int beside(const char *relative, char path[PATH_MAX]);
 
+/* A scene that comes along, or a pattern of them: in the sources' folder theirs, elsewhere those that were
+ * installed. As beside. */
+int beside_scene(const char *name, char path[PATH_MAX]);
+
 #endif

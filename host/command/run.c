@@ -7,8 +7,6 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
-#include <string.h>
-#include <unistd.h>
 
 #include "host/command/beside.h"
 #include "host/command/command.h"
@@ -64,16 +62,11 @@ static const struct option long_options[] = {
         {0},
 };
 
-/* In the sources' folder that one, elsewhere the one that was installed with this program. */
 static const char *default_scene(void)
 {
-	static const char in_sources[] = "common/scenes/geometry-2A.ini";
-	static char installed[PATH_MAX];
+	static char path[PATH_MAX];
 
-	if (access(in_sources, R_OK) == 0 ||
-	    beside("../share/droptower/scenes/geometry-2A.ini", installed) != 0)
-		return in_sources;
-	return installed;
+	return beside_scene("geometry-2A.ini", path) == 0 ? path : "geometry-2A.ini";
 }
 
 /* A series says what is dropped, and where the files go. */

@@ -193,16 +193,13 @@ static int parse(struct serve *serve, int argc, char **argv)
 	return COMMAND_DONE;
 }
 
-/* In the sources' folder those, elsewhere those that were installed with this program. */
 static int find_scenes(struct serve *serve)
 {
-	char installed[PATH_MAX];
+	char pattern[PATH_MAX];
 
 	if (serve->scene_count > 0)
 		return COMMAND_DONE;
-	if (glob("common/scenes/*.ini", 0, NULL, &serve->found) != 0 &&
-	    (beside("../share/droptower/scenes/*.ini", installed) != 0 ||
-	     glob(installed, 0, NULL, &serve->found) != 0)) {
+	if (beside_scene("*.ini", pattern) != 0 || glob(pattern, 0, NULL, &serve->found) != 0) {
 		command_error("no scenes came along; --scene FILE names them");
 		return COMMAND_INPUT;
 	}

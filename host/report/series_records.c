@@ -153,7 +153,6 @@ static void tell(FILE *out, struct remarks *remarks, size_t first, size_t counte
 		r->flag = 0;
 	}
 	fprintf(out, "</b> <span class=\"soft\">(%s)</span></li>\n",
-
 	        kind == OF_RECORD     ? record_flag_name(flag)
 	        : kind == OF_ESTIMATE ? estimate_flag_name(flag)
 	                              : estimate_status_name((enum estimate_status)flag));
