@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * droptower-console: options, and the start and end of the threads. `droptower serve` becomes this
- * program, and its --help tells the options.
+ * droptower-console: the start and end of the threads. `droptower serve` becomes this program.
  */
 #include <errno.h>
-#include <getopt.h>
-#include <glob.h>
 #include <gsl/gsl_errno.h>
+#include <limits.h>
 #include <semaphore.h>
 #include <signal.h>
 #include <stdio.h>
@@ -16,59 +14,21 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "host/command/archived.h"
-#include "host/command/beside.h"
 #include "host/command/command.h"
 #include "host/command/notify.h"
-#include "host/console/console.h"
 #include "host/console/guard.h"
-#include "host/console/http.h"
+#include "host/console/options.h"
 
 enum {
-	OPTION_LINK = 256,
-	OPTION_CONTROL,
-	OPTION_ARCHIVE,
-	OPTION_SERIES,
-	OPTION_OPERATOR,
-	OPTION_SCENE,
-	OPTION_BIND,
-	OPTION_PORT,
-	OPTION_TOKEN_FILE,
-	OPTION_BENCH,
-	PORT = 8731,
-	SCENES_MAX = 64,
-	BENCH_WORDS_MAX = 24,
 	TICK_MS = 40,      /* 25 Hz */
 	FILES_BESIDE = 64, /* descriptors that are no connection */
 	SELECT_AGAIN_MS = 1000,
 };
 
-static const struct option long_options[] = {
-        {"link", required_argument, NULL, OPTION_LINK},
-        {"control", required_argument, NULL, OPTION_CONTROL},
-        {"archive", required_argument, NULL, OPTION_ARCHIVE},
-        {"series", required_argument, NULL, OPTION_SERIES},
-        {"operator", required_argument, NULL, OPTION_OPERATOR},
-        {"scene", required_argument, NULL, OPTION_SCENE},
-        {"bind", required_argument, NULL, OPTION_BIND},
-        {"port", required_argument, NULL, OPTION_PORT},
-        {"token-file", required_argument, NULL, OPTION_TOKEN_FILE},
-        {"bench", required_argument, NULL, OPTION_BENCH},
-        {0},
-};
-
 struct serve {
 	struct console console;
-	struct tower_options tower;
-	struct work_options work;
-	struct http_options http;
-	const char *series, *token_file;
-	const char *scenes[SCENES_MAX + 1];
-	int scene_count;
-	const char *bench_words[BENCH_WORDS_MAX + 1];
-	int bench_word_count;
+	struct options options;
 	char token[GUARD_TOKEN_MAX + 1];
-	glob_t found;
 	struct http *server;
 	/* a question to the tower's thread, whose answer says that it is alive */
 	struct job ping;
@@ -104,119 +64,15 @@ static void catch_signals(void)
 	signal(SIGPIPE, SIG_IGN);
 }
 
-/* ---- options ---- */
-
-static int add_word(const char *option, const char **words, int *count, int max)
-{
-	if (*count == max)
-		return command_usage("serve", "more than %d %s", max, option);
-	words[(*count)++] = optarg;
-	return COMMAND_DONE;
-}
-
-static int take_port(struct serve *serve)
-{
-	double port;
-	int code = command_number("serve", "port", optarg, 0, 65535, &port);
-
-	if (code == COMMAND_DONE)
-		serve->http.port = (unsigned)port;
-	return code;
-}
-
-static int take_option(struct serve *serve, int option, char **argv)
-{
-	switch (option) {
-	case OPTION_LINK:
-		serve->tower.link = optarg;
-		return COMMAND_DONE;
-	case OPTION_CONTROL:
-		serve->tower.control = optarg;
-		return COMMAND_DONE;
-	case OPTION_ARCHIVE:
-		serve->work.archive = optarg;
-		return COMMAND_DONE;
-	case OPTION_SERIES:
-		serve->series = optarg;
-		return COMMAND_DONE;
-	case OPTION_OPERATOR:
-		serve->work.operator_name = optarg;
-		return COMMAND_DONE;
-	case OPTION_BIND:
-		serve->http.address = optarg;
-		return COMMAND_DONE;
-	case OPTION_TOKEN_FILE:
-		serve->token_file = optarg;
-		return COMMAND_DONE;
-	case OPTION_PORT:
-		return take_port(serve);
-	case OPTION_SCENE:
-		return add_word("--scene", serve->scenes, &serve->scene_count, SCENES_MAX);
-	case OPTION_BENCH:
-		return add_word("--bench", serve->bench_words, &serve->bench_word_count, BENCH_WORDS_MAX);
-	default:
-		return command_usage("serve", "option '%s' is not known or lacks its value",
-		                     argv[optind - 1]);
-	}
-}
-
-/* One that is not there yet is waited for; one that can never be is not. */
-static bool is_link(const char *url)
-{
-	return strncmp(url, "unix:", 5) == 0 || strncmp(url, "can:", 4) == 0 ||
-	       strncmp(url, "slcan:", 6) == 0;
-}
-
-static int parse(struct serve *serve, int argc, char **argv)
-{
-	int option, code = COMMAND_DONE;
-
-	opterr = 0;
-	while (code == COMMAND_DONE && (option = getopt_long(argc, argv, "", long_options, NULL)) != -1)
-		code = take_option(serve, option, argv);
-	if (code != COMMAND_DONE)
-		return code;
-	if (optind != argc)
-		return command_usage("serve", "'%s' is too much", argv[optind]);
-	if (serve->tower.link != NULL && serve->bench_word_count > 0)
-		return command_usage("serve", "--bench is for the simulated tower, --link for another one");
-	if (serve->tower.link == NULL && serve->tower.control != NULL)
-		return command_usage("serve", "--control goes with --link");
-	if (serve->tower.link != NULL && !is_link(serve->tower.link))
-		return command_usage("serve", "--link %.80s: expected unix:PATH, can:IF or slcan:DEV",
-		                     serve->tower.link);
-	if (!http_is_address(serve->http.address))
-		return command_usage("serve", "--bind %.80s: expected an address in numbers, like 127.0.0.1",
-		                     serve->http.address);
-	serve->work.archive = archived_folder(serve->work.archive);
-	serve->work.operator_name = archived_operator(serve->work.operator_name);
-	return COMMAND_DONE;
-}
-
-static int find_scenes(struct serve *serve)
-{
-	char pattern[PATH_MAX];
-
-	if (serve->scene_count > 0)
-		return COMMAND_DONE;
-	if (beside_scene("*.ini", pattern) != 0 || glob(pattern, 0, NULL, &serve->found) != 0) {
-		command_error("no scenes came along; --scene FILE names them");
-		return COMMAND_INPUT;
-	}
-	for (size_t i = 0; i < serve->found.gl_pathc && serve->scene_count < SCENES_MAX; i++)
-		serve->scenes[serve->scene_count++] = serve->found.gl_pathv[i];
-	return COMMAND_DONE;
-}
-
 static int make_token(struct serve *serve)
 {
 	char message[GUARD_MESSAGE_MAX];
 
-	if (serve->token_file == NULL) {
+	if (serve->options.token_file == NULL) {
 		guard_make_token(serve->token);
 		return COMMAND_DONE;
 	}
-	if (guard_read_token(serve->token_file, serve->token, message) == 0)
+	if (guard_read_token(serve->options.token_file, serve->token, message) == 0)
 		return COMMAND_DONE;
 	command_error("%s", message);
 	return COMMAND_INPUT;
@@ -244,12 +100,11 @@ static int start_work(struct serve *serve)
 	job_queue_init(&console->tower_queue);
 	job_queue_init(&console->work_queue);
 	console->live = live_create();
-	serve->work.scenes = serve->scenes;
 	if (console->live == NULL) {
 		command_error("no memory");
 		return COMMAND_INPUT;
 	}
-	console->work = work_start(console, &serve->work, message);
+	console->work = work_start(console, &serve->options.work, message);
 	if (console->work != NULL)
 		return COMMAND_DONE;
 	command_error("%s", message);
@@ -260,9 +115,7 @@ static int start_tower(struct serve *serve)
 {
 	char message[SESSION_MESSAGE_MAX];
 
-	serve->tower.bench_words = serve->bench_words;
-	serve->tower.scene = serve->scenes[0];
-	serve->console.tower = tower_start(&serve->console, &serve->tower, message);
+	serve->console.tower = tower_start(&serve->console, &serve->options.tower, message);
 	if (serve->console.tower != NULL)
 		return COMMAND_DONE;
 	command_error("%s", message);
@@ -273,14 +126,14 @@ static int start_http(struct serve *serve)
 {
 	char message[HTTP_MESSAGE_MAX];
 
-	serve->http.token = serve->token;
-	serve->http.parts = page_parts;
-	serve->http.part_count = page_part_count;
+	serve->options.http.token = serve->token;
+	serve->options.http.parts = page_parts;
+	serve->options.http.part_count = page_part_count;
 	/* The threads from here on step back behind the tower's: a page can wait. */
 	errno = 0;
 	if (nice(5) == -1 && errno != 0)
 		command_error("nice: %s", strerror(errno));
-	serve->server = http_start(&serve->console, &serve->http, message);
+	serve->server = http_start(&serve->console, &serve->options.http, message);
 	if (serve->server != NULL)
 		return COMMAND_DONE;
 	command_error("%s", message);
@@ -317,7 +170,7 @@ static void tell_refused(const struct serve *serve)
 	cJSON *answer = cJSON_ParseWithLength(serve->select.answer, serve->select.size);
 	const char *why = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(answer, "error"));
 
-	command_error("--series %s: %s", serve->series, why != NULL ? why : "no answer");
+	command_error("--series %s: %s", serve->options.series, why != NULL ? why : "no answer");
 	cJSON_Delete(answer);
 }
 
@@ -326,10 +179,10 @@ static int select_series(struct serve *serve)
 {
 	int status;
 
-	if (serve->series == NULL)
+	if (serve->options.series == NULL)
 		return COMMAND_DONE;
 	serve->select_body = cJSON_CreateObject();
-	cJSON_AddStringToObject(serve->select_body, "series", serve->series);
+	cJSON_AddStringToObject(serve->select_body, "series", serve->options.series);
 	ask_select(serve);
 	while (sem_wait(&serve->selected) != 0)
 		continue;
@@ -373,14 +226,14 @@ static void tell_what_to_do(const struct serve *serve)
 	fprintf(stderr,
 	        "\nThe technician's page is ready%s. Open this address in a browser; Ctrl-C ends it.\n"
 	        "Drops are kept in %s\n\n",
-	        serve->tower.link == NULL ? ", with a simulated tower" : "",
-	        realpath(serve->work.archive, folder) != NULL ? folder : serve->work.archive);
+	        serve->options.tower.link == NULL ? ", with a simulated tower" : "",
+	        realpath(serve->options.work.archive, folder) != NULL ? folder : serve->options.work.archive);
 }
 
 /* The token stands behind #, which a browser sends to nobody. */
 static void tell_address(const struct serve *serve)
 {
-	const char *address = serve->http.address;
+	const char *address = serve->options.http.address;
 	bool six = strchr(address, ':') != NULL;
 
 	if (!loopback(address))
@@ -480,19 +333,17 @@ static void stop(struct serve *serve)
 		job_queue_destroy(&console->tower_queue);
 	}
 	cJSON_Delete(serve->select_body);
-	globfree(&serve->found);
+	options_free(&serve->options);
 }
 
 int main(int argc, char **argv)
 {
-	static struct serve serve = {.http = {.address = "127.0.0.1", .port = PORT}};
-	int code = parse(&serve, argc, argv);
+	static struct serve serve;
+	int code = options_read(&serve.options, argc, argv);
 
 	gsl_set_error_handler_off();
 	sem_init(&serve.pong, 0, 0);
 	sem_init(&serve.selected, 0, 0);
-	if (code == COMMAND_DONE)
-		code = find_scenes(&serve);
 	if (code == COMMAND_DONE)
 		code = make_token(&serve);
 	if (code != COMMAND_DONE)
