@@ -2,8 +2,8 @@
 #ifndef DT_HOST_CONSOLE_HTTP_PRIVATE_H
 #define DT_HOST_CONSOLE_HTTP_PRIVATE_H
 /*
- * What http and visit share. A visit is a connection that has not shown the token: visit.c keeps them few and
- * short.
+ * What the files of the web server share: http.c has its start and end, request.c what is asked for, visit.c
+ * the connections that have not shown the token, which it keeps few and short.
  */
 #include <microhttpd.h>
 #include <pthread.h>
@@ -37,6 +37,15 @@ struct http {
 	struct visit *oldest, *newest;
 	unsigned visits;
 };
+
+/* A piece of a request comes; MHD_AccessHandlerCallback. */
+enum MHD_Result http_request(void *user, struct MHD_Connection *connection, const char *url,
+                             const char *method, const char *version, const char *upload, size_t *upload_size,
+                             void **context);
+
+/* Its answer is out, or its connection gone; MHD_RequestCompletedCallback. */
+void http_completed(void *user, struct MHD_Connection *connection, void **context,
+                    enum MHD_RequestTerminationCode code);
 
 /* A connection comes or goes; MHD_NotifyConnectionCallback. */
 void http_visit(void *user, struct MHD_Connection *connection, void **context,

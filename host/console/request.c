@@ -1,0 +1,405 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * A request, from its first line to its answer: who asks, for which job, with what body.
+ */
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+
+#include "host/console/http_private.h"
+#include "host/console/route.h"
+
+enum {
+	BODY_MAX = 16 * 1024,
+	SWALLOW_MAX = 1024 * 1024, /* of a body that is too large, so that its sender hears why */
+	TEXT_MAX = 128,
+};
+
+/* A request, from its first line to its answer. */
+struct request {
+	struct job job; /* its maker is the request */
+	struct http *http;
+	struct MHD_Connection *connection;
+	const struct route *route;
+	char console[HOLD_CONSOLE_MAX + 1];
+	cJSON *tree;
+	size_t announced; /* of its body, so far */
+	bool asked;       /* the job was given away */
+	char body[BODY_MAX + 1];
+};
+
+static const char *header(struct MHD_Connection *connection, const char *name)
+{
+	return MHD_lookup_connection_value(connection, MHD_HEADER_KIND, name);
+}
+
+/* ---- answers ---- */
+
+static void add_headers(struct MHD_Response *response, const char *type, bool page)
+{
+	static const char *const always[][2] = {
+	        {"X-Content-Type-Options", "nosniff"},
+	        {"X-Frame-Options", "DENY"},
+	        {"Referrer-Policy", "no-referrer"},
+	        {"Cross-Origin-Opener-Policy", "same-origin"},
+	        {"Cross-Origin-Resource-Policy", "same-origin"},
+	        {"Permissions-Policy", "camera=(), microphone=(), geolocation=(), usb=(), serial=()"},
+	};
+
+	for (size_t i = 0; i < sizeof(always) / sizeof(always[0]); i++)
+		MHD_add_response_header(response, always[i][0], always[i][1]);
+	if (type != NULL)
+		MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, type);
+	/* no script or style but the page's own files, no frame around it, nothing sent elsewhere; what else
+	 * is answered is no page at all */
+	MHD_add_response_header(
+	        response, "Content-Security-Policy",
+	        page ? "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src "
+	               "'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors "
+	               "'none'"
+	             : "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
+	               "sandbox");
+	MHD_add_response_header(response, MHD_HTTP_HEADER_CACHE_CONTROL, page ? "no-cache" : "no-store");
+}
+
+static enum MHD_Result send_and_forget(struct MHD_Connection *connection, unsigned status,
+                                       struct MHD_Response *response)
+{
+	enum MHD_Result result = MHD_queue_response(connection, status, response);
+
+	MHD_destroy_response(response);
+	return result;
+}
+
+/* An answer that needs no job. extra: a header, or NULL. */
+static enum MHD_Result refuse(struct MHD_Connection *connection, unsigned status, const char *text,
+                              const char *extra, const char *value)
+{
+	char body[TEXT_MAX + 16];
+	int size = snprintf(body, sizeof(body), "{\"error\":\"%.*s\"}", TEXT_MAX, text);
+	struct MHD_Response *response =
+	        MHD_create_response_from_buffer((size_t)size, body, MHD_RESPMEM_MUST_COPY);
+
+	if (response == NULL)
+		return MHD_NO;
+	add_headers(response, "application/json", false);
+	if (extra != NULL)
+		MHD_add_response_header(response, extra, value);
+	return send_and_forget(connection, status, response);
+}
+
+static enum MHD_Result answer(struct request *request)
+{
+	struct job *job = &request->job;
+	struct MHD_Response *response = MHD_create_response_from_buffer(job->answer != NULL ? job->size : 0,
+	                                                                job->answer, MHD_RESPMEM_MUST_FREE);
+
+	if (response == NULL)
+		return MHD_NO;
+	job->answer = NULL; /* the response's */
+	add_headers(response, job->type, false);
+	return send_and_forget(request->connection, (unsigned)job->status, response);
+}
+
+/* ---- the page ---- */
+
+static enum MHD_Result send_part(struct http *http, struct MHD_Connection *connection, const char *method,
+                                 const char *path)
+{
+	const char *name = path[0] == '\0' ? "index.html" : path;
+
+	for (size_t i = 0; i < http->part_count; i++) {
+		const struct page_part *part = &http->parts[i];
+		struct MHD_Response *response;
+		union { /* only read */
+			const unsigned char *given;
+			void *taken;
+		} bytes = {.given = part->bytes};
+
+		if (strcmp(part->name, name) != 0)
+			continue;
+		if (strcmp(method, "GET") != 0 && strcmp(method, "HEAD") != 0)
+			return refuse(connection, 405, "expected GET", MHD_HTTP_HEADER_ALLOW, "GET, HEAD");
+		response = MHD_create_response_from_buffer(part->size, bytes.taken, MHD_RESPMEM_PERSISTENT);
+		if (response == NULL)
+			return MHD_NO;
+		add_headers(response, part->type, true);
+		return send_and_forget(connection, 200, response);
+	}
+	return refuse(connection, 404, "no such page", NULL, NULL);
+}
+
+/* ---- jobs ---- */
+
+static const char *query(const struct job *job, const char *name)
+{
+	const struct request *request = job->maker;
+
+	return MHD_lookup_connection_value(request->connection, MHD_GET_ARGUMENT_KIND, name);
+}
+
+static bool count_job(struct http *http)
+{
+	bool open;
+
+	pthread_mutex_lock(&http->jobs_lock);
+	open = !http->closing;
+	if (open)
+		http->jobs++;
+	pthread_mutex_unlock(&http->jobs_lock);
+	return open;
+}
+
+/* On any thread. */
+static void wake(struct job *job)
+{
+	struct request *request = job->maker;
+	struct http *http = request->http;
+
+	MHD_resume_connection(request->connection); /* from here on the request is http's again */
+	pthread_mutex_lock(&http->jobs_lock);
+	http->jobs--;
+	pthread_mutex_unlock(&http->jobs_lock);
+}
+
+static void run_hold(struct request *request)
+{
+	struct job *job = &request->job;
+	struct hold *hold = &request->http->hold;
+	const cJSON *take = cJSON_GetObjectItemCaseSensitive(job->body, "take");
+	int64_t now_ms = session_now_ms();
+	cJSON *tree;
+
+	if (!cJSON_IsBool(take) || request->console[0] == '\0') {
+		job_refuse(job, 400, "expected \"take\": true or false, and X-Console");
+		return;
+	}
+	if (!cJSON_IsTrue(take)) {
+		hold_give(hold, request->console);
+	} else if (!hold_take(hold, request->console, now_ms)) {
+		job_refuse(job, 409, "another console holds the arm");
+		return;
+	}
+	tree = cJSON_CreateObject();
+	cJSON_AddBoolToObject(tree, "mine", hold_mine(hold, request->console, now_ms));
+	job_answer_json(job, tree);
+}
+
+static enum MHD_Result open_stream(struct request *request)
+{
+	struct MHD_Response *response =
+	        stream_open(request->http->streams, request->connection, request->console);
+
+	if (response == NULL)
+		return refuse(request->connection, 503, "too many pages watch already",
+		              MHD_HTTP_HEADER_RETRY_AFTER, "5");
+	add_headers(response, "text/event-stream", false);
+	return send_and_forget(request->connection, 200, response);
+}
+
+static bool parse_body(struct request *request)
+{
+	bool post = strcmp(request->route->method, "POST") == 0;
+
+	if (post) {
+		request->body[request->announced] = '\0';
+		request->tree = strlen(request->body) == request->announced
+		                        ? cJSON_ParseWithOpts(request->body, NULL, true)
+		                        : NULL;
+	}
+	if (request->route->always && !cJSON_IsObject(request->tree)) {
+		cJSON_Delete(request->tree);
+		request->tree = cJSON_CreateObject();
+	}
+	request->job.body = request->tree;
+	return !post || cJSON_IsObject(request->tree);
+}
+
+/* The job goes its way, and the connection sleeps until it is done. */
+static enum MHD_Result give_away(struct request *request)
+{
+	struct http *http = request->http;
+	struct job *job = &request->job;
+
+	if (!count_job(http))
+		return refuse(request->connection, 503, "the console is ending", NULL, NULL);
+	request->asked = true;
+	MHD_suspend_connection(request->connection); /* first: the job may be done at once */
+	job->run = request->route->run;
+	if (request->route->kind == ROUTE_TOWER) {
+		job->run(job);
+	} else if (job_put(&http->console->work_queue, job) != 0) {
+		job_refuse(job, 503, "too much is asked for at once");
+		job_done(job);
+	}
+	return MHD_YES;
+}
+
+/* The request is whole. */
+static enum MHD_Result begin(struct request *request)
+{
+	struct http *http = request->http;
+
+	if (request->announced > BODY_MAX && !request->route->always)
+		return refuse(request->connection, 413, "expected at most 16 KiB", NULL, NULL);
+	if (request->announced > BODY_MAX)
+		request->announced = 0;
+	if (!parse_body(request))
+		return refuse(request->connection, 400, "expected a JSON object", NULL, NULL);
+	if (request->route->needs_hold && !hold_mine(&http->hold, request->console, session_now_ms()))
+		return refuse(request->connection, 423, "this console does not hold the arm", NULL, NULL);
+	if (request->route->kind == ROUTE_STREAM)
+		return open_stream(request);
+	if (request->route->kind == ROUTE_HOLD) {
+		run_hold(request);
+		return answer(request);
+	}
+	return give_away(request);
+}
+
+static void take_body(struct request *request, const char *bytes, size_t size)
+{
+	size_t room = request->announced < BODY_MAX ? BODY_MAX - request->announced : 0;
+
+	memcpy(request->body + (BODY_MAX - room), bytes, size < room ? size : room);
+	request->announced += size;
+}
+
+/* ---- who asks ---- */
+
+static bool too_large(struct MHD_Connection *connection)
+{
+	const char *length = header(connection, MHD_HTTP_HEADER_CONTENT_LENGTH);
+
+	return length != NULL && strtoull(length, NULL, 10) > SWALLOW_MAX;
+}
+
+static enum MHD_Result check_token(struct http *http, struct MHD_Connection *connection, bool *passed)
+{
+	*passed = guard_token_agrees(http->token, header(connection, MHD_HTTP_HEADER_AUTHORIZATION));
+	if (*passed) {
+		http_prove(http, connection);
+		return MHD_YES;
+	}
+	if (!guard_take(&http->wrong, session_now_ms()))
+		return refuse(connection, 429, "too many requests without the token",
+		              MHD_HTTP_HEADER_RETRY_AFTER, "2");
+	return refuse(connection, 401, "expected the token that the console printed when it started",
+	              MHD_HTTP_HEADER_WWW_AUTHENTICATE, "Bearer realm=\"droptower\"");
+}
+
+static struct request *new_request(struct http *http, struct MHD_Connection *connection,
+                                   const struct route *route, const char *rest, const char *console)
+{
+	struct request *request = malloc(sizeof(*request));
+
+	if (request == NULL)
+		return NULL;
+	memset(request, 0, offsetof(struct request, body));
+	request->http = http;
+	request->connection = connection;
+	request->route = route;
+	snprintf(request->console, sizeof(request->console), "%s", console != NULL ? console : "");
+	request->job.console = http->console;
+	request->job.maker = request;
+	request->job.done = wake;
+	request->job.query = query;
+	request->job.path = rest;
+	return request;
+}
+
+static const char *allowed(const char *path)
+{
+	const char *rest;
+	bool other;
+
+	if (route_find("GET", path, &rest, &other) == NULL)
+		return "POST";
+	return route_find("POST", path, &rest, &other) != NULL ? "GET, POST" : "GET";
+}
+
+/* What is behind /api/, for who has the token. */
+static enum MHD_Result open_request(struct http *http, struct MHD_Connection *connection, const char *method,
+                                    const char *path, void **context)
+{
+	const char *console = header(connection, "X-Console"), *rest;
+	bool other_method;
+	const struct route *route = route_find(method, path, &rest, &other_method);
+
+	if (route == NULL && other_method)
+		return refuse(connection, 405, "another method is expected here", MHD_HTTP_HEADER_ALLOW,
+		              allowed(path));
+	if (route == NULL)
+		return refuse(connection, 404, "no such request, or no such name", NULL, NULL);
+	if (!route->always && !guard_take(&http->asked, session_now_ms()))
+		return refuse(connection, 429, "too many requests", MHD_HTTP_HEADER_RETRY_AFTER, "1");
+	if (console != NULL && !guard_console_valid(console) && !route->always)
+		return refuse(connection, 400, "X-Console: expected 16 to 64 letters and digits", NULL, NULL);
+	if (too_large(connection))
+		return refuse(connection, 413, "expected at most 16 KiB", NULL, NULL);
+	*context = new_request(http, connection, route, rest, console);
+	return *context != NULL ? MHD_YES : MHD_NO;
+}
+
+/* The first line and the headers are there. */
+static enum MHD_Result look_at(struct http *http, struct MHD_Connection *connection, const char *method,
+                               const char *url, void **context)
+{
+	const char *host = header(connection, MHD_HTTP_HEADER_HOST);
+	const union MHD_ConnectionInfo *info =
+	        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+	struct sockaddr_storage local = {0};
+	socklen_t size = sizeof(local);
+	enum MHD_Result result;
+	bool passed;
+	union {
+		struct sockaddr_storage *stored;
+		struct sockaddr *any;
+	} address = {.stored = &local};
+
+	if (info == NULL || getsockname(info->connect_fd, address.any, &size) != 0 ||
+	    !guard_host_agrees(host, address.any))
+		return refuse(connection, 403, "Host is not this console's", NULL, NULL);
+	if (!guard_origin_agrees(header(connection, MHD_HTTP_HEADER_ORIGIN), host))
+		return refuse(connection, 403, "Origin is not this console's", NULL, NULL);
+	if (strncmp(url, "/api/", 5) != 0)
+		return send_part(http, connection, method, url[0] == '/' ? url + 1 : url);
+	result = check_token(http, connection, &passed);
+	return passed ? open_request(http, connection, method, url + 5, context) : result;
+}
+
+enum MHD_Result http_request(void *user, struct MHD_Connection *connection, const char *url,
+                             const char *method, const char *version, const char *upload, size_t *upload_size,
+                             void **context)
+{
+	struct request *request = *context;
+
+	(void)version;
+	if (request == NULL)
+		return look_at(user, connection, method, url, context);
+	if (request->asked)
+		return answer(request);
+	if (*upload_size == 0)
+		return begin(request);
+	take_body(request, upload, *upload_size);
+	*upload_size = 0;
+	return request->announced <= SWALLOW_MAX ? MHD_YES : MHD_NO;
+}
+
+void http_completed(void *user, struct MHD_Connection *connection, void **context,
+                    enum MHD_RequestTerminationCode code)
+{
+	struct request *request = *context;
+
+	(void)user;
+	(void)connection;
+	(void)code;
+	if (request == NULL)
+		return;
+	cJSON_Delete(request->tree);
+	free(request->job.answer);
+	free(request);
+	*context = NULL;
+}
