@@ -1,17 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include <errno.h>
+/*
+ * `droptower model`: its options.
+ */
 #include <getopt.h>
 #include <math.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
-#include "host/record/whole.h"
-#include "host/report/forecast.h"
+#include "host/command/model_private.h"
 
 static const char help[] =
         "usage: droptower model --scene FILE [OPTIONS]\n"
@@ -75,19 +74,7 @@ static const struct option long_options[] = {
         {0},
 };
 
-#define HISTORY_BEFORE_S 0.002
-enum { TIMINGS = 5, LIST_MAX = 256, HISTORY_MAX = 10000000 };
-
-struct arguments {
-	const char *scene_file, *history;
-	const char *of_history; /* an option that says something of it */
-	double angle_deg, step_us, span_ms, draws, seed;
-	struct ensemble ensemble; /* scene is set once it is read */
-	const char *vary;
-	bool json, sensitivity, help;
-};
-
-/* ---- options ---- */
+enum { LIST_MAX = 256, HISTORY_MAX = 10000000 };
 
 /* The next word of a list with commas, from *list on; false at its end. */
 static bool next_word(const char **list, char word[LIST_MAX])
@@ -213,7 +200,7 @@ static int parse_vary(struct ensemble *ensemble, const char *list)
 	return code;
 }
 
-static int parse_number(struct arguments *a, int option, const char *text)
+static int parse_number(struct model_arguments *a, int option, const char *text)
 {
 	double percent;
 	int code;
@@ -239,7 +226,7 @@ static int parse_number(struct arguments *a, int option, const char *text)
 	}
 }
 
-static int parse_one(struct arguments *a, int option, const char *unknown)
+static int parse_one(struct model_arguments *a, int option, const char *unknown)
 {
 	switch (option) {
 	case OPTION_SCENE:
@@ -285,7 +272,7 @@ static int parse_one(struct arguments *a, int option, const char *unknown)
 }
 
 /* What does not go together. */
-static int check(const struct arguments *a, int rest)
+static int check(const struct model_arguments *a, int rest)
 {
 	int tasks = (a->ensemble.axes > 0) + (a->draws > 0) + a->sensitivity + (a->history != NULL);
 
@@ -312,7 +299,7 @@ static int check(const struct arguments *a, int rest)
 	return COMMAND_DONE;
 }
 
-static int parse(struct arguments *a, int argc, char **argv)
+static int parse(struct model_arguments *a, int argc, char **argv)
 {
 	int option, code = COMMAND_DONE;
 
@@ -327,153 +314,9 @@ static int parse(struct arguments *a, int argc, char **argv)
 	return code == COMMAND_DONE ? check(a, argc - optind) : code;
 }
 
-/* ---- work ---- */
-
-static int not_written(void)
-{
-	command_error("standard output: %s", strerror(errno));
-	return COMMAND_INPUT;
-}
-
-static int no_drop(const struct arguments *a, const char *message)
-{
-	command_error("%s: %s", a->scene_file, message);
-	return COMMAND_INPUT;
-}
-
-static double seconds(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-/* The best of a few, in us. */
-static double cost_of(const struct ensemble *e)
-{
-	double best = INFINITY;
-
-	for (int i = 0; i < TIMINGS; i++) {
-		struct model_prediction p;
-		double start = seconds();
-
-		if (model_solve(e->scene, e->fidelity, &e->options, &p, NULL) == 0)
-			best = fmin(best, 1e6 * (seconds() - start));
-	}
-	return best;
-}
-
-/* The rung above the one taken, with what that one takes of itself; false: there is none. */
-static bool solve_next(const struct ensemble *e, enum model_fidelity rung, struct model_prediction *next)
-{
-	struct model_options options = e->options;
-
-	if (rung == MODEL_PLANAR || rung < MODEL_STEADY)
-		return false;
-	if (rung == MODEL_SDOF && e->fidelity == MODEL_AUTO)
-		options.refinements = MODEL_STIFFNESS | MODEL_WEDGE;
-	return model_solve(e->scene, rung + 1, &options, next, NULL) == 0;
-}
-
-static int one(const struct arguments *a)
-{
-	const struct ensemble *e = &a->ensemble;
-	char message[MODEL_MESSAGE_MAX];
-	struct model_prediction prediction, next;
-	struct forecast forecast = {
-	        .scene = e->scene, .asked = e->options.asked, .prediction = &prediction, .next = &next};
-
-	if (model_solve(e->scene, e->fidelity, &e->options, &prediction, message) != 0)
-		return no_drop(a, message);
-	if (!solve_next(e, prediction.rung, &next))
-		forecast.next = NULL;
-	forecast.cost_us = cost_of(e);
-	return (a->json ? forecast_json(&forecast, stdout) : forecast_text(&forecast, stdout)) == 0
-	               ? COMMAND_DONE
-	               : not_written();
-}
-
-static int write_history(FILE *out, double (*value)[MODEL_AXES], size_t count, double step_s)
-{
-	fputs("time_s,S1X_g,S1Y_g,S2X_g,S2Y_g\n", out);
-	for (size_t k = 0; k < count; k++) {
-		fprintf(out, "%.9g", -HISTORY_BEFORE_S + (double)k * step_s);
-		for (int axis = 0; axis < MODEL_AXES; axis++)
-			if (isnan(value[k][axis]))
-				fputs(",", out);
-			else
-				fprintf(out, ",%.9g", value[k][axis]);
-		fputc('\n', out);
-	}
-	return ferror(out) ? DT_E_SYSTEM : 0;
-}
-
-static int history(const struct arguments *a)
-{
-	const struct ensemble *e = &a->ensemble;
-	char message[512];
-	double step_s = a->step_us * 1e-6;
-	size_t count = (size_t)((a->span_ms * 1e-3 + HISTORY_BEFORE_S) / step_s + 1e-9) + 1;
-	double(*value)[MODEL_AXES] = malloc(count * sizeof(*value));
-	struct model_prediction taken;
-	struct whole whole;
-	int result = value ? model_solve(e->scene, e->fidelity, &e->options, &taken, message) : DT_E_MEMORY;
-
-	if (result == 0)
-		result = model_histories(e->scene, taken.rung, &e->options, -HISTORY_BEFORE_S, step_s, value,
-		                         count, message);
-	if (result == DT_E_MEMORY)
-		snprintf(message, sizeof(message), "%s", error_text(result));
-	if (result != 0) {
-		free(value);
-		return no_drop(a, message);
-	}
-	result = whole_open(&whole, a->history, message, sizeof(message));
-	if (result == 0)
-		result = whole_close(&whole, write_history(whole.out, value, count, step_s), message,
-		                     sizeof(message));
-	free(value);
-	if (result == 0)
-		return COMMAND_DONE;
-	command_error("%s", message);
-	return COMMAND_INPUT;
-}
-
-/* Many predictions: what could not be is told, and is a failure when nothing is left. */
-static int many(const struct arguments *a)
-{
-	const struct ensemble *e = &a->ensemble;
-	size_t failed = 0, points = a->draws > 0 ? (size_t)a->draws : ensemble_points(e);
-	int result = a->draws > 0 ? forecast_monte_carlo(e, points, a->json, stdout, &failed)
-	                          : forecast_sweep(e, a->json, stdout, &failed);
-
-	if (result != 0 && result != DT_E_EMPTY) {
-		command_error("standard output: %s", error_text(result));
-		return COMMAND_INPUT;
-	}
-	if (failed > 0)
-		command_error("%s: %zu of %zu scenes make no drop", a->scene_file, failed, points);
-	return result == DT_E_EMPTY || failed == points ? COMMAND_INPUT : COMMAND_DONE;
-}
-
-static int sensitivity(const struct arguments *a)
-{
-	struct ensemble at = a->ensemble; /* one rung for all, so that no change of rungs shows */
-	char message[MODEL_MESSAGE_MAX];
-	struct model_prediction p;
-
-	if (model_solve(at.scene, at.fidelity, &at.options, &p, message) != 0)
-		return no_drop(a, message);
-	if (at.fidelity == MODEL_AUTO)
-		at.options.refinements = p.rung == MODEL_PLANAR ? (unsigned)MODEL_OF_RUNG : p.refinements;
-	at.fidelity = p.rung;
-	return forecast_sensitivity(&at, a->json, stdout) == 0 ? COMMAND_DONE : not_written();
-}
-
 int command_model(int argc, char **argv)
 {
-	struct arguments a = {.angle_deg = NAN, .step_us = 10, .span_ms = 12, .seed = NAN};
+	struct model_arguments a = {.angle_deg = NAN, .step_us = 10, .span_ms = 12, .seed = NAN};
 	struct scene scene;
 	int code;
 
@@ -493,11 +336,5 @@ int command_model(int argc, char **argv)
 	a.ensemble.seed = isnan(a.seed) ? 1 : (unsigned long)a.seed;
 	if (a.vary)
 		code = parse_vary(&a.ensemble, a.vary);
-	if (code != COMMAND_DONE)
-		return code;
-	if (a.ensemble.axes > 0)
-		return many(&a);
-	if (a.sensitivity)
-		return sensitivity(&a);
-	return a.history ? history(&a) : one(&a);
+	return code == COMMAND_DONE ? model_answer(&a) : code;
 }

@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_COMMAND_MODEL_PRIVATE_H
+#define DT_HOST_COMMAND_MODEL_PRIVATE_H
+/*
+ * What the files of `droptower model` share: model.c has the options, model_answer.c what is done with them.
+ */
+#include <stdbool.h>
+
+#include "host/model/ensemble.h"
+
+struct model_arguments {
+	const char *scene_file, *history;
+	const char *of_history; /* an option that says something of it */
+	double angle_deg, step_us, span_ms, draws, seed;
+	struct ensemble ensemble; /* scene is set once it is read */
+	const char *vary;
+	bool json, sensitivity, help;
+};
+
+/* Prints what was asked for. A COMMAND_* exit code; what is wrong was printed. */
+int model_answer(const struct model_arguments *arguments);
+
+#endif
