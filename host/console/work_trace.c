@@ -46,15 +46,26 @@ static bool open_drop(struct job *job, struct drop *drop)
 	return false;
 }
 
-static bool evaluate_drop(struct job *job, struct drop *drop, struct evaluated *e)
+/* With what answer makes of the drop's analysis. */
+static void answer_drop(struct job *job, void (*answer)(struct job *job, const struct report *report))
 {
-	struct evaluate_options options = {.scene = &drop->scene, .iepe_time_constant_s = NAN};
-	int result = evaluate_open(e, &drop->record, &options);
+	struct evaluate_options options = {.iepe_time_constant_s = NAN};
+	struct evaluated e;
+	struct drop drop;
+	int result;
 
-	if (result == 0)
-		return true;
-	job_refuse(job, work_status(result), "%s: %s", job->path, error_text(result));
-	return false;
+	if (!open_drop(job, &drop))
+		return;
+	options.scene = &drop.scene;
+	result = evaluate_open(&e, &drop.record, &options);
+	if (result == 0) {
+		answer(job, &e.report);
+		evaluate_close(&e);
+	} else {
+		job_refuse(job, work_status(result), "%s: %s", job->path, error_text(result));
+	}
+	record_free(&drop.record);
+	job_done(job);
 }
 
 /* ---- samples as bytes ---- */
@@ -169,23 +180,13 @@ static void answer_trace(struct job *job, const struct report *report)
 
 void work_trace(struct job *job)
 {
-	struct evaluated e;
-	struct drop drop;
-
-	if (!open_drop(job, &drop))
-		return;
-	if (evaluate_drop(job, &drop, &e)) {
-		answer_trace(job, &e.report);
-		evaluate_close(&e);
-	}
-	record_free(&drop.record);
-	job_done(job);
+	answer_drop(job, answer_trace);
 }
 
 /* ---- the model ---- */
 
-static void answer_model(struct job *job, const struct report *report, const struct channel *times,
-                         double (*value_g)[MODEL_AXES])
+static void answer_histories(struct job *job, const struct report *report, const struct channel *times,
+                             double (*value_g)[MODEL_AXES])
 {
 	static const char *const names[MODEL_AXES + 2] = {"S1X", "S1Y", "S2X", "S2Y", "S1R", "S2R"};
 	struct report_zero zero = report_zero(report);
@@ -204,7 +205,7 @@ static void answer_model(struct job *job, const struct report *report, const str
 }
 
 /* At the instants of the drop's fastest channel. */
-static void solve_model(struct job *job, const struct report *report)
+static void answer_model(struct job *job, const struct report *report)
 {
 	const struct channel *times = record_channel(report->record, "S2Y");
 	char message[MODEL_MESSAGE_MAX] = "no model of this drop";
@@ -221,7 +222,7 @@ static void solve_model(struct job *job, const struct report *report)
 		                         times->start_s - start_s, 1 / times->rate_hz, value_g, times->count,
 		                         message);
 	if (result == 0)
-		answer_model(job, report, times, value_g);
+		answer_histories(job, report, times, value_g);
 	else
 		job_refuse(job, 404, "%s: %s", job->path, message);
 	free(value_g);
@@ -229,17 +230,7 @@ static void solve_model(struct job *job, const struct report *report)
 
 void work_model(struct job *job)
 {
-	struct evaluated e;
-	struct drop drop;
-
-	if (!open_drop(job, &drop))
-		return;
-	if (evaluate_drop(job, &drop, &e)) {
-		solve_model(job, &e.report);
-		evaluate_close(&e);
-	}
-	record_free(&drop.record);
-	job_done(job);
+	answer_drop(job, answer_model);
 }
 
 /* ---- spectra ---- */
