@@ -9,10 +9,10 @@
 #include <cmocka.h>
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "host/model/auto.h"
+#include "tests/unit/shipped.h"
 
 #define PI 3.14159265358979323846
 
@@ -35,22 +35,11 @@ static double spread(double low, double high)
 	return low * exp(uniform(0.0, 1.0) * log(high / low));
 }
 
-static struct scene shipped(const char *geometry)
-{
-	char file[64], message[SCENE_MESSAGE_MAX];
-	struct scene scene;
-
-	snprintf(file, sizeof(file), "common/scenes/geometry-%s.ini", geometry);
-	if (scene_read(&scene, file, message) != 0)
-		fail_msg("%s", message);
-	return scene;
-}
-
 /* A product, its mat and a drop; the contact's stiffness is near that of its duration. */
 static struct scene random_scene(void)
 {
 	struct model_options plain = model_defaults;
-	struct scene s = shipped("2A");
+	struct scene s = shipped_scene("2A");
 	struct model_prediction p;
 
 	do {
@@ -185,7 +174,7 @@ static struct model_prediction ask(const struct scene *s, unsigned asked, double
 
 static void test_the_study(void **unused)
 {
-	struct scene box = shipped("1"), plate = shipped("2A");
+	struct scene box = shipped_scene("1"), plate = shipped_scene("2A");
 
 	(void)unused;
 	/* at the balance angle nothing turns: two masses are enough for the box, one for a rough plate */
@@ -209,7 +198,7 @@ static void test_the_study(void **unused)
 static void test_partial_answers(void **unused)
 {
 	const enum model_fidelity rungs[] = {MODEL_COUPLED, MODEL_PLANAR};
-	struct scene s = shipped("2B");
+	struct scene s = shipped_scene("2B");
 
 	(void)unused;
 	s.drop_angle_deg = 33.0;
@@ -236,7 +225,7 @@ static void test_partial_answers(void **unused)
 
 static void test_outside_the_sample(void **unused)
 {
-	struct scene s = shipped("2A");
+	struct scene s = shipped_scene("2A");
 	struct drop drop;
 
 	(void)unused;
@@ -248,7 +237,7 @@ static void test_outside_the_sample(void **unused)
 	assert_int_equal(drop_of_scene(&s, &drop, NULL), 0);
 	assert_true(isinf(auto_difference(&drop, MODEL_COUPLED, MODEL_ASK_BOX)));
 	assert_string_equal(ask(&s, MODEL_ASK_BOX, 0.2).fidelity, "planar");
-	s = shipped("2A");
+	s = shipped_scene("2A");
 	s.mount_plate_mass_kg = s.product_case_mass_kg;
 	assert_string_equal(ask(&s, MODEL_ASK_PLATE, 0.2).fidelity, "planar");
 }
@@ -256,7 +245,7 @@ static void test_outside_the_sample(void **unused)
 static void test_names_and_refusals(void **unused)
 {
 	struct model_options o = model_defaults;
-	struct scene s = shipped("2A");
+	struct scene s = shipped_scene("2A");
 	char message[MODEL_MESSAGE_MAX];
 	enum model_question question;
 	struct model_prediction p;

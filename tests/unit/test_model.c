@@ -9,10 +9,10 @@
 #include <cmocka.h>
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "host/model/model.h"
+#include "tests/unit/shipped.h"
 
 #define PI 3.14159265358979323846
 
@@ -72,17 +72,6 @@ static struct model_prediction solve(const struct scene *scene, enum model_fidel
 	assert_string_equal(p.fidelity, model_fidelity_name(p.rung));
 	assert_true(strlen(p.reason) > 40 && strlen(p.reason) < sizeof(p.reason) - 1);
 	return p;
-}
-
-static struct scene read_scene(const char *geometry)
-{
-	char file[64], message[SCENE_MESSAGE_MAX];
-	struct scene scene;
-
-	snprintf(file, sizeof(file), "common/scenes/geometry-%s.ini", geometry);
-	if (scene_read(&scene, file, message) != 0)
-		fail_msg("%s", message);
-	return scene;
 }
 
 static void test_box_without_plate(void **state)
@@ -288,7 +277,7 @@ static struct deviation against_tables(enum model_fidelity fidelity, const struc
 	struct deviation d = {0};
 
 	for (int g = 0; g < 3; g++) {
-		struct scene scene = read_scene(tables[g].geometry);
+		struct scene scene = shipped_scene(tables[g].geometry);
 
 		for (int i = 0; i < 5; i++) {
 			struct model_prediction p;
@@ -336,7 +325,7 @@ static void test_the_ladder_against_the_tables(void **state)
 static void test_the_scenes_give_the_reference(void **state)
 {
 	struct model_options fine = model_defaults;
-	struct scene scene = read_scene("2A");
+	struct scene scene = shipped_scene("2A");
 	struct model_prediction p;
 
 	(void)state;
@@ -348,7 +337,7 @@ static void test_the_scenes_give_the_reference(void **state)
 	check_close("2A lag", p.lag_s, 1.95045e-3, 1e-5);
 	check_close("2A dent", p.dent_m, 2.94122581e-3, 1e-8);
 	check_close("2A travel", p.plate_travel_m, 6.70338575e-3, 1e-7);
-	scene = read_scene("2B");
+	scene = shipped_scene("2B");
 	p = solve(&scene, MODEL_COUPLED, &fine);
 	check_close("2B box", p.box.value_g, 5357.37182846565 / 9.81, 1e-9);
 	check_close("2B plate", p.resultant[0].value_g, 4540.28203567002 / 9.81, 1e-9);
@@ -367,7 +356,7 @@ static void test_the_scenes_give_the_reference(void **state)
 /* What a rung cannot say is not there, and what it can is. */
 static void test_what_rungs_say(void **state)
 {
-	struct scene scene = read_scene("2A");
+	struct scene scene = shipped_scene("2A");
 
 	(void)state;
 	for (enum model_fidelity f = MODEL_PAPER; f < MODEL_FIDELITIES; f++) {
@@ -395,7 +384,7 @@ static void test_histories_and_peaks(void **state)
 	(void)state;
 	for (int g = 0; g < 3; g++)
 		for (enum model_fidelity f = MODEL_STEADY; f < MODEL_FIDELITIES; f++) {
-			struct scene scene = read_scene(geometries[g]);
+			struct scene scene = shipped_scene(geometries[g]);
 			struct model_prediction p = solve(&scene, f, NULL);
 
 			assert_int_equal(model_histories(&scene, f, NULL, -1e-3, 5e-6, value, 1600, NULL), 0);
@@ -422,7 +411,7 @@ static void test_histories_and_peaks(void **state)
 /* The mat: the corner must not come out below it. */
 static void test_through_the_mat(void **state)
 {
-	struct scene scene = read_scene("1");
+	struct scene scene = shipped_scene("1");
 	char message[MODEL_MESSAGE_MAX] = "";
 	struct model_prediction p = {.lag_s = 42.0};
 
@@ -442,7 +431,7 @@ static void test_through_the_mat(void **state)
 /* From the materials: a dent through the mat and twice the contact time that was seen. */
 static void test_hertz_does_not_hold(void **state)
 {
-	struct scene scene = read_scene("1");
+	struct scene scene = shipped_scene("1");
 	char message[MODEL_MESSAGE_MAX] = "";
 	struct contact_hertz hertz;
 
@@ -504,7 +493,7 @@ static void test_degenerate_scenes(void **state)
 	(void)state;
 	for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++)
 		for (enum model_fidelity f = cases[i].from; f < MODEL_FIDELITIES; f++) {
-			struct scene scene = read_scene("2A");
+			struct scene scene = shipped_scene("2A");
 			struct model_prediction p = {.lag_s = 42.0};
 			char message[MODEL_MESSAGE_MAX] = "";
 			double value[MODEL_AXES];
@@ -522,7 +511,7 @@ static void test_degenerate_scenes(void **state)
 /* Through resonance, critical damping and the whole of e: every rung has an answer, without a jump. */
 static void test_no_gaps(void **state)
 {
-	struct scene scene = read_scene("2A");
+	struct scene scene = shipped_scene("2A");
 	double last[MODEL_FIDELITIES] = {0};
 
 	(void)state;
@@ -547,7 +536,7 @@ static void test_no_gaps(void **state)
 		for (enum model_fidelity f = MODEL_SDOF; f <= MODEL_COUPLED; f++)
 			assert_true(isfinite(solve(&scene, f, NULL).resultant[0].value_g));
 	}
-	scene = read_scene("2A");
+	scene = shipped_scene("2A");
 	for (int i = 0; i < 40; i++) {
 		scene.contact_restitution =
 		        i < 20 ? 1e-3 * pow(2.0, i * 0.45) : 1.0 - 0.5 * pow(0.35, i - 19);
@@ -589,7 +578,7 @@ static void test_refusals(void **state)
 {
 	struct model_options options = model_defaults;
 	struct model_prediction p = {.lag_s = 42.0};
-	struct scene scene = read_scene("2A");
+	struct scene scene = shipped_scene("2A");
 	char message[MODEL_MESSAGE_MAX];
 	double value[2] = {7.0, 7.0};
 
@@ -603,7 +592,7 @@ static void test_refusals(void **state)
 	scene.mount_damping_ratio = 0.0;
 	scene.mount_stiffness_n_m = pow(PI / 0.003, 2) / (1 / 0.014 + 1 / 0.169);
 	assert_true(model_solve(&scene, MODEL_STEADY, NULL, &p, message) == DT_E_NUMERIC || p.lag_s != 42.0);
-	scene = read_scene("2A");
+	scene = shipped_scene("2A");
 	scene.mount_damping_ratio = 1.5;
 	assert_int_equal(model_solve(&scene, MODEL_PAPER, NULL, &p, message), DT_E_ARGUMENT);
 	assert_non_null(strstr(message, "damping_ratio"));

@@ -11,30 +11,19 @@
 #include <cmocka.h>
 
 #include <stdbool.h>
-#include <stdio.h>
 #include <stdlib.h>
 
 #include "common/units.h"
 #include "hil/product.h"
 #include "tests/unit/near.h"
+#include "tests/unit/shipped.h"
 
 #define IMPACT_M_S 4.18811174636 /* from 0.894 m */
-
-static struct scene read_scene(const char *geometry)
-{
-	struct scene scene;
-	char file[64], message[SCENE_MESSAGE_MAX];
-
-	snprintf(file, sizeof(file), "common/scenes/geometry-%s.ini", geometry);
-	if (scene_read(&scene, file, message) != 0)
-		fail_msg("%s", message);
-	return scene;
-}
 
 /* The reference numbers were computed with this lever, rounded to 0.1 mm. */
 static struct scene reference_scene(const char *geometry)
 {
-	struct scene scene = read_scene(geometry);
+	struct scene scene = shipped_scene(geometry);
 
 	scene.product_balance_angle_deg = UNITS_DEG(atan(0.0505 / 0.1083));
 	return scene;
@@ -166,7 +155,7 @@ static void peaks_agree_with_reference(void **state)
 /* A sharp nominal corner, no tangential force, linear mounts, stiffness the same at every angle. */
 static struct scene plain_scene(const char *geometry, double angle_deg)
 {
-	struct scene scene = read_scene(geometry);
+	struct scene scene = shipped_scene(geometry);
 
 	scene.product_balance_angle_deg = UNITS_DEG(atan(0.101 / 0.289));
 	scene.contact_tangential_ratio = 0;
@@ -237,7 +226,7 @@ static void hysteresis_follows_restitution(void **state)
 {
 	static const double known[][2] = {
 	        {0.25, 3.84080603978}, {0.5, 1.43275053327}, {0.75, 0.495911318234}, {0.9, 0.166481950685}};
-	struct scene scene = read_scene("1");
+	struct scene scene = shipped_scene("1");
 	struct product p;
 
 	(void)state;
@@ -286,7 +275,7 @@ static void momentum_balances(void **state)
 
 	(void)state;
 	for (int c = 0; c < 9; c++) {
-		const struct scene scene = read_scene(geometry[c / 3]);
+		const struct scene scene = shipped_scene(geometry[c / 3]);
 		const double angle0 = UNITS_RAD(15 + 10 * (c % 3)), mp = scene.mount_plate_mass_kg;
 		const double mass = scene.product_case_mass_kg + mp;
 		struct balance sum = {0, 0, 0}, f;
@@ -339,7 +328,7 @@ static double energy(const struct product *p)
 
 static void free_flight_keeps_energy(void **state)
 {
-	const struct scene scene = read_scene("1");
+	const struct scene scene = shipped_scene("1");
 	struct product p;
 	double start, spin, x_m_s;
 
@@ -363,7 +352,7 @@ static void free_flight_keeps_energy(void **state)
 /* What the drops showed: half the speed comes back, contact of about 3 ms. */
 static void rebound_and_contact_time(void **state)
 {
-	const struct scene scene = read_scene("1");
+	const struct scene scene = shipped_scene("1");
 	struct product p;
 	int steps = 0;
 
@@ -432,7 +421,7 @@ static void later_impacts_come_to_rest(void **state)
 
 	(void)state;
 	for (int c = 0; c < 15; c++) {
-		const struct scene scene = read_scene(geometry[c % 3]);
+		const struct scene scene = shipped_scene(geometry[c % 3]);
 		struct product p;
 		struct product_reading r;
 		bool down = true;
@@ -466,7 +455,7 @@ static void later_impacts_come_to_rest(void **state)
 /* Set down without speed it sinks in a little and stays; and the mat never pulls. */
 static void gentle_touch_and_quick_lift(void **state)
 {
-	const struct scene scene = read_scene("1");
+	const struct scene scene = shipped_scene("1");
 	struct product p;
 
 	(void)state;
@@ -484,7 +473,7 @@ static void gentle_touch_and_quick_lift(void **state)
 
 static void carried_product_reads_the_reaction(void **state)
 {
-	const struct scene scene = read_scene("2B");
+	const struct scene scene = shipped_scene("2B");
 	struct product p;
 	struct product_reading r;
 
