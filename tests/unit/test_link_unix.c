@@ -18,13 +18,13 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/time.h>
 #include <sys/un.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "common/link/link.h"
+#include "tests/unit/interrupted.h"
 
 #define PACKET_BYTES 76u
 #define MANY 20000u
@@ -706,32 +706,12 @@ static void test_directions(void **state)
 	assert_int_equal(link_close(NULL), 0);
 }
 
-static volatile sig_atomic_t alarms;
-
-static void on_alarm(int number)
-{
-	(void)number;
-	alarms = alarms + 1;
-}
-
-/* Never early, however often it is interrupted. */
 static void test_timeout_under_interrupts(void **state)
 {
-	struct sigaction action = {.sa_handler = on_alarm};
-	struct itimerval often = {{0, 2000}, {0, 2000}}, never = {{0, 0}, {0, 0}};
 	struct link *server = join(LINK_READ_WRITE);
-	struct timespec before, after;
-	struct frame frame;
 
 	(void)state;
-	(void)sigaction(SIGALRM, &action, NULL);
-	(void)setitimer(ITIMER_REAL, &often, NULL);
-	(void)clock_gettime(CLOCK_MONOTONIC, &before);
-	assert_int_equal(link_receive(server, &frame, 60), 0);
-	(void)clock_gettime(CLOCK_MONOTONIC, &after);
-	(void)setitimer(ITIMER_REAL, &never, NULL);
-	assert_true((after.tv_sec - before.tv_sec) * 1000000000 + after.tv_nsec - before.tv_nsec >= 60000000);
-	assert_true(alarms > 0);
+	interrupted_receive(server);
 	assert_int_equal(link_close(server), 0);
 }
 

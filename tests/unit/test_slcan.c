@@ -11,17 +11,15 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/time.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "common/link/link.h"
 #include "common/link/slcan_text.h"
+#include "tests/unit/interrupted.h"
 
 #define COUNT(a) (sizeof(a) / sizeof((a)[0]))
 #define WAIT_MS 10000
@@ -362,27 +360,10 @@ static void test_adapter_that_does_not_read(void **state)
 	assert_string_equal(text, vectors[0].line);
 }
 
-static void on_alarm(int number)
-{
-	(void)number;
-}
-
-/* Never early, however often it is interrupted. */
 static void test_timeout_under_interrupts(void **state)
 {
-	struct sigaction action = {.sa_handler = on_alarm};
-	struct itimerval often = {{0, 2000}, {0, 2000}}, never = {{0, 0}, {0, 0}};
-	struct timespec before, after;
-	struct frame frame;
-
 	(void)state;
-	(void)sigaction(SIGALRM, &action, NULL);
-	(void)setitimer(ITIMER_REAL, &often, NULL);
-	(void)clock_gettime(CLOCK_MONOTONIC, &before);
-	assert_int_equal(link_receive(line, &frame, 60), 0);
-	(void)clock_gettime(CLOCK_MONOTONIC, &after);
-	(void)setitimer(ITIMER_REAL, &never, NULL);
-	assert_true((after.tv_sec - before.tv_sec) * 1000000000 + after.tv_nsec - before.tv_nsec >= 60000000);
+	interrupted_receive(line);
 }
 
 static void test_unplugged(void **state)
