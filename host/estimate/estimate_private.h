@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ESTIMATE_ESTIMATE_PRIVATE_H
+#define DT_HOST_ESTIMATE_ESTIMATE_PRIVATE_H
+/*
+ * What the parts of estimate share: one record while it is analysed.
+ *   estimate.c          the order of it all; each channel by itself
+ *   estimate_decay.c    where a channel's decay begins and ends; the plate's of two axes
+ *   estimate_sensors.c  resultants and lag, and what the lag says of S1
+ *   estimate_name.c     words for status, flags and families
+ */
+#include "host/estimate/estimate.h"
+#include "host/estimate/peak.h"
+#include "host/estimate/ringdown.h"
+#include "host/estimate/trace.h"
+
+struct work {
+	struct trace trace;
+	struct peak peak;
+	struct ringdown_span span;
+	struct ringdown ringdown;
+};
+
+/* Channels in the record's order. */
+struct desk {
+	const struct record *record;
+	const struct estimate_options *options;
+	struct work *work;
+	double *scratch;
+};
+
+/* Index of the channel of that sensor and axis; the record's channel_count if there is none. */
+size_t estimate_find(const struct desk *desk, const char *sensor, char axis);
+
+/* Every channel's ring-down, from the peaks and pulses. */
+void estimate_decays(const struct desk *desk, struct analysis *analysis);
+
+/* The resultants of the sensors that have X and Y, and where both have the lag, and what it says of S1's
+ * peaks and decays. */
+void estimate_sensors(const struct desk *desk, struct analysis *analysis);
+
+/* X's and Y's ring-down of S1 as one, where it rings on its own. */
+void estimate_plate(const struct desk *desk, struct analysis *analysis);
+
+#endif
