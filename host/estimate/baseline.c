@@ -100,24 +100,42 @@ void baseline_find(const struct trace *trace, double *scratch, struct estimate_b
 	*baseline = found;
 }
 
+bool baseline_holds(const struct trace *trace, const struct estimate_baseline *baseline)
+{
+	size_t from, until;
+
+	quiet_find(trace, &from, &until);
+	if (baseline->samples == 0 || trace_index(trace, baseline->from_s) != from ||
+	    trace_index(trace, baseline->until_s) + 1 != until)
+		return false;
+	while (from < until && !(trace->sample[from] & (SAMPLE_SPIKE | SAMPLE_BAD)))
+		from++;
+	return from == until;
+}
+
 static void subtract(struct trace *trace, const struct estimate_baseline *baseline)
 {
 	double offset = baseline->offset_g, *value = trace->value_g;
+	const size_t count = trace->count;
 	size_t k = 0;
 
 	if (baseline->hum_g > 0 || fabs(baseline->drift_g_s) > 0) {
 		struct zero zero = zero_from(baseline, trace, 0);
 
-		for (; k < trace->count; k++)
-			value[k] -= zero_next(&zero);
+		for (; k + 2 <= count; k += 2)
+			pair_store(value + k, pair_load(value + k) - zero_next(&zero));
+		if (k < count)
+			value[k] -= zero_next(&zero)[0];
 		trace_changed(trace);
 		return;
 	}
-	for (; k + 4 <= trace->count; k += 4) {
+	for (; k + 8 <= count; k += 8) {
 		pair_store(value + k, pair_load(value + k) - offset);
 		pair_store(value + k + 2, pair_load(value + k + 2) - offset);
+		pair_store(value + k + 4, pair_load(value + k + 4) - offset);
+		pair_store(value + k + 6, pair_load(value + k + 6) - offset);
 	}
-	for (; k < trace->count; k++)
+	for (; k < count; k++)
 		value[k] -= offset;
 	for (size_t i = 0; i < trace_blocks(trace); i++) {
 		trace->block[i].low_g -= offset;

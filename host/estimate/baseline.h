@@ -27,6 +27,10 @@
 /* scratch holds trace->count doubles. */
 void baseline_find(const struct trace *trace, double *scratch, struct estimate_baseline *baseline);
 
+/* Whether a baseline that was found before samples were marked spikes or bad would come out as it did: the
+ * quiet part is the same and none of it is marked. */
+bool baseline_holds(const struct trace *trace, const struct estimate_baseline *baseline);
+
 /* Takes offset, drift and hum off every sample (zero.h), flags them, and notes noise and hum in the trace. */
 void baseline_remove(struct trace *trace, const struct estimate_baseline *baseline);
 

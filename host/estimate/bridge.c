@@ -51,6 +51,6 @@ double bridge_at(const struct trace *trace, double time_s)
 	else
 		for (ptrdiff_t i = 0; i < 4; i++)
 			value[i] = bridge_sample(trace, k - 1 + i);
-	return -x * (x - 1) * (x - 2) / 6 * value[0] + (x + 1) * (x - 1) * (x - 2) / 2 * value[1] -
-	       (x + 1) * x * (x - 2) / 2 * value[2] + (x + 1) * x * (x - 1) / 6 * value[3];
+	return (1 + x) * (2 - x) / 2 * ((1 - x) * value[1] + x * value[2]) -
+	       x * (1 - x) / 6 * ((2 - x) * value[0] + (1 + x) * value[3]);
 }

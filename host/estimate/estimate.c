@@ -30,7 +30,8 @@ static void clean(struct trace *trace, double *scratch, struct estimate_baseline
 	marked |= dropout_mark(trace, baseline->noise_g);
 	if (marked) {
 		trace_marked(trace);
-		baseline_find(trace, scratch, baseline);
+		if (!baseline_holds(trace, baseline))
+			baseline_find(trace, scratch, baseline);
 	}
 	clip_judge_twins(trace, baseline->noise_g);
 }

@@ -7,7 +7,7 @@ void gram_start(struct gram *gram, unsigned unknowns)
 {
 	gram->columns = unknowns + 1;
 	gram->taken = 0;
-	memset(gram->sum, 0, gram->columns * sizeof(gram->sum[0]));
+	memset(gram->sum, 0, (unknowns < GRAM_COMMON ? GRAM_COMMON : unknowns + 1) * sizeof(gram->sum[0]));
 }
 
 void gram_add_any(struct gram *gram, const double *row)
@@ -15,10 +15,9 @@ void gram_add_any(struct gram *gram, const double *row)
 	const unsigned columns = gram->columns;
 
 	gram->taken++;
-	for (unsigned i = 0; i < columns && i < GRAM_COMMON; i++)
+	for (unsigned i = 0; i < GRAM_COMMON; i++)
 		gram_add_column(gram, row, i);
-	if (columns > 6)
-		gram_add_column(gram, row, 6);
+	gram_add_column(gram, row, 6);
 	if (columns > 7)
 		gram_add_column(gram, row, 7);
 	if (columns > 8)

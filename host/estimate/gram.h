@@ -12,7 +12,7 @@
 
 enum {
 	GRAM_MAX = CHOLESKY_MAX + 1,
-	GRAM_COMMON = 6, /* columns of nearly every fit */
+	GRAM_COMMON = 6, /* columns of nearly every fit, summed up for every one */
 };
 
 struct gram {
@@ -46,11 +46,11 @@ static inline void gram_add_column(struct gram *gram, const double *row, unsigne
 
 void gram_add_any(struct gram *gram, const double *row);
 
-/* row: an even number of doubles, the last one of any value where there is a column less. Laid out flat,
- * since the compiler makes short work of loops whose length it knows. */
+/* row: an even number of doubles, GRAM_COMMON at least; those beyond the columns have any value. Laid out
+ * flat, since the compiler makes short work of loops whose length it knows. */
 static inline void gram_add(struct gram *gram, const double *row)
 {
-	if (gram->columns != GRAM_COMMON) {
+	if (gram->columns > GRAM_COMMON) {
 		gram_add_any(gram, row);
 		return;
 	}

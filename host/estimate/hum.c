@@ -5,6 +5,7 @@
 
 #include "common/units.h"
 #include "host/estimate/cholesky.h"
+#include "host/estimate/gram.h"
 
 enum {
 	BLOCK_SAMPLES_MIN = 4,
@@ -41,14 +42,13 @@ enum { TONE_HALVINGS = 14 };
 /* The means may scatter by this much more, in squares, than the samples' noise asks. */
 #define COLOUR_MAX 3.0
 
-/* Adds up the normal equations, means taken from that of the first block on; returns the sum of squares. */
-static double add_blocks(struct hum_line *line, const struct quiet *quiet, double half_s,
-                         double normal[CHOLESKY_MAX][CHOLESKY_MAX], double right[CHOLESKY_MAX])
+/* Adds up the normal equations, means taken from that of the first block on. */
+static void add_blocks(struct hum_line *line, const struct quiet *quiet, double half_s, struct gram *gram)
 {
 	const struct quiet_block *block = quiet->block;
 	const unsigned first = line->has_slope ? 2 : 1;
 	struct phasor hum[ZERO_HUMS_MAX];
-	double row[HUM_TERMS_MAX] = {1}, squares = 0;
+	double row[GRAM_MAX] = {0};
 
 	for (unsigned h = 0; h < line->hums; h++) {
 		double turns = 2 * UNITS_PI * line->hum_hz[h] * half_s;
@@ -56,23 +56,18 @@ static double add_blocks(struct hum_line *line, const struct quiet *quiet, doubl
 		hum[h] = phasor_at(turns * block[0].place, turns * (block[1].place - block[0].place));
 	}
 	for (size_t i = 0; i < quiet->count; i++) {
-		double w = block[i].weight, y = block[i].mean - block[0].mean;
+		double w = sqrt(block[i].weight);
 
-		if (line->has_slope)
-			row[1] = block[i].place;
+		row[0] = w;
+		row[1] = w * block[i].place;
 		for (unsigned h = 0; h < line->hums; h++) {
-			row[first + 2 * h] = hum[h].cosine;
-			row[first + 2 * h + 1] = hum[h].sine;
+			row[first + 2 * h] = w * hum[h].cosine;
+			row[first + 2 * h + 1] = w * hum[h].sine;
 			phasor_turn(&hum[h]);
 		}
-		for (unsigned a = 0; a < line->terms; a++) {
-			right[a] += w * row[a] * y;
-			for (unsigned b = 0; b <= a; b++)
-				normal[a][b] += w * row[a] * row[b];
-		}
-		squares += w * y * y;
+		row[line->terms] = w * (block[i].mean - block[0].mean);
+		gram_add(gram, row);
 	}
-	return squares;
 }
 
 /* Least squares; half_s is half of the quiet part. False when the means do not tell. */
@@ -81,9 +76,13 @@ static bool fit_line(struct hum_line *line, const struct quiet *quiet, double ha
 	static const double second[HUM_TERMS_MAX] = {0, 1};
 	double normal[CHOLESKY_MAX][CHOLESKY_MAX] = {{0}}, right[CHOLESKY_MAX] = {0};
 	struct cholesky factor;
+	struct gram gram;
 
 	line->terms = 1u + (line->has_slope ? 1 : 0) + 2 * line->hums;
-	line->squares = add_blocks(line, quiet, half_s, normal, right);
+	line->squares = 0;
+	gram_start(&gram, line->terms);
+	add_blocks(line, quiet, half_s, &gram);
+	gram_finish(&gram, normal, right, &line->squares);
 	if (!cholesky_factor(&factor, line->terms, normal))
 		return false;
 	cholesky_solve(&factor, right, line->term);

@@ -3,13 +3,15 @@
 
 #include <complex.h>
 #include <math.h>
+#include <string.h>
 
 #include "common/units.h"
 #include "host/estimate/gram.h"
 #include "host/estimate/pair.h"
+#include "host/estimate/phasor.h"
 #include "host/estimate/spring.h"
 
-enum { MODES_MAX = 2 };
+enum { DECAYS_MAX = 3 }; /* two modes and the hum */
 
 /* Damping beyond this part of the angular frequency is no swing. */
 #define DECAY_MAX 3.0
@@ -18,27 +20,6 @@ struct problem {
 	const struct modes *modes;
 	const struct series *series;
 };
-
-/* e^{(-a + i w) t} and what turns it by one step. */
-struct rotor {
-	double re, im, turn_re, turn_im;
-};
-
-static struct rotor rotor_start(double decay, double omega, const struct series *series)
-{
-	double size = exp(-decay * series->first_s), turn = exp(-decay * series->step_s);
-
-	return (struct rotor){size * cos(omega * series->first_s), size * sin(omega * series->first_s),
-	                      turn * cos(omega * series->step_s), turn * sin(omega * series->step_s)};
-}
-
-static inline void rotor_turn(struct rotor *r)
-{
-	double re = r->re * r->turn_re - r->im * r->turn_im;
-
-	r->im = r->re * r->turn_im + r->im * r->turn_re;
-	r->re = re;
-}
 
 unsigned modes_size(const struct modes *modes)
 {
@@ -56,162 +37,301 @@ static bool possible(const struct modes *modes, const double *p)
 	return true;
 }
 
-/* Sums over the points of one mode, each with t^0, t^1, t^2 in it: e = (re, im) by itself, its products, the
- * residual r. Even and odd points apart. */
-struct moments {
-	PAIR re[2], im[2], re_re[3], re_im[3], im_im[3];
-	PAIR r_re[2], r_im[2], r, rr;
+static unsigned decays_of(const struct modes *modes)
+{
+	return modes->count + (modes->hum_hz > 0);
+}
+
+/* Where a decay's cosine stands among the unknowns, its sine after it. */
+static unsigned swing_place(const struct modes *modes, unsigned d)
+{
+	return d < modes->count ? MODES_COSINE + MODES_EACH * d : 1 + MODES_EACH * modes->count;
+}
+
+/* What a fit looks at: a series from its first good point to its last, and the decays there. */
+struct view {
+	const double *value_g;
+	const bool *good;
+	unsigned count, decays;
+	double first_s, step_s, offset_g;
+	struct phasor decay[DECAYS_MAX]; /* the modes, then the hum, which does not decay */
+	double swing[DECAYS_MAX][2];     /* their cosines and sines */
 };
 
-static inline void moments_add(struct moments *m, PAIR re, PAIR im, PAIR r, PAIR time)
+static struct view look(const struct problem *problem, const double *p)
 {
-	const PAIR late_re = time * re, late_im = time * im;
+	const struct modes *modes = problem->modes;
+	const struct series *series = problem->series;
+	struct view view = {.count = series->count,
+	                    .decays = decays_of(modes),
+	                    .step_s = series->step_s,
+	                    .offset_g = p[MODES_OFFSET]};
+	unsigned skip = 0;
 
-	m->re[0] += re;
-	m->im[0] += im;
-	m->re[1] += late_re;
-	m->im[1] += late_im;
-	m->re_re[0] += re * re;
-	m->re_im[0] += re * im;
-	m->im_im[0] += im * im;
-	m->re_re[1] += late_re * re;
-	m->re_im[1] += late_re * im;
-	m->im_im[1] += late_im * im;
-	m->re_re[2] += late_re * late_re;
-	m->re_im[2] += late_re * late_im;
-	m->im_im[2] += late_im * late_im;
-	m->r_re[0] += r * re;
-	m->r_im[0] += r * im;
-	m->r_re[1] += r * late_re;
-	m->r_im[1] += r * late_im;
-	m->r += r;
-	m->rr += r * r;
-}
+	while (view.count > 0 && !series->good[view.count - 1])
+		view.count--;
+	while (skip < view.count && !series->good[skip])
+		skip++;
+	view.count -= skip;
+	view.value_g = series->value_g + skip;
+	view.good = series->good + skip;
+	view.first_s = series->first_s + skip * series->step_s;
+	for (unsigned d = 0; d < view.decays; d++) {
+		const double *mode = p + MODES_EACH * d;
+		const bool hum = d == modes->count;
 
-static void moments_take(struct moments *sums, const struct series *series, const double *p)
-{
-	const bool whole = series->used == series->count;
-	struct rotor r = rotor_start(p[MODES_DECAY], p[MODES_OMEGA], series), next = r;
-	struct moments m = {.r = {0}};
-	PAIR re, im, time = {series->first_s, series->first_s + series->step_s};
-	double turn_re = r.turn_re * r.turn_re - r.turn_im * r.turn_im, turn_im = 2 * r.turn_re * r.turn_im;
-
-	rotor_turn(&next);
-	re = (PAIR){r.re, next.re};
-	im = (PAIR){r.im, next.im};
-	for (unsigned k = 0; k < series->count; k += 2) {
-		const PAIR turned = re * turn_re - im * turn_im;
-		PAIR model = p[MODES_COSINE] * re + p[MODES_SINE] * im + p[MODES_OFFSET];
-
-		if (whole && k + 1 < series->count) {
-			moments_add(&m, re, im, pair_load(series->value_g + k) - model, time);
-		} else {
-			const bool second = k + 1 < series->count && series->good[k + 1];
-			const PAIR count = {series->good[k], second};
-			const PAIR value = {series->value_g[k], second ? series->value_g[k + 1] : 0};
-
-			moments_add(&m, count * re, count * im, count * (value - model), time);
-		}
-		time += 2 * series->step_s;
-		im = re * turn_im + im * turn_re;
-		re = turned;
+		view.decay[d] = phasor_decaying(hum ? 0 : mode[MODES_DECAY],
+		                                hum ? 2 * UNITS_PI * modes->hum_hz : mode[MODES_OMEGA],
+		                                view.first_s, view.step_s);
+		memcpy(view.swing[d], p + swing_place(modes, d), sizeof(view.swing[d]));
 	}
-	*sums = m;
+	return view;
 }
 
-/* One mode and the offset: what nearly every record needs, so it is the fast one. The derivative by decay is
- * -t (c re + s im), that by omega t (s re - c im): all sums follow from the moments. */
-static size_t plain(const void *context, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
-                    double right[CHOLESKY_MAX], double *squares)
+/* Two complex numbers side by side. */
+struct complex_pair {
+	PAIR re, im;
+};
+
+static inline struct complex_pair times(struct complex_pair a, struct complex_pair b)
+{
+	return (struct complex_pair){a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
+}
+
+static inline struct complex_pair plus(struct complex_pair a, struct complex_pair b)
+{
+	return (struct complex_pair){a.re + b.re, a.im + b.im};
+}
+
+static inline struct complex_pair scale(PAIR factor, struct complex_pair a)
+{
+	return (struct complex_pair){factor * a.re, factor * a.im};
+}
+
+/* Of two geometric series: j^0, j^1 and j^2 times w^j, summed over j < n, n > 0. By doubling: the second half
+ * of a sum is the first one, so much later. */
+static void sum_geometric(struct complex_pair w, unsigned n, struct complex_pair sum[3])
+{
+	const PAIR one = {1, 1};
+	struct complex_pair power = w; /* w^m */
+	PAIR m = one;                  /* so many terms are summed */
+	unsigned bit = 1;
+
+	memset(sum, 0, 3 * sizeof(*sum));
+	sum[0].re = one;
+	while (bit <= n / 2)
+		bit *= 2;
+	while (bit >>= 1) {
+		struct complex_pair late = plus(sum[1], scale(m, sum[0]));
+		struct complex_pair later = plus(sum[2], scale(m, plus(sum[1], late)));
+
+		sum[0] = plus(sum[0], times(power, sum[0]));
+		sum[1] = plus(sum[1], times(power, late));
+		sum[2] = plus(sum[2], times(power, later));
+		power = times(power, power);
+		m += m;
+		if (n & bit) {
+			sum[0] = plus(sum[0], power);
+			sum[1] = plus(sum[1], scale(m, power));
+			sum[2] = plus(sum[2], scale(m * m, power));
+			power = times(power, w);
+			m += one;
+		}
+	}
+}
+
+/* From sums over the index j to sums over the view's times, of what begins with start. */
+static void by_time(struct complex_pair sum[3], struct complex_pair start, const struct view *view)
+{
+	const PAIR first = {view->first_s, view->first_s}, step = {view->step_s, view->step_s};
+	struct complex_pair late = plus(scale(first, sum[0]), scale(step, sum[1]));
+	struct complex_pair later = plus(scale(step, sum[1]), late);
+
+	later = plus(scale(first, later), scale(step * step, sum[2]));
+	sum[0] = times(start, sum[0]);
+	sum[1] = times(start, late);
+	sum[2] = times(start, later);
+}
+
+/* Of the residual, by itself and times each decay, with t^0 and t^1; even and odd points apart. */
+struct residual_sums {
+	PAIR c[DECAYS_MAX][2], s[DECAYS_MAX][2], sum, squares;
+};
+
+/* Over the good points, with t^0, t^1 and t^2. As complex numbers: a decay by itself (in [0]), and its
+ * product with another, no later one, and with the other's conjugate. */
+struct sums {
+	struct complex_pair of[DECAYS_MAX][3], with[DECAYS_MAX][DECAYS_MAX][3];
+	struct residual_sums residual;
+};
+
+/* a b and a times b's conjugate */
+static inline struct complex_pair product(double ac, double as, double bc, double bs)
+{
+	return times((struct complex_pair){{ac, ac}, {as, as}}, (struct complex_pair){{bc, bc}, {bs, -bs}});
+}
+
+/* All but the residual's, as if no point were missing. */
+static void sum_whole(struct sums *sums, const struct view *view)
+{
+	for (unsigned d = 0; d < view->decays; d++) {
+		const struct phasor *a = &view->decay[d];
+		struct complex_pair *of = sums->of[d];
+
+		sum_geometric((struct complex_pair){{a->step_cosine}, {a->step_sine}}, view->count, of);
+		by_time(of, (struct complex_pair){{a->cosine}, {a->sine}}, view);
+		for (unsigned e = 0; e <= d; e++) {
+			const struct phasor *b = &view->decay[e];
+			struct complex_pair *with = sums->with[d][e];
+
+			sum_geometric(product(a->step_cosine, a->step_sine, b->step_cosine, b->step_sine),
+			              view->count, with);
+			by_time(with, product(a->cosine, a->sine, b->cosine, b->sine), view);
+		}
+	}
+}
+
+/* Takes off a point: value times t^0, t^1, t^2. */
+static inline void take_off(struct complex_pair sum[3], struct complex_pair value, double time)
+{
+	const PAIR minus = {-1, -1}, later = {time, time};
+
+	value = scale(minus, value);
+	for (unsigned i = 0; i < 3; i++, value = scale(later, value))
+		sum[i] = plus(sum[i], value);
+}
+
+/* A point that is missing: the first or the second of two. */
+static void leave_out(struct sums *sums, const struct phasor_pair *decay, unsigned decays, unsigned which,
+                      double time)
+{
+	for (unsigned d = 0; d < decays; d++) {
+		const double c = decay[d].cosine[which], s = decay[d].sine[which];
+
+		take_off(sums->of[d], (struct complex_pair){{c}, {s}}, time);
+		for (unsigned e = 0; e <= d; e++)
+			take_off(sums->with[d][e],
+			         product(c, s, decay[e].cosine[which], decay[e].sine[which]), time);
+	}
+}
+
+/* Leaves out what is missing. Inlined where there is one decay: its sums stay in registers. */
+static inline __attribute__((always_inline)) void sum_residual(struct sums *sums, const struct view *view,
+                                                               const unsigned decays)
+{
+	PAIR time = {view->first_s, view->first_s + view->step_s};
+	struct residual_sums residual = {.sum = {0}};
+	struct phasor_pair decay[DECAYS_MAX];
+
+	for (unsigned d = 0; d < decays; d++)
+		decay[d] = phasor_two(view->decay[d]);
+	for (unsigned k = 0; k < view->count; k += 2) {
+		const bool more = k + 1 < view->count, first = view->good[k],
+		           second = more && view->good[k + 1];
+		PAIR r = more ? pair_load(view->value_g + k) : (PAIR){view->value_g[k]};
+
+		r -= view->offset_g;
+		for (unsigned d = 0; d < decays; d++)
+			r -= view->swing[d][0] * decay[d].cosine + view->swing[d][1] * decay[d].sine;
+		if (!first || !second) {
+			if (!first)
+				leave_out(sums, decay, decays, 0, time[0]);
+			if (more && !second)
+				leave_out(sums, decay, decays, 1, time[1]);
+			r = (PAIR){first ? r[0] : 0, second ? r[1] : 0};
+		}
+		residual.sum += r;
+		residual.squares += r * r;
+		for (unsigned d = 0; d < decays; d++) {
+			const PAIR c = r * decay[d].cosine, s = r * decay[d].sine;
+
+			residual.c[d][0] += c;
+			residual.s[d][0] += s;
+			residual.c[d][1] += time * c;
+			residual.s[d][1] += time * s;
+			phasor_pair_turn(&decay[d]);
+		}
+		time += 2 * view->step_s;
+	}
+	sums->residual = residual;
+}
+
+static void sum_up(struct sums *sums, const struct view *view)
+{
+	sum_whole(sums, view);
+	if (view->decays == 1)
+		sum_residual(sums, view, 1);
+	else
+		sum_residual(sums, view, view->decays);
+}
+
+/* A derivative of the model: a decay's cosine and sine times these, and t where it is late. */
+struct column {
+	unsigned decay, late;
+	double c, s;
+};
+
+/* The derivative by decay is -t (c cos + s sin), that by omega t (s cos - c sin). */
+static unsigned make_columns(struct column column[CHOLESKY_MAX], const struct modes *modes, const double *p)
+{
+	unsigned n = 0;
+
+	for (unsigned d = 0; d < decays_of(modes); d++) {
+		const double *swing = p + swing_place(modes, d);
+
+		if (d < modes->count) {
+			column[n++] = (struct column){d, 1, -swing[0], -swing[1]};
+			column[n++] = (struct column){d, 1, swing[1], -swing[0]};
+		}
+		column[n++] = (struct column){d, 0, 1, 0};
+		column[n++] = (struct column){d, 0, 0, 1};
+	}
+	return n;
+}
+
+static inline double both(PAIR pair)
+{
+	return pair[0] + pair[1];
+}
+
+/* Any number of modes, hum or none. All products of derivatives follow from those of the decays, and these
+ * are geometric series but for what is missing; only the residual is summed point by point. */
+static size_t undisturbed(const void *context, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
+                          double right[CHOLESKY_MAX], double *squares)
 {
 	const struct problem *problem = context;
-	const double c = p[MODES_COSINE], s = p[MODES_SINE];
-	double re[2], im[2], re_re[3], re_im[3], im_im[3], r_re[2], r_im[2];
-	struct moments m;
+	struct column column[CHOLESKY_MAX];
+	struct view view;
+	struct sums sums;
+	unsigned n;
 
 	if (!possible(problem->modes, p))
 		return 0;
-	moments_take(&m, problem->series, p);
-	for (unsigned i = 0; i < 3; i++) {
-		re_re[i] = m.re_re[i][0] + m.re_re[i][1];
-		re_im[i] = m.re_im[i][0] + m.re_im[i][1];
-		im_im[i] = m.im_im[i][0] + m.im_im[i][1];
-	}
-	for (unsigned i = 0; i < 2; i++) {
-		re[i] = m.re[i][0] + m.re[i][1];
-		im[i] = m.im[i][0] + m.im[i][1];
-		r_re[i] = m.r_re[i][0] + m.r_re[i][1];
-		r_im[i] = m.r_im[i][0] + m.r_im[i][1];
-	}
+	view = look(problem, p);
+	sum_up(&sums, &view);
+	n = make_columns(column, problem->modes, p);
 	normal[MODES_OFFSET][MODES_OFFSET] = problem->series->used;
-	normal[MODES_DECAY][MODES_OFFSET] = -c * re[1] - s * im[1];
-	normal[MODES_DECAY][MODES_DECAY] = c * c * re_re[2] + 2 * c * s * re_im[2] + s * s * im_im[2];
-	normal[MODES_OMEGA][MODES_OFFSET] = s * re[1] - c * im[1];
-	normal[MODES_OMEGA][MODES_DECAY] = c * s * (im_im[2] - re_re[2]) + (c * c - s * s) * re_im[2];
-	normal[MODES_OMEGA][MODES_OMEGA] = s * s * re_re[2] - 2 * c * s * re_im[2] + c * c * im_im[2];
-	normal[MODES_COSINE][MODES_OFFSET] = re[0];
-	normal[MODES_COSINE][MODES_DECAY] = -c * re_re[1] - s * re_im[1];
-	normal[MODES_COSINE][MODES_OMEGA] = s * re_re[1] - c * re_im[1];
-	normal[MODES_COSINE][MODES_COSINE] = re_re[0];
-	normal[MODES_SINE][MODES_OFFSET] = im[0];
-	normal[MODES_SINE][MODES_DECAY] = -c * re_im[1] - s * im_im[1];
-	normal[MODES_SINE][MODES_OMEGA] = s * re_im[1] - c * im_im[1];
-	normal[MODES_SINE][MODES_COSINE] = re_im[0];
-	normal[MODES_SINE][MODES_SINE] = im_im[0];
-	right[MODES_OFFSET] = m.r[0] + m.r[1];
-	right[MODES_DECAY] = -c * r_re[1] - s * r_im[1];
-	right[MODES_OMEGA] = s * r_re[1] - c * r_im[1];
-	right[MODES_COSINE] = r_re[0];
-	right[MODES_SINE] = r_im[0];
-	*squares = m.rr[0] + m.rr[1];
-	return problem->series->used;
-}
+	right[MODES_OFFSET] = both(sums.residual.sum);
+	*squares = both(sums.residual.squares);
+	for (unsigned i = 0; i < n; i++) {
+		const struct column a = column[i];
+		const struct complex_pair of = sums.of[a.decay][a.late];
 
-/* Any number of modes, hum or none. */
-static size_t general(const void *context, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
-                      double right[CHOLESKY_MAX], double *squares)
-{
-	const struct problem *problem = context;
-	const struct modes *modes = problem->modes;
-	const struct series *series = problem->series;
-	const unsigned size = modes_size(modes), hum = 1 + MODES_EACH * modes->count;
-	struct rotor rotor[MODES_MAX + 1];
-	double row[GRAM_MAX] = {1}, time = series->first_s;
-	struct gram gram;
+		normal[1 + i][MODES_OFFSET] = a.c * of.re[0] + a.s * of.im[0];
+		right[1 + i] =
+		        both(a.c * sums.residual.c[a.decay][a.late] + a.s * sums.residual.s[a.decay][a.late]);
+		for (unsigned j = 0; j <= i; j++) {
+			const struct column b = column[j];
+			const struct complex_pair with = sums.with[a.decay][b.decay][a.late + b.late];
 
-	if (!possible(modes, p))
-		return 0;
-	gram_start(&gram, size);
-	for (unsigned m = 0; m < modes->count; m++)
-		rotor[m] =
-		        rotor_start(p[MODES_DECAY + MODES_EACH * m], p[MODES_OMEGA + MODES_EACH * m], series);
-	rotor[modes->count] = rotor_start(0, 2 * UNITS_PI * modes->hum_hz, series);
-	for (unsigned k = 0; k < series->count; k++, time += series->step_s) {
-		double residual = series->value_g[k] - p[MODES_OFFSET];
-
-		for (unsigned m = 0; m < modes->count; m++) {
-			const double *q = p + MODES_EACH * m;
-			double *mine = row + MODES_EACH * m, re = rotor[m].re, im = rotor[m].im;
-			double swing = q[MODES_COSINE] * re + q[MODES_SINE] * im;
-
-			mine[MODES_DECAY] = -time * swing;
-			mine[MODES_OMEGA] = time * (q[MODES_SINE] * re - q[MODES_COSINE] * im);
-			mine[MODES_COSINE] = re;
-			mine[MODES_SINE] = im;
-			residual -= swing;
-			rotor_turn(&rotor[m]);
+			normal[1 + i][1 + j] =
+			        ((a.c * b.c - a.s * b.s) * with.re[0] + (a.c * b.c + a.s * b.s) * with.re[1] +
+			         (a.s * b.c + a.c * b.s) * with.im[0] +
+			         (a.s * b.c - a.c * b.s) * with.im[1]) /
+			        2;
 		}
-		if (modes->hum_hz > 0) {
-			row[hum] = rotor[modes->count].re;
-			row[hum + 1] = rotor[modes->count].im;
-			residual -= p[hum] * row[hum] + p[hum + 1] * row[hum + 1];
-			rotor_turn(&rotor[modes->count]);
-		}
-		row[size] = residual;
-		if (series->good[k])
-			gram_add(&gram, row);
 	}
-	return gram_finish(&gram, normal, right, squares);
+	return problem->series->used;
 }
 
 /* h of the header and its derivative by a. */
@@ -219,9 +339,10 @@ struct law {
 	double h, by_decay;
 };
 
-static struct law law_at(double decay, double time)
+/* size: of the swing */
+static struct law law_at(double decay, double time, double size)
 {
-	double left = exp(-2 * decay * time), h = (1 - left) / (2 * decay);
+	double left = size * size, h = (1 - left) / (2 * decay);
 
 	return (struct law){h, (time * left - h) / decay};
 }
@@ -232,14 +353,15 @@ static size_t bent(const void *context, const double *p, double normal[CHOLESKY_
 {
 	const struct problem *problem = context;
 	const struct series *series = problem->series;
+	double size = exp(-p[MODES_DECAY] * series->first_s), shrink = exp(-p[MODES_DECAY] * series->step_s);
 	struct gram gram;
 
 	if (!possible(problem->modes, p) || !(p[MODES_DECAY] > 0))
 		return 0;
 	gram_start(&gram, MODES_LAW + 1);
-	for (unsigned i = 0; i < series->count; i++) {
-		double time = series->first_s + i * series->step_s, size = exp(-p[MODES_DECAY] * time);
-		struct law law = law_at(p[MODES_DECAY], time);
+	for (unsigned i = 0; i < series->count; i++, size *= shrink) {
+		double time = series->first_s + i * series->step_s;
+		struct law law = law_at(p[MODES_DECAY], time, size);
 		double angle = p[MODES_OMEGA] * time + p[MODES_LAW] * law.h;
 		double re = size * cos(angle), im = size * sin(angle);
 		double swing = p[MODES_COSINE] * re + p[MODES_SINE] * im;
@@ -270,12 +392,10 @@ static size_t spring(const void *context, const double *p, double normal[CHOLESK
 
 static struct lm_problem make_problem(const struct modes *modes, const struct problem *problem)
 {
-	struct lm_problem made = {.size = modes_size(modes), .model = problem, .normal = general};
+	struct lm_problem made = {.size = modes_size(modes), .model = problem, .normal = undisturbed};
 
 	if (modes->law != MODES_LAW_NONE)
 		made.normal = modes->law == MODES_LAW_SQUARE ? bent : spring;
-	else if (modes->count == 1 && !(modes->hum_hz > 0))
-		made.normal = plain;
 	return made;
 }
 
@@ -333,7 +453,7 @@ double modes_at(const struct modes *modes, double time_s)
 	if (modes->law == MODES_LAW_SPRING)
 		return spring_at(p, time_s);
 	if (modes->law == MODES_LAW_SQUARE)
-		bend = p[MODES_LAW] * law_at(p[MODES_DECAY], time_s).h;
+		bend = p[MODES_LAW] * law_at(p[MODES_DECAY], time_s, exp(-p[MODES_DECAY] * time_s)).h;
 	for (unsigned m = 0; m < modes->count; m++) {
 		const double *q = p + MODES_EACH * m;
 		double angle = q[MODES_OMEGA] * time_s + bend;
@@ -353,10 +473,11 @@ void modes_residual(const struct modes *modes, const struct series *series, doub
 		residual_g[k] = series->value_g[k] - modes->p[MODES_OFFSET];
 	for (unsigned m = 0; m < modes->count; m++) {
 		const double *p = modes->p + MODES_EACH * m;
-		struct rotor r = rotor_start(p[MODES_DECAY], p[MODES_OMEGA], series);
+		struct phasor r =
+		        phasor_decaying(p[MODES_DECAY], p[MODES_OMEGA], series->first_s, series->step_s);
 
-		for (unsigned k = 0; k < series->count; k++, rotor_turn(&r))
-			residual_g[k] -= p[MODES_COSINE] * r.re + p[MODES_SINE] * r.im;
+		for (unsigned k = 0; k < series->count; k++, phasor_turn(&r))
+			residual_g[k] -= p[MODES_COSINE] * r.cosine + p[MODES_SINE] * r.sine;
 	}
 }
 

@@ -2,6 +2,7 @@
 #include "host/estimate/pencil.h"
 
 #include <math.h>
+#include <string.h>
 
 #include <gsl/gsl_eigen.h>
 #include <gsl/gsl_errno.h>
@@ -13,44 +14,73 @@ enum {
 	LONGEST = 24, /* of the overlapping stretches */
 	RANK = 5,     /* two pairs of poles and the offset */
 	COUNT_MAX = 128,
+	ROUNDS = 5,
 };
 
-/* Upper triangle of the covariance of all stretches of length n; the matrix is symmetric. */
-static void covariance(gsl_matrix *r, const double *value, unsigned count, size_t n)
+/* Of all stretches of length n. One element along a diagonal differs from the last by its ends. */
+static void covariance(double r[LONGEST][LONGEST], const double *value, unsigned count, size_t n)
 {
-	for (size_t i = 0; i < n; i++) {
-		for (size_t j = 0; j <= i; j++) {
-			double sum = 0;
+	const size_t stretches = count - n + 1;
 
-			for (size_t k = 0; k + n <= count; k++)
-				sum += value[k + i] * value[k + j];
-			gsl_matrix_set(r, i, j, sum);
-			gsl_matrix_set(r, j, i, sum);
+	for (size_t j = 0; j < n; j++) {
+		double sum = 0;
+
+		for (size_t k = 0; k < stretches; k++)
+			sum += value[k] * value[k + j];
+		r[0][j] = r[j][0] = sum;
+		for (size_t i = 1; i + j < n; i++) {
+			sum += value[stretches + i - 1] * value[stretches + i - 1 + j] -
+			       value[i - 1] * value[i - 1 + j];
+			r[i][i + j] = r[i + j][i] = sum;
 		}
 	}
 }
 
-/* The leading eigenvectors, as the columns of basis. */
+/* Makes columns perpendicular to those before and of length 1; false where one is none of its own. */
+static bool straighten(double basis[LONGEST][RANK], size_t n)
+{
+	for (size_t j = 0; j < RANK; j++) {
+		double square = 0;
+
+		for (size_t before = 0; before < j; before++) {
+			double along = 0;
+
+			for (size_t i = 0; i < n; i++)
+				along += basis[i][before] * basis[i][j];
+			for (size_t i = 0; i < n; i++)
+				basis[i][j] -= along * basis[i][before];
+		}
+		for (size_t i = 0; i < n; i++)
+			square += basis[i][j] * basis[i][j];
+		if (!(square > 0) || !isfinite(square))
+			return false;
+		for (size_t i = 0; i < n; i++)
+			basis[i][j] /= sqrt(square);
+	}
+	return true;
+}
+
+/* The leading eigenvectors, as the columns of basis, by orthogonal iteration. */
 static bool signal_space(double basis[LONGEST][RANK], const double *value, unsigned count, size_t n)
 {
-	gsl_matrix *r = gsl_matrix_alloc(n, n), *vectors = gsl_matrix_alloc(n, n);
-	gsl_vector *values = gsl_vector_alloc(n);
-	gsl_eigen_symmv_workspace *work = gsl_eigen_symmv_alloc(n);
-	bool found = false;
+	double r[LONGEST][LONGEST];
 
-	if (r && vectors && values && work) {
-		covariance(r, value, count, n);
-		found = gsl_eigen_symmv(r, values, vectors, work) == GSL_SUCCESS &&
-		        gsl_eigen_symmv_sort(values, vectors, GSL_EIGEN_SORT_VAL_DESC) == GSL_SUCCESS;
-		for (size_t i = 0; found && i < n; i++)
-			for (size_t j = 0; j < RANK; j++)
-				basis[i][j] = gsl_matrix_get(vectors, i, j);
+	covariance(r, value, count, n);
+	for (size_t i = 0; i < n; i++)
+		for (size_t j = 0; j < RANK; j++)
+			basis[i][j] = r[i][j * n / RANK];
+	for (unsigned round = 0; round < ROUNDS; round++) {
+		double turned[LONGEST][RANK] = {{0}};
+
+		if (!straighten(basis, n))
+			return false;
+		for (size_t i = 0; i < n; i++)
+			for (size_t k = 0; k < n; k++)
+				for (size_t j = 0; j < RANK; j++)
+					turned[i][j] += r[i][k] * basis[k][j];
+		memcpy(basis, turned, sizeof(turned));
 	}
-	gsl_matrix_free(r);
-	gsl_matrix_free(vectors);
-	gsl_vector_free(values);
-	gsl_eigen_symmv_free(work);
-	return found;
+	return straighten(basis, n);
 }
 
 /* The turn that takes basis without its last row to basis without its first, by least squares. */

@@ -47,7 +47,7 @@ static size_t largest(const struct trace *trace, double middle_g)
 		const struct trace_block *block = &trace->block[k / TRACE_BLOCK];
 		double value;
 
-		if (!(fmax(block->high_g - middle_g, middle_g - block->low_g) > most)) {
+		if (!(block->high_g - middle_g > most || middle_g - block->low_g > most)) {
 			k |= TRACE_BLOCK - 1;
 			continue;
 		}
@@ -119,53 +119,62 @@ static void add_plain(const struct quiet *quiet, size_t from, size_t until, doub
 	sums->second += second[0] + second[1];
 }
 
-/* Adds the samples [from, until) that lie within reach of about. */
+/* Adds the samples [from, until) that lie within reach of about; zero, unless NULL, begins there. */
 static void add_up(const struct quiet *quiet, size_t from, size_t until, double about, double reach,
-                   struct sums *sums)
+                   struct zero *zero, struct sums *sums)
 {
 	const double *value = quiet->trace->value_g;
-	struct sums s = *sums;
-	struct zero zero = {0};
+	PAIR first = {0}, second = {0};
 
-	if (quiet->zero)
-		zero = zero_from(quiet->zero, quiet->trace, from);
-	for (size_t k = from; k < until; k++) {
-		size_t good = trace_good(quiet->trace, k), used;
-		double d = value[k] - about;
+	for (size_t k = from; k < until; k += 2) {
+		const bool more = k + 1 < until;
+		size_t good[2] = {trace_good(quiet->trace, k), more && trace_good(quiet->trace, k + 1)},
+		       used[2];
+		PAIR d = (PAIR){value[k], more ? value[k + 1] : 0} - about;
 
-		if (quiet->zero)
-			d -= zero_next(&zero);
-		used = good & (fabs(d) <= reach);
-		d = used ? d : 0;
-		s.good += good;
-		s.used += used;
-		s.first += d;
-		s.second += d * d;
+		if (zero)
+			d -= zero_next(zero);
+		for (unsigned i = 0; i < 2; i++)
+			used[i] = good[i] & (fabs(d[i]) <= reach);
+		d = (PAIR){used[0] ? d[0] : 0, used[1] ? d[1] : 0};
+		sums->good += good[0] + good[1];
+		sums->used += used[0] + used[1];
+		first += d;
+		second += d * d;
 	}
-	*sums = s;
+	sums->first += first[0] + first[1];
+	sums->second += second[0] + second[1];
 }
 
 struct quiet_moments quiet_take(struct quiet *quiet, double about, double reach)
 {
-	double all = (double)(quiet->until - quiet->from), n, mean;
+	const double all = (double)(quiet->until - quiet->from);
 	bool plain = is_plain(quiet, quiet->from, quiet->until, about, reach);
 	struct sums sums = {0};
+	struct zero zero;
+	double n, mean;
 
 	quiet->count = 0;
 	for (size_t k = quiet->from; k < quiet->until && quiet->count < QUIET_BLOCKS_MAX;
 	     k += quiet->length) {
 		size_t end = k + quiet->length < quiet->until ? k + quiet->length : quiet->until;
 		struct quiet_block *block = &quiet->block[quiet->count++];
-		struct sums before = sums;
+		struct sums here = {0};
 
+		/* Two by two a block of an odd length leaves it a sample too far. */
+		if (quiet->zero && (k == quiet->from || quiet->length % 2))
+			zero = zero_from(quiet->zero, quiet->trace, k);
 		if (plain || is_plain(quiet, k, end, about, reach))
-			add_plain(quiet, k, end, about, &sums);
+			add_plain(quiet, k, end, about, &here);
 		else
-			add_up(quiet, k, end, about, reach, &sums);
-		n = (double)(sums.used - before.used);
-		block->weight = n;
-		block->mean = n > 0 ? about + (sums.first - before.first) / n : about;
+			add_up(quiet, k, end, about, reach, quiet->zero ? &zero : NULL, &here);
+		block->weight = (double)here.used;
+		block->mean = here.used > 0 ? about + here.first / (double)here.used : about;
 		block->place = (double)(k + end - 2 * quiet->from) / all - 1;
+		sums.good += here.good;
+		sums.used += here.used;
+		sums.first += here.first;
+		sums.second += here.second;
 	}
 	if ((quiet->until - quiet->from) % quiet->length != 0)
 		quiet->count--; /* the last one is not full: no place among the others */

@@ -77,14 +77,15 @@ bool series_lengthen(struct series *series, const struct trace *trace, size_t fi
 
 double series_squares(const struct series *series)
 {
-	double sum = 0, squares = 0;
+	double sum = 0, squares = 0, mean;
 
 	for (unsigned k = 0; k < series->count; k++)
 		sum += series->good[k] ? series->value_g[k] : 0;
-	for (unsigned k = 0; k < series->count && series->used > 0; k++) {
-		double off = series->value_g[k] - sum / series->used;
+	mean = sum / series->used;
+	for (unsigned k = 0; k < series->count; k++) {
+		double off = series->good[k] ? series->value_g[k] - mean : 0;
 
-		squares += series->good[k] ? off * off : 0;
+		squares += off * off;
 	}
 	return squares;
 }

@@ -249,20 +249,12 @@ static struct sums sum_under(const struct problem *m, const double *p, const str
 		PAIR count, value = two_samples(m, k, under->last, &count), next = c * turn_c - s * turn_s;
 
 		if (m->family == ESTIMATE_FAMILY_SINE_POWER) {
-			PAIR u, v, w;
+			const PAIR cosine = pair_more(c, (PAIR){COSINE_MIN, COSINE_MIN});
+			const PAIR logarithm = {log(cosine[0]), log(cosine[1])},
+			           less = (p[POWER] - 1) * logarithm;
+			const PAIR rest = count * (PAIR){exp(less[0]), exp(less[1])};
+			const PAIR u = rest * cosine, v = -p[POWER] * rest * s, w = u * logarithm;
 
-			for (unsigned i = 0; i < 2; i++) {
-				double unit[3];
-
-				unit_pulse(m->family, p[POWER], c[i] > COSINE_MIN ? c[i] : COSINE_MIN, s[i],
-				           unit);
-				u[i] = unit[0];
-				v[i] = unit[1];
-				w[i] = unit[2];
-			}
-			u *= count;
-			v *= count;
-			w *= count;
 			add_up(&sums, phi, u, v, value - p[PEAK] * u);
 			add_power(&sums, phi, u, v, w, value - p[PEAK] * u);
 		} else {

@@ -79,7 +79,8 @@ static void look_closely(struct trace *trace, size_t k, struct trace_block *bloc
 	}
 }
 
-static bool all_good(const uint8_t *sample)
+/* All marks of a whole block's samples, eight samples side by side. */
+static uint64_t marks_of(const uint8_t *sample)
 {
 	uint64_t any = 0;
 
@@ -89,7 +90,7 @@ static bool all_good(const uint8_t *sample)
 		memcpy(&word, sample + i, sizeof(word));
 		any |= word;
 	}
-	return any == 0;
+	return any;
 }
 
 /* The block that begins at sample k, from values that lie elsewhere or in the trace itself. */
@@ -98,7 +99,8 @@ static void look(struct trace *trace, size_t k, const double *from)
 	struct trace_block *block = &trace->block[k / TRACE_BLOCK];
 	double *to = trace->value_g + k;
 
-	if (trace->count - k >= TRACE_BLOCK && all_good(trace->sample + k) && take_block(to, from, block))
+	if (trace->count - k >= TRACE_BLOCK && marks_of(trace->sample + k) == 0 &&
+	    take_block(to, from, block))
 		return;
 	if (from != to)
 		memcpy(to, from, smaller(TRACE_BLOCK, trace->count - k) * sizeof(*to));
@@ -121,7 +123,11 @@ void trace_changed(struct trace *trace)
 
 void trace_marked(struct trace *trace)
 {
-	trace_changed(trace);
+	const uint64_t bad = (SAMPLE_BAD | SAMPLE_SPIKE) * 0x0101010101010101u;
+
+	for (size_t k = 0; k < trace->count; k += TRACE_BLOCK)
+		if (trace->count - k < TRACE_BLOCK || marks_of(trace->sample + k) & bad)
+			look(trace, k, trace->value_g + k);
 	clip_mark(trace);
 }
 

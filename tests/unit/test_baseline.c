@@ -346,6 +346,40 @@ static void without_quiet(void **state)
 	synth_free(&channel);
 }
 
+/* Only marks that the quiet part has, and what moves it, ask for another baseline. */
+static void holds(void **state)
+{
+	struct channel channel = synth_channel("a", 7000, 0, 3500);
+	struct under u = {.offset_g = 2, .noise_g = 1};
+	struct synth_random random = {38};
+	static double scratch[3500];
+	struct estimate_baseline b;
+	struct trace trace;
+	size_t quiet;
+
+	(void)state;
+	fill(&channel, &u, &random);
+	assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+	baseline_find(&trace, scratch, &b);
+	assert_true(baseline_holds(&trace, &b));
+	trace.sample[900] |= SAMPLE_SPIKE;
+	trace_marked(&trace);
+	assert_true(baseline_holds(&trace, &b));
+	quiet = trace_index(&trace, b.from_s) + 100;
+	trace.sample[quiet] |= SAMPLE_SPIKE;
+	assert_false(baseline_holds(&trace, &b));
+	trace.sample[quiet] = SAMPLE_BAD;
+	assert_false(baseline_holds(&trace, &b));
+	trace.sample[quiet] = 0;
+	trace.value_g[quiet + 300] = 900;
+	trace_changed(&trace);
+	assert_false(baseline_holds(&trace, &b));
+	b.samples = 0;
+	assert_false(baseline_holds(&trace, &b));
+	trace_close(&trace);
+	synth_free(&channel);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -353,7 +387,7 @@ int main(void)
 	        cmocka_unit_test(drift_and_hum),    cmocka_unit_test(hum_in_noise),
 	        cmocka_unit_test(motion),           cmocka_unit_test(robust),
 	        cmocka_unit_test(other_hum),        cmocka_unit_test(earlier_shock),
-	        cmocka_unit_test(without_quiet),
+	        cmocka_unit_test(without_quiet),    cmocka_unit_test(holds),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

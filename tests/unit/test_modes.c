@@ -120,6 +120,53 @@ static void exact(void **state)
 	trace_close(&trace);
 }
 
+/* The covariance is that of the points that are there, whatever is missing at either end or between. */
+static void holes(void **state)
+{
+	static const size_t lost[] = {0, 1, 2, 60, 61, 63, 140, 295, 299, 300};
+	struct trace trace = open_sum(40, 5, 0, 2);
+	struct modes modes = {.count = 2, .hum_hz = 50, .p = {0, 70, 1.05 * w1, 0, 0, 110, 0.96 * w2}};
+	double normal[CHOLESKY_MAX][CHOLESKY_MAX] = {{0}};
+	struct cholesky factor;
+	struct series s;
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(lost) / sizeof(lost[0]); i++)
+		trace.sample[lost[i]] = SAMPLE_LOST;
+	series_take(&s, &trace, 0, 301, 0.25, 1);
+	assert_int_equal(s.used, 291);
+	assert_true(modes_linear(&modes, &s));
+	assert_true(modes_fit(&modes, &s));
+	assert_int_equal(modes.fit.used, 291);
+	for (unsigned k = 0; k < s.count; k++) {
+		double t = s.first_s + k * s.step_s, hum = 2 * PI * 50 * t;
+		double row[CHOLESKY_MAX] = {[MODES_OFFSET] = 1, [9] = cos(hum), [10] = sin(hum)};
+
+		for (unsigned m = 0; m < 2; m++) {
+			const double *p = modes.p + MODES_EACH * m;
+			double *mine = row + MODES_EACH * m, size = exp(-p[MODES_DECAY] * t);
+			double re = size * cos(p[MODES_OMEGA] * t), im = size * sin(p[MODES_OMEGA] * t);
+
+			mine[MODES_DECAY] = -t * (p[MODES_COSINE] * re + p[MODES_SINE] * im);
+			mine[MODES_OMEGA] = t * (p[MODES_SINE] * re - p[MODES_COSINE] * im);
+			mine[MODES_COSINE] = re;
+			mine[MODES_SINE] = im;
+		}
+		for (unsigned i = 0; s.good[k] && i < CHOLESKY_MAX; i++)
+			for (unsigned j = 0; j <= i; j++)
+				normal[i][j] += row[i] * row[j];
+	}
+	assert_true(cholesky_factor(&factor, CHOLESKY_MAX, normal));
+	for (unsigned i = 0; i < CHOLESKY_MAX; i++) {
+		double unit[CHOLESKY_MAX] = {0};
+
+		unit[i] = 1;
+		assert_near_part(cholesky_variance(&modes.fit.factor, unit), cholesky_variance(&factor, unit),
+		                 1e-5);
+	}
+	trace_close(&trace);
+}
+
 /* No place, no fit; nothing crashes on a series that determines nothing. */
 static void impossible(void **state)
 {
@@ -276,9 +323,10 @@ static void bump(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(series),     cmocka_unit_test(thinned),   cmocka_unit_test(exact),
-	        cmocka_unit_test(impossible), cmocka_unit_test(scanned),   cmocka_unit_test(pencil),
-	        cmocka_unit_test(outliers),   cmocka_unit_test(crossings), cmocka_unit_test(bump),
+	        cmocka_unit_test(series), cmocka_unit_test(thinned),    cmocka_unit_test(exact),
+	        cmocka_unit_test(holes),  cmocka_unit_test(impossible), cmocka_unit_test(scanned),
+	        cmocka_unit_test(pencil), cmocka_unit_test(outliers),   cmocka_unit_test(crossings),
+	        cmocka_unit_test(bump),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
