@@ -31,6 +31,7 @@ struct ringdown_job {
 	size_t first, last;              /* all there is */
 	struct modes modes;              /* the best so far */
 	struct modes single;             /* one mode, nothing else */
+	double total;                    /* squares of the series it began with, about its mean */
 	double doubt_omega, doubt_decay; /* of the values beyond their scatter */
 	unsigned flags;
 	const char *path[ESTIMATE_PATH_MAX];
@@ -75,10 +76,10 @@ bool ringdown_passes(const struct ringdown_job *job, const struct modes *modes);
 /* Standard deviation of a point: the larger of the noise and the residual. */
 double ringdown_sigma_point(const struct ringdown_job *job, const struct modes *modes);
 
-/* Part of what is not noise that the fit explains. */
+/* Of the fit it began with: the part of what is not noise that it explains. */
 double ringdown_explained(const struct ringdown_job *job);
 
-/* What the fit takes from the sum of squares, in the noise's variance: how far it stands out. */
+/* What it takes from the sum of squares, in the noise's variance: how far it stands out. */
 double ringdown_gain(const struct ringdown_job *job);
 
 /* ---- ringdown_richer.c ---- */

@@ -35,7 +35,7 @@ double ringdown_sigma_point(const struct ringdown_job *job, const struct modes *
 
 double ringdown_explained(const struct ringdown_job *job)
 {
-	double noise = job->trace->noise_g, expected = 0, total = series_squares(&job->series);
+	double noise = job->trace->noise_g, expected = 0, total = job->total;
 
 	if (isfinite(noise))
 		expected = noise * noise / job->series.block;
@@ -47,5 +47,5 @@ double ringdown_gain(const struct ringdown_job *job)
 {
 	double noise = job->trace->noise_g;
 
-	return (series_squares(&job->series) - job->modes.fit.squares) * job->series.block / (noise * noise);
+	return (job->total - job->modes.fit.squares) * job->series.block / (noise * noise);
 }

@@ -81,14 +81,15 @@ static void consider(struct ringdown_job *job, const struct modes *candidate)
 
 static void fit_hum(struct ringdown_job *job)
 {
-	const double hz[] = {50, 60, job->trace->hum_hz};
+	const double mine = job->trace->hum_hz, hz[] = {50, 60, mine};
+	const size_t count = mine > 0 && mine != 50 && mine != 60 ? 3 : 2;
 
 	ringdown_try(job, "full+hum");
-	for (size_t i = 0; i < sizeof(hz) / sizeof(hz[0]); i++) {
+	for (size_t i = 0; i < count; i++) {
 		struct modes modes = job->single;
 
 		modes.hum_hz = hz[i];
-		if (hz[i] > 0 && modes_linear(&modes, &job->series) && modes_fit(&modes, &job->series))
+		if (modes_linear(&modes, &job->series) && modes_fit(&modes, &job->series))
 			consider(job, &modes);
 	}
 }

@@ -87,6 +87,7 @@ static bool settle(struct ringdown_job *job, double omega, double decay)
 		block = ringdown_block(job, modes->p[MODES_OMEGA]);
 	}
 	job->single = *modes;
+	job->total = series_squares(&job->series);
 	return true;
 }
 
