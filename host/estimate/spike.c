@@ -17,6 +17,9 @@ enum {
 #define HOLE_BENDS 4.0
 #define SIGMAS 6.0
 
+/* Of two near each other one reaches this part of the highest around them. */
+#define EXTREME 0.7
+
 /* |second difference| about sample k */
 static double bend(const double *v)
 {
@@ -63,7 +66,8 @@ struct around {
 	double value[2 * SIDE + 1];
 };
 
-static bool gather(const struct trace *trace, size_t k, struct around *around)
+/* Sample skip is left out; k itself where none is. */
+static bool gather(const struct trace *trace, size_t k, size_t skip, struct around *around)
 {
 	for (int side = -1; side <= 1; side += 2) {
 		int found = 0;
@@ -73,7 +77,7 @@ static bool gather(const struct trace *trace, size_t k, struct around *around)
 
 			if (at >= trace->count) /* below 0 too */
 				break;
-			if (!trace_good(trace, at))
+			if (!trace_good(trace, at) || at == skip)
 				continue;
 			found++;
 			around->time[SIDE + side * found] = side * away;
@@ -97,20 +101,58 @@ static double curvature(const struct around *a, int before, int at, int after)
 }
 
 /* The rule of stands_alone for samples that are not evenly spaced: by curvatures instead of bends. */
-static bool stands_alone_by_hole(const struct trace *trace, size_t k, double noise_g)
+static bool stands_alone_by_hole(const struct trace *trace, size_t k, size_t skip, double noise_g)
 {
 	const int m = SIDE;
+	/* Between two spikes there is no hole wide enough for noise to hide a bend. */
+	const double calm = skip == k ? 0 : SIGMAS * noise_g;
 	struct around a;
 	double span, near, far;
 
-	if (!gather(trace, k, &a))
+	if (!gather(trace, k, skip, &a))
 		return false;
 	span = -a.time[m - 1] * a.time[m + 1] / 2;
 	near = fmax(curvature(&a, m - 2, m - 1, m + 1), curvature(&a, m - 1, m + 1, m + 2));
 	far = fmax(fmax(curvature(&a, m - 3, m - 2, m - 1), curvature(&a, m - 4, m - 3, m - 2)),
 	           fmax(curvature(&a, m + 1, m + 2, m + 3), curvature(&a, m + 2, m + 3, m + 4)));
 	return curvature(&a, m - 1, m, m + 1) * span >
-	       (HOLE_BENDS * fmax(near, far) * span) + 2 * SIGMAS * noise_g;
+	       HOLE_BENDS * fmax(fmax(near, far) - calm, 0) * span + 2 * SIGMAS * noise_g;
+}
+
+/* How far v[0] stands off the straight line between its neighbours so many samples before and after. */
+static double off_line(const double *v, int before, int after)
+{
+	return v[0] - (after * v[-before] + before * v[after]) / (before + after);
+}
+
+/* Hardly a good sample of its block lies further from zero. */
+static bool is_extreme(const struct trace *trace, size_t k)
+{
+	return fabs(trace->value_g[k]) >= EXTREME * trace_most(trace, k);
+}
+
+/* Two so near that each is the other's neighbour: how far behind k the second one is; 0 if there is none.
+ * Side by side to the same side they are spike_at's, or a kink. Lower ones than what is around them do no
+ * harm, and may be a vibration. */
+static size_t second_spike(const struct trace *trace, size_t k, double noise_g)
+{
+	const double *v = trace->value_g + k, least = 2 * SIGMAS * noise_g;
+
+	/* Nearly always nothing stands off. */
+	if (!(fabs(off_line(v, 1, 1)) > least) && !(fabs(off_line(v, 1, 2)) > least))
+		return 0;
+	for (size_t behind = 1; behind <= SIDE && k + behind + 1 < trace->count; behind++) {
+		int between = behind == 1 ? 2 : 1;
+		double one = off_line(v, 1, between), other = off_line(v + behind, between, 1);
+
+		if (fabs(one) > least && fabs(other) > least && (behind > 1 || one * other < 0) &&
+		    (is_extreme(trace, k) || is_extreme(trace, k + behind)) &&
+		    all_good(trace, k - SIDE, k + SIDE + 1) &&
+		    stands_alone_by_hole(trace, k, k + behind, noise_g) &&
+		    stands_alone_by_hole(trace, k + behind, k, noise_g))
+			return behind;
+	}
+	return 0;
 }
 
 /* How many samples from k on are a spike. */
@@ -121,7 +163,7 @@ static size_t spike_at(const struct trace *trace, size_t k, double noise_g)
 	if (!trace_good(trace, k))
 		return 0;
 	if (!all_good(trace, k - SIDE, k + SIDE + 1))
-		return stands_alone_by_hole(trace, k, noise_g) ? 1 : 0;
+		return stands_alone_by_hole(trace, k, k, noise_g) ? 1 : 0;
 	if (stands_alone(v, noise_g))
 		return 1;
 	if (k + SIDE + 1 < trace->count && trace_good(trace, k + SIDE + 1) && stand_alone(v, noise_g))
@@ -158,7 +200,7 @@ static bool mark_in(struct trace *trace, size_t i, double noise_g)
 	bool marked = false;
 
 	for (size_t k = from < SIDE ? SIDE : from; k < until; k++) {
-		size_t wide;
+		size_t wide, second;
 
 		if (whole && k % RUN == 0 && k + RUN <= until && is_calm(value + k, calm_g)) {
 			k += RUN - 1;
@@ -169,12 +211,12 @@ static bool mark_in(struct trace *trace, size_t i, double noise_g)
 		    !(bend(value + k) > calm_g))
 			continue;
 		wide = spike_at(trace, k, noise_g);
-		if (wide == 0)
+		second = wide > 0 ? wide - 1 : second_spike(trace, k, noise_g);
+		if (wide == 0 && second == 0)
 			continue;
 		trace->sample[k] |= SAMPLE_SPIKE;
-		trace->sample[k + wide - 1] |= SAMPLE_SPIKE;
+		trace->sample[k + second] |= SAMPLE_SPIKE;
 		marked = true;
-		k += wide - 1;
 	}
 	return marked;
 }

@@ -7,7 +7,8 @@
  * among themselves, four on each side, and more than noise. A kink (the onset of a contact), a summit and a
  * vibration of any frequency bend their neighbours as much as themselves; so does whatever a sensor with a
  * limited bandwidth shows. A pulse shorter than about three samples is no different from a spike: it is taken
- * for one.
+ * for one. Two within four samples hide each other: each is judged as if the other were missing, where one of
+ * them is about as high as anything in its block.
  *
  * Marks SAMPLE_SPIKE, which is not good from then on, and RECORD_FLAG_SPIKE. Before baseline_remove. Nothing
  * is marked where the noise is not known, or in the four first and last samples. Beside missing samples only

@@ -169,6 +169,31 @@ static void found(void **state)
 	assert_int_equal(missed, 0);
 }
 
+/* Two within four samples of each other, of any sign, and higher than the plate: neither hides the other. */
+static void found_near(void **state)
+{
+	static const double noise[] = {0.3, 1, 3, 10};
+	struct synth_random random = {26};
+	size_t missed = 0, at = 0;
+
+	(void)state;
+	for (int run = 0; run < 2000; run++) {
+		double rate = run % 3 ? 10000 : 7000, sigma = noise[run % 4];
+		struct channel channel = synth_channel("a", rate, 0, (size_t)(0.1 * rate));
+		size_t k = (size_t)((0.028 + 0.06 * synth_uniform(&random)) * rate);
+		size_t behind = 1 + (size_t)(run / 4 % 4);
+
+		fill(&channel, SYNTH_HALF_SINE, true, 3e-3, 300, sigma, &random);
+		channel.value_g[k] += synth_uniform(&random) < 0.5 ? 600 : -600;
+		channel.value_g[k + behind] += synth_uniform(&random) < 0.5 ? 600 : -600;
+		if (marked(&channel, sigma, &at) != 2 || at != k)
+			missed++;
+		synth_free(&channel);
+	}
+	printf("%zu of 2000 pairs missed\n", missed);
+	assert_true(missed <= 10);
+}
+
 /* On the contact itself, at its summit and on its flanks, but for the steep onset of a Hunt-Crossley pulse.
  */
 static void on_the_pulse(void **state)
@@ -300,9 +325,9 @@ static void dropouts(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(clean),        cmocka_unit_test(vibrations),  cmocka_unit_test(found),
-	        cmocka_unit_test(on_the_pulse), cmocka_unit_test(recordings),  cmocka_unit_test(says_nothing),
-	        cmocka_unit_test(dropouts),     cmocka_unit_test(among_holes),
+	        cmocka_unit_test(clean),        cmocka_unit_test(vibrations),   cmocka_unit_test(found),
+	        cmocka_unit_test(found_near),   cmocka_unit_test(on_the_pulse), cmocka_unit_test(recordings),
+	        cmocka_unit_test(says_nothing), cmocka_unit_test(dropouts),     cmocka_unit_test(among_holes),
 	};
 
 	for (int shape = 0; shape < SYNTH_SHAPES; shape++)
