@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/estimate/peak.h"
+#include "host/estimate/peak_private.h"
 
 #include <math.h>
 
@@ -31,24 +31,6 @@
  * its residual shows. */
 #define UNSEEN 1e-3
 
-/* Clipped samples within so many sigma of each other tremble about a limit. */
-#define FLAT_SIGMAS 6.0
-
-/* Of what an unasked sine-power adds to a limit, or across a hole: not every pulse it fits is of its family.
- */
-#define OTHER_FAMILY 0.05
-
-/* What readings beyond the range are trusted: this part of what they add is taken as their uncertainty. */
-#define BEYOND_RANGE 0.1
-
-/* Below this many sigma an axis is weak; the strongest must stand this many times higher than that. */
-#define WEAK_SIGMAS 10.0
-#define STRONG_OVER_WEAK 2.0
-
-/* An amplitude is there from this many of its own sigma on: chance has one number to get there, not as many
- * as there are samples. */
-#define WEAK_SIGNIFICANT 3.5
-
 /* Another extreme is as high when it lies below by less than this part and this many sigma. */
 #define RIVAL_PART 0.01
 #define RIVAL_SIGMAS 3.0
@@ -58,7 +40,7 @@
 
 enum { SAMPLES_MIN = 3 };
 
-static void tried(struct estimate_how *how, const char *name)
+void peak_tried(struct estimate_how *how, const char *name)
 {
 	for (int i = 0; i < ESTIMATE_PATH_MAX; i++) {
 		if (how->path[i])
@@ -212,7 +194,7 @@ static bool take_crest(const struct trace *trace, struct peak *peak)
 	double near = trace_time(trace, peak->at), shift, rise, bend;
 	struct crest crest;
 
-	tried(&result->how, "poly4/poly6");
+	peak_tried(&result->how, "poly4/poly6");
 	if (parabola(trace, peak, &shift, &rise, &bend))
 		near += shift / trace->rate_hz;
 	if (!crest_fit(&crest, axes, 1, near, peak->width_s, &peak->span))
@@ -232,18 +214,18 @@ static bool take_crest(const struct trace *trace, struct peak *peak)
 }
 
 /* Without any model: it says so in its uncertainty. */
-static void take_samples(const struct trace *trace, struct peak *peak)
+void peak_take_samples(const struct trace *trace, struct peak *peak)
 {
 	struct estimate_how *how = &peak->result.how;
 
 	if (!take_parabola(trace, peak))
 		take_sample(trace, peak);
-	tried(how, how->method);
+	peak_tried(how, how->method);
 }
 
-static bool fit(const struct trace *trace, enum estimate_family family, struct peak *peak)
+bool peak_fit(const struct trace *trace, enum estimate_family family, struct peak *peak)
 {
-	tried(&peak->result.how, estimate_family_name(family));
+	peak_tried(&peak->result.how, estimate_family_name(family));
 	if (!shape_fit(&peak->shape, trace, family, &peak->start))
 		return false;
 	if (family == ESTIMATE_FAMILY_HALF_SINE)
@@ -251,7 +233,7 @@ static bool fit(const struct trace *trace, enum estimate_family family, struct p
 	return true;
 }
 
-static void take_shape(struct peak *peak)
+void peak_take_shape(struct peak *peak)
 {
 	struct estimate_peak *result = &peak->result;
 
@@ -264,7 +246,7 @@ static void take_shape(struct peak *peak)
 	peak->model = PEAK_MODEL_SHAPE;
 }
 
-static bool meets(const struct peak *peak, const struct estimate_options *options)
+bool peak_meets(const struct peak *peak, const struct estimate_options *options)
 {
 	double tolerance = options->tolerance > 0 ? options->tolerance : ESTIMATE_TOLERANCE;
 
@@ -279,9 +261,10 @@ static void sharpen(const struct trace *trace, struct peak *peak)
 	double apart_g, apart_s, sigma_g;
 
 	/* Both are enough to see that no symmetric family will do. */
-	if (peak->lopsided || (fit(trace, ESTIMATE_FAMILY_HALF_SINE, peak) && shape_hopeless(&peak->shape)))
+	if (peak->lopsided ||
+	    (peak_fit(trace, ESTIMATE_FAMILY_HALF_SINE, peak) && shape_hopeless(&peak->shape)))
 		return;
-	if (!fit(trace, ESTIMATE_FAMILY_SINE_POWER, peak)) {
+	if (!peak_fit(trace, ESTIMATE_FAMILY_SINE_POWER, peak)) {
 		peak->shape.family = ESTIMATE_FAMILY_AUTO;
 		return;
 	}
@@ -292,7 +275,7 @@ static void sharpen(const struct trace *trace, struct peak *peak)
 	    apart_g > AGREE_SIGMAS * local.sigma_g || apart_s > AGREE_SIGMAS * local.sigma_time_s ||
 	    sigma_g > local.sigma_g)
 		return;
-	take_shape(peak);
+	peak_take_shape(peak);
 	peak->result.sigma_g = hypot(sigma_g, apart_g / 2);
 }
 
@@ -301,32 +284,32 @@ static void reach_across(const struct trace *trace, struct peak *peak)
 {
 	double sample = fabs(trace->value_g[peak->at]);
 
-	if ((fit(trace, ESTIMATE_FAMILY_HALF_SINE, peak) && shape_hopeless(&peak->shape)) ||
-	    !fit(trace, ESTIMATE_FAMILY_SINE_POWER, peak) || shape_judge(&peak->shape) != SHAPE_FITS)
+	if ((peak_fit(trace, ESTIMATE_FAMILY_HALF_SINE, peak) && shape_hopeless(&peak->shape)) ||
+	    !peak_fit(trace, ESTIMATE_FAMILY_SINE_POWER, peak) || shape_judge(&peak->shape) != SHAPE_FITS)
 		return;
-	take_shape(peak);
+	peak_take_shape(peak);
 	peak->result.sigma_g =
-	        hypot(peak->result.sigma_g, OTHER_FAMILY * (fabs(peak->shape.peak_g) - sample));
+	        hypot(peak->result.sigma_g, PEAK_OTHER_FAMILY * (fabs(peak->shape.peak_g) - sample));
 }
 
 /* The family that is given, or the ladder. */
-static void climb(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
+void peak_climb(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
 {
 	struct estimate_how *how = &peak->result.how;
 	enum shape_verdict verdict = SHAPE_REFUSED;
 	struct estimate_peak *result = &peak->result;
 
 	if (options->family != ESTIMATE_FAMILY_AUTO) {
-		if (fit(trace, options->family, peak))
+		if (peak_fit(trace, options->family, peak))
 			verdict = shape_judge(&peak->shape);
 		if (verdict == SHAPE_FITS) {
-			take_shape(peak);
+			peak_take_shape(peak);
 			return;
 		}
 		how->flags |= ESTIMATE_FLAG_MODEL;
 	}
 	if (!take_crest(trace, peak)) {
-		take_samples(trace, peak);
+		peak_take_samples(trace, peak);
 		if (how->status == ESTIMATE_AMBIGUOUS && how->flags & ESTIMATE_FLAG_GAPS)
 			reach_across(trace, peak);
 		return;
@@ -334,130 +317,13 @@ static void climb(const struct trace *trace, const struct estimate_options *opti
 	if (verdict == SHAPE_DOUBTFUL) {
 		struct estimate_peak local = *result;
 
-		take_shape(peak);
+		peak_take_shape(peak);
 		result->sigma_g = hypot(result->sigma_g, (result->value_g - local.value_g) / 2);
 		result->sigma_time_s = hypot(result->sigma_time_s, (result->time_s - local.time_s) / 2);
-	} else if ((how->status == ESTIMATE_AMBIGUOUS || !meets(peak, options)) &&
+	} else if ((how->status == ESTIMATE_AMBIGUOUS || !peak_meets(peak, options)) &&
 	           options->family != ESTIMATE_FAMILY_SINE_POWER) {
 		sharpen(trace, peak);
 	}
-}
-
-/* The clipped samples under the pulse. */
-struct clipped {
-	size_t first, last, n;
-	bool limit;       /* some of them stand at one */
-	double low, high; /* of their magnitudes */
-};
-
-static struct clipped clipped_under(const struct trace *trace, const struct peak *peak)
-{
-	struct clipped found = {0, 0, 0, false, INFINITY, -INFINITY};
-
-	for (size_t k = trace_index(trace, peak->span.from_s);
-	     k < trace->count && trace_time(trace, k) <= peak->span.until_s; k++) {
-		if (!trace_good(trace, k) || !(trace->sample[k] & SAMPLE_CLIPPED))
-			continue;
-		found.first = found.n == 0 ? k : found.first;
-		found.last = k;
-		found.n++;
-		found.limit = found.limit || trace->sample[k] & TRACE_LIMIT;
-		found.low = fmin(found.low, fabs(trace->value_g[k]));
-		found.high = fmax(found.high, fabs(trace->value_g[k]));
-	}
-	return found;
-}
-
-/* The flanks speak against the family, yet the truth lies beyond the limit. */
-static void take_suspect(struct peak *peak, const struct clipped *clipped)
-{
-	struct estimate_peak *result = &peak->result;
-	double half = (peak->clipped_until_s - peak->clipped_from_s) / 2;
-	double beyond = fmax(fabs(peak->shape.peak_g) - clipped->low, 0);
-
-	take_shape(peak);
-	result->sigma_g = hypot(sqrt(fmax(peak->shape.chi_square, 1)) * result->sigma_g, beyond / 2);
-	result->sigma_time_s = fmax(result->sigma_time_s, half);
-	result->how.flags |= ESTIMATE_FLAG_MODEL;
-}
-
-/* Into peak->shape the first family that fits; a doubtful one stands against those of more freedom. */
-static enum shape_verdict fit_flanks(const struct trace *trace, enum estimate_family family,
-                                     struct peak *peak)
-{
-	static const enum estimate_family ladder[] = {ESTIMATE_FAMILY_HALF_SINE, ESTIMATE_FAMILY_HAVERSINE,
-	                                              ESTIMATE_FAMILY_SINE_POWER};
-	enum shape_verdict best = SHAPE_REFUSED;
-
-	for (unsigned i = 0; i < sizeof(ladder) / sizeof(ladder[0]); i++) {
-		struct shape before = peak->shape;
-		enum shape_verdict verdict;
-
-		if (family != ESTIMATE_FAMILY_AUTO && family != ladder[i])
-			continue;
-		if (best == SHAPE_DOUBTFUL && ladder[i] == ESTIMATE_FAMILY_SINE_POWER)
-			break;
-		if (!fit(trace, ladder[i], peak)) {
-			peak->shape = before;
-			continue;
-		}
-		verdict = shape_judge(&peak->shape);
-		if (verdict > best || (verdict == best && best == SHAPE_DOUBTFUL))
-			peak->shape = before;
-		best = verdict < best ? verdict : best;
-		if (best == SHAPE_FITS)
-			break;
-	}
-	return best;
-}
-
-/* From the flanks alone. */
-static void extrapolate(const struct trace *trace, const struct estimate_options *options,
-                        const struct clipped *clipped, struct peak *peak)
-{
-	enum shape_verdict verdict = fit_flanks(trace, options->family, peak);
-
-	if (peak->shape.family == ESTIMATE_FAMILY_AUTO) {
-		take_samples(trace, peak);
-		peak->result.sigma_g = NAN;
-		peak->result.sigma_time_s = (peak->clipped_until_s - peak->clipped_from_s) / 2;
-		return;
-	}
-	if (verdict == SHAPE_FITS)
-		take_shape(peak);
-	else
-		take_suspect(peak, clipped);
-	if (options->family != peak->shape.family && peak->shape.family == ESTIMATE_FAMILY_SINE_POWER)
-		peak->result.sigma_g =
-		        hypot(peak->result.sigma_g, OTHER_FAMILY * (fabs(peak->shape.peak_g) - clipped->low));
-	peak->result.how.flags |= ESTIMATE_FLAG_EXTRAPOLATED;
-}
-
-static void find_clipped(const struct trace *trace, const struct estimate_options *options,
-                         struct clipped *clipped, struct peak *peak)
-{
-	struct estimate_peak *result = &peak->result;
-	double half = 0.5 / trace->rate_hz;
-	/* Two samples to either side of a summit are alike by chance. */
-	bool flat = clipped->n > 2 && clipped->high - clipped->low <= FLAT_SIGMAS * trace->noise_g;
-
-	/* One that trembles takes along what lies between. */
-	if (clipped->limit || flat) {
-		peak->clipped_from_s = trace_time(trace, clipped->first) - half;
-		peak->clipped_until_s = trace_time(trace, clipped->last) + half;
-	}
-	if (flat && !clipped->limit) {
-		peak->start.limit_from_s = peak->clipped_from_s;
-		peak->start.limit_until_s = peak->clipped_until_s;
-	}
-	if (clipped->limit || flat) {
-		extrapolate(trace, options, clipped, peak);
-	} else {
-		climb(trace, options, peak);
-		result->sigma_g =
-		        hypot(result->sigma_g, BEYOND_RANGE * fmax(fabs(result->value_g) - clipped->low, 0));
-	}
-	result->how.status = ESTIMATE_CLIPPED;
 }
 
 /* Whether another pulse of the event is as high: sampling and noise then decided which one was taken. */
@@ -467,7 +333,7 @@ static bool has_rival(const struct trace *trace, const struct peak *peak)
 	double level = (1 - RIVAL_PART) * height - RIVAL_SIGMAS * noise;
 	size_t from = trace_index(trace, peak->span.from_s), until = trace_index(trace, peak->span.until_s);
 
-	if (!(height > WEAK_SIGMAS * noise))
+	if (!(height > PEAK_WEAK_SIGMAS * noise))
 		return false;
 	return (trace->first < from && trace_reaches(trace, trace->first, from, level) < from) ||
 	       (until < trace->last && trace_reaches(trace, until, trace->last, level) < trace->last);
@@ -478,7 +344,6 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 	struct peak found = {
 	        .result = {NAN, NAN, NAN, NAN, {.method = "", .chi_square = NAN, .status = ESTIMATE_SHORT}},
 	        .scale = 1};
-	struct clipped clipped;
 
 	found.at = highest(trace);
 	*peak = found;
@@ -499,88 +364,10 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 		peak->result.how.flags |= ESTIMATE_FLAG_SPIKE;
 	if (has_rival(trace, peak))
 		peak->result.how.flags |= ESTIMATE_FLAG_RIVAL;
-	clipped = clipped_under(trace, peak);
-	if (clipped.n > 0)
-		find_clipped(trace, options, &clipped, peak);
-	else
-		climb(trace, options, peak);
-	if (!meets(peak, options))
+	if (!peak_unclip(trace, options, peak))
+		peak_climb(trace, options, peak);
+	if (!peak_meets(peak, options))
 		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
-}
-
-bool peak_is_weak(const struct trace *trace, const struct peak *peak)
-{
-	if (peak->result.how.status == ESTIMATE_NO_PEAK)
-		return true;
-	return (peak->result.how.status == ESTIMATE_OK || peak->result.how.status == ESTIMATE_AMBIGUOUS) &&
-	       fabs(trace->value_g[peak->at]) < WEAK_SIGMAS * trace->noise_g;
-}
-
-/* Sums of one amplitude: the strong axis' samples, between them by straight lines, as the shape. */
-struct amplitude {
-	double value, sigma; /* by unit height of the shape */
-	double chi_square;
-};
-
-static bool fit_amplitude(const struct trace *trace, const struct trace *strong_trace,
-                          const struct peak *strong, struct amplitude *amplitude)
-{
-	double square = 0, product = 0, squares = 0, shape;
-	unsigned used = 0;
-
-	for (size_t k = trace_index(trace, strong->span.from_s);
-	     k < trace->count && trace_time(trace, k) <= strong->span.until_s; k++) {
-		if (!trace_good(trace, k) || !trace_at(strong_trace, trace_time(trace, k), &shape))
-			continue;
-		shape /= strong->result.value_g;
-		square += shape * shape;
-		product += shape * trace->value_g[k];
-		squares += trace->value_g[k] * trace->value_g[k];
-		used++;
-	}
-	if (used < 3 || !(square > 0))
-		return false;
-	amplitude->value = product / square;
-	amplitude->sigma = trace->noise_g / sqrt(square);
-	amplitude->chi_square =
-	        (squares - product * amplitude->value) / ((used - 1) * trace->noise_g * trace->noise_g);
-	return !(amplitude->chi_square > 1 + SHAPE_CHI_MAX * sqrt(2.0 / (used - 1)));
-}
-
-bool peak_weak(const struct trace *trace, const struct estimate_options *options,
-               const struct trace *strong_trace, const struct peak *strong, struct peak *peak)
-{
-	const struct estimate_peak *from = &strong->result;
-	struct estimate_peak result = {
-	        .time_s = from->time_s,
-	        .sigma_time_s = from->sigma_time_s,
-	        .how = {.method = "strong-axis",
-	                .flags =
-	                        ESTIMATE_FLAG_WEAK | (from->how.flags & ~(unsigned)ESTIMATE_FLAG_TOLERANCE)}};
-	struct amplitude amplitude;
-
-	if (from->how.status != ESTIMATE_OK || strong->model == PEAK_MODEL_NONE || !(trace->noise_g > 0) ||
-	    fabs(from->value_g) < STRONG_OVER_WEAK * WEAK_SIGMAS * trace->noise_g ||
-	    !fit_amplitude(trace, strong_trace, strong, &amplitude) ||
-	    fabs(amplitude.value) < WEAK_SIGNIFICANT * amplitude.sigma)
-		return false;
-	result.value_g = amplitude.value;
-	result.sigma_g = amplitude.sigma;
-	result.how.chi_square = amplitude.chi_square;
-	result.how.flags |= peak->result.how.flags & (ESTIMATE_FLAG_GAPS | ESTIMATE_FLAG_SPIKE);
-	for (int i = 0; i < ESTIMATE_PATH_MAX; i++)
-		result.how.path[i] = peak->result.how.path[i];
-	tried(&result.how, result.how.method);
-	*peak = *strong;
-	peak->result = result;
-	peak->at = trace_index(trace, from->time_s);
-	if (peak->at == trace->count)
-		peak->at--;
-	peak->sign = amplitude.value < 0 ? -1 : 1;
-	peak->scale = amplitude.value / from->value_g;
-	if (!meets(peak, options))
-		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
-	return true;
 }
 
 bool peak_at(const struct peak *peak, double time_s, double derivative[3], double variance[2])

@@ -1,0 +1,130 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/estimate/peak_private.h"
+
+#include <math.h>
+
+/* Clipped samples within so many sigma of each other tremble about a limit. */
+#define FLAT_SIGMAS 6.0
+
+/* What readings beyond the range are trusted: this part of what they add is taken as their uncertainty. */
+#define BEYOND_RANGE 0.1
+
+/* The clipped samples under the pulse. */
+struct clipped {
+	size_t first, last, n;
+	bool limit;       /* some of them stand at one */
+	double low, high; /* of their magnitudes */
+};
+
+static struct clipped clipped_under(const struct trace *trace, const struct peak *peak)
+{
+	struct clipped found = {0, 0, 0, false, INFINITY, -INFINITY};
+
+	for (size_t k = trace_index(trace, peak->span.from_s);
+	     k < trace->count && trace_time(trace, k) <= peak->span.until_s; k++) {
+		if (!trace_good(trace, k) || !(trace->sample[k] & SAMPLE_CLIPPED))
+			continue;
+		found.first = found.n == 0 ? k : found.first;
+		found.last = k;
+		found.n++;
+		found.limit = found.limit || trace->sample[k] & TRACE_LIMIT;
+		found.low = fmin(found.low, fabs(trace->value_g[k]));
+		found.high = fmax(found.high, fabs(trace->value_g[k]));
+	}
+	return found;
+}
+
+/* The flanks speak against the family, yet the truth lies beyond the limit. */
+static void take_suspect(struct peak *peak, const struct clipped *clipped)
+{
+	struct estimate_peak *result = &peak->result;
+	double half = (peak->clipped_until_s - peak->clipped_from_s) / 2;
+	double beyond = fmax(fabs(peak->shape.peak_g) - clipped->low, 0);
+
+	peak_take_shape(peak);
+	result->sigma_g = hypot(sqrt(fmax(peak->shape.chi_square, 1)) * result->sigma_g, beyond / 2);
+	result->sigma_time_s = fmax(result->sigma_time_s, half);
+	result->how.flags |= ESTIMATE_FLAG_MODEL;
+}
+
+/* Into peak->shape the first family that fits; a doubtful one stands against those of more freedom. */
+static enum shape_verdict fit_flanks(const struct trace *trace, enum estimate_family family,
+                                     struct peak *peak)
+{
+	static const enum estimate_family ladder[] = {ESTIMATE_FAMILY_HALF_SINE, ESTIMATE_FAMILY_HAVERSINE,
+	                                              ESTIMATE_FAMILY_SINE_POWER};
+	enum shape_verdict best = SHAPE_REFUSED;
+
+	for (unsigned i = 0; i < sizeof(ladder) / sizeof(ladder[0]); i++) {
+		struct shape before = peak->shape;
+		enum shape_verdict verdict;
+
+		if (family != ESTIMATE_FAMILY_AUTO && family != ladder[i])
+			continue;
+		if (best == SHAPE_DOUBTFUL && ladder[i] == ESTIMATE_FAMILY_SINE_POWER)
+			break;
+		if (!peak_fit(trace, ladder[i], peak)) {
+			peak->shape = before;
+			continue;
+		}
+		verdict = shape_judge(&peak->shape);
+		if (verdict > best || (verdict == best && best == SHAPE_DOUBTFUL))
+			peak->shape = before;
+		best = verdict < best ? verdict : best;
+		if (best == SHAPE_FITS)
+			break;
+	}
+	return best;
+}
+
+/* From the flanks alone. */
+static void extrapolate(const struct trace *trace, const struct estimate_options *options,
+                        const struct clipped *clipped, struct peak *peak)
+{
+	enum shape_verdict verdict = fit_flanks(trace, options->family, peak);
+
+	if (peak->shape.family == ESTIMATE_FAMILY_AUTO) {
+		peak_take_samples(trace, peak);
+		peak->result.sigma_g = NAN;
+		peak->result.sigma_time_s = (peak->clipped_until_s - peak->clipped_from_s) / 2;
+		return;
+	}
+	if (verdict == SHAPE_FITS)
+		peak_take_shape(peak);
+	else
+		take_suspect(peak, clipped);
+	if (options->family != peak->shape.family && peak->shape.family == ESTIMATE_FAMILY_SINE_POWER)
+		peak->result.sigma_g = hypot(peak->result.sigma_g,
+		                             PEAK_OTHER_FAMILY * (fabs(peak->shape.peak_g) - clipped->low));
+	peak->result.how.flags |= ESTIMATE_FLAG_EXTRAPOLATED;
+}
+
+bool peak_unclip(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
+{
+	const struct clipped clipped = clipped_under(trace, peak);
+	struct estimate_peak *result = &peak->result;
+	double half = 0.5 / trace->rate_hz;
+	/* Two samples to either side of a summit are alike by chance. */
+	bool flat = clipped.n > 2 && clipped.high - clipped.low <= FLAT_SIGMAS * trace->noise_g;
+
+	if (clipped.n == 0)
+		return false;
+	/* One that trembles takes along what lies between. */
+	if (clipped.limit || flat) {
+		peak->clipped_from_s = trace_time(trace, clipped.first) - half;
+		peak->clipped_until_s = trace_time(trace, clipped.last) + half;
+	}
+	if (flat && !clipped.limit) {
+		peak->start.limit_from_s = peak->clipped_from_s;
+		peak->start.limit_until_s = peak->clipped_until_s;
+	}
+	if (clipped.limit || flat) {
+		extrapolate(trace, options, &clipped, peak);
+	} else {
+		peak_climb(trace, options, peak);
+		result->sigma_g =
+		        hypot(result->sigma_g, BEYOND_RANGE * fmax(fabs(result->value_g) - clipped.low, 0));
+	}
+	result->how.status = ESTIMATE_CLIPPED;
+	return true;
+}

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ESTIMATE_PEAK_PRIVATE_H
+#define DT_HOST_ESTIMATE_PEAK_PRIVATE_H
+/*
+ * What the parts of peak share: one channel's peak, its width measured, on its way through the methods.
+ *   peak.c          the highest sample, the order of methods, the model at an instant
+ *   peak_clipped.c  samples at a limit or beyond the range: from the flanks
+ *   peak_weak.c     an axis by the shape of its sensor's strongest one
+ */
+#include "host/estimate/peak.h"
+
+/* Below this many sigma an axis is weak. */
+#define PEAK_WEAK_SIGMAS 10.0
+
+/* Of what an unasked sine-power adds to a limit, or across a hole: not every pulse it fits is of its family.
+ */
+#define PEAK_OTHER_FAMILY 0.05
+
+/* One more method on the path. */
+void peak_tried(struct estimate_how *how, const char *name);
+
+/* Whether the tolerance is met. */
+bool peak_meets(const struct peak *peak, const struct estimate_options *options);
+
+/* The family's fit into peak->shape; false when there is none. */
+bool peak_fit(const struct trace *trace, enum estimate_family family, struct peak *peak);
+
+/* That fit as the value. */
+void peak_take_shape(struct peak *peak);
+
+/* A value without any model: it says so in its uncertainty. */
+void peak_take_samples(const struct trace *trace, struct peak *peak);
+
+/* The family that is given, or polynomials, and families from there. */
+void peak_climb(const struct trace *trace, const struct estimate_options *options, struct peak *peak);
+
+/* The same where samples under the pulse are clipped; false where none is. */
+bool peak_unclip(const struct trace *trace, const struct estimate_options *options, struct peak *peak);
+
+#endif

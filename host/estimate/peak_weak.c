@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/estimate/peak_private.h"
+
+#include <math.h>
+
+/* The strongest axis must stand this many times higher than a weak one may. */
+#define STRONG_OVER_WEAK 2.0
+
+/* An amplitude is there from this many of its own sigma on: chance has one number to get there, not as many
+ * as there are samples. */
+#define WEAK_SIGNIFICANT 3.5
+
+bool peak_is_weak(const struct trace *trace, const struct peak *peak)
+{
+	if (peak->result.how.status == ESTIMATE_NO_PEAK)
+		return true;
+	return (peak->result.how.status == ESTIMATE_OK || peak->result.how.status == ESTIMATE_AMBIGUOUS) &&
+	       fabs(trace->value_g[peak->at]) < PEAK_WEAK_SIGMAS * trace->noise_g;
+}
+
+/* Sums of one amplitude: the strong axis' samples, between them by straight lines, as the shape. */
+struct amplitude {
+	double value, sigma; /* by unit height of the shape */
+	double chi_square;
+};
+
+static bool fit_amplitude(const struct trace *trace, const struct trace *strong_trace,
+                          const struct peak *strong, struct amplitude *amplitude)
+{
+	double square = 0, product = 0, squares = 0, shape;
+	unsigned used = 0;
+
+	for (size_t k = trace_index(trace, strong->span.from_s);
+	     k < trace->count && trace_time(trace, k) <= strong->span.until_s; k++) {
+		if (!trace_good(trace, k) || !trace_at(strong_trace, trace_time(trace, k), &shape))
+			continue;
+		shape /= strong->result.value_g;
+		square += shape * shape;
+		product += shape * trace->value_g[k];
+		squares += trace->value_g[k] * trace->value_g[k];
+		used++;
+	}
+	if (used < 3 || !(square > 0))
+		return false;
+	amplitude->value = product / square;
+	amplitude->sigma = trace->noise_g / sqrt(square);
+	amplitude->chi_square =
+	        (squares - product * amplitude->value) / ((used - 1) * trace->noise_g * trace->noise_g);
+	return !(amplitude->chi_square > 1 + SHAPE_CHI_MAX * sqrt(2.0 / (used - 1)));
+}
+
+bool peak_weak(const struct trace *trace, const struct estimate_options *options,
+               const struct trace *strong_trace, const struct peak *strong, struct peak *peak)
+{
+	const struct estimate_peak *from = &strong->result;
+	struct estimate_peak result = {
+	        .time_s = from->time_s,
+	        .sigma_time_s = from->sigma_time_s,
+	        .how = {.method = "strong-axis",
+	                .flags =
+	                        ESTIMATE_FLAG_WEAK | (from->how.flags & ~(unsigned)ESTIMATE_FLAG_TOLERANCE)}};
+	struct amplitude amplitude;
+
+	if (from->how.status != ESTIMATE_OK || strong->model == PEAK_MODEL_NONE || !(trace->noise_g > 0) ||
+	    fabs(from->value_g) < STRONG_OVER_WEAK * PEAK_WEAK_SIGMAS * trace->noise_g ||
+	    !fit_amplitude(trace, strong_trace, strong, &amplitude) ||
+	    fabs(amplitude.value) < WEAK_SIGNIFICANT * amplitude.sigma)
+		return false;
+	result.value_g = amplitude.value;
+	result.sigma_g = amplitude.sigma;
+	result.how.chi_square = amplitude.chi_square;
+	result.how.flags |= peak->result.how.flags & (ESTIMATE_FLAG_GAPS | ESTIMATE_FLAG_SPIKE);
+	for (int i = 0; i < ESTIMATE_PATH_MAX; i++)
+		result.how.path[i] = peak->result.how.path[i];
+	peak_tried(&result.how, result.how.method);
+	*peak = *strong;
+	peak->result = result;
+	peak->at = trace_index(trace, from->time_s);
+	if (peak->at == trace->count)
+		peak->at--;
+	peak->sign = amplitude.value < 0 ? -1 : 1;
+	peak->scale = amplitude.value / from->value_g;
+	if (!peak_meets(peak, options))
+		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
+	return true;
+}
