@@ -10,11 +10,13 @@ enum {
 };
 
 /* Half windows of order 6 and 4, in widths. */
-#define FINE_HALF 0.455
+#define FINE_HALF 0.465
 #define COARSE_HALF 0.35
 
-/* Windows shrink by this much where the polynomial does not fit, so many times. */
+/* Windows shrink by this much where the polynomial does not fit, so many times; by little where so much would
+ * leave too few samples at once. */
 #define SHRINK 0.75
+#define LITTLE_SHRINK 0.93
 
 enum { SHRINKS = 12 };
 
@@ -22,7 +24,7 @@ enum { SHRINKS = 12 };
  * orders even where the foot of the pulse cuts one side. */
 #define NARROWEST 15.0
 
-/* A residual this small against the magnitude does no harm. */
+/* A residual, or half the orders' difference, this small against the magnitude does no harm. */
 #define RESIDUAL_MIN 3e-4
 
 /* Newton's last move, in steps. */
@@ -187,6 +189,7 @@ static bool fit_pair(struct crest *crest, const struct trace *const axes[], unsi
 {
 	struct surface fine, coarse;
 	struct crest six, four;
+	double noise_g;
 
 	six.time_s = near_s;
 	if (!climb(&fine, axes, count, &six.time_s, FINE_HALF * width_s, span, 6))
@@ -200,13 +203,14 @@ static bool fit_pair(struct crest *crest, const struct trace *const axes[], unsi
 		return false;
 	six.model_g = fabs(six.value_g - four.value_g) / 2;
 	six.model_s = fabs(six.time_s - four.time_s) / 2;
+	noise_g = six.sigma_g;
 	six.sigma_g = hypot(six.sigma_g, six.model_g);
 	six.sigma_time_s = hypot(six.sigma_time_s, six.model_s);
 	six.chi_square = chi_square(&fine, axes);
 	for (unsigned i = 0; i < count; i++)
 		six.axis[i] = fine.axis[i];
 	*crest = six;
-	*good = follows(&fine, axes, six.value_g);
+	*good = follows(&fine, axes, six.value_g) && six.model_g <= fmax(noise_g, RESIDUAL_MIN * six.value_g);
 	return true;
 }
 
@@ -214,6 +218,7 @@ bool crest_fit(struct crest *crest, const struct trace *const axes[], unsigned c
                double width_s, const struct local_span *span)
 {
 	bool good = false, fitted = fit_pair(crest, axes, count, near_s, width_s, span, &good);
+	double shrink = SHRINK;
 
 	if (!fitted) {
 		for (unsigned i = 0; i < count; i++)
@@ -221,8 +226,11 @@ bool crest_fit(struct crest *crest, const struct trace *const axes[], unsigned c
 		fitted = fit_pair(crest, axes, count, near_s, width_s, span, &good);
 	}
 	for (int i = 0; i < SHRINKS && fitted && !good; i++) {
-		width_s *= SHRINK;
-		if (!fit_pair(crest, axes, count, near_s, width_s, span, &good))
+		if (fit_pair(crest, axes, count, near_s, shrink * width_s, span, &good))
+			width_s *= shrink;
+		else if (i == 0)
+			shrink = LITTLE_SHRINK;
+		else
 			break;
 	}
 	return fitted;

@@ -5,11 +5,12 @@
  * The crest of the magnitude of one or two axes: sqrt(sum of squares) of local polynomials, one per axis at
  * its own rate, maximised on one continuous time. One axis is a peak, two are a resultant.
  *
- * Two orders are fitted, order 4 over +-0.35 width and order 6 over +-0.455 width. Where order 6 leaves a
- * residual that noise does not explain (ripple on the pulse), both windows shrink until it does not, or the
- * samples run out. The value is that of order 6, its standard uncertainty noise or residual through the fit
- * and half the difference of the two orders, added in squares: the difference sees a shape that the
- * polynomials cannot follow.
+ * Two orders are fitted, order 4 over +-0.35 width and order 6 over +-0.465 width. Where order 6 leaves a
+ * residual that noise does not explain (ripple on the pulse), or half the orders' difference is more than
+ * noise makes of order 6 (a steep side), both windows shrink until it is not, or the samples run out. The
+ * value is that of order 6, its standard uncertainty noise or residual through the fit and half the
+ * difference of the two orders, added in squares: the difference sees a shape that the polynomials cannot
+ * follow.
  */
 #include "host/estimate/local.h"
 

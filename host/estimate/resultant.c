@@ -204,6 +204,9 @@ static bool combine(const struct resultant_axes *axes, const struct peak *lead, 
 	result->sigma_g = sqrt(variance[0]) / result->peak_g;
 	result->time_s = time;
 	result->sigma_time_s = sqrt(variance[1]) / fabs(half[2]);
+	/* As in crest.h: a polynomial's maximum over noise is too high by what its wandering gains. */
+	if (lead->model == PEAK_MODEL_LOCAL)
+		result->peak_g -= variance[1] / (2 * fabs(half[2]) * result->peak_g);
 	return true;
 }
 
