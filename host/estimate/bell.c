@@ -174,3 +174,11 @@ double bell_at(const struct bell *bell, double time_s)
 		return 0;
 	return bell->height_g * pow(c, bell->power) * (1 + bell->bulge * (1 - c * c));
 }
+
+double bell_area(const struct bell *bell)
+{
+	double flank = shape_mean_cosine(bell->power);
+
+	return bell->height_g * bell->base_s *
+	       (flank + bell->bulge * (flank - shape_mean_cosine(bell->power + 2)));
+}

@@ -26,5 +26,6 @@ struct bell {
 bool bell_fit(const struct trace *trace, const struct peak *peak, struct bell *bell);
 
 double bell_at(const struct bell *bell, double time_s);
+double bell_area(const struct bell *bell); /* in g s */
 
 #endif

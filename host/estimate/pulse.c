@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/units.h"
+#include "host/estimate/guide.h"
 
 #define EDGE_LEVEL 0.1
 
@@ -11,9 +12,6 @@
  * slope times step squared: that of x (1 - x) / 2 for x uniform in 0..1, 1/sqrt(720). The two kinks of a
  * pulse may fall on the same place, so that their errors add up. */
 #define KINK 0.0372677996249965
-
-/* A pulse that has no kink at its foot, a haversine's or an elastic contact's, leaves this part of that. */
-#define NO_KINK 0.2
 
 struct edge {
 	double time_s;
@@ -142,14 +140,20 @@ static double filled(const struct trace *trace, const struct peak *peak, double 
 	return (double)n * step;
 }
 
+/* With the doubt of zero over the pulse's length. */
+static void take_velocity_sigma(const struct trace *trace, const struct estimate_baseline *baseline,
+                                double sigma_g_s, double length_s, struct estimate_pulse *pulse)
+{
+	double zero = trace->noise_g * length_s / sqrt((double)baseline->samples);
+
+	pulse->sigma_velocity_m_s = baseline->samples > 0 ? UNITS_G_M_S2 * hypot(sigma_g_s, zero) : NAN;
+}
+
 static void velocity(const struct trace *trace, const struct peak *peak,
                      const struct estimate_baseline *baseline, const struct edge edge[2],
                      struct estimate_pulse *pulse)
 {
-	bool smooth =
-	        pulse->family == ESTIMATE_FAMILY_HAVERSINE || pulse->family == ESTIMATE_FAMILY_SINE_POWER;
-	double from, until, length, hole, step = 1 / trace->rate_hz, sigma,
-	                                  kink = smooth ? NO_KINK * KINK : KINK;
+	double from, until, length, hole, step = 1 / trace->rate_hz, sigma;
 
 	trace_edge(trace, peak->at, -1, peak->sign, 0, &from);
 	trace_edge(trace, peak->at, 1, peak->sign, 0, &until);
@@ -159,9 +163,8 @@ static void velocity(const struct trace *trace, const struct peak *peak,
 	pulse->velocity_change_m_s = UNITS_G_M_S2 * area(trace, peak, from, until, &hole);
 	sigma = hypot(trace->noise_g * sqrt(step * length), hole);
 	sigma = hypot(sigma, filled(trace, peak, from, until) * peak->result.sigma_g);
-	sigma = hypot(sigma, kink * step * step * (edge[0].slope_g_s + edge[1].slope_g_s));
-	sigma = hypot(sigma, trace->noise_g * length / sqrt((double)baseline->samples));
-	pulse->sigma_velocity_m_s = baseline->samples > 0 ? UNITS_G_M_S2 * sigma : NAN;
+	sigma = hypot(sigma, KINK * step * step * (edge[0].slope_g_s + edge[1].slope_g_s));
+	take_velocity_sigma(trace, baseline, sigma, length, pulse);
 }
 
 /* Families in the order they are asked without one being given. */
@@ -188,8 +191,9 @@ static bool fit(const struct trace *trace, const struct peak *peak, enum estimat
 }
 
 /* The best of those that are not refused; best stays AUTO when all are. Families that the noise lets pass
- * differ in their base by more than either's own uncertainty: half of it is added to the best one's. */
-static void choose(const struct trace *trace, const struct peak *peak, enum estimate_family family,
+ * differ in their base by more than either's own uncertainty: half of it is added to the best one's. False
+ * where no symmetric pulse will do. */
+static bool choose(const struct trace *trace, const struct peak *peak, enum estimate_family family,
                    struct shape *best, struct estimate_how *how)
 {
 	bool plain = fabs(peak->result.value_g) > PLAIN_SIGMAS * trace->noise_g;
@@ -202,9 +206,9 @@ static void choose(const struct trace *trace, const struct peak *peak, enum esti
 		if (family != ESTIMATE_FAMILY_AUTO && family != ladder[i])
 			continue;
 		if (family == ESTIMATE_FAMILY_AUTO && peak->lopsided)
-			return;
+			return false;
 		if (ladder[i] == ESTIMATE_FAMILY_SINE_POWER && best->family != ESTIMATE_FAMILY_AUTO)
-			return;
+			return true;
 		how->path[tried++] = estimate_family_name(ladder[i]);
 		if (!fit(trace, peak, ladder[i], &shape))
 			continue;
@@ -212,7 +216,7 @@ static void choose(const struct trace *trace, const struct peak *peak, enum esti
 		if (best->family == ESTIMATE_FAMILY_AUTO && !(how->chi_square < shape.chi_square))
 			how->chi_square = shape.chi_square;
 		if (shape_hopeless(&shape))
-			return;
+			return false;
 		verdict = shape_judge(&shape);
 		if (verdict == SHAPE_FITS && best->family != ESTIMATE_FAMILY_AUTO) {
 			double rival = hypot(best->sigma_base_s, (shape.base_s - best->base_s) / 2);
@@ -227,24 +231,28 @@ static void choose(const struct trace *trace, const struct peak *peak, enum esti
 		*best = shape;
 		how->flags |= verdict == SHAPE_FITS ? 0 : ESTIMATE_FLAG_MODEL;
 		if (plain && fabs(shape.power_z) < CLEAR_SCORE)
-			return;
+			return true;
 	}
+	return true;
 }
 
-static void contact(const struct trace *trace, const struct peak *peak, enum estimate_family family,
-                    struct estimate_pulse *pulse)
+/* True with a guide to the samples: the family where none of its questions is open, otherwise a pulse without
+ * one. */
+static bool contact(const struct trace *trace, const struct peak *peak, enum estimate_family family,
+                    struct estimate_pulse *pulse, struct guide *guide)
 {
 	struct estimate_how *how = &pulse->contact;
 	struct shape shape = {.family = ESTIMATE_FAMILY_AUTO};
+	bool symmetric;
 
 	how->status = pulse->status;
 	how->flags = peak->result.how.flags &
 	             (ESTIMATE_FLAG_GAPS | ESTIMATE_FLAG_SPIKE | ESTIMATE_FLAG_EXTRAPOLATED);
-	choose(trace, peak, family, &shape, how);
+	symmetric = choose(trace, peak, family, &shape, how);
 	if (shape.family == ESTIMATE_FAMILY_AUTO) {
 		how->flags |= ESTIMATE_FLAG_MODEL;
 		how->status = ESTIMATE_NOT_CONVERGED;
-		return;
+		return symmetric && guide_from_bell(trace, peak, guide);
 	}
 	how->method = estimate_family_name(shape.family);
 	how->chi_square = shape.chi_square;
@@ -254,6 +262,29 @@ static void contact(const struct trace *trace, const struct peak *peak, enum est
 	pulse->contact_start_s = shape.peak_s - shape.base_s / 2;
 	pulse->fitted_velocity_m_s = UNITS_G_M_S2 * shape.area_g_s;
 	pulse->sigma_fitted_velocity_m_s = UNITS_G_M_S2 * shape.sigma_area_g_s;
+	return how->flags & ESTIMATE_FLAG_MODEL ? guide_from_bell(trace, peak, guide)
+	                                        : guide_from_shape(&shape, guide);
+}
+
+/* Width and area once more, by what the samples say beyond the guide. */
+static void refine(const struct trace *trace, const struct peak *peak,
+                   const struct estimate_baseline *baseline, const struct guide *guide,
+                   struct estimate_pulse *pulse)
+{
+	double level = EDGE_LEVEL * fabs(peak->result.value_g), area, sigma;
+	struct guide_edge edge[2];
+
+	area = guide_area(guide, trace, peak, &sigma);
+	pulse->velocity_change_m_s = UNITS_G_M_S2 * area;
+	take_velocity_sigma(trace, baseline, sigma, guide->curve.base_s, pulse);
+	if (!guide_edge(guide, trace, -1, level, &edge[0]) || !guide_edge(guide, trace, 1, level, &edge[1]))
+		return;
+	pulse->start_s = edge[0].time_s;
+	pulse->end_s = edge[1].time_s;
+	pulse->duration_s = pulse->end_s - pulse->start_s;
+	pulse->sigma_duration_s =
+	        hypot(guide_spread(guide, edge),
+	              EDGE_LEVEL * peak->result.sigma_g * (1 / edge[0].slope_g_s + 1 / edge[1].slope_g_s));
 }
 
 void pulse_measure(const struct trace *trace, const struct peak *peak,
@@ -277,6 +308,7 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	};
 	double level = EDGE_LEVEL * fabs(peak->result.value_g), tilt;
 	struct edge edge[2];
+	struct guide guide;
 
 	*pulse = found;
 	if (found.status == ESTIMATE_SHORT || found.status == ESTIMATE_NO_PEAK)
@@ -293,9 +325,10 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	               (baseline->doubtful ? ESTIMATE_FLAG_ZERO : 0u);
 	pulse->sigma_duration_s =
 	        hypot(hypot(edge[0].sigma_s, edge[1].sigma_s), EDGE_LEVEL * peak->result.sigma_g * tilt);
-	if (peak->model != PEAK_MODEL_NONE)
-		contact(trace, peak, family, pulse);
-	velocity(trace, peak, baseline, edge, pulse);
+	if (peak->model != PEAK_MODEL_NONE && contact(trace, peak, family, pulse, &guide))
+		refine(trace, peak, baseline, &guide, pulse);
+	else
+		velocity(trace, peak, baseline, edge, pulse);
 }
 
 void pulse_of_weak(const struct peak *weak, const struct estimate_pulse *strong, struct estimate_pulse *pulse)

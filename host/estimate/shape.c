@@ -387,6 +387,11 @@ static bool question(const struct problem *m, const double *p, struct shape *sha
 	return true;
 }
 
+double shape_mean_cosine(double power)
+{
+	return tgamma((power + 1) / 2) / tgamma(power / 2 + 1) / sqrt(UNITS_PI);
+}
+
 /* Of a pulse of height and base 1. */
 static double unit_area(const struct shape *shape, double power)
 {
@@ -394,7 +399,7 @@ static double unit_area(const struct shape *shape, double power)
 		return 2 / UNITS_PI;
 	if (shape->family == ESTIMATE_FAMILY_HAVERSINE)
 		return 0.5;
-	return exp(lgamma((power + 1) / 2) - lgamma(power / 2 + 1)) / sqrt(UNITS_PI);
+	return shape_mean_cosine(power);
 }
 
 static void express(const struct problem *m, const double *p, struct shape *shape)

@@ -71,6 +71,9 @@ bool shape_lopsided(const struct shape *shape);
  */
 bool shape_hopeless(const struct shape *shape);
 
+/* Of cos^power over its half turn: the area of such a pulse of height and base 1. */
+double shape_mean_cosine(double power);
+
 /* Value, slope per s, curvature per s^2, and the variances of value and slope unless that is NULL. */
 void shape_at(const struct shape *shape, double time_s, double derivative[3], double variance[2]);
 

@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/estimate/guide.h"
+
+#include <math.h>
+
+#include "common/units.h"
+
+/* A curve that leaves zero with a slope: a power below. */
+#define KINK_POWER 1.1
+
+/* The bulge moves an edge by little: each round leaves a hundredth of that. */
+enum { EDGE_ROUNDS = 4 };
+
+bool guide_from_shape(const struct shape *shape, struct guide *guide)
+{
+	if (isnan(shape->chi_square))
+		return false;
+	guide->curve = (struct bell){.height_g = shape->peak_g,
+	                             .centre_s = shape->peak_s,
+	                             .base_s = shape->base_s,
+	                             .power = shape->power};
+	guide->area_g_s = shape->area_g_s;
+	guide->sigma_peak_g = shape->sigma_peak_g;
+	guide->sigma_base_s = shape->power < KINK_POWER ? shape->sigma_base_s : 0;
+	return true;
+}
+
+bool guide_from_bell(const struct trace *trace, const struct peak *peak, struct guide *guide)
+{
+	if (!(trace->noise_g > 0) || !bell_fit(trace, peak, &guide->curve))
+		return false;
+	guide->area_g_s = bell_area(&guide->curve);
+	guide->sigma_peak_g = peak->result.sigma_g;
+	guide->sigma_base_s = 0;
+	return true;
+}
+
+/* Cosine of the angle at which the curve is level parts of its height; negative where there is none. */
+static double edge_cosine(const struct bell *curve, double level)
+{
+	double c = 0;
+
+	for (int i = 0; i < EDGE_ROUNDS; i++)
+		c = pow(level / (1 + curve->bulge * (1 - c * c)), 1 / curve->power);
+	return level > 0 && c < 1 ? c : -1;
+}
+
+/* What a sample says beyond the curve, in the pulse's direction. */
+static double beyond(const struct guide *guide, const struct trace *trace, size_t k)
+{
+	double over = trace->value_g[k] - bell_at(&guide->curve, trace_time(trace, k));
+
+	return guide->curve.height_g < 0 ? -over : over;
+}
+
+bool guide_edge(const struct guide *guide, const struct trace *trace, int step, double level_g,
+                struct guide_edge *edge)
+{
+	const struct bell *curve = &guide->curve;
+	double height = fabs(curve->height_g), c = edge_cosine(curve, level_g / height), half, place, outside;
+	size_t after;
+
+	if (!(c > 0))
+		return false;
+	half = acos(c) * curve->base_s / UNITS_PI;
+	edge->time_s = curve->centre_s + step * half;
+	after = trace_index(trace, edge->time_s);
+	if (after == 0 || after == trace->count || !trace_good(trace, after - 1) || !trace_good(trace, after))
+		return false;
+	place = (edge->time_s - trace_time(trace, after - 1)) * trace->rate_hz;
+	edge->slope_g_s = UNITS_PI / curve->base_s * sqrt(1 - c * c) *
+	                  (curve->power * level_g / c - 2 * height * curve->bulge * pow(c, curve->power + 1));
+	if (!(edge->slope_g_s > 0))
+		return false;
+	edge->sigma_s = trace->noise_g * hypot(place, 1 - place) / edge->slope_g_s;
+	outside = step < 0 ? 1 - place : place;
+	edge->stays = edge->taken = 0;
+	if (half + (1 - outside) / trace->rate_hz > curve->base_s / 2) {
+		edge->stays = outside;
+		edge->taken = 1 - outside;
+	}
+	edge->time_s +=
+	        step * ((1 - place) * beyond(guide, trace, after - 1) + place * beyond(guide, trace, after)) /
+	        edge->slope_g_s;
+	return true;
+}
+
+double guide_spread(const struct guide *guide, const struct guide_edge edge[2])
+{
+	double stays = (edge[0].stays + edge[1].stays) / 2, taken = (edge[0].taken + edge[1].taken) / 2;
+	/* The base hangs on the very samples that correct it. */
+	double foot = guide->sigma_base_s * sqrt(stays * (stays + 2 * taken));
+
+	return hypot(foot, hypot(edge[0].sigma_s, edge[1].sigma_s));
+}
+
+/* c to the curve's power; the named families' without its cost. */
+static double flank(const struct bell *curve, double c)
+{
+	if (curve->power == 1)
+		return c;
+	return curve->power == 2 ? c * c : pow(c, curve->power);
+}
+
+double guide_area(const struct guide *guide, const struct trace *trace, const struct peak *peak,
+                  double *sigma_g_s)
+{
+	const struct bell *curve = &guide->curve;
+	double turn = UNITS_PI / curve->base_s, step = 1 / trace->rate_hz, sum = 0;
+	size_t k = trace_index(trace, curve->centre_s - curve->base_s / 2), used = 0, follow = 0;
+	double angle = turn * (trace_time(trace, k) - curve->centre_s), c = cos(angle), s = sin(angle);
+	const double turn_c = cos(turn * step), turn_s = sin(turn * step);
+
+	for (; k < trace->count && angle < UNITS_PI / 2; k++, angle += turn * step) {
+		double time = trace_time(trace, k), cosine = fmax(c, 0), next = c * turn_c - s * turn_s;
+
+		s = s * turn_c + c * turn_s;
+		c = next;
+		if (!trace_good(trace, k) || (time > peak->clipped_from_s && time < peak->clipped_until_s)) {
+			follow++;
+			continue;
+		}
+		used++;
+		sum += trace->value_g[k] -
+		       curve->height_g * flank(curve, cosine) * (1 + curve->bulge * (1 - cosine * cosine));
+	}
+	/* What stands in for a missing sample is a mean of the others: it errs as they do. */
+	*sigma_g_s = step * hypot(trace->noise_g * sqrt((double)(used + 2 * follow)),
+	                          guide->sigma_peak_g * (double)follow);
+	return guide->area_g_s + step * sum;
+}
