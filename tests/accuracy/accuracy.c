@@ -27,7 +27,7 @@ static int judge(const struct cells *cells, bool quiet)
 
 int main(int argc, char **argv)
 {
-	struct cells_options options = {.drops = 2000, .all = true};
+	struct cells_options options = {.drops = 10000, .all = true};
 	struct cells cells;
 	bool quiet = false;
 	long processors = sysconf(_SC_NPROCESSORS_ONLN);

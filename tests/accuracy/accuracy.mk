@@ -18,7 +18,7 @@ ifeq ($(SANITIZE)$(COVERAGE),)
 tests: $(BUILD)/tests/test_accuracy
 endif
 
-DROPS ?= 2000
+DROPS ?= 10000
 
 .PHONY: accuracy chart
 accuracy: setup ## every estimate against its Cramer-Rao bound, thousands of drops of known truth (DROPS=)
