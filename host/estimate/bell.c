@@ -43,7 +43,7 @@ static bool usable(const struct trace *trace, size_t k)
 
 /* The pulse of height 1 at the angle whose cosine is c, and its derivative by the angle; row gets those by
  * height, power and bulge. */
-static double shape(const double p[PARAMETERS], double c, double sine, double row[PARAMETERS])
+static inline double shape(const double p[PARAMETERS], double c, double sine, double row[PARAMETERS])
 {
 	double logarithm = log(c), flank = exp(p[POWER] * logarithm), rise = 1 - c * c;
 	double value = flank * (1 + p[BULGE] * rise);
@@ -54,38 +54,60 @@ static double shape(const double p[PARAMETERS], double c, double sine, double ro
 	return p[HEIGHT] * sine * (2 * p[BULGE] * flank * c - p[POWER] * value / c);
 }
 
+/* From sample to sample through the pulse, by recurrence. */
+struct walk {
+	double angle, cosine, sine;
+	double step, step_cosine, step_sine;
+};
+
+static struct walk start_walk(const struct scene *scene, const double p[PARAMETERS])
+{
+	double per_s = UNITS_PI / p[BASE], step = per_s / scene->trace->rate_hz;
+	double angle = (trace_time(scene->trace, scene->first) - p[CENTRE]) * per_s;
+
+	return (struct walk){angle, cos(angle), sin(angle), step, cos(step), sin(step)};
+}
+
+static inline void turn(struct walk *walk)
+{
+	double cosine = walk->cosine * walk->step_cosine - walk->sine * walk->step_sine;
+
+	walk->sine = walk->sine * walk->step_cosine + walk->cosine * walk->step_sine;
+	walk->cosine = cosine;
+	walk->angle += walk->step;
+}
+
+static inline bool is_inside(const struct walk *walk)
+{
+	return fabs(walk->angle) < UNITS_PI / 2 && walk->cosine > 0;
+}
+
 static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
                      double right[CHOLESKY_MAX], double *squares)
 {
 	const struct scene *scene = model;
-	double per_s = UNITS_PI / p[BASE], step = per_s / scene->trace->rate_hz, angle, c, s, turn_c, turn_s;
 	double prior = scene->noise_g / BULGE_PRIOR;
+	struct walk walk;
 	size_t used = 0;
 	struct gram gram;
 
 	if (!(p[POWER] > POWER_MIN && p[POWER] < POWER_MAX) || !(p[BASE] > 0))
 		return 0;
-	angle = (trace_time(scene->trace, scene->first) - p[CENTRE]) * per_s;
-	c = cos(angle);
-	s = sin(angle);
-	turn_c = cos(step);
-	turn_s = sin(step);
+	walk = start_walk(scene, p);
 	gram_start(&gram, PARAMETERS);
-	for (size_t k = scene->first; k < scene->last; k++, angle += step) {
-		double row[COLUMNS], residual = scene->trace->value_g[k], cosine = c, sine = s;
+	for (size_t k = scene->first; k < scene->last; k++, turn(&walk)) {
+		double row[COLUMNS], residual = scene->trace->value_g[k];
 
-		c = cosine * turn_c - sine * turn_s;
-		s = sine * turn_c + cosine * turn_s;
 		if (!usable(scene->trace, k))
 			continue;
 		used++;
-		if (fabs(angle) >= UNITS_PI / 2 || !(cosine > 0)) {
+		if (!is_inside(&walk)) {
 			*squares += residual * residual;
 			continue;
 		}
-		row[CENTRE] = shape(p, cosine, sine, row);
-		row[BASE] = -row[CENTRE] * angle / p[BASE];
-		row[CENTRE] *= -per_s;
+		row[CENTRE] = shape(p, walk.cosine, walk.sine, row);
+		row[BASE] = -row[CENTRE] * walk.angle / p[BASE];
+		row[CENTRE] *= -UNITS_PI / p[BASE];
 		row[RESIDUAL] = residual - p[HEIGHT] * row[HEIGHT];
 		gram_add(&gram, row);
 	}
@@ -121,16 +143,16 @@ static bool start(const struct trace *trace, const struct peak *peak, double p[P
 static double lopsided(const struct scene *scene, const double p[PARAMETERS])
 {
 	double odd_odd = 0, odd_centre = 0, centre_centre = 0, odd_residual = 0;
+	struct walk walk = start_walk(scene, p);
 
-	for (size_t k = scene->first; k < scene->last; k++) {
-		double angle = UNITS_PI * (trace_time(scene->trace, k) - p[CENTRE]) / p[BASE];
-		double cosine = cos(angle), row[PARAMETERS], value, odd, centre;
+	for (size_t k = scene->first; k < scene->last; k++, turn(&walk)) {
+		double row[PARAMETERS], value, odd, centre;
 
-		if (!usable(scene->trace, k) || fabs(angle) >= UNITS_PI / 2 || !(cosine > 0))
+		if (!usable(scene->trace, k) || !is_inside(&walk))
 			continue;
-		centre = shape(p, cosine, sin(angle), row);
+		centre = shape(p, walk.cosine, walk.sine, row);
 		value = p[HEIGHT] * row[HEIGHT];
-		odd = value * sin(angle);
+		odd = value * walk.sine;
 		odd_odd += odd * odd;
 		odd_centre += odd * centre;
 		centre_centre += centre * centre;

@@ -6,13 +6,50 @@
  * holes of up to BRIDGE_MAX samples bridged by straight lines, longer ones and what lies outside taken as 0.
  * Leaving holes out instead would favour the shift at which the hole costs least.
  */
+#include <stddef.h>
+#include <string.h>
+
 #include "host/estimate/trace.h"
 
 enum { BRIDGE_MAX = 64 };
 
-/* Sample k, or the straight line across the hole it lies in. */
-double bridge_sample(const struct trace *trace, ptrdiff_t k);
+/* Sample k where it is missing or outside: the straight line across the hole it lies in. */
+double bridge_hole(const struct trace *trace, ptrdiff_t k);
 
-double bridge_at(const struct trace *trace, double time_s);
+static inline double bridge_sample(const struct trace *trace, ptrdiff_t k)
+{
+	return k >= 0 && k < (ptrdiff_t)trace->count && trace_good(trace, (size_t)k) ? trace->value_g[k]
+	                                                                             : bridge_hole(trace, k);
+}
+
+/* Whether the four samples from k on are there and carry no mark at all. */
+static inline bool bridge_plain(const struct trace *trace, ptrdiff_t k)
+{
+	uint32_t four;
+
+	if (k < 0 || k + 3 >= (ptrdiff_t)trace->count)
+		return false;
+	memcpy(&four, trace->sample + k, sizeof(four));
+	return four == 0;
+}
+
+/* A straight line would favour whole samples. */
+static inline double bridge_at(const struct trace *trace, double time_s)
+{
+	double place = (time_s - trace->start_s) * trace->rate_hz, x, value[4];
+	ptrdiff_t k;
+
+	if (!(place >= 0) || place > (double)trace->count)
+		return 0;
+	k = (ptrdiff_t)place;
+	x = place - (double)k;
+	if (bridge_plain(trace, k - 1))
+		memcpy(value, trace->value_g + k - 1, sizeof(value));
+	else
+		for (ptrdiff_t i = 0; i < 4; i++)
+			value[i] = bridge_sample(trace, k - 1 + i);
+	return (1 + x) * (2 - x) / 2 * ((1 - x) * value[1] + x * value[2]) -
+	       x * (1 - x) / 6 * ((2 - x) * value[0] + (1 + x) * value[3]);
+}
 
 #endif

@@ -9,6 +9,7 @@
 #include "host/estimate/bridge.h"
 #include "host/estimate/gram.h"
 #include "host/estimate/lm.h"
+#include "host/estimate/product.h"
 #include "host/estimate/respond.h"
 
 /* After the contact S1 is followed this long. A mount that stiffens as it swings out is one oscillator only
@@ -97,7 +98,7 @@ static void block_mean(const struct scene *scene, double complex pole, double co
 	for (size_t i = 0; i < scene->block_size; i++) {
 		*mean += here;
 		*by_pole += (from + (double)i * scene->sample_s) * here;
-		here *= turn;
+		here = product(here, turn);
 	}
 	*mean /= (double)scene->block_size;
 	*by_pole /= (double)scene->block_size;
@@ -116,16 +117,16 @@ static void add_blocks(const struct scene *scene, const struct respond *respond,
 	swing = respond->swing * mean;
 	by_decay = respond->swing_by_decay * mean - respond->swing * by_pole;
 	by_omega = respond->swing_by_omega * mean + I * respond->swing * by_pole;
-	for (unsigned i = 0; i < scene->block_count; i++, past += step, here *= turn) {
+	for (unsigned i = 0; i < scene->block_count; i++, past += step, here = product(here, turn)) {
 		double complex value;
 		double row[COLUMNS];
 
 		if (isnan(scene->block_g[i]))
 			continue;
-		value = swing * here;
-		row[DECAY] = gain * (creal(by_decay * here) - past * creal(value));
-		row[OMEGA] = gain * (creal(by_omega * here) - past * cimag(value));
-		row[DELAY] = -gain * creal(pole * value);
+		value = product(swing, here);
+		row[DECAY] = gain * (product_real(by_decay, here) - past * creal(value));
+		row[OMEGA] = gain * (product_real(by_omega, here) - past * cimag(value));
+		row[DELAY] = -gain * product_real(pole, value);
 		row[GAIN] = creal(value);
 		row[OFFSET] = weight;
 		row[RESIDUAL] = weight * (scene->block_g[i] - p[OFFSET]) - gain * row[GAIN];
@@ -169,8 +170,9 @@ static void input_from_bell(const struct bell *bell, struct respond_input *input
 	input->count = BELL_STEPS;
 	input->step_s = bell->base_s / BELL_STEPS;
 	input->from_s = bell->centre_s - bell->base_s / 2;
-	for (unsigned i = 0; i <= 2 * BELL_STEPS; i++)
-		input->value[i] = bell_at(bell, input->from_s + i * input->step_s / 2);
+	for (unsigned i = 0; i <= BELL_STEPS; i++)
+		input->value[i] = input->value[2 * BELL_STEPS - i] =
+		        bell_at(bell, input->from_s + i * input->step_s / 2);
 }
 
 static void input_from_samples(const struct trace *trace, const struct peak *peak,
@@ -226,10 +228,9 @@ static void collect(const struct driven_axis *axis, double delay_s, double windo
 	double free = end + delay_s + MARGIN * length;
 	double level = NEXT_CONTACT_LEVEL * fabs(axis->peak[1]->result.value_g);
 	size_t first = trace_index(s1, scene->input.from_s + fmin(delay_s, 0)), middle, last, stride;
-	size_t again = trace_index(s2, end), until = trace_index(s2, free + window_s);
+	size_t again =
+	        trace_reaches(s2, trace_index(s2, end), trace_index(s2, fmax(free + window_s, end)), level);
 
-	while (again < until && !(trace_good(s2, again) && fabs(s2->value_g[again]) > level))
-		again++;
 	middle = trace_index(s1, free);
 	last = trace_index(s1, trace_time(s2, again));
 	stride = (middle - first) / CONTACT_SAMPLES + 1;

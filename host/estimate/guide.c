@@ -38,9 +38,10 @@ bool guide_from_bell(const struct trace *trace, const struct peak *peak, struct 
 /* Cosine of the angle at which the curve is level parts of its height; negative where there is none. */
 static double edge_cosine(const struct bell *curve, double level)
 {
+	const int rounds = fabs(curve->bulge) > 0 ? EDGE_ROUNDS : 1;
 	double c = 0;
 
-	for (int i = 0; i < EDGE_ROUNDS; i++)
+	for (int i = 0; i < rounds; i++)
 		c = pow(level / (1 + curve->bulge * (1 - c * c)), 1 / curve->power);
 	return level > 0 && c < 1 ? c : -1;
 }

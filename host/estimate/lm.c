@@ -11,6 +11,10 @@
 /* Less hardly changes a step: one that was taken back would be again. */
 #define DAMPING_FELT 1e-3
 
+/* On a kinked model: to stay short of the kink takes more, and is needed again at the next step. */
+#define KINK_DOWN 0.3
+#define KINK_FELT 1e-2
+
 /* Damped this much and still no better: this is the bottom, as far as rounding can tell. */
 #define DAMPING_MAX 1e6
 
@@ -67,9 +71,20 @@ static double squares_of(const struct lm_problem *problem, const struct place *p
 	return sum;
 }
 
-static bool finish(const struct lm_problem *problem, struct place *place, struct lm_result *result)
+/* Whether a step of that promise, after one of before, is the last: 0 when that one tells nothing, as none
+ * does on a kinked model. */
+static bool is_last(const struct lm_problem *problem, double promise, double before, double variance)
 {
-	result->squares = place->squares;
+	const double end = LM_STEP * LM_STEP * variance;
+
+	return promise <= end ||
+	       (!(problem->kink > 0) && promise <= variance && promise * promise <= end * before);
+}
+
+static bool finish(const struct lm_problem *problem, struct place *place, double promise,
+                   struct lm_result *result)
+{
+	result->squares = fmax(place->squares - promise, 0);
 	result->used = place->used;
 	return cholesky_factor(&result->factor, problem->size, place->normal);
 }
@@ -77,7 +92,9 @@ static bool finish(const struct lm_problem *problem, struct place *place, struct
 bool lm_fit(const struct lm_problem *problem, double *p, struct lm_result *result)
 {
 	struct place place[2], *here = &place[0], *there = &place[1];
-	double damping = DAMPING_START, rounding;
+	const double felt = problem->kink > 0 ? KINK_FELT : DAMPING_FELT;
+	const double down = problem->kink > 0 ? KINK_DOWN : DAMPING_DOWN;
+	double damping = DAMPING_START, before = 0, rounding;
 
 	if (!stand(problem, p, here))
 		return false;
@@ -92,15 +109,16 @@ bool lm_fit(const struct lm_problem *problem, double *p, struct lm_result *resul
 		for (unsigned i = 0; i < problem->size; i++)
 			trial[i] = p[i] + change[i];
 		variance = here->squares / (double)(here->used - problem->size);
-		if (damping < DAMPING_FELT && promise <= LM_STEP * LM_STEP * variance) {
+		if (damping < DAMPING_FELT && is_last(problem, promise, before, variance)) {
 			memcpy(p, trial, problem->size * sizeof(*p));
-			return finish(problem, here, result);
+			return finish(problem, here, promise, result);
 		}
 		result->iterations++;
 		if (!stand(problem, trial, there) || there->squares > here->squares) {
 			if (promise <= rounding || damping > DAMPING_MAX)
-				return finish(problem, here, result);
-			damping = fmax(damping * DAMPING_UP, DAMPING_FELT);
+				return finish(problem, here, 0, result);
+			damping = fmax(damping * DAMPING_UP, felt);
+			before = 0;
 			continue;
 		}
 		gain = here->squares - there->squares;
@@ -108,11 +126,12 @@ bool lm_fit(const struct lm_problem *problem, double *p, struct lm_result *resul
 		swap = here;
 		here = there;
 		there = swap;
-		damping *= DAMPING_DOWN;
+		before = damping < DAMPING_FELT ? promise : 0;
+		damping *= down;
 		variance = here->squares / (double)(here->used - problem->size);
 		if (promise <= LM_STEP * LM_STEP * variance || promise <= rounding ||
 		    (result->iterations > LM_PATIENCE && gain <= problem->kink * variance))
-			return finish(problem, here, result);
+			return finish(problem, here, 0, result);
 	}
 	return false;
 }

@@ -8,8 +8,8 @@
  * of squares is taken back.
  *
  * Converged when a step is below LM_STEP standard deviations, the residual's own: a measure that asks for no
- * scale of the unknowns. It is taken without another look at the data: the error left is far smaller, as
- * steps shrink quadratically, and so is what it changes of the result.
+ * scale of the unknowns; or when it is below one and the next would be below LM_STEP, shrinking once more as
+ * it has shrunk. That step is taken without another look at the data.
  */
 #include <stdbool.h>
 #include <stddef.h>
@@ -36,10 +36,10 @@ struct lm_problem {
 };
 
 struct lm_result {
-	double squares;         /* at the solution, or one such step before it */
+	double squares;         /* at the solution; past the last look as the straight model has it */
 	size_t used;            /* samples */
 	unsigned iterations;    /* normal equations made */
-	struct cholesky factor; /* of J^T J at the solution: covariance for unit noise */
+	struct cholesky factor; /* of J^T J at the last look: covariance for unit noise */
 };
 
 /* From p to the minimum, p changed in place. False, p wherever it was left, without convergence. */

@@ -95,9 +95,11 @@ void local_at(const struct local *local, double time_s, double derivative[3])
 
 double local_spread(const struct local *local, double time_s, unsigned order)
 {
-	double x = (time_s - local->centre_s) / local->half_s, power = pow(local->half_s, -(double)order);
+	double x = (time_s - local->centre_s) / local->half_s, power = 1;
 	double row[CHOLESKY_MAX] = {0};
 
+	for (unsigned d = 0; d < order; d++)
+		power /= local->half_s;
 	for (unsigned i = order; i < local->terms; i++) {
 		row[i] = power;
 		for (unsigned d = 0; d < order; d++)

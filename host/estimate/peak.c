@@ -341,17 +341,17 @@ static bool has_rival(const struct trace *trace, const struct peak *peak)
 
 void peak_find(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
 {
-	struct peak found = {
-	        .result = {NAN, NAN, NAN, NAN, {.method = "", .chi_square = NAN, .status = ESTIMATE_SHORT}},
-	        .scale = 1};
+	double height;
 
-	found.at = highest(trace);
-	*peak = found;
-	if (found.at == trace->count)
+	*peak = (struct peak){
+	        .result = {NAN, NAN, NAN, NAN, {.method = "", .chi_square = NAN, .status = ESTIMATE_SHORT}},
+	        .at = highest(trace),
+	        .scale = 1};
+	if (peak->at == trace->count)
 		return;
-	peak->sign = trace->value_g[found.at] < 0 ? -1 : 1;
-	if (!(fabs(trace->value_g[found.at]) > 0) ||
-	    fabs(trace->value_g[found.at]) < NOISE_FACTOR_MIN * trace->noise_g) {
+	peak->sign = trace->value_g[peak->at] < 0 ? -1 : 1;
+	height = fabs(trace->value_g[peak->at]);
+	if (!(height > 0) || height < NOISE_FACTOR_MIN * trace->noise_g) {
 		peak->result.how.status = ESTIMATE_NO_PEAK;
 		return;
 	}

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/units.h"
+#include "host/estimate/product.h"
 
 enum {
 	TERMS = 12,
@@ -19,29 +20,27 @@ struct hold {
 	double complex by_pole[3]; /* derivative of weight */
 };
 
-/* The integrals of s^n e^(z (1 - s)) over 0..1, n = 0 1 2, and their derivatives by z: n! z^k / (k + n + 1)!
- * summed over k. In closed form they cancel for small z. */
+/* The integrals of s^n e^(z (1 - s)) over 0..1, n = 0 1 2, and their derivatives by z. They are n! f(n + 1),
+ * f(m) = sum of z^k / (k + m)! over k, by the series of the last: in closed form they cancel for small z. */
 static void moments(double complex z, double complex moment[3], double complex by_z[3])
 {
-	double complex power = 1;
-	double factorial = 1; /* of k + 1 */
+	static const double factor[TERMS] = {1.0 / 24,         1.0 / 120,         1.0 / 720,
+	                                     1.0 / 5040,       1.0 / 40320,       1.0 / 362880,
+	                                     1.0 / 3628800,    1.0 / 39916800,    1.0 / 479001600,
+	                                     1.0 / 6227020800, 1.0 / 87178291200, 1.0 / 1307674368000};
+	double complex first, second, third, fourth = 0;
 
-	for (unsigned n = 0; n < 3; n++)
-		moment[n] = by_z[n] = 0;
-	for (unsigned k = 0; k < TERMS; k++) {
-		double first = 1 / factorial, second = first / (k + 2), third = 2 * second / (k + 3);
-		/* d/dz z^(k+1) = (k + 1) z^k belongs to the next factorial. */
-		double next = second * (k + 1), after = next / (k + 3), last = 2 * after / (k + 4);
-
-		moment[0] += power * first;
-		moment[1] += power * second;
-		moment[2] += power * third;
-		by_z[0] += power * next;
-		by_z[1] += power * after;
-		by_z[2] += power * last;
-		power *= z;
-		factorial *= k + 2;
-	}
+	for (unsigned k = TERMS; k-- > 0;)
+		fourth = product(fourth, z) + factor[k];
+	third = product(fourth, z) + 1.0 / 6;
+	second = product(third, z) + 1.0 / 2;
+	first = product(second, z) + 1;
+	moment[0] = first;
+	moment[1] = second;
+	moment[2] = 2 * third;
+	by_z[0] = first - second;
+	by_z[1] = second - 2 * third;
+	by_z[2] = 2 * (third - 3 * fourth);
 }
 
 static void make_hold(struct hold *hold, double complex pole, double step_s)
@@ -71,16 +70,17 @@ static void residue_slopes(const struct respond *respond, double complex slope[2
 static void fill_knot(const struct respond *respond, const double complex residue_by[2], double complex state,
                       double complex by_pole, double input, struct respond_knot *knot)
 {
-	double complex residue = respond->residue, rate = respond->pole * state + input;
-	double complex rate_by_pole = state + respond->pole * by_pole;
+	double complex residue = respond->residue, rate = product(respond->pole, state) + input;
+	double complex rate_by_pole = state + product(respond->pole, by_pole);
+	double complex moved = product(residue, by_pole), rate_moved = product(residue, rate_by_pole);
 
 	knot->state = state;
-	knot->at.value = 2 * creal(residue * state);
-	knot->at.slope = 2 * creal(residue * rate);
-	knot->at.by_decay = 2 * creal(residue_by[0] * state - residue * by_pole);
-	knot->at.by_omega = 2 * creal(residue_by[1] * state + I * residue * by_pole);
-	knot->slope_by_decay = 2 * creal(residue_by[0] * rate - residue * rate_by_pole);
-	knot->slope_by_omega = 2 * creal(residue_by[1] * rate + I * residue * rate_by_pole);
+	knot->at.value = 2 * product_real(residue, state);
+	knot->at.slope = 2 * product_real(residue, rate);
+	knot->at.by_decay = 2 * (product_real(residue_by[0], state) - creal(moved));
+	knot->at.by_omega = 2 * (product_real(residue_by[1], state) - cimag(moved));
+	knot->slope_by_decay = 2 * (product_real(residue_by[0], rate) - creal(rate_moved));
+	knot->slope_by_omega = 2 * (product_real(residue_by[1], rate) - cimag(rate_moved));
 }
 
 void respond_make(struct respond *respond, const struct respond_input *input, double decay, double omega)
@@ -100,9 +100,9 @@ void respond_make(struct respond *respond, const struct respond_input *input, do
 	for (unsigned k = 0; k < input->count; k++) {
 		const double *value = &input->value[2 * k];
 
-		by_pole = hold.turn * (by_pole + input->step_s * state) + hold.by_pole[0] * value[0] +
+		by_pole = product(hold.turn, by_pole + input->step_s * state) + hold.by_pole[0] * value[0] +
 		          hold.by_pole[1] * value[1] + hold.by_pole[2] * value[2];
-		state = hold.turn * state + hold.weight[0] * value[0] + hold.weight[1] * value[1] +
+		state = product(hold.turn, state) + hold.weight[0] * value[0] + hold.weight[1] * value[1] +
 		        hold.weight[2] * value[2];
 		fill_knot(respond, residue_by, state, by_pole, value[2], &respond->knot[k + 1]);
 	}
@@ -113,12 +113,12 @@ void respond_make(struct respond *respond, const struct respond_input *input, do
 
 static void after_input(const struct respond *respond, double past_s, struct respond_point *point)
 {
-	double complex turn = cexp(respond->pole * past_s), swing = respond->swing * turn;
+	double complex turn = cexp(respond->pole * past_s), swing = product(respond->swing, turn);
 
 	point->value = creal(swing);
-	point->slope = creal(respond->pole * swing);
-	point->by_decay = creal(respond->swing_by_decay * turn - past_s * swing);
-	point->by_omega = creal(respond->swing_by_omega * turn + I * past_s * swing);
+	point->slope = product_real(respond->pole, swing);
+	point->by_decay = product_real(respond->swing_by_decay, turn) - past_s * creal(swing);
+	point->by_omega = product_real(respond->swing_by_omega, turn) - past_s * cimag(swing);
 }
 
 /* At part x of the step from a to b. */

@@ -24,12 +24,12 @@ enum { STEPS = 8, NEWTON = 8 };
  * to know where to look. */
 static bool magnitude(const struct resultant_axes *axes, unsigned i, size_t k, double *value_g)
 {
-	double other;
+	double value = axes->trace[i]->value_g[k], other;
 
 	if (!trace_good(axes->trace[i], k) ||
 	    !trace_at(axes->trace[1 - i], trace_time(axes->trace[i], k), &other))
 		return false;
-	*value_g = hypot(axes->trace[i]->value_g[k], other);
+	*value_g = sqrt(value * value + other * other);
 	return true;
 }
 
