@@ -378,6 +378,8 @@ async function history() {
 	await desk.click("#view-history");
 	await desk.page.fill("#history-text", "wrong corner");
 	await desk.click("#history-go");
+	for (const [label, wanted] of [["accepted", "4 of 5"], ["rejected", "1"], ["undecided", "0"]])
+		assert.equal(await desk.text(`#history-list tr[data-series="${SERIES}"] td[data-label="${label}"]`), wanted);
 	await desk.page.click(`#history-list tr[data-series="${SERIES}"] button`);
 	for (const number of [2, 3])
 		await desk.page.check(`#history-drops tr[data-drop="${SERIES}/${number}"] input[type="checkbox"]`);

@@ -30,6 +30,7 @@ const HEAD = [
 	"height m",
 	"accepted",
 	"rejected",
+	"undecided",
 	"partial",
 	"last drop",
 ];
@@ -42,6 +43,7 @@ function seriesRow(one) {
 		number(one.height_m, 3),
 		`${one.accepted} of ${one.planned}`,
 		String(one.rejected),
+		String(one.recorded - one.accepted - one.rejected),
 		String(one.partial),
 		one.last ? time(one.last) : "–",
 	];
