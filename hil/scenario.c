@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -228,6 +229,7 @@ int scenario_read(struct scenario *scenario, const char *file, char message[SCEN
 
 int scenario_scene(const struct scenario *scenario, struct scene *scene, char message[SCENE_MESSAGE_MAX])
 {
+	char where[SCENE_MESSAGE_MAX];
 	struct scene wanted;
 	int result = scene_read(&wanted, scenario->scene_file, message);
 
@@ -238,7 +240,9 @@ int scenario_scene(const struct scenario *scenario, struct scene *scene, char me
 	for (unsigned i = 0; i < scenario->override_count; i++)
 		*(double *)(void *)((char *)&wanted + scenario->override[i].offset) =
 		        scenario->override[i].value;
-	result = scene_check(&wanted, scenario->scene_file, message);
+	snprintf(where, sizeof(where), "%.200s%s", scenario->scene_file,
+	         scenario->override_count > 0 ? ", changed by [scene]" : "");
+	result = scene_check(&wanted, where, message);
 	if (result == 0)
 		*scene = wanted;
 	return result;

@@ -21,7 +21,9 @@ static void say(struct verdict *verdict, bool good, const char *name, const char
 {
 	size_t used = strlen(verdict->failed);
 
-	fprintf(verdict->out, "  %-5s%-22s %-28s %s\n", good ? "ok" : "FAIL", name, measured, expected);
+	/* a path is too long for its column: what was expected then stands below it */
+	fprintf(verdict->out, "  %-5s%-22s %-28s%s%s\n", good ? "ok" : "FAIL", name, measured,
+	        strlen(measured) > 28 ? "\n                              " : " ", expected);
 	if (good)
 		return;
 	verdict->failures++;

@@ -265,7 +265,7 @@ static void puts_its_values_into_the_scene(void **state)
 	assert_true(scene.drop_angle_deg == 31 && scene.contact_friction == 0.5);
 	good(&s, "[scene]\ngate_upper_m = 0.75\n");
 	assert_true(scenario_scene(&s, &scene, text) < 0);
-	assert_non_null(strstr(text, "gates are not in order"));
+	assert_non_null(strstr(text, ", changed by [scene]: the gates are not in order"));
 }
 
 int main(void)
