@@ -232,9 +232,12 @@ static int drop_text(void *context, const struct archive_drop *drop)
 	}
 	snprintf(name, sizeof(name), "%s/%u", drop->series.name, drop->number);
 	fprintf(p->out, "%-20s %-16.16s %-11s", name, drop->time, partial ? drop->state : drop->decision);
-	for (int i = 0; i < COLUMNS; i++)
-		put_cell(p->out, drop->value[columns[i].value], &columns[i],
-		         (drop->not_ok >> columns[i].value & 1u) != 0 ? '*' : ' ');
+	for (int i = 0; i < COLUMNS; i++) {
+		bool not_ok = (drop->not_ok >> columns[i].value & 1u) != 0;
+
+		put_cell(p->out, drop->value[columns[i].value], &columns[i], not_ok ? '*' : ' ');
+		p->marked |= not_ok && !isnan(drop->value[columns[i].value]);
+	}
 	if (strcmp(drop->state, "missing") == 0)
 		fputs(" raw log missing", p->out);
 	if (drop->simulated)
@@ -258,16 +261,16 @@ static void total_text(const struct print *p)
 	fprintf(out, "\n%-49s", p->undecided ? "n, accepted and undecided" : "n, accepted");
 	for (int i = 0; i < COLUMNS; i++)
 		fprintf(out, "%8u ", p->total.value[columns[i].value].n);
-	fputs("\n* look at its status: 'droptower analyze' on the log says what is the matter\n", out);
+	fputc('\n', out);
 }
 
 static int head_text(void *context, const struct archive_series *series)
 {
 	struct print *p = context;
 
-	fprintf(p->out, "%s, campaign %s: %s at %g deg from %g m, %u of %u drops recorded\n\n", series->name,
-	        series->campaign, series->scene_name, series->angle_deg, series->height_m, series->recorded,
-	        series->planned);
+	fprintf(p->out, "%s, campaign %s: %s at %g deg from %g m, %u of %u drops recorded; peaks in g\n\n",
+	        series->name, series->campaign, series->scene_name, series->angle_deg, series->height_m,
+	        series->recorded, series->planned);
 	return 0;
 }
 
@@ -287,6 +290,9 @@ static int drops_text(struct print *p, const struct archive_filter *filter)
 		total_text(p);
 	else if (filter->series != NULL)
 		fputs("\nnone accepted yet: no mean\n", p->out);
+	if (p->marked)
+		fputs("* look at its status: 'droptower analyze' on the log says what is the matter\n",
+		      p->out);
 	print_more(p);
 	return 0;
 }

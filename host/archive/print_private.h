@@ -16,6 +16,7 @@ struct print {
 	cJSON *array;              /* of what is printed as JSON */
 	size_t lines, limit;       /* limit 0: none */
 	bool more;                 /* than limit */
+	bool marked;               /* a value has a star */
 	struct archive_cell total; /* of the drops that count */
 };
 

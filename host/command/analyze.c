@@ -11,8 +11,8 @@
 static const char help[] =
         "usage: droptower analyze FILE... [OPTIONS]\n"
         "\n"
-        "Analyses logged drops (candump text, LCM event log, our CSV) and foreign recordings (any delimited\n"
-        "text, LabVIEW .lvm). The format is found from the content.\n"
+        "Analyses logged drops (candump text, LCM event log, our CSV), UFF58, HDF5 and LabVIEW .lvm files,\n"
+        "and any delimited text. The format is found from the content.\n"
         "\n"
         "  --columns SPEC   for foreign text: one name:unit per column, '-' before the unit flips the sign,\n"
         "                   a lone '-' skips, e.g. \"time:ms,fixture:g,board:-g,-\"; units s ms us, g m/s2;\n"
@@ -121,7 +121,7 @@ static int parse_shock(struct arguments *arguments, int option, const char *unkn
 		evaluate->band.channel = optarg;
 		return COMMAND_DONE;
 	default:
-		return command_usage("analyze", "option '%s' is not known or lacks its value", unknown);
+		return command_option("analyze", unknown);
 	}
 }
 
@@ -195,7 +195,7 @@ static int analyze_file(const char *file, const struct arguments *arguments)
 	return code;
 }
 
-static int check(const struct arguments *arguments, int argc)
+static int check(const struct arguments *arguments, int argc, char **argv)
 {
 	if (optind == argc)
 		return command_usage("analyze", "no FILE given");
@@ -206,6 +206,8 @@ static int check(const struct arguments *arguments, int argc)
 	if (arguments->band_file == NULL &&
 	    (arguments->evaluate.band.channel != NULL || arguments->evaluate.band.at_peak))
 		return command_usage("analyze", "--channel and --band-at-peak need a --band");
+	if (command_is_input("analyze", arguments->evaluate.html, argv[optind]))
+		return COMMAND_USAGE;
 	return COMMAND_DONE;
 }
 
@@ -244,7 +246,7 @@ int command_analyze(int argc, char **argv)
 		return COMMAND_DONE;
 	}
 	if (code == COMMAND_DONE)
-		code = check(&arguments, argc);
+		code = check(&arguments, argc, argv);
 	if (code == COMMAND_DONE && arguments.scene_file != NULL) {
 		code = evaluate_read_scene(&scene, arguments.scene_file, arguments.angle_deg);
 		arguments.evaluate.scene = &scene;

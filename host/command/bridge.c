@@ -65,8 +65,7 @@ static int parse(struct bridge *bridge, int argc, char **argv)
 			bridge->help = true;
 			return COMMAND_DONE;
 		default:
-			return command_usage("bridge", "option '%s' is not known or lacks its value",
-			                     argv[optind - 1]);
+			return command_option("bridge", argv[optind - 1]);
 		}
 	}
 	if (code == COMMAND_DONE && optind != argc)

@@ -77,8 +77,7 @@ static int parse(struct arguments *arguments, int argc, char **argv)
 			arguments->help = 1;
 			return COMMAND_DONE;
 		default:
-			return command_usage("chart", "option '%s' is not known or lacks its value",
-			                     argv[optind - 1]);
+			return command_option("chart", argv[optind - 1]);
 		}
 	}
 	return code;

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/command/command.h"
 
+#include <getopt.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "common/error.h"
 #include "common/scenes/scene.h"
@@ -33,6 +35,26 @@ int command_usage(const char *name, const char *format, ...)
 	fprintf(stderr, "; try 'droptower %s --help'\n", name);
 	va_end(arguments);
 	return COMMAND_USAGE;
+}
+
+int command_option(const char *name, const char *word)
+{
+	if (optopt == 0 || strncmp(word, "--", 2) != 0)
+		return command_usage(name, "no option '%s'", word);
+	if (strchr(word, '=') != NULL)
+		return command_usage(name, "option '%s' takes no value", word);
+	return command_usage(name, "option '%s' lacks its value", word);
+}
+
+bool command_is_input(const char *name, const char *out, const char *in)
+{
+	struct stat written, read;
+
+	if (out == NULL || stat(out, &written) != 0 || stat(in, &read) != 0 || !S_ISREG(read.st_mode) ||
+	    written.st_dev != read.st_dev || written.st_ino != read.st_ino)
+		return false;
+	command_usage(name, "'%s' is read, expected another file to write", out);
+	return true;
 }
 
 int command_link_failed(const char *doing, int result)

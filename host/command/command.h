@@ -37,6 +37,13 @@ void command_error(const char *format, ...) __attribute__((format(printf, 1, 2))
 /* Wrong usage: the line, then "try 'droptower NAME --help'"; returns COMMAND_USAGE. */
 int command_usage(const char *name, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* What getopt_long(3) did not take, read as word: an option that is none, or one without its value. Returns
+ * COMMAND_USAGE. */
+int command_option(const char *name, const char *word);
+
+/* Whether out, which is to be written, is the file that is read: says so. NULL is none. */
+bool command_is_input(const char *name, const char *out, const char *in);
+
 /* A call on a session or link failed with result: says so and returns COMMAND_LINK. */
 int command_link_failed(const char *doing, int result);
 

@@ -80,12 +80,13 @@ int command_convert(int argc, char **argv)
 			fputs(help, stdout);
 			return COMMAND_DONE;
 		} else
-			return command_usage("convert", "option '%s' is not known or lacks its value",
-			                     argv[optind - 1]);
+			return command_option("convert", argv[optind - 1]);
 	}
 	if (dbc != NULL)
 		return optind == argc ? write_dbc(dbc) : command_usage("convert", "--dbc takes no IN");
 	if (optind + 2 != argc)
 		return command_usage("convert", "expected IN OUT, %d given", argc - optind);
+	if (command_is_input("convert", argv[optind + 1], argv[optind]))
+		return COMMAND_USAGE;
 	return convert(argv[optind], argv[optind + 1], columns);
 }

@@ -265,8 +265,7 @@ int command_ctl(int argc, char **argv)
 			return COMMAND_DONE;
 		}
 		if (option != 'l')
-			return command_usage("ctl", "option '%s' is not known or lacks its value",
-			                     argv[optind - 1]);
+			return command_option("ctl", argv[optind - 1]);
 		url = optarg;
 	}
 	code = parse_order(argv + optind, argc - optind, &order);

@@ -113,6 +113,23 @@ static bool refuses_cfc(const struct record *record, unsigned cfc)
 	return false;
 }
 
+/* filter_lowpass leaves channels alone that sample too slowly for it, and nothing says so: all of them are a
+ * slip. */
+static const double LOWPASS_OF_RATE = 0.45;
+
+static bool refuses_lowpass(const struct record *record, double lowpass_hz)
+{
+	double most = 0;
+
+	for (size_t i = 0; i < record->channel_count; i++)
+		most = fmax(most, record->channels[i].rate_hz);
+	if (lowpass_hz < LOWPASS_OF_RATE * most || !(lowpass_hz > 0))
+		return false;
+	command_error("%s: --lowpass %g Hz is too high for every channel, expected less than %g Hz",
+	              record->file, lowpass_hz, LOWPASS_OF_RATE * most);
+	return true;
+}
+
 int evaluate_open(struct evaluated *e, const struct record *record, const struct evaluate_options *options)
 {
 	struct estimate_options estimate = estimate_options_of(options);
@@ -120,7 +137,7 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 	char message[MODEL_MESSAGE_MAX];
 	int result;
 
-	if (refuses_cfc(record, options->cfc))
+	if (refuses_cfc(record, options->cfc) || refuses_lowpass(record, options->lowpass_hz))
 		return EVALUATE_TOLD;
 	result = estimate_record(record, &estimate, &e->analysis);
 	if (result != 0)

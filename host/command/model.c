@@ -267,7 +267,7 @@ static int parse_one(struct model_arguments *a, int option, const char *unknown)
 	case OPTION_TOLERANCE:
 		return parse_number(a, option, optarg);
 	default:
-		return command_usage("model", "option '%s' is not known or lacks its value", unknown);
+		return command_option("model", unknown);
 	}
 }
 
@@ -283,6 +283,8 @@ static int check(const struct model_arguments *a, int rest)
 	if (tasks > 1)
 		return command_usage("model",
 		                     "expected one of --sweep, --monte-carlo, --sensitivity and --history");
+	if (command_is_input("model", a->history, a->scene_file))
+		return COMMAND_USAGE;
 	if (a->of_history != NULL && a->history == NULL)
 		return command_usage("model", "%s needs --history FILE", a->of_history);
 	if (a->ensemble.axes > 0 && ensemble_points(&a->ensemble) == 0)

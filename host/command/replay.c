@@ -185,7 +185,12 @@ static int replay_file(struct replay *replay)
 static int parse_speed(const char *text, double *speed)
 {
 	if (strcmp(text, "max") != 0)
-		return command_number("replay", "speed", text, 1e-3, 1e6, speed);
+		return command_is_number(text, 1e-3, 1e6, speed)
+		               ? COMMAND_DONE
+		               : command_usage(
+		                         "replay",
+		                         "--speed is '%s', expected max or a number from 0.001 to 1e+06",
+		                         text);
 	*speed = 0.0;
 	return COMMAND_DONE;
 }
@@ -209,14 +214,15 @@ int command_replay(int argc, char **argv)
 			fputs(help, stdout);
 			return COMMAND_DONE;
 		} else
-			code = command_usage("replay", "option '%s' is not known or lacks its value",
-			                     argv[optind - 1]);
+			code = command_option("replay", argv[optind - 1]);
 	}
 	if (code != COMMAND_DONE)
 		return code;
 	if (optind + 1 != argc)
 		return command_usage("replay", "one FILE expected, %d given", argc - optind);
 	replay.file = argv[optind];
+	if (strncmp(replay.to, "log:", 4) == 0 && command_is_input("replay", replay.to + 4, replay.file))
+		return COMMAND_USAGE;
 	command_catch_signals();
 	code = replay_file(&replay);
 	if (code == COMMAND_DONE && replay.skipped > 0)

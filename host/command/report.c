@@ -66,8 +66,7 @@ static int parse(struct arguments *a, int argc, char **argv)
 			a->help = true;
 			return COMMAND_DONE;
 		default:
-			return command_usage("report", "option '%s' is not known or lacks its value",
-			                     argv[optind - 1]);
+			return command_option("report", argv[optind - 1]);
 		}
 	}
 	if (argc - optind != 1)

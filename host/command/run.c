@@ -7,6 +7,8 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
+#include <unistd.h>
 
 #include "host/command/beside.h"
 #include "host/command/command.h"
@@ -26,9 +28,10 @@ static const char help[] =
         "  --scene FILE   what is dropped (default geometry-2A.ini, which comes along)\n"
         "  --angle DEG    contact angle, instead of the scene's\n"
         "  --out DIR      where the files go (default .)\n"
-        "  --archive DIR  with --series NAME: the drop goes into an archive ('droptower series new' makes a\n"
-        "                 series), which knows scene and angle; without it $DROPTOWER_ARCHIVE or ./archive\n"
-        "  --operator NAME who drops ($USER)\n"
+        "  --series NAME  into an archive, as the series' next drop; 'droptower series new' makes a series,\n"
+        "                 which knows scene and angle\n"
+        "  --archive DIR  where that series is; without it $DROPTOWER_ARCHIVE or ./archive\n"
+        "  --operator NAME who drops into a series ($USER)\n"
         "  --json         one JSON object on standard output instead of the table\n"
         "  --strict       a flagged record or channel is a failure (exit 3)\n"
         "  --bench WORD   simulated tower only: a word for droptower-bench, e.g. --bench=--loss\n"
@@ -62,11 +65,12 @@ static const struct option long_options[] = {
         {0},
 };
 
+/* NULL: it did not come along. */
 static const char *default_scene(void)
 {
 	static char path[PATH_MAX];
 
-	return beside_scene("geometry-2A.ini", path) == 0 ? path : "geometry-2A.ini";
+	return beside_scene("geometry-2A.ini", path) == 0 && access(path, F_OK) == 0 ? path : NULL;
 }
 
 /* A series says what is dropped, and where the files go. */
@@ -81,9 +85,12 @@ static int check_archive(struct run *run)
 	if (run->out == NULL)
 		run->out = ".";
 	run->scene_assumed = run->scene_file == NULL && run->series == NULL;
-	if (run->scene_file == NULL)
+	if (run->scene_assumed)
 		run->scene_file = default_scene();
-	return COMMAND_DONE;
+	if (!run->scene_assumed || run->scene_file != NULL)
+		return COMMAND_DONE;
+	command_error("no scenes came along; --scene FILE names one");
+	return COMMAND_INPUT;
 }
 
 static int parse(struct run *run, int argc, char **argv)
@@ -130,8 +137,7 @@ static int parse(struct run *run, int argc, char **argv)
 			run->help = true;
 			return COMMAND_DONE;
 		default:
-			return command_usage("run", "option '%s' is not known or lacks its value",
-			                     argv[optind - 1]);
+			return command_option("run", argv[optind - 1]);
 		}
 	}
 	if (code == COMMAND_DONE && optind != argc)
@@ -152,22 +158,38 @@ void run_progress(const struct run *run, const char *format, ...)
 	fputc('\n', stderr);
 }
 
+/* Behind the user's words, so that these hold; the seed before them, so that theirs does. */
+static void say_to_bench(struct run *run, char seed[32], char angle[32])
+{
+	const char **words = run->bench_words;
+
+	/* with one seed for all the drops of a series would be the same drop */
+	if (run->series != NULL) {
+		snprintf(seed, 32, "%u", run->recording.number);
+		memmove(words + 2, words, (size_t)run->bench_word_count * sizeof(*words));
+		words[0] = "--seed";
+		words[1] = seed;
+		run->bench_word_count += 2;
+	}
+	snprintf(angle, 32, "%.17g", run->scene.drop_angle_deg);
+	words[run->bench_word_count++] = "--scene";
+	words[run->bench_word_count++] = run->scene_file;
+	words[run->bench_word_count++] = "--angle";
+	words[run->bench_word_count++] = angle;
+}
+
 static int run_drop(struct run *run)
 {
 	struct simulated tower = {0};
 	struct record record;
-	char angle[32], message[256];
+	char seed[32], angle[32], message[256];
 	int code;
 
 	if (run->link != NULL && run->scene_assumed)
 		run_progress(run, "scene     %s at %g deg, for want of --scene", run->scene.name,
 		             run->scene.drop_angle_deg);
 	if (run->link == NULL) {
-		const char *words[] = {"--scene", run->scene_file, "--angle", angle};
-
-		snprintf(angle, sizeof(angle), "%.17g", run->scene.drop_angle_deg);
-		for (size_t i = 0; i < sizeof(words) / sizeof(words[0]); i++)
-			run->bench_words[run->bench_word_count++] = words[i];
+		say_to_bench(run, seed, angle);
 		if (simulated_start(&tower, run->bench_words, message, sizeof(message)) != 0) {
 			if (command_interrupted())
 				return command_stopped();

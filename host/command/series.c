@@ -150,7 +150,7 @@ static int parse_text(struct series_arguments *a, int option, const char *unknow
 		to = &a->csv;
 		break;
 	default:
-		return command_usage("series", "option '%s' is not known or lacks its value", unknown);
+		return command_option("series", unknown);
 	}
 	*to = optarg;
 	return COMMAND_DONE;

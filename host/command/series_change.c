@@ -74,9 +74,11 @@ static int is_new_log(struct archive *archive, const char *file, const char **en
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}
-	*ending = strcmp(record.format, "lcm") == 0   ? ".lcm"
-	          : strcmp(record.format, "csv") == 0 ? ".csv"
-	                                              : ".log";
+	*ending = strcmp(record.format, "lcm") == 0     ? ".lcm"
+	          : strcmp(record.format, "csv") == 0   ? ".csv"
+	          : strcmp(record.format, "uff58") == 0 ? ".unv"
+	          : strcmp(record.format, "hdf5") == 0  ? ".h5"
+	                                                : ".log";
 	record_free(&record);
 	found = archive_find(archive, file, drop);
 	if (found < 0)
@@ -207,6 +209,8 @@ static int accept_series(struct archive *archive, const struct series_arguments 
 
 	for (size_t i = 0; i < chosen.count && code == COMMAND_DONE; i++)
 		code = decide(archive, a, chosen.drop[i].name, ARCHIVE_ACCEPTED);
+	if (code == COMMAND_DONE && chosen.count == 0)
+		printf("%s: no drop to decide\n", series);
 	free(chosen.drop);
 	return code;
 }

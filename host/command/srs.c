@@ -175,7 +175,7 @@ static int parse_one(struct arguments *arguments, int option, const char *unknow
 		arguments->strict = true;
 		return COMMAND_DONE;
 	default:
-		return command_usage("srs", "option '%s' is not known or lacks its value", unknown);
+		return command_option("srs", unknown);
 	}
 }
 
@@ -195,6 +195,9 @@ static int parse(struct arguments *arguments, int argc, char **argv)
 		return code;
 	if (optind + 1 != argc)
 		return command_usage("srs", "expected one FILE, %d given", argc - optind);
+	if (command_is_input("srs", arguments->csv, argv[optind]) ||
+	    command_is_input("srs", arguments->svg, argv[optind]))
+		return COMMAND_USAGE;
 	if (arguments->q > 0 && arguments->spectrum.srs.damping >= 0)
 		return command_usage("srs", "--q and --damping say the same, expected one of them");
 	if (arguments->spectrum.srs.damping < 0)

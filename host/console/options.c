@@ -85,7 +85,7 @@ static int take(struct options *options, int option, const char *word)
 		return add_word("--bench", options->bench_words, &options->bench_word_count,
 		                OPTIONS_BENCH_WORDS_MAX);
 	default:
-		return command_usage("serve", "option '%s' is not known or lacks its value", word);
+		return command_option("serve", word);
 	}
 }
 

@@ -437,6 +437,11 @@ int read_delimited(struct record *record, const struct source *source, const cha
 	struct reading reading = {.source = source, .message = message, .record = &filled, .decimal = '.'};
 	int error;
 
+	if (source->size >= 2 &&
+	    (memcmp(source->bytes, "\xff\xfe", 2) == 0 || memcmp(source->bytes, "\xfe\xff", 2) == 0))
+		return source_refuse(
+		        message, DT_E_FORMAT, source->file, 0,
+		        "text in UTF-16, expected UTF-8: 'iconv -f UTF-16 -t UTF-8' makes it so");
 	if (!columns)
 		return source_refuse(message, DT_E_FORMAT, source->file, 0,
 		                     "not a log of a drop tower; for other text expected --columns "

@@ -6,6 +6,7 @@
 
 #include "host/record/whole.h"
 #include "host/report/page.h"
+#include "host/report/shock.h"
 
 static const char *title(const struct report *report)
 {
@@ -40,6 +41,25 @@ static void head(struct page *page)
 	        good ? "good" : "bad", good ? "&#10003;" : "&#9888;", verdict);
 	if (report->simulated)
 		fputs("<p><b>Simulated tower: no product fell.</b></p>\n", out);
+}
+
+static void band(struct page *page)
+{
+	const struct band *band = page->report->band;
+	char *text = NULL;
+	size_t size = 0;
+	FILE *line = band ? open_memstream(&text, &size) : NULL;
+
+	if (!line)
+		return;
+	shock_write_band(band, line);
+	if (fclose(line) == 0) {
+		fprintf(page->out, "<div><div class=\"verdict %s\">%s ", band->verdict.pass ? "good" : "bad",
+		        band->verdict.pass ? "&#10003;" : "&#9888;");
+		page_text(page->out, text);
+		fputs("</div></div>\n", page->out);
+	}
+	free(text);
 }
 
 static const char *unless_ok(enum estimate_status status, const char *note)
@@ -153,6 +173,7 @@ static void foot(struct page *page)
 static void write_page(struct page *page)
 {
 	head(page);
+	band(page);
 	cards(page);
 	flags(page);
 	page_pictures(page);

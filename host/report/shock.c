@@ -64,11 +64,11 @@ void shock_put(struct builder *b, cJSON *root, const struct report *report)
 	put_band(b, root, report->band);
 }
 
-static void write_band(const struct band *band, FILE *out)
+void shock_write_band(const struct band *band, FILE *out)
 {
 	const struct limit_verdict *v = &band->verdict;
 
-	fprintf(out, "\nband on %s, its time 0 at the pulse's %s: %s", band->channel,
+	fprintf(out, "band on %s, its time 0 at the pulse's %s: %s", band->channel,
 	        band->at_peak ? "peak" : "10 % point", v->pass ? "pass" : "FAIL");
 	if (v->checked > 0)
 		fprintf(out, ", %s %.2f g at %.3f ms", v->margin < 0 ? "outside by" : "nearest",
@@ -79,12 +79,11 @@ static void write_band(const struct band *band, FILE *out)
 		fprintf(out, ", %zu samples not there", v->missing);
 	if (v->checked == 0)
 		fprintf(out, ", no sample within the band's time");
-	fputc('\n', out);
 }
 
 static void write_events(const struct events *events, double zero_s, FILE *out)
 {
-	fprintf(out, "\n%zu shocks, largest first", events->found);
+	fprintf(out, "\n%zu shock%s, largest first", events->found, events->found == 1 ? "" : "s");
 	if (events->found > events->count)
 		fprintf(out, ", of which %zu", events->count);
 	fputc('\n', out);
@@ -101,7 +100,7 @@ static void write_events(const struct events *events, double zero_s, FILE *out)
 
 static void write_falls(const struct free_falls *falls, double zero_s, FILE *out)
 {
-	fprintf(out, "\n%zu free falls\n", falls->count);
+	fprintf(out, "\n%zu free fall%s\n", falls->count, falls->count == 1 ? "" : "s");
 	for (size_t i = 0; i < falls->count; i++) {
 		const struct free_fall *f = &falls->fall[i];
 
@@ -113,8 +112,11 @@ static void write_falls(const struct free_falls *falls, double zero_s, FILE *out
 
 void shock_write(const struct report *report, double zero_s, FILE *out)
 {
-	if (report->band)
-		write_band(report->band, out);
+	if (report->band) {
+		fputc('\n', out);
+		shock_write_band(report->band, out);
+		fputc('\n', out);
+	}
 	if (!report->show_events)
 		return;
 	if (report->events)

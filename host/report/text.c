@@ -208,6 +208,7 @@ static void write_model(const struct report *report, FILE *out)
 {
 	struct report_row rows[REPORT_ROWS_MAX];
 	size_t count = report_compare(report, rows);
+	bool compared = false;
 	int column;
 
 	if (!count)
@@ -215,6 +216,7 @@ static void write_model(const struct report *report, FILE *out)
 	fprintf(out, "\n%-20s %10s %10s %8s %12s\n", "model against drop", "model", "measured", "+-",
 	        "difference");
 	for (size_t i = 0; i < count; i++) {
+		compared |= isfinite(rows[i].measured);
 		fprintf(out, "%-17s %2s", rows[i].label, rows[i].unit);
 		cell(out, 10, rows[i].decimals, rows[i].predicted * rows[i].scale);
 		cell(out, 10, rows[i].decimals, rows[i].measured * rows[i].scale);
@@ -224,6 +226,8 @@ static void write_model(const struct report *report, FILE *out)
 		else
 			fprintf(out, " %10s\n", "-");
 	}
+	if (!compared)
+		fputs("Nothing to compare: the model speaks of channels named S1X, S1Y, S2X and S2Y.\n", out);
 	column = fprintf(out, "Model %s,", report->prediction->fidelity);
 	fill(out, column, report->prediction->reason, ".");
 	fputc('\n', out);

@@ -183,6 +183,10 @@ static void test_refused_texts(void **state)
 
 	(void)state;
 	refuse(rows, NULL, DT_E_FORMAT, ": not a log of a drop tower; for other text expected --columns");
+	refuse("\xff\xfe"
+	       "0",
+	       "time:s,a:g", DT_E_FORMAT, ": text in UTF-16, expected UTF-8");
+	refuse("\xfe\xff", NULL, DT_E_FORMAT, ": text in UTF-16, expected UTF-8");
 	refuse(rows, "time:s,a:g,b:g", DT_E_FORMAT, ":2: 2 columns, expected 3");
 	refuse(rows, "time:s", DT_E_ARGUMENT, "--columns: ");
 	refuse("0 1\n1 2\n2 3 4\n", "time:s,a:g", DT_E_FORMAT, ":3: 3 columns, expected 2");
