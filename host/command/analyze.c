@@ -22,7 +22,7 @@ static const char help[] =
         "  --lowpass HZ     zero-phase low-pass before everything else\n"
         "  --cfc CLASS      channel frequency class 60, 180, 600 or 1000 (SAE J211, ISO 6487), zero-phase\n"
         "  --iepe S         undo the sensor supply's high-pass of this time constant (0: leave it);\n"
-        "                   without it, the scene's\n"
+        "                   without it, the scene's where channels are named S1X to S2Z\n"
         "  --family NAME    the contact pulse is a half-sine, haversine or sine-power (auto)\n"
         "  --tolerance PCT  standard uncertainty asked for, of the value (0.5); what it takes is done\n"
         "  --events         list shocks, largest first, and free falls in the table too\n"

@@ -49,8 +49,20 @@ static bool any_flag(const struct record *record, const struct analysis *analysi
 	return flagged;
 }
 
+/* A scene's sensors are the tower's: a foreign record says nothing of its own. */
+static bool is_of_the_tower(const struct record *record)
+{
+	static const char *const names[] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
+
+	for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
+		if (record_channel(record, names[i]))
+			return true;
+	return false;
+}
+
 /* What a scene knows of sensors and drop goes into the estimates. */
-static struct estimate_options estimate_options_of(const struct evaluate_options *options)
+static struct estimate_options estimate_options_of(const struct record *record,
+                                                   const struct evaluate_options *options)
 {
 	const struct scene *scene = options->scene;
 	struct estimate_options estimate = {
@@ -62,7 +74,8 @@ static struct estimate_options estimate_options_of(const struct evaluate_options
 	};
 
 	if (isnan(estimate.iepe_time_constant_s))
-		estimate.iepe_time_constant_s = scene ? scene->sensor_iepe_time_constant_s : 0;
+		estimate.iepe_time_constant_s =
+		        scene && is_of_the_tower(record) ? scene->sensor_iepe_time_constant_s : 0;
 	if (scene)
 		estimate.impact_speed_m_s = sqrt(2 * UNITS_G_M_S2 * scene->drop_height_m);
 	return estimate;
@@ -132,7 +145,7 @@ static bool refuses_lowpass(const struct record *record, double lowpass_hz)
 
 int evaluate_open(struct evaluated *e, const struct record *record, const struct evaluate_options *options)
 {
-	struct estimate_options estimate = estimate_options_of(options);
+	struct estimate_options estimate = estimate_options_of(record, options);
 	const struct scene *scene = options->scene;
 	char message[MODEL_MESSAGE_MAX];
 	int result;
