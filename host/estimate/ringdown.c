@@ -29,17 +29,21 @@ void ringdown_try(struct ringdown_job *job, const char *method)
 		job->path[job->tried++] = method;
 }
 
+/* Of the mode that the values are of. */
+static bool decays(const struct modes *modes)
+{
+	const double *p = modes->p + MODES_EACH * modes_stronger(modes);
+	double decay = p[MODES_DECAY];
+
+	return decay > 0 && decay < RINGDOWN_DAMPING_MAX * hypot(decay, p[MODES_OMEGA]);
+}
+
 static enum estimate_status judge(const struct ringdown_job *job)
 {
-	const double *p = job->modes.p;
-
 	if (ringdown_explained(job) < EXPLAINED_MIN || ringdown_gain(job) < GAIN_MIN ||
 	    modes_swing_g(&job->modes, 0) < RINGDOWN_SWING_LEVEL * job->span->peak_g)
 		return ESTIMATE_NO_PEAK;
-	if (!(p[MODES_DECAY] > 0) ||
-	    !(p[MODES_DECAY] < RINGDOWN_DAMPING_MAX * hypot(p[MODES_DECAY], p[MODES_OMEGA])))
-		return ESTIMATE_NOT_CONVERGED;
-	return ESTIMATE_OK;
+	return decays(&job->modes) ? ESTIMATE_OK : ESTIMATE_NOT_CONVERGED;
 }
 
 /* From the block fit to whatever the residual needs. */
@@ -193,6 +197,14 @@ static double three_cycles(const struct ringdown_job *job)
 	return 3 / (crossings.time_s[CROSSINGS_MAX - 1] - crossings.time_s[0]);
 }
 
+static bool has_tried(const struct ringdown_job *job, const char *method)
+{
+	for (unsigned i = 0; i < job->tried; i++)
+		if (strcmp(job->path[i], method) == 0)
+			return true;
+	return false;
+}
+
 static void conclude(struct ringdown_job *job, struct ringdown *ringdown)
 {
 	struct estimate_how *how = &ringdown->result.how;
@@ -203,6 +215,9 @@ static void conclude(struct ringdown_job *job, struct ringdown *ringdown)
 	else
 		job->flags |= ESTIMATE_FLAG_MODEL;
 	how->method = method_of(job);
+	/* Another window may have taken it from blocks to samples, or back. */
+	if (!has_tried(job, how->method))
+		ringdown_try(job, how->method);
 	how->chi_square = ringdown_chi_square(job, &job->modes);
 	how->flags = shape_flags(job);
 	how->status = ESTIMATE_OK;
@@ -236,7 +251,7 @@ void ringdown_refine(const struct trace *trace, const struct ringdown_span *span
 	}
 	if (strcmp(before->how.method, "full") == 0 && !ringdown_full(&job))
 		return;
-	if (ringdown_passes(&job, &job.modes))
+	if (decays(&job.modes) && ringdown_passes(&job, &job.modes))
 		conclude(&job, ringdown);
 }
 
@@ -267,6 +282,9 @@ void ringdown_find(const struct trace *trace, const struct ringdown_span *span, 
 		if (*status == ESTIMATE_OK) {
 			escalate(&job);
 			ringdown_reach_back(&job);
+			*status = decays(&job.modes) ? ESTIMATE_OK : ESTIMATE_NOT_CONVERGED;
+		}
+		if (*status == ESTIMATE_OK) {
 			conclude(&job, &found);
 			found.result.three_cycle_frequency_hz = three_cycles(&job);
 		}

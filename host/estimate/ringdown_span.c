@@ -33,6 +33,9 @@
 #define BACK_PAIR 2.0
 #define BACK_AGAIN 1.5
 
+/* So far off one is not even chance: an outlier, or a contact too short to show twice. */
+#define BACK_FAR 6.0
+
 enum { WINDOWS = 4 };
 
 static size_t window_end(const struct ringdown_job *job, double omega, double decay, double constants,
@@ -170,8 +173,9 @@ static size_t free_since(const struct ringdown_job *job, const struct modes *sam
 	for (k = job->first; k > earliest; k--) {
 		double off = off_by(job, samples, k - 1, noise);
 
-		if ((fabs(off) > BACK_ALONE || fabs(off + after) > BACK_PAIR) &&
-		    (k - 1 == earliest || fabs(off_by(job, samples, k - 2, noise)) > BACK_AGAIN))
+		if (fabs(off) > BACK_FAR ||
+		    ((fabs(off) > BACK_ALONE || fabs(off + after) > BACK_PAIR) &&
+		     (k - 1 == earliest || fabs(off_by(job, samples, k - 2, noise)) > BACK_AGAIN)))
 			return k;
 		after = off;
 	}

@@ -510,7 +510,90 @@ static void refines(void **state)
 	                &r);
 	assert_near(r.start_s, late.start_s, 0);
 	trace_close(&trace);
+	/* A hole that the first window did not have leaves no blocks, and the path says so. */
+	synth_lose(&channel, 15, 1);
+	assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+	trace.noise_g = 1;
+	late.result.how.flags = 0;
+	r = late;
+	ringdown_refine(&trace,
+	                &(struct ringdown_span){.from_s = 9.9 / 7000, .until_s = INFINITY, .peak_g = 600},
+	                &r);
+	assert_string_equal(r.result.how.method, "full");
+	assert_int_equal(r.result.how.flags, ESTIMATE_FLAG_GAPS);
+	assert_string_equal(r.result.how.path[0], "block");
+	assert_non_null(r.result.how.path[1]);
+	assert_string_equal(r.result.how.path[1], "full");
+	assert_null(r.result.how.path[2]);
+	trace_close(&trace);
 	synth_free(&channel);
+}
+
+/* A lone outlier before from_s is where it stops, however well the samples before it belong to the decay. */
+static void reaches_outlier(void **state)
+{
+	(void)state;
+	for (unsigned seed = 820; seed < 830; seed++) {
+		struct synth_random random = {seed};
+		struct decay d = plain;
+		struct channel channel;
+		struct ringdown r;
+		struct trace trace;
+
+		d.noise_g = 1;
+		channel = make(&d, &random);
+		channel.value_g[12] += seed % 2 ? 60 : -60;
+		assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+		trace.noise_g = 1;
+		ringdown_find(
+		        &trace,
+		        &(struct ringdown_span){
+		                .from_s = 0.0025, .until_s = INFINITY, .peak_g = 600, .margin_s = 0.0025},
+		        &r);
+		assert_int_equal(r.result.how.status, ESTIMATE_OK);
+		assert_int_equal(r.result.how.flags, 0);
+		assert_true(r.start_s > 12.5 / 7000);
+		trace_close(&trace);
+		synth_free(&channel);
+	}
+}
+
+/* A decay so slow that noise hides whether it is one: a damping ratio that is ok is above 0, after every
+ * change of the window too. */
+static void decays(void **state)
+{
+	int ok = 0;
+
+	(void)state;
+	for (unsigned seed = 0; seed < 300; seed++) {
+		struct synth_random random = {seed};
+		struct ringdown_span span = {
+		        .from_s = 0.0025, .until_s = INFINITY, .peak_g = 40, .margin_s = 0.0025};
+		struct decay d = plain;
+		struct channel channel;
+		struct ringdown r;
+		struct trace trace;
+
+		d.damping = 1e-4;
+		d.noise_g = 10;
+		d.amplitude_g = 30;
+		channel = make(&d, &random);
+		assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+		trace.noise_g = 10;
+		ringdown_find(&trace, &span, &r);
+		for (int again = 0; again < 2; again++) {
+			if (r.result.how.status == ESTIMATE_OK && !(r.result.damping_ratio > 0))
+				fail_msg("seed %u, %s: damping %g", seed, again ? "refined" : "found",
+				         r.result.damping_ratio);
+			ok += r.result.how.status == ESTIMATE_OK;
+			span.from_s = 0;
+			ringdown_refine(&trace, &span, &r);
+		}
+		trace_close(&trace);
+		synth_free(&channel);
+	}
+	/* As often it is found to swell, which is no decay. */
+	assert_in_range(ok, 150, 450);
 }
 
 /* Tolerance decides only where the residual does not: every sample, and a flag when that is no help. */
@@ -547,6 +630,7 @@ static void tolerance(void **state)
 	                                .tolerance = 0.97 * r.result.sigma_damping / r.result.damping_ratio},
 	        &r);
 	assert_string_equal(r.result.how.method, "full");
+	assert_non_null(r.result.how.path[1]);
 	assert_string_equal(r.result.how.path[1], "full");
 	assert_null(r.result.how.path[2]);
 	trace_close(&trace);
@@ -730,7 +814,8 @@ int main(void)
 	        cmocka_unit_test(offset),        cmocka_unit_test(holes),
 	        cmocka_unit_test(follows_swing), cmocka_unit_test(softening_mount),
 	        cmocka_unit_test(refused),       cmocka_unit_test(reaches_back),
-	        cmocka_unit_test(refines),       cmocka_unit_test(tolerance),
+	        cmocka_unit_test(refines),       cmocka_unit_test(reaches_outlier),
+	        cmocka_unit_test(decays),        cmocka_unit_test(tolerance),
 	        cmocka_unit_test(against_gsl),   cmocka_unit_test(nothing),
 	        cmocka_unit_test(too_short),     cmocka_unit_test(combined),
 	};
