@@ -38,6 +38,9 @@
 /* How far from its centre a local model is believed, in half widths of its window. */
 #define LOCAL_REACH 0.95
 
+/* No parabola tells a time better than to this part of a sample. */
+#define SHIFT_MIN 1e-2
+
 enum { SAMPLES_MIN = 3 };
 
 void peak_tried(struct estimate_how *how, const char *name)
@@ -153,7 +156,7 @@ static void take_sample(const struct trace *trace, struct peak *peak)
 }
 
 /* The parabola through the highest sample and its neighbours: its top is shift samples later and rise
- * higher. False where it has none. */
+ * higher. False where it has none there. */
 static bool parabola(const struct trace *trace, const struct peak *peak, double *shift, double *rise,
                      double *bend)
 {
@@ -169,7 +172,7 @@ static bool parabola(const struct trace *trace, const struct peak *peak, double 
 		return false;
 	*shift = (before - after) / (2 * *bend);
 	*rise = (before - after) * *shift / -4;
-	return true;
+	return fabs(*shift) <= 1;
 }
 
 static bool take_parabola(const struct trace *trace, struct peak *peak)
@@ -183,7 +186,8 @@ static bool take_parabola(const struct trace *trace, struct peak *peak)
 	result->value_g = trace->value_g[peak->at] + rise;
 	result->time_s = trace_time(trace, peak->at) + shift / trace->rate_hz;
 	result->sigma_g = hypot(trace->noise_g, fmax(fabs(rise), fabs(bend) / 8));
-	result->sigma_time_s = hypot(trace->noise_g / (sqrt(2.0) * bend), shift / 2) / trace->rate_hz;
+	result->sigma_time_s =
+	        fmax(hypot(trace->noise_g / (sqrt(2.0) * bend), shift / 2), SHIFT_MIN) / trace->rate_hz;
 	return true;
 }
 

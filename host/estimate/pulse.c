@@ -13,6 +13,10 @@
  * pulse may fall on the same place, so that their errors add up. */
 #define KINK 0.0372677996249965
 
+/* In a peak of less noise than this a curve may have found one hump of it: its feet then are not the pulse's.
+ */
+#define AREA_SIGMAS 8.0
+
 struct edge {
 	double time_s;
 	double slope_g_s; /* magnitude */
@@ -266,17 +270,23 @@ static bool contact(const struct trace *trace, const struct peak *peak, enum est
 	                                        : guide_from_shape(&shape, guide);
 }
 
-/* Width and area once more, by what the samples say beyond the guide. */
-static void refine(const struct trace *trace, const struct peak *peak,
-                   const struct estimate_baseline *baseline, const struct guide *guide,
-                   struct estimate_pulse *pulse)
+/* The sum once more, by what the samples say beyond the guide. */
+static void guided_velocity(const struct trace *trace, const struct peak *peak,
+                            const struct estimate_baseline *baseline, const struct guide *guide,
+                            struct estimate_pulse *pulse)
 {
-	double level = EDGE_LEVEL * fabs(peak->result.value_g), area, sigma;
+	double sigma;
+
+	pulse->velocity_change_m_s = UNITS_G_M_S2 * guide_area(guide, trace, peak, &sigma);
+	take_velocity_sigma(trace, baseline, sigma, guide->curve.base_s, pulse);
+}
+
+static void guided_width(const struct trace *trace, const struct peak *peak, const struct guide *guide,
+                         struct estimate_pulse *pulse)
+{
+	double level = EDGE_LEVEL * fabs(peak->result.value_g);
 	struct guide_edge edge[2];
 
-	area = guide_area(guide, trace, peak, &sigma);
-	pulse->velocity_change_m_s = UNITS_G_M_S2 * area;
-	take_velocity_sigma(trace, baseline, sigma, guide->curve.base_s, pulse);
 	if (!guide_edge(guide, trace, -1, level, &edge[0]) || !guide_edge(guide, trace, 1, level, &edge[1]))
 		return;
 	pulse->start_s = edge[0].time_s;
@@ -309,11 +319,13 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	double level = EDGE_LEVEL * fabs(peak->result.value_g), tilt;
 	struct edge edge[2];
 	struct guide guide;
+	bool guided;
 
 	*pulse = found;
 	if (found.status == ESTIMATE_SHORT || found.status == ESTIMATE_NO_PEAK)
 		return;
-	if (!find_edge(trace, peak, -1, level, &edge[0]) || !find_edge(trace, peak, 1, level, &edge[1])) {
+	if (!find_edge(trace, peak, -1, level, &edge[0]) || !find_edge(trace, peak, 1, level, &edge[1]) ||
+	    !(edge[1].time_s > edge[0].time_s)) {
 		pulse->status = ESTIMATE_SHORT;
 		return;
 	}
@@ -325,10 +337,13 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	               (baseline->doubtful ? ESTIMATE_FLAG_ZERO : 0u);
 	pulse->sigma_duration_s =
 	        hypot(hypot(edge[0].sigma_s, edge[1].sigma_s), EDGE_LEVEL * peak->result.sigma_g * tilt);
-	if (peak->model != PEAK_MODEL_NONE && contact(trace, peak, family, pulse, &guide))
-		refine(trace, peak, baseline, &guide, pulse);
+	guided = peak->model != PEAK_MODEL_NONE && contact(trace, peak, family, pulse, &guide);
+	if (guided && fabs(peak->result.value_g) > AREA_SIGMAS * trace->noise_g)
+		guided_velocity(trace, peak, baseline, &guide, pulse);
 	else
 		velocity(trace, peak, baseline, edge, pulse);
+	if (guided)
+		guided_width(trace, peak, &guide, pulse);
 }
 
 void pulse_of_weak(const struct peak *weak, const struct estimate_pulse *strong, struct estimate_pulse *pulse)

@@ -176,6 +176,35 @@ static void between_samples(void **state)
 	}
 }
 
+/* Of five sigma and 200 samples: a family may have found one hump of the noise. The sum must not be that
+ * hump's. */
+static void faint(void **state)
+{
+	enum { TIMES = 100 };
+	const double height_g = 5, base_s = 0.02, truth = 9.81 * height_g * base_s * 2 / PI;
+	struct synth_random random = {36};
+	int most = 0;
+
+	(void)state;
+	for (int i = 0; i < TIMES; i++) {
+		struct channel channel = synth_channel("S2Y", 10000, -0.1, 2000);
+		struct estimate_baseline baseline;
+		struct estimate_pulse pulse;
+
+		for (size_t k = 0; k < channel.count; k++) {
+			double t = -0.1 + (double)k / 10000;
+
+			channel.value_g[k] =
+			        height_g * synth_pulse(SYNTH_HALF_SINE, t / base_s) + synth_normal(&random);
+		}
+		pulse = measure(&channel, &baseline);
+		most += pulse.velocity_change_m_s > truth / 2;
+		synth_free(&channel);
+	}
+	printf("seed 36: more than half of the velocity in %d of %d\n", most, TIMES);
+	assert_true(most >= TIMES - 2);
+}
+
 /* A lost frame inside the pulse is bridged where no family fits, and said in the uncertainty; a family that
  * fits knows what was there. */
 static void hole(void **state)
@@ -389,17 +418,10 @@ static void starts_inside(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(families),
-	        cmocka_unit_test(clipped),
-	        cmocka_unit_test(of_weak),
-	        cmocka_unit_test(reference),
-	        cmocka_unit_test(shapes),
-	        cmocka_unit_test(noise),
-	        cmocka_unit_test(hole),
-	        cmocka_unit_test(hole_covered),
-	        cmocka_unit_test(between_samples),
-	        cmocka_unit_test(cut),
-	        cmocka_unit_test(starts_inside),
+	        cmocka_unit_test(families),        cmocka_unit_test(clipped), cmocka_unit_test(of_weak),
+	        cmocka_unit_test(reference),       cmocka_unit_test(shapes),  cmocka_unit_test(noise),
+	        cmocka_unit_test(faint),           cmocka_unit_test(hole),    cmocka_unit_test(hole_covered),
+	        cmocka_unit_test(between_samples), cmocka_unit_test(cut),     cmocka_unit_test(starts_inside),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
