@@ -3,6 +3,7 @@
 
 #include <droptower_version.h>
 #include <errno.h>
+#include <pwd.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,10 +26,14 @@ const char *archived_folder(const char *given)
 const char *archived_operator(const char *given)
 {
 	const char *user = getenv("USER");
+	const struct passwd *login;
 
 	if (given != NULL)
 		return given;
-	return user != NULL ? user : "";
+	if (user != NULL)
+		return user;
+	login = getpwuid(geteuid());
+	return login != NULL ? login->pw_name : "";
 }
 
 int archived_failed(const struct archive *archive)

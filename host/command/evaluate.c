@@ -11,6 +11,7 @@
 #include "common/units.h"
 #include "host/command/command.h"
 #include "host/estimate/cfc.h"
+#include "host/estimate/filter.h"
 #include "host/record/whole.h"
 #include "host/report/report.h"
 #include "host/shock/free_fall.h"
@@ -49,18 +50,8 @@ static bool any_flag(const struct record *record, const struct analysis *analysi
 	return flagged;
 }
 
-/* A scene's sensors are the tower's: a foreign record says nothing of its own. */
-static bool is_of_the_tower(const struct record *record)
-{
-	static const char *const names[] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
-
-	for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
-		if (record_channel(record, names[i]))
-			return true;
-	return false;
-}
-
-/* What a scene knows of sensors and drop goes into the estimates. */
+/* What a scene knows of sensors and drop goes into the estimates. Its sensors are the tower's: of a foreign
+ * record's it knows nothing. */
 static struct estimate_options estimate_options_of(const struct record *record,
                                                    const struct evaluate_options *options)
 {
@@ -75,7 +66,7 @@ static struct estimate_options estimate_options_of(const struct record *record,
 
 	if (isnan(estimate.iepe_time_constant_s))
 		estimate.iepe_time_constant_s =
-		        scene && is_of_the_tower(record) ? scene->sensor_iepe_time_constant_s : 0;
+		        scene && record_is_of_tower(record) ? scene->sensor_iepe_time_constant_s : 0;
 	if (scene)
 		estimate.impact_speed_m_s = sqrt(2 * UNITS_G_M_S2 * scene->drop_height_m);
 	return estimate;
@@ -126,20 +117,17 @@ static bool refuses_cfc(const struct record *record, unsigned cfc)
 	return false;
 }
 
-/* filter_lowpass leaves channels alone that sample too slowly for it, and nothing says so: all of them are a
- * slip. */
-static const double LOWPASS_OF_RATE = 0.45;
-
+/* A corner too high for one channel is flagged; for all of them it is a slip. */
 static bool refuses_lowpass(const struct record *record, double lowpass_hz)
 {
 	double most = 0;
 
 	for (size_t i = 0; i < record->channel_count; i++)
 		most = fmax(most, record->channels[i].rate_hz);
-	if (lowpass_hz < LOWPASS_OF_RATE * most || !(lowpass_hz > 0))
+	if (lowpass_hz < FILTER_CORNER_MAX * most || !(lowpass_hz > 0))
 		return false;
 	command_error("%s: --lowpass %g Hz is too high for every channel, expected less than %g Hz",
-	              record->file, lowpass_hz, LOWPASS_OF_RATE * most);
+	              record->file, lowpass_hz, FILTER_CORNER_MAX * most);
 	return true;
 }
 

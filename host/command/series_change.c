@@ -68,6 +68,7 @@ static int is_new_log(struct archive *archive, const char *file, const char **en
 {
 	char message[READ_MESSAGE_MAX], drop[ARCHIVE_NAME_MAX + 16];
 	struct record record;
+	bool ours;
 	int found;
 
 	if (read_record(&record, file, NULL, message) != 0) {
@@ -79,7 +80,12 @@ static int is_new_log(struct archive *archive, const char *file, const char **en
 	          : strcmp(record.format, "uff58") == 0 ? ".unv"
 	          : strcmp(record.format, "hdf5") == 0  ? ".h5"
 	                                                : ".log";
+	ours = record_is_of_tower(&record);
 	record_free(&record);
+	if (!ours) {
+		command_error("%s: no channel S1X to S2Z, expected a drop of the tower", file);
+		return COMMAND_INPUT;
+	}
 	found = archive_find(archive, file, drop);
 	if (found < 0)
 		return archived_failed(archive);
@@ -252,6 +258,12 @@ int series_verb_note(struct archive *archive, struct series_arguments *a)
 	return COMMAND_DONE;
 }
 
+static bool is_sensor(const char *name)
+{
+	return name[0] == 'S' && (name[1] == '1' || name[1] == '2') &&
+	       (name[2] == '\0' || (strchr("XYZ", name[2]) != NULL && name[3] == '\0'));
+}
+
 int series_verb_calibrate(struct archive *archive, struct series_arguments *a)
 {
 	double gain;
@@ -261,6 +273,10 @@ int series_verb_calibrate(struct archive *archive, struct series_arguments *a)
 	if (!command_is_number(a->word[1], 0.1, 10, &gain))
 		return command_usage("series", "calibrate: GAIN is '%s', expected a number from 0.1 to 10",
 		                     a->word[1]);
+	if (!is_sensor(a->word[0]))
+		return command_usage("series",
+		                     "calibrate: no sensor '%s', expected S1 or S2, or an axis as S1X",
+		                     a->word[0]);
 	if (archive_calibrate(archive, a->word[0], gain, a->date, a->note != NULL ? a->note : "") != 0)
 		return archived_failed(archive);
 	return COMMAND_DONE;

@@ -12,9 +12,6 @@ enum { SECTIONS = 2 };
  * frequency axis, so that the whole has its corner where it was asked for at any rate. */
 #define ONE_PASS_CORNER 1.1164697500474103
 
-/* Corner over the sampling rate, from which on the filter has nothing to remove. */
-#define CORNER_MAX 0.45
-
 /* Reflected length in periods of the corner; the filter has forgotten its start by then. */
 #define REFLECT_PERIODS 5.0
 
@@ -98,7 +95,11 @@ int filter_lowpass(struct trace *trace, double lowpass_hz)
 	struct filter_section section[SECTIONS];
 	double one_pass;
 
-	if (!(corner < CORNER_MAX) || trace->count == 0)
+	if (!(corner < FILTER_CORNER_MAX)) {
+		trace->flags |= RECORD_FLAG_UNFILTERED;
+		return 0;
+	}
+	if (trace->count == 0)
 		return 0;
 	one_pass = atan(ONE_PASS_CORNER * tan(UNITS_PI * corner)) / UNITS_PI;
 	/* Pole pairs at 67.5 and 22.5 degrees from the real axis. */

@@ -9,9 +9,12 @@
  * value, so that a constant comes out as it went in and a step at the end makes no wave.
  *
  * Runs of good samples between lost and bad ones are filtered each on their own; what is missing stays
- * missing. A corner too close to half the sampling rate has nothing to remove and leaves the trace as it is.
+ * missing. A corner too close to half the sampling rate leaves the trace as it is, flagged "unfiltered".
  */
 #include "host/estimate/trace.h"
+
+/* Over the sampling rate: filter_lowpass leaves alone from there on. */
+#define FILTER_CORNER_MAX 0.45
 
 /* Unity at zero frequency: b (1 + 2/z + 1/z^2) / (1 + a1/z + a2/z^2), and its state. */
 struct filter_section {

@@ -56,6 +56,16 @@ const struct channel *record_channel(const struct record *record, const char *na
 	return NULL;
 }
 
+bool record_is_of_tower(const struct record *record)
+{
+	static const char *const names[] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
+
+	for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
+		if (record_channel(record, names[i]))
+			return true;
+	return false;
+}
+
 static void finish_channel(struct record *record, struct channel *channel)
 {
 	const double full_scale_g = (double)WIRE_SAMPLE_FULL_SCALE / WIRE_COUNTS_PER_G;
@@ -123,7 +133,7 @@ const char *record_flag_name(unsigned flags)
 	        "lost_samples", "bad_samples", "clipped",         "incomplete", "crc_unknown", "slow_frame",
 	        "no_impact",    "fault",       "uneven_sampling", "full_scale", "overrun",     "zero_shift",
 	        "cable",        "stuck",       "spike",           "zeroed",     "offset",      "drift",
-	        "hum",          "too_short",   "zero_unsure",
+	        "hum",          "too_short",   "zero_unsure",     "unfiltered",
 	};
 
 	for (size_t bit = 0; bit < sizeof(names) / sizeof(names[0]); bit++)

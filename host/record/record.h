@@ -46,6 +46,7 @@ enum {
 	RECORD_FLAG_HUM = 1u << 18,    /* "hum": mains or another hum shows before the pulse; taken off */
 	RECORD_FLAG_SHORT = 1u << 19,  /* "too_short": ends inside its pulse, or has hardly a sample */
 	RECORD_FLAG_ZERO_UNSURE = 1u << 20, /* "zero_unsure": more than noise before the pulse */
+	RECORD_FLAG_UNFILTERED = 1u << 21, /* "unfiltered": too slow for the low-pass asked for, left alone */
 };
 
 struct channel {
@@ -111,6 +112,9 @@ struct channel *record_add_channel(struct record *record, const char *name, doub
 
 /* NULL if there is none of that name. */
 const struct channel *record_channel(const struct record *record, const char *name);
+
+/* Whether a channel is one of the tower's, S1X to S2Z. */
+bool record_is_of_tower(const struct record *record);
 
 /* Recomputes lost_samples and every flag that follows from samples, gaps, CRC and marks. Readers call it
  * last. */

@@ -125,6 +125,7 @@ static void test_names(void **state)
 	        {RECORD_FLAG_HUM, "hum"},
 	        {RECORD_FLAG_SHORT, "too_short"},
 	        {RECORD_FLAG_ZERO_UNSURE, "zero_unsure"},
+	        {RECORD_FLAG_UNFILTERED, "unfiltered"},
 	        {0, ""},
 	        {1u << 31, ""},
 	};

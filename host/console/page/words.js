@@ -74,6 +74,7 @@ export const FLAGS = {
 	hum: "mains or another hum shows before the pulse; it was taken off: check screen and earth",
 	too_short: "the record begins or ends inside its pulse",
 	zero_unsure: "more than noise before the pulse: zero is unsure",
+	unfiltered: "sampled too slowly for the low-pass asked for: left as it was",
 };
 
 const STATUS = {
