@@ -90,6 +90,17 @@ static int tell_oddity(const struct run *run, const struct record *record, int c
 	return code == COMMAND_DONE && (run->aborted || run->earlier) ? COMMAND_REFUSED : code;
 }
 
+/* How far the series is, and what is left to do. */
+static int tell_series(void *context, const struct archive_series *series)
+{
+	FILE *out = context;
+
+	fprintf(out,
+	        "series   %u of %u planned accepted, %u to decide: 'droptower series accept' or 'reject'\n",
+	        series->accepted, series->planned, series->recorded - series->accepted - series->rejected);
+	return 0;
+}
+
 /* The drop is recorded before it is looked at. */
 static int report_archived(struct run *run, struct record *record)
 {
@@ -99,6 +110,8 @@ static int report_archived(struct run *run, struct record *record)
 	const char *note = run->aborted   ? "aborted in motion"
 	                   : run->earlier ? "was still in the tower from an earlier run"
 	                                  : "";
+	struct archive_filter mine = archive_filter_none();
+	FILE *out = run->json ? stderr : stdout;
 	int code, shown;
 
 	if (archive_finish(run->archive, &run->recording, 0, note) != 0)
@@ -107,9 +120,12 @@ static int report_archived(struct run *run, struct record *record)
 	code = archived_analyse(run->archive, r->series, r->number, r->raw);
 	snprintf(record->file, sizeof(record->file), "%s", r->raw);
 	shown = evaluate(record, &options);
-	if (shown == COMMAND_DONE)
-		fprintf(run->json ? stderr : stdout, "\ndrop     %s/%u\nraw log  %s\n", r->series, r->number,
-		        r->log);
+	mine.series = r->series;
+	if (shown == COMMAND_DONE) {
+		fprintf(out, "\ndrop     %s/%u\nraw log  %s\n", r->series, r->number, r->log);
+		if (archive_each_series(run->archive, &mine, tell_series, out) != 0)
+			return archived_failed(run->archive);
+	}
 	return tell_oddity(run, record, code != COMMAND_DONE ? code : shown);
 }
 
