@@ -4,6 +4,7 @@
 /*
  * What the analyzer says of a record. Every quantity is a value with its standard uncertainty, the method
  * that gave it and a status; a value whose status is not ok may be NAN and must not be shown without it.
+ * Where the record has no quiet part the noise is not known, and an uncertainty that hangs on it is NAN.
  * Accelerations in g, times in s after the record's first instant, frequencies in Hz.
  */
 #include <stdbool.h>
