@@ -147,7 +147,8 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 	                            .analysis = &e->analysis,
 	                            .scene = scene,
 	                            .version = DT_VERSION,
-	                            .simulated = options->simulated};
+	                            .simulated = options->simulated,
+	                            .tolerance_asked = options->tolerance > 0};
 	result = find_shocks(e, options, &estimate);
 	if (result != 0) {
 		evaluate_close(e);

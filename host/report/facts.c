@@ -209,6 +209,8 @@ size_t report_notes(const struct report *report, struct report_note notes[REPORT
 	struct noting noting = {.notes = notes, .flag = 1};
 
 	for (; estimate_flag_name(noting.flag)[0]; noting.flag <<= 1) {
+		if (noting.flag == ESTIMATE_FLAG_TOLERANCE && !report->tolerance_asked)
+			continue;
 		for (size_t i = 0; i < a->channel_count; i++) {
 			const struct estimate_channel *e = &a->channels[i];
 			const char *name = report->record->channels[i].name;
@@ -221,7 +223,7 @@ size_t report_notes(const struct report *report, struct report_note notes[REPORT
 		for (size_t i = 0; i < a->resultant_count; i++)
 			note(&noting, a->resultants[i].peak_g, a->resultants[i].how.flags,
 			     a->resultants[i].sensor, "resultant");
-		if (a->has_lag)
+		if (report_driven(report))
 			note(&noting, a->lag.driven_s, a->lag.driven.flags, "S1", "driven lag");
 		if (a->has_plate)
 			note(&noting, a->plate.frequency_hz, a->plate.how.flags, "plate", "frequency");

@@ -81,8 +81,9 @@ static void joint(struct page *page)
 	if (a->has_lag) {
 		const struct estimate_lag *l = &a->lag;
 
-		joint_row(out, "S1 after S2, driven oscillator", "ms", 4, l->driven_s * 1e3,
-		          l->sigma_driven_s * 1e3, l->driven.status);
+		if (report_driven(page->report))
+			joint_row(out, "S1 after S2, driven oscillator", "ms", 4, l->driven_s * 1e3,
+			          l->sigma_driven_s * 1e3, l->driven.status);
 		joint_row(out, "S1 after S2, first peaks", "ms", 3, l->first_peak_s * 1e3, (double)NAN,
 		          l->status);
 		joint_row(out, "S1 after S2, largest peaks", "ms", 4, l->largest_peak_s * 1e3,
