@@ -6,6 +6,7 @@
 #include "common/units.h"
 #include "host/estimate/gram.h"
 #include "host/estimate/lm.h"
+#include "host/estimate/phasor.h"
 
 /* Samples this many bases to either side of the peak take part: beyond the feet zero is fitted. */
 #define REACH_BASES 0.8
@@ -54,10 +55,10 @@ static inline double shape(const double p[PARAMETERS], double c, double sine, do
 	return p[HEIGHT] * sine * (2 * p[BULGE] * flank * c - p[POWER] * value / c);
 }
 
-/* From sample to sample through the pulse, by recurrence. */
+/* From sample to sample through the pulse. */
 struct walk {
-	double angle, cosine, sine;
-	double step, step_cosine, step_sine;
+	double angle, step;
+	struct phasor at;
 };
 
 static struct walk start_walk(const struct scene *scene, const double p[PARAMETERS])
@@ -65,21 +66,18 @@ static struct walk start_walk(const struct scene *scene, const double p[PARAMETE
 	double per_s = UNITS_PI / p[BASE], step = per_s / scene->trace->rate_hz;
 	double angle = (trace_time(scene->trace, scene->first) - p[CENTRE]) * per_s;
 
-	return (struct walk){angle, cos(angle), sin(angle), step, cos(step), sin(step)};
+	return (struct walk){angle, step, phasor_at(angle, step)};
 }
 
 static inline void turn(struct walk *walk)
 {
-	double cosine = walk->cosine * walk->step_cosine - walk->sine * walk->step_sine;
-
-	walk->sine = walk->sine * walk->step_cosine + walk->cosine * walk->step_sine;
-	walk->cosine = cosine;
+	phasor_turn(&walk->at);
 	walk->angle += walk->step;
 }
 
 static inline bool is_inside(const struct walk *walk)
 {
-	return fabs(walk->angle) < UNITS_PI / 2 && walk->cosine > 0;
+	return fabs(walk->angle) < UNITS_PI / 2 && walk->at.cosine > 0;
 }
 
 static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
@@ -105,7 +103,7 @@ static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_
 			*squares += residual * residual;
 			continue;
 		}
-		row[CENTRE] = shape(p, walk.cosine, walk.sine, row);
+		row[CENTRE] = shape(p, walk.at.cosine, walk.at.sine, row);
 		row[BASE] = -row[CENTRE] * walk.angle / p[BASE];
 		row[CENTRE] *= -UNITS_PI / p[BASE];
 		row[RESIDUAL] = residual - p[HEIGHT] * row[HEIGHT];
@@ -150,9 +148,9 @@ static double lopsided(const struct scene *scene, const double p[PARAMETERS])
 
 		if (!usable(scene->trace, k) || !is_inside(&walk))
 			continue;
-		centre = shape(p, walk.cosine, walk.sine, row);
+		centre = shape(p, walk.at.cosine, walk.at.sine, row);
 		value = p[HEIGHT] * row[HEIGHT];
-		odd = value * walk.sine;
+		odd = value * walk.at.sine;
 		odd_odd += odd * odd;
 		odd_centre += odd * centre;
 		centre_centre += centre * centre;

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/units.h"
+#include "host/estimate/phasor.h"
 
 /* A curve that leaves zero with a slope: a power below. */
 #define KINK_POWER 1.1
@@ -109,14 +110,13 @@ double guide_area(const struct guide *guide, const struct trace *trace, const st
 	const struct bell *curve = &guide->curve;
 	double turn = UNITS_PI / curve->base_s, step = 1 / trace->rate_hz, sum = 0;
 	size_t k = trace_index(trace, curve->centre_s - curve->base_s / 2), used = 0, follow = 0;
-	double angle = turn * (trace_time(trace, k) - curve->centre_s), c = cos(angle), s = sin(angle);
-	const double turn_c = cos(turn * step), turn_s = sin(turn * step);
+	double angle = turn * (trace_time(trace, k) - curve->centre_s);
+	struct phasor at = phasor_at(angle, turn * step);
 
 	for (; k < trace->count && angle < UNITS_PI / 2; k++, angle += turn * step) {
-		double time = trace_time(trace, k), cosine = fmax(c, 0), next = c * turn_c - s * turn_s;
+		double time = trace_time(trace, k), cosine = fmax(at.cosine, 0);
 
-		s = s * turn_c + c * turn_s;
-		c = next;
+		phasor_turn(&at);
 		if (!trace_good(trace, k) || (time > peak->clipped_from_s && time < peak->clipped_until_s)) {
 			follow++;
 			continue;

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "host/estimate/pair.h"
+#include "host/estimate/phasor.h"
 
 /* The fit looks this many half widths to either side: as far as the foot of a haversine and a fifth more. */
 #define REACH_HALF_WIDTHS 1.2
@@ -154,16 +155,15 @@ static inline void add_power(struct sums *sums, PAIR phi, PAIR u, PAIR v, PAIR w
 	sums->rw += r * w;
 }
 
-/* cos and sin of phi by recurrence. */
 static struct sums sum_under(const struct shape_problem *m, const double *p, const struct shape_under *under)
 {
-	const double turn_c = cos(2 * under->step), turn_s = sin(2 * under->step);
+	struct phasor_pair at = phasor_two(phasor_at(under->phi, under->step));
 	PAIR phi = {under->phi, under->phi + under->step};
-	PAIR c = {cos(phi[0]), cos(phi[1])}, s = {sin(phi[0]), sin(phi[1])};
 	struct sums sums = {.uu = {0}};
 
 	for (size_t k = under->first; k < under->last; k += 2) {
-		PAIR count, value = two_samples(m, k, under->last, &count), next = c * turn_c - s * turn_s;
+		const PAIR c = at.cosine, s = at.sine;
+		PAIR count, value = two_samples(m, k, under->last, &count);
 
 		if (m->family == ESTIMATE_FAMILY_SINE_POWER) {
 			const PAIR cosine = pair_more(c, (PAIR){SHAPE_COSINE_MIN, SHAPE_COSINE_MIN});
@@ -181,8 +181,7 @@ static struct sums sum_under(const struct shape_problem *m, const double *p, con
 			add_up(&sums, phi, u, v, value - p[SHAPE_PEAK] * u);
 		}
 		phi += 2 * under->step;
-		s = s * turn_c + c * turn_s;
-		c = next;
+		phasor_pair_turn(&at);
 	}
 	return sums;
 }

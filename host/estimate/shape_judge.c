@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "host/estimate/gram.h"
+#include "host/estimate/phasor.h"
 
 #define CHI_REFUSED 6.0
 #define SCORE_REFUSED 5.0
@@ -31,17 +32,16 @@ bool shape_question(const struct shape_problem *m, const double *p, struct shape
 	const unsigned size = shape_unknowns(m->family), skew = size, power = size + 1;
 	const bool asks_power = size == SHAPE_POWER;
 	struct shape_under under = shape_under_pulse(m, p);
-	const double turn_c = cos(under.step), turn_s = sin(under.step);
-	double phi = under.phi, c = cos(phi), s = sin(phi);
+	struct phasor at = phasor_at(under.phi, under.step);
+	double phi = under.phi;
 	struct gram gram;
 
 	gram_start(&gram, asks_power ? size + 2 : size + 1);
 	for (size_t k = under.first; k < under.last; k++, phi += under.step) {
 		double row[GRAM_COMMON], residual = m->trace->value_g[k];
-		double cosine = c > SHAPE_COSINE_MIN ? c : SHAPE_COSINE_MIN, sine = s;
+		double cosine = at.cosine > SHAPE_COSINE_MIN ? at.cosine : SHAPE_COSINE_MIN, sine = at.sine;
 
-		c = c * turn_c - s * turn_s;
-		s = s * turn_c + cosine * turn_s;
+		phasor_turn(&at);
 		if (!trace_good(m->trace, k) || shape_is_censored(m, k))
 			continue;
 		residual -= shape_row(m, p, phi, cosine, sine, row);
