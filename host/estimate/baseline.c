@@ -108,9 +108,7 @@ bool baseline_holds(const struct trace *trace, const struct estimate_baseline *b
 	if (baseline->samples == 0 || trace_index(trace, baseline->from_s) != from ||
 	    trace_index(trace, baseline->until_s) + 1 != until)
 		return false;
-	while (from < until && !(trace->sample[from] & (SAMPLE_SPIKE | SAMPLE_BAD)))
-		from++;
-	return from == until;
+	return !trace_any(trace, baseline->from_s, baseline->until_s, SAMPLE_SPIKE | SAMPLE_BAD);
 }
 
 static void subtract(struct trace *trace, const struct estimate_baseline *baseline)

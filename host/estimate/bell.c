@@ -37,11 +37,6 @@ struct scene {
 	double noise_g;
 };
 
-static bool usable(const struct trace *trace, size_t k)
-{
-	return trace_good(trace, k) && !(trace->sample[k] & SAMPLE_CLIPPED);
-}
-
 /* The pulse of height 1 at the angle whose cosine is c, and its derivative by the angle; row gets those by
  * height, power and bulge. */
 static inline double shape(const double p[PARAMETERS], double c, double sine, double row[PARAMETERS])
@@ -96,7 +91,7 @@ static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_
 	for (size_t k = scene->first; k < scene->last; k++, turn(&walk)) {
 		double row[COLUMNS], residual = scene->trace->value_g[k];
 
-		if (!usable(scene->trace, k))
+		if (!trace_usable(scene->trace, k))
 			continue;
 		used++;
 		if (!is_inside(&walk)) {
@@ -146,7 +141,7 @@ static double lopsided(const struct scene *scene, const double p[PARAMETERS])
 	for (size_t k = scene->first; k < scene->last; k++, turn(&walk)) {
 		double row[PARAMETERS], value, odd, centre;
 
-		if (!usable(scene->trace, k) || !is_inside(&walk))
+		if (!trace_usable(scene->trace, k) || !is_inside(&walk))
 			continue;
 		centre = shape(p, walk.at.cosine, walk.at.sine, row);
 		value = p[HEIGHT] * row[HEIGHT];
@@ -186,13 +181,25 @@ bool bell_fit(const struct trace *trace, const struct peak *peak, struct bell *b
 	       fabs(lopsided(&scene, p)) <= LOPSIDED_MAX;
 }
 
+double bell_of(const struct bell *bell, double c)
+{
+	double flank = c;
+
+	/* The named families' without the cost of a power. */
+	if (bell->power == 2)
+		flank = c * c;
+	else if (bell->power != 1)
+		flank = pow(c, bell->power);
+	return bell->height_g * flank * (1 + bell->bulge * (1 - c * c));
+}
+
 double bell_at(const struct bell *bell, double time_s)
 {
 	double angle = UNITS_PI * (time_s - bell->centre_s) / bell->base_s, c = cos(angle);
 
 	if (!(fabs(angle) < UNITS_PI / 2) || !(c > 0))
 		return 0;
-	return bell->height_g * pow(c, bell->power) * (1 + bell->bulge * (1 - c * c));
+	return bell_of(bell, c);
 }
 
 double bell_area(const struct bell *bell)

@@ -25,6 +25,10 @@ struct bell {
  * refuses it; bell is then undefined. */
 bool bell_fit(const struct trace *trace, const struct peak *peak, struct bell *bell);
 
+/* Where the curve's cosine is c, from 0 to 1. */
+double bell_of(const struct bell *bell, double c);
+
+/* At an instant; 0 beyond its feet. */
 double bell_at(const struct bell *bell, double time_s);
 double bell_area(const struct bell *bell); /* in g s */
 

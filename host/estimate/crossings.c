@@ -63,7 +63,7 @@ void crossings_find(struct crossings *found, const struct trace *trace, size_t f
 
 	memset(found, 0, sizeof(*found));
 	for (size_t k = first; k < end && found->count < CROSSINGS_MAX; k++) {
-		if (!series_usable(trace, k))
+		if (!trace_usable(trace, k))
 			continue;
 		value = trace->value_g[k] - offset_g;
 		if (value * value_before < 0) {

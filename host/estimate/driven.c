@@ -81,11 +81,6 @@ struct scene {
 	double block_g[BLOCKS]; /* NAN: has a hole */
 };
 
-static bool usable(const struct trace *trace, size_t k)
-{
-	return trace_good(trace, k) && !(trace->sample[k] & SAMPLE_CLIPPED);
-}
-
 /* Mean of e^(pole u) over a block's samples, u from its middle, and its derivative by the pole: a block mean
  * of a damped oscillation is one, only smaller. */
 static void block_mean(const struct scene *scene, double complex pole, double complex *mean,
@@ -195,7 +190,7 @@ static void input_from_samples(const struct trace *trace, const struct peak *pea
 
 static void add_single(struct scene *scene, const struct trace *trace, size_t k, double ramp)
 {
-	if (!usable(trace, k) || scene->single_count == SINGLES)
+	if (!trace_usable(trace, k) || scene->single_count == SINGLES)
 		return;
 	scene->single[scene->single_count++] =
 	        (struct single){trace_time(trace, k), trace->value_g[k], fmin(fmax(ramp, 0), 1)};
@@ -208,7 +203,7 @@ static void add_block(struct scene *scene, const struct trace *trace, size_t fir
 	bool whole = true;
 
 	for (size_t k = first; k < first + scene->block_size; k++) {
-		whole = whole && usable(trace, k);
+		whole = whole && trace_usable(trace, k);
 		sum += trace->value_g[k];
 	}
 	for (size_t k = first; !whole && k < first + scene->block_size; k++)

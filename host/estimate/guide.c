@@ -96,14 +96,6 @@ double guide_spread(const struct guide *guide, const struct guide_edge edge[2])
 	return hypot(foot, hypot(edge[0].sigma_s, edge[1].sigma_s));
 }
 
-/* c to the curve's power; the named families' without its cost. */
-static double flank(const struct bell *curve, double c)
-{
-	if (curve->power == 1)
-		return c;
-	return curve->power == 2 ? c * c : pow(c, curve->power);
-}
-
 double guide_area(const struct guide *guide, const struct trace *trace, const struct peak *peak,
                   double *sigma_g_s)
 {
@@ -122,8 +114,7 @@ double guide_area(const struct guide *guide, const struct trace *trace, const st
 			continue;
 		}
 		used++;
-		sum += trace->value_g[k] -
-		       curve->height_g * flank(curve, cosine) * (1 + curve->bulge * (1 - cosine * cosine));
+		sum += trace->value_g[k] - bell_of(curve, cosine);
 	}
 	/* What stands in for a missing sample is a mean of the others: it errs as they do. */
 	*sigma_g_s = step * hypot(trace->noise_g * sqrt((double)(used + 2 * follow)),

@@ -267,8 +267,8 @@ static inline double both(PAIR pair)
 	return pair[0] + pair[1];
 }
 
-/* All products of derivatives follow from those of the decays, and these
- * are geometric series but for what is missing; only the residual is summed point by point. */
+/* All products of derivatives follow from those of the decays, and these are geometric series but for what is
+ * missing; only the residual is summed point by point. */
 size_t modes_undisturbed(const void *context, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
                          double right[CHOLESKY_MAX], double *squares)
 {

@@ -51,19 +51,17 @@ static void take_suspect(struct peak *peak, const struct clipped *clipped)
 static enum shape_verdict fit_flanks(const struct trace *trace, enum estimate_family family,
                                      struct peak *peak)
 {
-	static const enum estimate_family ladder[] = {ESTIMATE_FAMILY_HALF_SINE, ESTIMATE_FAMILY_HAVERSINE,
-	                                              ESTIMATE_FAMILY_SINE_POWER};
 	enum shape_verdict best = SHAPE_REFUSED;
 
-	for (unsigned i = 0; i < sizeof(ladder) / sizeof(ladder[0]); i++) {
+	for (unsigned i = 0; i < SHAPE_LADDER; i++) {
 		struct shape before = peak->shape;
 		enum shape_verdict verdict;
 
-		if (family != ESTIMATE_FAMILY_AUTO && family != ladder[i])
+		if (family != ESTIMATE_FAMILY_AUTO && family != shape_ladder[i])
 			continue;
-		if (best == SHAPE_DOUBTFUL && ladder[i] == ESTIMATE_FAMILY_SINE_POWER)
+		if (best == SHAPE_DOUBTFUL && shape_ladder[i] == ESTIMATE_FAMILY_SINE_POWER)
 			break;
-		if (!peak_fit(trace, ladder[i], peak)) {
+		if (!peak_fit(trace, shape_ladder[i], peak)) {
 			peak->shape = before;
 			continue;
 		}

@@ -171,12 +171,6 @@ static void velocity(const struct trace *trace, const struct peak *peak,
 	take_velocity_sigma(trace, baseline, sigma, length, pulse);
 }
 
-/* Families in the order they are asked without one being given. */
-static const enum estimate_family ladder[] = {ESTIMATE_FAMILY_HALF_SINE, ESTIMATE_FAMILY_HAVERSINE,
-                                              ESTIMATE_FAMILY_SINE_POWER};
-
-enum { LADDER = sizeof(ladder) / sizeof(ladder[0]) };
-
 /* A half-sine that is not refused and asks for no other power by this many sigma needs no second opinion. */
 #define CLEAR_SCORE 2.0
 
@@ -203,18 +197,18 @@ static bool choose(const struct trace *trace, const struct peak *peak, enum esti
 	bool plain = fabs(peak->result.value_g) > PLAIN_SIGMAS * trace->noise_g;
 	unsigned tried = 0;
 
-	for (unsigned i = 0; i < LADDER; i++) {
+	for (unsigned i = 0; i < SHAPE_LADDER; i++) {
 		enum shape_verdict verdict;
 		struct shape shape;
 
-		if (family != ESTIMATE_FAMILY_AUTO && family != ladder[i])
+		if (family != ESTIMATE_FAMILY_AUTO && family != shape_ladder[i])
 			continue;
 		if (family == ESTIMATE_FAMILY_AUTO && peak->lopsided)
 			return false;
-		if (ladder[i] == ESTIMATE_FAMILY_SINE_POWER && best->family != ESTIMATE_FAMILY_AUTO)
+		if (shape_ladder[i] == ESTIMATE_FAMILY_SINE_POWER && best->family != ESTIMATE_FAMILY_AUTO)
 			return true;
-		how->path[tried++] = estimate_family_name(ladder[i]);
-		if (!fit(trace, peak, ladder[i], &shape))
+		how->path[tried++] = estimate_family_name(shape_ladder[i]);
+		if (!fit(trace, peak, shape_ladder[i], &shape))
 			continue;
 		/* How far the best of the refused ones is off. */
 		if (best->family == ESTIMATE_FAMILY_AUTO && !(how->chi_square < shape.chi_square))

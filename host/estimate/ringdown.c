@@ -179,7 +179,7 @@ static unsigned shape_flags(const struct ringdown_job *job)
 	if (job->modes.hum_hz > 0)
 		flags |= ESTIMATE_FLAG_HUM;
 	for (unsigned k = 0; k < job->series.count * job->series.block; k++)
-		if (!series_usable(job->trace, job->first + k))
+		if (!trace_usable(job->trace, job->first + k))
 			return flags | ESTIMATE_FLAG_GAPS;
 	return flags;
 }

@@ -156,7 +156,7 @@ static double off_by(const struct ringdown_job *job, const struct modes *samples
 {
 	const struct trace *trace = job->trace;
 
-	if (!series_usable(trace, k))
+	if (!trace_usable(trace, k))
 		return 0;
 	return (trace->value_g[k] - modes_at(samples, trace_time(trace, k) - job->span->from_s)) / noise;
 }

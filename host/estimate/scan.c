@@ -120,7 +120,7 @@ static size_t add_up(const struct trace *trace, size_t k, size_t end, double *su
 			k += LANES;
 			continue;
 		}
-		if (series_usable(trace, k)) {
+		if (trace_usable(trace, k)) {
 			*sum += trace->value_g[k];
 			*squares += trace->value_g[k] * trace->value_g[k];
 			n++;

@@ -15,7 +15,7 @@ static inline void take_point(struct series *series, const struct trace *trace, 
 		marks |= sample[i];
 		sum += value[i];
 	}
-	good = series_usable_mark(marks);
+	good = trace_usable_mark(marks);
 	series->value_g[series->count] = good ? sum / series->block : 0;
 	series->good[series->count++] = good;
 	series->used += good;
@@ -66,7 +66,7 @@ bool series_lengthen(struct series *series, const struct trace *trace, size_t fi
 	memmove(series->value_g + more, series->value_g, series->count * sizeof(*series->value_g));
 	memmove(series->good + more, series->good, series->count * sizeof(*series->good));
 	for (unsigned k = 0; k < more; k++) {
-		series->good[k] = series_usable(trace, first + k);
+		series->good[k] = trace_usable(trace, first + k);
 		series->value_g[k] = series->good[k] ? trace->value_g[first + k] : 0;
 		series->used += series->good[k];
 	}

@@ -23,17 +23,6 @@ struct series {
 	bool good[SERIES_MAX];
 };
 
-/* Whether a sample, or samples by all their marks, follow the swing: there, not bad and not clipped. */
-static inline bool series_usable_mark(unsigned marks)
-{
-	return !(marks & (SAMPLE_LOST | SAMPLE_BAD | SAMPLE_SPIKE | SAMPLE_CLIPPED));
-}
-
-static inline bool series_usable(const struct trace *trace, size_t k)
-{
-	return series_usable_mark(trace->sample[k]);
-}
-
 /* Samples [first, last) of the trace in blocks, times counted from from_s. The block grows as needed to
  * stay within SERIES_MAX points. */
 void series_take(struct series *series, const struct trace *trace, size_t first, size_t last, double from_s,

@@ -25,6 +25,9 @@
 /* Without noise a limit is sharp. */
 #define SHARP 1e-6
 
+const enum estimate_family shape_ladder[SHAPE_LADDER] = {ESTIMATE_FAMILY_HALF_SINE, ESTIMATE_FAMILY_HAVERSINE,
+                                                         ESTIMATE_FAMILY_SINE_POWER};
+
 struct shape_under shape_under_pulse(const struct shape_problem *m, const double *p)
 {
 	double rate = m->trace->rate_hz, peak_s = m->near_s + p[SHAPE_TIME],

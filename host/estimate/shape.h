@@ -71,6 +71,10 @@ bool shape_lopsided(const struct shape *shape);
  */
 bool shape_hopeless(const struct shape *shape);
 
+/* The families in the order they are asked where none is given. */
+enum { SHAPE_LADDER = 3 };
+extern const enum estimate_family shape_ladder[SHAPE_LADDER];
+
 /* Of cos^power over its half turn: the area of such a pulse of height and base 1. */
 double shape_mean_cosine(double power);
 

@@ -69,6 +69,18 @@ static inline bool trace_good(const struct trace *trace, size_t k)
 	return !(trace->sample[k] & (SAMPLE_LOST | SAMPLE_BAD | SAMPLE_SPIKE));
 }
 
+/* Whether a sample, or samples by all their marks, say where the signal is: there, not bad and not clipped.
+ */
+static inline bool trace_usable_mark(unsigned marks)
+{
+	return !(marks & (SAMPLE_LOST | SAMPLE_BAD | SAMPLE_SPIKE | SAMPLE_CLIPPED));
+}
+
+static inline bool trace_usable(const struct trace *trace, size_t k)
+{
+	return trace_usable_mark(trace->sample[k]);
+}
+
 static inline double trace_time(const struct trace *trace, size_t k)
 {
 	return trace->start_s + (double)k / trace->rate_hz;
