@@ -74,8 +74,12 @@ struct archive_recording {
 	int lock;                        /* held while it is being recorded */
 };
 
-/* Makes the next drop of series, its empty log included. ending: ".log". simulated: on a simulated tower, so
- * that no product falls; false when that is not known. DT_E_UNKNOWN: no such series. */
+/* What a log of that format, as records name it, ends in: ".log" of "candump", and of one that has no ending
+ * of its own here. */
+const char *archive_ending(const char *format);
+
+/* Makes the next drop of series, its empty log included. ending: of the log, as above. simulated: on a
+ * simulated tower, so that no product falls; false when that is not known. DT_E_UNKNOWN: no such series. */
 DT_MUST_USE int archive_begin(struct archive *archive, const char *series, const char *operator_name,
                               const char *ending, bool simulated, struct archive_recording *recording);
 

@@ -66,6 +66,9 @@ DT_MUST_USE int archive_check_name(struct archive *archive, const char *what, co
 DT_MUST_USE int archive_check_names(struct archive *archive, const char *series, const char *campaign);
 DT_MUST_USE int archive_check_text(struct archive *archive, const char *what, const char *text);
 
+/* Whether a name ends as a log's does. */
+bool archive_is_log(const char *name);
+
 struct archive_place {
 	int64_t drop, series;
 	char name[ARCHIVE_NAME_MAX + 1];

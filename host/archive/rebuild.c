@@ -102,22 +102,12 @@ static bool ends_in(const char *name, const char *ending)
 	return length > tail && strcmp(name + length - tail, ending) == 0;
 }
 
-static bool is_log(const char *name)
-{
-	static const char *const endings[] = {".log", ".lcm", ".csv", ".unv", ".h5"};
-	bool is = false;
-
-	for (size_t i = 0; i < sizeof(endings) / sizeof(endings[0]); i++)
-		is |= ends_in(name, endings[i]);
-	return is;
-}
-
 /* A log that no sidecar speaks of. */
 static void look_for_sidecar(struct rebuild *rebuild, const FTSENT *entry)
 {
 	char path[ARCHIVE_PATH_MAX], text[ARCHIVE_MESSAGE_MAX];
 
-	if (entry->fts_statp->st_size == 0 || !is_log(entry->fts_name))
+	if (entry->fts_statp->st_size == 0 || !archive_is_log(entry->fts_name))
 		return;
 	snprintf(path, sizeof(path), "%.4200s", entry->fts_path);
 	strcpy(strrchr(path, '.'), ".ini");

@@ -134,6 +134,30 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 
 /* ---- recording ---- */
 
+static const struct {
+	const char *format, *ending;
+} logs[] = {{"candump", ".log"}, {"lcm", ".lcm"}, {"csv", ".csv"}, {"uff58", ".unv"}, {"hdf5", ".h5"}};
+
+enum { LOGS = sizeof(logs) / sizeof(logs[0]) };
+
+const char *archive_ending(const char *format)
+{
+	for (unsigned i = 0; i < LOGS; i++)
+		if (strcmp(logs[i].format, format) == 0)
+			return logs[i].ending;
+	return logs[0].ending;
+}
+
+bool archive_is_log(const char *name)
+{
+	const char *dot = strrchr(name, '.');
+
+	for (unsigned i = 0; i < LOGS; i++)
+		if (dot != NULL && dot != name && strcmp(dot, logs[i].ending) == 0)
+			return true;
+	return false;
+}
+
 /* The next number whose log is not there; its log is made, and locked. */
 static int take_number(struct archive *archive, const char *year, const char *ending,
                        struct archive_recording *r)

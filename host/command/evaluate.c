@@ -12,6 +12,7 @@
 #include "host/command/command.h"
 #include "host/estimate/cfc.h"
 #include "host/estimate/filter.h"
+#include "host/record/drop.h"
 #include "host/record/whole.h"
 #include "host/report/report.h"
 #include "host/shock/free_fall.h"
@@ -66,7 +67,7 @@ static struct estimate_options estimate_options_of(const struct record *record,
 
 	if (isnan(estimate.iepe_time_constant_s))
 		estimate.iepe_time_constant_s =
-		        scene && record_is_of_tower(record) ? scene->sensor_iepe_time_constant_s : 0;
+		        scene && drop_has_channel(record) ? scene->sensor_iepe_time_constant_s : 0;
 	if (scene)
 		estimate.impact_speed_m_s = sqrt(2 * UNITS_G_M_S2 * scene->drop_height_m);
 	return estimate;

@@ -13,6 +13,7 @@
 #include "host/command/archived.h"
 #include "host/command/command.h"
 #include "host/command/series_private.h"
+#include "host/record/drop.h"
 #include "host/record/read.h"
 
 /* ---- new series and logs ---- */
@@ -75,12 +76,8 @@ static int is_new_log(struct archive *archive, const char *file, const char **en
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}
-	*ending = strcmp(record.format, "lcm") == 0     ? ".lcm"
-	          : strcmp(record.format, "csv") == 0   ? ".csv"
-	          : strcmp(record.format, "uff58") == 0 ? ".unv"
-	          : strcmp(record.format, "hdf5") == 0  ? ".h5"
-	                                                : ".log";
-	ours = record_is_of_tower(&record);
+	*ending = archive_ending(record.format);
+	ours = drop_has_channel(&record);
 	record_free(&record);
 	if (!ours) {
 		command_error("%s: no channel S1X to S2Z, expected a drop of the tower", file);

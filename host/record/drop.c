@@ -9,9 +9,10 @@
 #include "common/wire.h"
 #include "common/wire_table.h"
 
+const char *const drop_channel_names[DROP_CHANNELS] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
+
 int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_ms)
 {
-	static const char *const names[DROP_CHANNELS] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
 	uint32_t ticks = last_tick_ms - first_tick_ms + 1;
 	struct record drop;
 
@@ -23,8 +24,8 @@ int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_
 	drop.last_tick_ms = last_tick_ms;
 	for (unsigned i = 0; i < DROP_CHANNELS; i++) {
 		uint32_t per_tick = i % 3 == 0 ? WIRE_X_PER_TICK : WIRE_YZ_PER_TICK;
-		struct channel *channel =
-		        record_add_channel(&drop, names[i], 1000.0 * per_tick, (size_t)ticks * per_tick);
+		struct channel *channel = record_add_channel(&drop, drop_channel_names[i], 1000.0 * per_tick,
+		                                             (size_t)ticks * per_tick);
 		if (!channel) {
 			record_free(&drop);
 			return DT_E_MEMORY;
@@ -110,6 +111,14 @@ static uint32_t samples_crc32(const struct record *record)
 		}
 	}
 	return crc;
+}
+
+bool drop_has_channel(const struct record *record)
+{
+	for (unsigned i = 0; i < DROP_CHANNELS; i++)
+		if (record_channel(record, drop_channel_names[i]))
+			return true;
+	return false;
 }
 
 int drop_check(const struct record *record)

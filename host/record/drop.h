@@ -16,6 +16,9 @@ enum {
 	DROP_TICKS_MAX = 2048, /* more than the longest capture the tower can be set to */
 };
 
+/* "S1X" to "S2Z", in the order of a drop's channels. */
+extern const char *const drop_channel_names[DROP_CHANNELS];
+
 /* Makes *record the drop of ticks first..last, all samples lost. DT_E_RANGE, DT_E_MEMORY. */
 DT_MUST_USE int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_ms);
 
@@ -34,6 +37,9 @@ DT_MUST_USE int drop_close(struct record *record);
 /* Whether the channels are those of a drop of its ticks, whole blocks of them: 0, DT_E_RANGE for the ticks,
  * DT_E_FORMAT for the channels, DT_E_MEMORY. */
 DT_MUST_USE int drop_check(const struct record *record);
+
+/* Whether a channel has the name of a drop's. */
+bool drop_has_channel(const struct record *record);
 
 /* Ticks of the window; the record must be a drop. */
 uint32_t drop_ticks(const struct record *record);

@@ -56,16 +56,6 @@ const struct channel *record_channel(const struct record *record, const char *na
 	return NULL;
 }
 
-bool record_is_of_tower(const struct record *record)
-{
-	static const char *const names[] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
-
-	for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
-		if (record_channel(record, names[i]))
-			return true;
-	return false;
-}
-
 static void finish_channel(struct record *record, struct channel *channel)
 {
 	const double full_scale_g = (double)WIRE_SAMPLE_FULL_SCALE / WIRE_COUNTS_PER_G;

@@ -113,9 +113,6 @@ struct channel *record_add_channel(struct record *record, const char *name, doub
 /* NULL if there is none of that name. */
 const struct channel *record_channel(const struct record *record, const char *name);
 
-/* Whether a channel is one of the tower's, S1X to S2Z. */
-bool record_is_of_tower(const struct record *record);
-
 /* Recomputes lost_samples and every flag that follows from samples, gaps, CRC and marks. Readers call it
  * last. */
 void record_finish(struct record *record);
