@@ -17,16 +17,17 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from tap import *
 
 ME, OTHER = "a" * 16, "b" * 16
+PATIENCE_S = 40  # whatever is slower is a hang
 
 
-def wait_for(condition, seconds, what):
-    end = time.monotonic() + seconds
+def wait_for(condition, what):
+    end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         value = condition()
         if value:
             return value
         time.sleep(0.01)
-    raise AssertionError(f"no {what() if callable(what) else what} within {seconds} s")
+    raise AssertionError(f"no {what() if callable(what) else what} within {PATIENCE_S} s")
 
 
 STALLED = "nothing was heard of the tower"
@@ -69,12 +70,12 @@ class Stream(threading.Thread):
         if name == "state":
             self.state = data
 
-    def wait(self, condition, seconds, what):
+    def wait(self, condition, what):
         """The first state for which condition holds."""
         def look():
             state = self.state
             return state if state and condition(state) else None
-        return wait_for(look, seconds, lambda: f"{what}; it was {json.dumps(self.state)[:900]}")
+        return wait_for(look, lambda: f"{what}; it was {json.dumps(self.state)[:900]}")
 
     def close(self):
         try:
@@ -171,48 +172,51 @@ class Console:
         self.post("/api/series", {"name": name, "campaign": "trial", "scene": wanted, "angle_deg": angle, "planned": 5, **more})
         self.post("/api/select", {"series": name})
 
-    def ready(self, stream, seconds=30):
+    def ready(self, stream):
         """At rest and green, also after a pause of the machine that outlasted an ARM."""
         old = stream.state
         return stream.wait(lambda s: s is not old and s["tower"]["state"] == "READY" and s["tower"]["phase"] == "idle" and
                            (not s["tower"]["trouble"] or STALLED in s["tower"]["trouble"]) and
-                           all(c["green"] for c in s["checks"]), seconds, "all checks green")
+                           all(c["green"] for c in s["checks"]), "all checks green")
 
     def arm(self):
         answer = self.post("/api/arm")
         assert answer["token"] > 0 and 0 < answer["expires_s"] <= 60, answer
         return answer["token"]
 
-    def drop(self, stream, seconds=20):
-        """Arms, releases, waits for the result; its name. A machine that is too busy for the heartbeat of 500 ms makes
-        the tower refuse: that is said, cleared, and tried again."""
+    def drop(self, stream):
+        """Arms, releases, waits for the result; its name."""
         before = self.ready(stream)["archive"]["result"]
+        self.let_fall(stream)
+        return stream.wait(lambda s: s["archive"]["result"] not in (None, before) and s["tower"]["phase"] == "idle",
+                           "result")["archive"]["result"]
+
+    def let_fall(self, stream):
+        """ARM and RELEASE. A machine that is too busy for the heartbeat of 500 ms makes the tower refuse: that is said,
+        cleared, and tried again."""
         for attempt in range(3):
+            self.ready(stream)
             if self.release(stream):
-                break
+                return
             print(f"# attempt {attempt + 1}: no heartbeat for 500 ms on a busy machine; cleared, again")
             self.clear()
-            self.ready(stream)
-        else:
-            raise AssertionError("no heartbeat for 500 ms in three attempts")
-        return stream.wait(lambda s: s["archive"]["result"] not in (None, before) and s["tower"]["phase"] == "idle", seconds,
-                           "result")["archive"]["result"]
+        raise AssertionError("no heartbeat for 500 ms in three attempts")
 
     def release(self, stream):
         """ARM and RELEASE; False when the tower lost the host's heartbeat in between."""
         status, _, answer = self.ask("POST", "/api/arm", {})
         if status == 200:
             token = json.loads(answer)["token"]
-            stream.wait(lambda s: s["tower"]["phase"] == "armed" or s["tower"]["fault"] == "HOST_LOST", 1, "armed")
+            stream.wait(lambda s: s["tower"]["phase"] == "armed" or s["tower"]["fault"] == "HOST_LOST", "armed")
             status, _, answer = self.ask("POST", "/api/release", {"token": token})
         if status == 409 and b"no host heartbeat" in answer:
             return False
         equal(status, 200, f"ARM and RELEASE: {answer[:300]}")
         return True
 
-    def clear(self, seconds=15):
+    def clear(self):
         """Once the cause is gone: the bench lifts the frame."""
-        wait_for(lambda: self.post("/api/clear", expect=None) == 200, seconds, "CLEAR")
+        wait_for(lambda: self.post("/api/clear", expect=None) == 200, "CLEAR")
 
     # ---- the process ----
 
