@@ -11,7 +11,6 @@ import { build, makeFolder, serve, stop } from "./programs.mjs";
 import { note } from "./tap.mjs";
 
 const SERIES = "tabs";
-const SOON_MS = 4000;
 const BUSY = 4; // requests of each tab
 
 let server, relay, browser, desks, last;
@@ -104,7 +103,7 @@ async function busyAndArmed() {
 async function abortBusy() {
 	await desks[0].again(busyAndArmed);
 	await last.abort("the others are busy");
-	await desks[0].until({ step: "arm", state: "READY" }, SOON_MS);
+	await desks[0].until({ step: "arm", state: "READY" });
 	letGo();
 }
 
