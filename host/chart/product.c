@@ -46,12 +46,10 @@ static void prepare(struct product *product)
 		int x = 2 * i, y = x + 1;
 
 		decay(product, i, &product->ringdown[i]);
-		sensor->axes = (struct resultant_axes){{&product->trace[x], &product->trace[y]},
-		                                       {&product->peak[x], &product->peak[y]}};
+		sensor->axes = (struct resultant_axes){.trace = {&product->trace[x], &product->trace[y]},
+		                                       .peak = {&product->peak[x], &product->peak[y]}};
 		resultant_find(&sensor->axes, &product->resultant[i]);
 		sensor->resultant = &product->resultant[i];
-		sensor->ringdown[0] = &product->ringdown[0];
-		sensor->ringdown[1] = &product->ringdown[1];
 	}
 }
 
@@ -134,8 +132,16 @@ void product_decays(struct product *product)
 
 void product_lag(struct product *product)
 {
+	struct driven driven[2];
+	struct driven_curve curve;
 	struct estimate_lag lag;
-	double free_s[2];
 
-	lag_find(&product->sensor[0], &product->sensor[1], &lag, free_s);
+	for (int i = 0; i < 2; i++) {
+		const struct driven_axis axis = {{&product->trace[i], &product->trace[2 + i]},
+		                                 {&product->peak[i], &product->peak[2 + i]},
+		                                 &product->ringdown[i]};
+
+		driven_find(&axis, &driven[i], &curve);
+	}
+	lag_find(&product->sensor[0], &product->sensor[1], driven, &lag);
 }

@@ -47,9 +47,6 @@
 /* A lag less certain than this part of S2's pulse says nothing. */
 #define UNCERTAIN_MAX 0.1
 
-/* What the peak may be off, as part of it, before the residual shows that the plate is none such. */
-#define UNSEEN 1e-3
-
 /* A residual beyond this part of S1's sum of squares: no oscillator. */
 #define UNEXPLAINED_MAX 0.05
 
@@ -72,7 +69,7 @@ struct single {
 /* What one fit looks at. Blocks are means of block_size samples; where one has a hole, its samples stand
  * alone instead. */
 struct scene {
-	struct respond_input input;
+	struct respond_input *input;
 	unsigned single_count, block_count;
 	size_t block_size;
 	double sample_s, block_from_s; /* middle of the first block */
@@ -138,9 +135,9 @@ static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_
 	double first = scene->block_from_s - 0.5 * (double)scene->block_size * scene->sample_s;
 
 	if (!(p[DECAY] > 0) || !(p[OMEGA] > 0) ||
-	    !(first - p[DELAY] > scene->input.from_s + scene->input.count * scene->input.step_s))
+	    !(first - p[DELAY] > scene->input->from_s + scene->input->count * scene->input->step_s))
 		return 0;
-	respond_make(&respond, &scene->input, p[DECAY], p[OMEGA]);
+	respond_make(&respond, scene->input, p[DECAY], p[OMEGA]);
 	gram_start(&gram, PARAMETERS);
 	for (unsigned i = 0; i < scene->single_count; i++) {
 		const struct single *single = &scene->single[i];
@@ -219,10 +216,10 @@ static void collect(const struct driven_axis *axis, double delay_s, double windo
                     struct scene *scene)
 {
 	const struct trace *s1 = axis->trace[0], *s2 = axis->trace[1];
-	double length = scene->input.count * scene->input.step_s, end = scene->input.from_s + length;
+	double length = scene->input->count * scene->input->step_s, end = scene->input->from_s + length;
 	double free = end + delay_s + MARGIN * length;
 	double level = NEXT_CONTACT_LEVEL * fabs(axis->peak[1]->result.value_g);
-	size_t first = trace_index(s1, scene->input.from_s + fmin(delay_s, 0)), middle, last, stride;
+	size_t first = trace_index(s1, scene->input->from_s + fmin(delay_s, 0)), middle, last, stride;
 	size_t again =
 	        trace_reaches(s2, trace_index(s2, end), trace_index(s2, fmax(free + window_s, end)), level);
 
@@ -236,7 +233,7 @@ static void collect(const struct driven_axis *axis, double delay_s, double windo
 	scene->block_from_s =
 	        trace_time(s1, middle) + 0.5 * (double)(scene->block_size - 1) * scene->sample_s;
 	for (size_t k = first; k < middle; k += stride)
-		add_single(scene, s1, k, (trace_time(s1, k) - scene->input.from_s - delay_s) / length);
+		add_single(scene, s1, k, (trace_time(s1, k) - scene->input->from_s - delay_s) / length);
 	for (size_t k = middle; k + scene->block_size <= last && scene->block_count < BLOCKS;
 	     k += scene->block_size)
 		add_block(scene, s1, k);
@@ -298,20 +295,20 @@ static bool judge(const struct driven_axis *axis, const struct scene *scene, con
 	return isfinite(solution->spread_s);
 }
 
-/* Delay and gain by S1's peak; a clipped one may have been taken from the other side, as high as the limit
- * too. */
+/* Delay and gain by S1's peak, or half a cycle before: a clipped one is as high as the limit on either side,
+ * and noise may lift the next swing above the first. */
 static void start_by_peak(const struct driven_axis *axis, const struct respond_crest *crest, double *p)
 {
 	const struct estimate_peak *peak = &axis->peak[0]->result;
-	double reading;
+	double half_s = UNITS_PI / p[OMEGA], reading;
 
 	p[DELAY] = peak->time_s - crest->time_s;
 	p[GAIN] = peak->value_g / crest->value;
-	if (peak->how.status != ESTIMATE_CLIPPED || !trace_at(axis->trace[0], crest->time_s, &reading) ||
+	if (p[DELAY] < half_s / 2 || !trace_at(axis->trace[0], crest->time_s, &reading) ||
 	    reading * peak->value_g > 0)
 		return;
-	p[DELAY] = 0;
-	p[GAIN] *= -1;
+	p[DELAY] -= half_s;
+	p[GAIN] *= -exp(p[DECAY] * half_s);
 }
 
 /* From the ring-down's frequency and damping, and S1's peak. */
@@ -327,7 +324,7 @@ static bool solve(const struct driven_axis *axis, struct scene *scene, double cy
 
 	p[OMEGA] = 2 * UNITS_PI * ring->frequency_hz;
 	p[DECAY] = p[OMEGA] * part / sqrt(1 - part * part);
-	respond_make(&respond, &scene->input, p[DECAY], p[OMEGA]);
+	respond_make(&respond, scene->input, p[DECAY], p[OMEGA]);
 	if (!respond_crest(&respond, axis->peak[1]->sign, &crest))
 		return false;
 	start_by_peak(axis, &crest, p);
@@ -335,7 +332,7 @@ static bool solve(const struct driven_axis *axis, struct scene *scene, double cy
 	collect(axis, p[DELAY], cycles * 2 * UNITS_PI / p[OMEGA], p[OMEGA], scene);
 	if (!lm_fit(&problem, p, &result))
 		return false;
-	respond_make(&respond, &scene->input, p[DECAY], p[OMEGA]);
+	respond_make(&respond, scene->input, p[DECAY], p[OMEGA]);
 	return judge(axis, scene, &respond, &result, solution);
 }
 
@@ -395,15 +392,17 @@ static bool solve_both(const struct driven_axis *axis, struct scene *scene, stru
 	return true;
 }
 
-/* A refused fit may miss the peak by as much as it misses S1's own. */
+/* A refused fit may miss the peak by as much as it misses S1's own. input_s: what noise as input moves it by.
+ */
 static void express(const struct driven_axis *axis, const struct solution *solution, double from_s,
-                    double sigma_from_s, struct driven *driven)
+                    double sigma_from_s, double input_s, struct driven *driven)
 {
 	double fit = solution->spread_s * solution->noise_g, sigma;
 
 	if (solution->refused)
 		fit = hypot(fit * sqrt(fmax(solution->chi_square, 1)),
 		            solution->peak_s - axis->peak[0]->result.time_s);
+	fit = hypot(fit, input_s);
 	sigma = hypot(fit, sigma_from_s);
 	if (!(sigma < UNCERTAIN_MAX * axis->peak[1]->width_s))
 		return;
@@ -416,10 +415,21 @@ static void express(const struct driven_axis *axis, const struct solution *solut
 	if (solution->refused)
 		return;
 	driven->peak_g = solution->peak_g;
-	driven->sigma_peak_g = hypot(solution->peak_spread_g * solution->noise_g, UNSEEN * solution->peak_g);
+	driven->sigma_peak_g = solution->peak_spread_g * solution->noise_g;
+	driven->peak_s = solution->peak_s;
+	driven->sigma_peak_s = fit;
 }
 
-void driven_find(const struct driven_axis *axis, struct driven *driven)
+static void draw(const struct solution *solution, const struct driven *driven, struct driven_curve *curve)
+{
+	respond_make(&curve->respond, &curve->input, solution->p[DECAY], solution->p[OMEGA]);
+	curve->gain = solution->p[GAIN];
+	curve->delay_s = solution->p[DELAY];
+	curve->sigma_g = driven->sigma_peak_g;
+	curve->sigma_s = driven->sigma_peak_s;
+}
+
+void driven_find(const struct driven_axis *axis, struct driven *driven, struct driven_curve *curve)
 {
 	const struct trace *s2 = axis->trace[1];
 	const struct peak *peak = axis->peak[1];
@@ -432,6 +442,8 @@ void driven_find(const struct driven_axis *axis, struct driven *driven)
 	                          .sigma_s = NAN,
 	                          .peak_g = NAN,
 	                          .sigma_peak_g = NAN,
+	                          .peak_s = NAN,
+	                          .sigma_peak_s = NAN,
 	                          .free_s = NAN,
 	                          .chi_square = NAN,
 	                          .status = ESTIMATE_SHORT};
@@ -439,22 +451,37 @@ void driven_find(const struct driven_axis *axis, struct driven *driven)
 		return;
 	driven->status = ESTIMATE_NOT_CONVERGED;
 	driven->flags = flaws(axis);
+	scene.input = &curve->input;
 	driven->smooth = has_smooth = bell_fit(s2, peak, &bell);
 	if (has_smooth) {
-		input_from_bell(&bell, &scene.input);
+		input_from_bell(&bell, &curve->input);
 		has_smooth = solve_both(axis, &scene, &smooth);
 	}
 	if (!(has_smooth && !smooth.refused) &&
 	    !trace_any(s2, peak->span.from_s, peak->span.until_s, TRACE_LIMIT)) {
 		driven->sampled = true;
-		input_from_samples(s2, peak, &scene.input);
+		input_from_samples(s2, peak, &curve->input);
 		has_sampled = solve_both(axis, &scene, &sampled);
 	}
 	if (has_sampled && !(has_smooth && !better(&sampled, &smooth)))
-		express(axis, &sampled, peak->result.time_s,
-		        hypot(sampled.input_spread_s * s2->noise_g, peak->result.sigma_time_s), driven);
+		express(axis, &sampled, peak->result.time_s, peak->result.sigma_time_s,
+		        sampled.input_spread_s * s2->noise_g, driven);
 	else if (has_smooth)
-		express(axis, &smooth, bell.centre_s, bell.sigma_centre_s, driven);
-	if (isfinite(driven->peak_g) && !has_sampled)
+		express(axis, &smooth, bell.centre_s, bell.sigma_centre_s, 0, driven);
+	if (isnan(driven->peak_g))
+		return;
+	draw(has_sampled ? &sampled : &smooth, driven, curve);
+	if (!has_sampled)
 		driven->free_s = smooth.free_s;
+}
+
+void driven_at(const struct driven_curve *curve, double time_s, double derivative[3], double variance[2])
+{
+	respond_bend(&curve->respond, time_s - curve->delay_s, derivative);
+	for (unsigned i = 0; i < 3; i++)
+		derivative[i] *= curve->gain;
+	if (variance == NULL)
+		return;
+	variance[0] = pow(curve->sigma_g, 2) + pow(derivative[1] * curve->sigma_s, 2);
+	variance[1] = pow(derivative[2] * curve->sigma_s, 2);
 }

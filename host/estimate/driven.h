@@ -20,6 +20,7 @@
  * known.
  */
 #include "host/estimate/peak.h"
+#include "host/estimate/respond.h"
 #include "host/estimate/ringdown.h"
 
 struct driven_axis {
@@ -30,7 +31,9 @@ struct driven_axis {
 
 struct driven {
 	double lag_s, sigma_s;
-	double peak_g, sigma_peak_g; /* S1's by the fitted response; NAN unless ok and not refused */
+	double peak_g, sigma_peak_g; /* S1's by the fitted response, with the fit's uncertainty and no doubt
+	                                of the model; NAN unless ok and not refused */
+	double peak_s, sigma_peak_s; /* its time, likewise */
 	double free_s; /* from when on S1's decay is as good as free; NAN likewise, or where S2 is no smooth
 	                  pulse */
 	bool smooth, sampled; /* inputs tried */
@@ -39,6 +42,18 @@ struct driven {
 	enum estimate_status status;
 };
 
-void driven_find(const struct driven_axis *axis, struct driven *driven);
+/* The fitted response: S1 at any time. It stays where it is made. */
+struct driven_curve {
+	struct respond_input input;
+	struct respond respond; /* to that input */
+	double gain, delay_s;
+	double sigma_g, sigma_s; /* of the peak */
+};
+
+/* The curve is there when driven's peak is a number. */
+void driven_find(const struct driven_axis *axis, struct driven *driven, struct driven_curve *curve);
+
+/* As peak_at, of S1. */
+void driven_at(const struct driven_curve *curve, double time_s, double derivative[3], double variance[2]);
 
 #endif

@@ -103,7 +103,7 @@ struct estimate_peak {
 	double time_s;
 	double sigma_time_s;
 	struct estimate_how how; /* "poly4/poly6" "sine-power" "half-sine" "haversine" "strong-axis"
-	                            "parabola" "sample"; of a clipped S1 "driven-oscillator" */
+	                            "parabola" "sample"; of S1 "driven-oscillator" where that explains it */
 };
 
 struct estimate_pulse {
@@ -170,8 +170,6 @@ struct estimate_lag {
 	double sigma_driven_s;
 	double driven_axis_s[2]; /* X, Y; NAN when that axis does not follow the oscillator */
 	double sigma_driven_axis_s[2];
-	double driven_peak_g[2]; /* S1's, by the same fit; NAN where its residual refuses it */
-	double sigma_driven_peak_g[2];
 	struct estimate_how driven; /* "driven-oscillator" */
 	enum estimate_status status;
 };

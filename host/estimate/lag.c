@@ -5,7 +5,6 @@
 #include <stddef.h>
 
 #include "host/estimate/bridge.h"
-#include "host/estimate/driven.h"
 
 enum {
 	SHIFTS = 48,     /* to either side */
@@ -98,12 +97,15 @@ static bool usable(const struct resultant *resultant)
 static void combine(const struct driven axis[2], struct estimate_lag *lag)
 {
 	double weight[2] = {0, 0}, sum = 0, both, apart;
+	unsigned tried = 0;
 
+	if (axis[0].smooth || axis[1].smooth)
+		lag->driven.path[tried++] = "pulse";
+	if (axis[0].sampled || axis[1].sampled)
+		lag->driven.path[tried++] = "samples";
 	for (unsigned i = 0; i < 2; i++) {
 		lag->driven_axis_s[i] = axis[i].lag_s;
 		lag->sigma_driven_axis_s[i] = axis[i].sigma_s;
-		lag->driven_peak_g[i] = axis[i].peak_g;
-		lag->sigma_driven_peak_g[i] = axis[i].sigma_peak_g;
 		if (axis[i].status == ESTIMATE_OK && axis[i].sigma_s > 0) {
 			weight[i] = 1 / (axis[i].sigma_s * axis[i].sigma_s);
 			sum += weight[i] * axis[i].lag_s;
@@ -126,29 +128,8 @@ static void combine(const struct driven axis[2], struct estimate_lag *lag)
 		lag->sigma_driven_s *= apart;
 }
 
-static void drive(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag,
-                  double free_s[2])
-{
-	struct driven axis[2];
-	unsigned tried = 0;
-
-	for (unsigned i = 0; i < 2; i++) {
-		const struct driven_axis pair = {{s1->axes.trace[i], s2->axes.trace[i]},
-		                                 {s1->axes.peak[i], s2->axes.peak[i]},
-		                                 s1->ringdown[i]};
-
-		driven_find(&pair, &axis[i]);
-		free_s[i] = axis[i].free_s;
-	}
-	if (axis[0].smooth || axis[1].smooth)
-		lag->driven.path[tried++] = "pulse";
-	if (axis[0].sampled || axis[1].sampled)
-		lag->driven.path[tried++] = "samples";
-	combine(axis, lag);
-}
-
-void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag,
-              double free_s[2])
+void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, const struct driven driven[2],
+              struct estimate_lag *lag)
 {
 	const struct resultant *r1 = s1->resultant, *r2 = s2->resultant;
 	struct estimate_lag found = {
@@ -161,8 +142,6 @@ void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct e
 	        .sigma_driven_s = NAN,
 	        .driven_axis_s = {NAN, NAN},
 	        .sigma_driven_axis_s = {NAN, NAN},
-	        .driven_peak_g = {NAN, NAN},
-	        .sigma_driven_peak_g = {NAN, NAN},
 	        .driven = {.method = "", .chi_square = NAN, .status = ESTIMATE_SHORT},
 	        .status = r2->result.how.status,
 	};
@@ -170,7 +149,7 @@ void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct e
 	if (found.status == ESTIMATE_OK || !usable(r1))
 		found.status = r1->result.how.status;
 	*lag = found;
-	drive(s1, s2, lag, free_s);
+	combine(driven, lag);
 	if (!usable(r1) || !usable(r2))
 		return;
 	lag->largest_peak_s = r1->result.time_s - r2->result.time_s;

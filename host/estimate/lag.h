@@ -20,19 +20,18 @@
  * that does not follow one nothing is used. How: the path names the inputs that were tried, "pulse" and
  * "samples"; its chi-square is the larger of the axes', the status X's when neither has a value.
  */
+#include "host/estimate/driven.h"
 #include "host/estimate/resultant.h"
-#include "host/estimate/ringdown.h"
 
 #define LAG_SPREAD_MAX_S 0.3e-3
 
 struct lag_sensor {
 	struct resultant_axes axes;
 	const struct resultant *resultant;
-	const struct ringdown *ringdown[2]; /* X, Y; of S1 */
 };
 
-/* free_s: when S1's decay on X and on Y begins, by the driven oscillator; NAN where that does not tell. */
-void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, struct estimate_lag *lag,
-              double free_s[2]);
+/* driven: of X and Y. */
+void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, const struct driven driven[2],
+              struct estimate_lag *lag);
 
 #endif

@@ -155,6 +155,37 @@ void respond_at(const struct respond *respond, double time_s, struct respond_poi
 	between(&respond->knot[k], &respond->knot[k + 1], place - k, step, point);
 }
 
+void respond_bend(const struct respond *respond, double time_s, double derivative[3])
+{
+	double step = respond->input->step_s, place = (time_s - respond->input->from_s) / step;
+	double complex state[3];
+
+	if (place >= respond->input->count) {
+		state[0] = product(respond->swing, cexp(respond->pole * (time_s - respond->end_s)));
+		state[1] = respond->pole * state[0];
+		state[2] = respond->pole * state[1];
+	} else if (place > 0) {
+		unsigned k = (unsigned)place;
+		const double *value = &respond->input->value[2 * k];
+		double x = place - k, push = -3 * value[0] + 4 * value[1] - value[2];
+		double bow = 2 * (value[0] - 2 * value[1] + value[2]);
+		double half = value[0] + x / 2 * (push + x / 2 * bow), now = value[0] + x * (push + x * bow);
+		struct hold hold;
+
+		make_hold(&hold, respond->pole, x * step);
+		state[0] = hold.turn * respond->knot[k].state + hold.weight[0] * value[0] +
+		           hold.weight[1] * half + hold.weight[2] * now;
+		state[1] = respond->pole * state[0] + now;
+		state[2] = respond->pole * state[1] + (push + 2 * x * bow) / step;
+		for (unsigned i = 0; i < 3; i++)
+			state[i] *= 2 * respond->residue;
+	} else {
+		state[0] = state[1] = state[2] = 0;
+	}
+	for (unsigned i = 0; i < 3; i++)
+		derivative[i] = creal(state[i]);
+}
+
 double respond_free_since(const struct respond *respond, double level)
 {
 	double back_s = respond->input->step_s / FREE_PARTS;

@@ -48,6 +48,9 @@ void respond_make(struct respond *respond, const struct respond_input *input, do
 
 void respond_at(const struct respond *respond, double time_s, struct respond_point *point);
 
+/* Value, slope per s and curvature per s^2, exact between knots too: ten times as dear. */
+void respond_bend(const struct respond *respond, double time_s, double derivative[3]);
+
 /* The maximum of sign times the response. */
 struct respond_crest {
 	double time_s, value;

@@ -120,6 +120,16 @@ static bool usable(const struct peak *peak)
 	return peak->result.how.status != ESTIMATE_SHORT && peak->result.how.status != ESTIMATE_NO_PEAK;
 }
 
+/* As peak_at, by what gave the axis' peak. */
+static bool model_at(const struct resultant_axes *axes, unsigned i, double time_s, double derivative[3],
+                     double variance[2])
+{
+	if (axes->curve[i] == NULL)
+		return peak_at(axes->peak[i], time_s, derivative, variance);
+	driven_at(axes->curve[i], time_s, derivative, variance);
+	return true;
+}
+
 /* Half of the square's value, slope and curvature at an instant, by the axes' own models. */
 static bool square_at(const struct resultant_axes *axes, double time_s, double half[3])
 {
@@ -127,7 +137,7 @@ static bool square_at(const struct resultant_axes *axes, double time_s, double h
 	for (unsigned i = 0; i < 2; i++) {
 		double d[3];
 
-		if (!peak_at(axes->peak[i], time_s, d, NULL))
+		if (!model_at(axes, i, time_s, d, NULL))
 			return false;
 		half[0] += d[0] * d[0] / 2;
 		half[1] += d[0] * d[1];
@@ -140,7 +150,7 @@ static bool square_at(const struct resultant_axes *axes, double time_s, double h
 static bool summit(const struct resultant_axes *axes, double *time_s, double half[3])
 {
 	double x = axes->peak[0]->result.time_s, y = axes->peak[1]->result.time_s, best = -1;
-	double slack = fabs(y - x) / STEPS + 1e-9;
+	double slack = fabs(y - x) / STEPS + 1e-7;
 
 	*time_s = x;
 	for (int i = 0; i <= STEPS; i++) {
@@ -175,8 +185,7 @@ static void spread(const struct resultant_axes *axes, double time_s, double vari
 		const struct estimate_peak *own = &axes->peak[i]->result;
 		double d[3], noise[2], top[3], top_noise[2], beyond;
 
-		if (!peak_at(axes->peak[i], time_s, d, noise) ||
-		    !peak_at(axes->peak[i], own->time_s, top, top_noise))
+		if (!model_at(axes, i, time_s, d, noise) || !model_at(axes, i, own->time_s, top, top_noise))
 			continue;
 		variance[0] += d[0] * d[0] * noise[0];
 		variance[1] += d[0] * d[0] * noise[1] + d[1] * d[1] * noise[0];
@@ -188,9 +197,10 @@ static void spread(const struct resultant_axes *axes, double time_s, double vari
 }
 
 /* By the axes' own models. False when they are not of the pulse whose largest sample is at near_s. */
-static bool combine(const struct resultant_axes *axes, const struct peak *lead, double near_s,
+static bool combine(const struct resultant_axes *axes, unsigned strong, double near_s,
                     struct resultant *found)
 {
+	const struct peak *lead = axes->peak[strong];
 	struct estimate_resultant *result = &found->result;
 	double x = axes->peak[0]->result.time_s, y = axes->peak[1]->result.time_s;
 	double slack = SAME_PULSE * found->width_s, time, half[3], variance[2];
@@ -205,7 +215,7 @@ static bool combine(const struct resultant_axes *axes, const struct peak *lead, 
 	result->time_s = time;
 	result->sigma_time_s = sqrt(variance[1]) / fabs(half[2]);
 	/* As in crest.h: a polynomial's maximum over noise is too high by what its wandering gains. */
-	if (lead->model == PEAK_MODEL_LOCAL)
+	if (lead->model == PEAK_MODEL_LOCAL && axes->curve[strong] == NULL)
 		result->peak_g -= variance[1] / (2 * fabs(half[2]) * result->peak_g);
 	return true;
 }
@@ -291,8 +301,8 @@ void resultant_find(const struct resultant_axes *axes, struct resultant *resulta
 	/* Where no instant has both axes, their models may meet all the same. */
 	near = at < axes->trace[fast]->count ? trace_time(axes->trace[fast], at) : lead->result.time_s;
 	found.span = span_around(axes, strong, near);
-	if (!(two && combine(axes, lead, near, &found)) && !refit(axes, near, &found) &&
-	    !(two && combine(axes, lead, lead->result.time_s, &found)))
+	if (!(two && combine(axes, strong, near, &found)) && !refit(axes, near, &found) &&
+	    !(two && combine(axes, strong, lead->result.time_s, &found)))
 		return;
 	found.result.how.path[0] = found.result.how.method;
 	find_first(axes, fast, strong, at, top, &found);

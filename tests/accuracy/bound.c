@@ -145,6 +145,30 @@ double stage_resultant(const struct stage *stage, double *at)
 	return resultant_of(stage->scene.shape, x.at, y.at, at);
 }
 
+static double plate_magnitude(const struct stage *stage, double time_s)
+{
+	return hypot(stage_signal(stage, STAGE_S1X, time_s), stage_signal(stage, STAGE_S1Y, time_s));
+}
+
+/* The signal is straight lines between the knots of a table: the summit of a parabola through three points
+ * that are many knots apart. */
+double stage_plate_resultant(const struct stage *stage, double *at)
+{
+	const double apart = 10 * SYNTH_STEP_S;
+	double x = stage->axis[0].skew_s + stage->axis[0].s1_peak_s;
+	double y = stage->axis[1].skew_s + stage->axis[1].s1_peak_s;
+	double top = stage->onset_s + fmin(x, y), last = stage->onset_s + fmax(x, y), low, middle, high;
+
+	for (double t = top; t < last; t += SYNTH_STEP_S)
+		if (plate_magnitude(stage, t) > plate_magnitude(stage, top))
+			top = t;
+	low = plate_magnitude(stage, top - apart);
+	middle = plate_magnitude(stage, top);
+	high = plate_magnitude(stage, top + apart);
+	*at = top + apart / 2 * (low - high) / (low - 2 * middle + high);
+	return middle - (low - high) * (low - high) / (low - 2 * middle + high) / 8;
+}
+
 static void add_resultant(const struct problem p[2], const struct covariance c[2], struct bounds *sum)
 {
 	double value[2], time[2], gradient[UNKNOWNS_MAX], when[UNKNOWNS_MAX];
@@ -311,13 +335,18 @@ static void lag_samples(const struct problem *problem, const double *p, double *
 	*count = n;
 }
 
-static double lag_of(const struct stage *stage, const double *p)
+/* What hangs on those: the lag, S1's peak and its time. */
+enum { LAG, PLATE_G, PLATE_S, OUTCOMES };
+
+static void outcome(const struct stage *stage, const double *p, double out[OUTCOMES])
 {
 	static double plate[STAGE_TABLE];
 	double height;
 
 	synth_plate(plate, STAGE_TABLE, stage->scene.shape, p[2], p[5], p[6]);
-	return p[4] + stage_plate_peak(plate, &height) - synth_pulse_summit(stage->scene.shape) * p[2];
+	out[LAG] = p[4] + stage_plate_peak(plate, &height) - synth_pulse_summit(stage->scene.shape) * p[2];
+	out[PLATE_G] = p[3] * height;
+	out[PLATE_S] = p[1] + out[LAG];
 }
 
 static void add_lags(const struct stage *stage, struct bounds *sum)
@@ -329,7 +358,8 @@ static void add_lags(const struct stage *stage, struct bounds *sum)
 		struct covariance c;
 		double natural = stage->damped_hz / sqrt(1 - STAGE_DAMPING * STAGE_DAMPING);
 		double more[4] = {stage->axis[axis].gain, stage->axis[axis].delay_s, natural, STAGE_DAMPING};
-		double step[4] = {stage->axis[axis].gain * 1e-4, 2e-6, 0.1, 1e-3}, gradient[7];
+		double step[4] = {stage->axis[axis].gain * 1e-4, 2e-6, 0.1, 1e-3};
+		double gradient[OUTCOMES][7];
 
 		memcpy(problem.at + 3, more, sizeof(more));
 		memcpy(problem.step + 3, step, sizeof(step));
@@ -338,16 +368,20 @@ static void add_lags(const struct stage *stage, struct bounds *sum)
 		problem.signal = lag_samples;
 		find_covariance(&problem, &c);
 		for (unsigned i = 0; i < 7; i++) {
-			double p[UNKNOWNS_MAX], high;
+			double p[UNKNOWNS_MAX], high[OUTCOMES], low[OUTCOMES];
 
 			memcpy(p, problem.at, sizeof(p));
 			p[i] += problem.step[i];
-			high = lag_of(stage, p);
+			outcome(stage, p, high);
 			p[i] -= 2 * problem.step[i];
-			gradient[i] = (high - lag_of(stage, p)) / (2 * problem.step[i]);
+			outcome(stage, p, low);
+			for (unsigned j = 0; j < OUTCOMES; j++)
+				gradient[j][i] = (high[j] - low[j]) / (2 * problem.step[i]);
 		}
-		sum->lag_s[axis] += variance(&c, gradient);
-		weight += 1 / variance(&c, gradient);
+		sum->lag_s[axis] += variance(&c, gradient[LAG]);
+		sum->plate_g[axis] += variance(&c, gradient[PLATE_G]);
+		sum->plate_s[axis] += variance(&c, gradient[PLATE_S]);
+		weight += 1 / variance(&c, gradient[LAG]);
 	}
 	sum->joint_lag_s += 1 / weight;
 }
@@ -365,8 +399,11 @@ void bounds_find(struct stage *stage, bool lags, struct bounds *bounds)
 		if (lags && i % LAG_EVERY == 0)
 			add_lags(stage, &lag);
 	}
-	for (int i = 0; i < 2; i++)
+	for (int i = 0; i < 2; i++) {
 		bounds->lag_s[i] = lag.lag_s[i] * LAG_EVERY;
+		bounds->plate_g[i] = lag.plate_g[i] * LAG_EVERY;
+		bounds->plate_s[i] = lag.plate_s[i] * LAG_EVERY;
+	}
 	bounds->joint_lag_s = lag.joint_lag_s * LAG_EVERY;
 	for (size_t i = 0; i < sizeof(*bounds) / sizeof(double); i++)
 		value[i] = sqrt(value[i] / ONSETS);

@@ -10,7 +10,7 @@
  *   resultant  from both axes' pulses
  *   decay      c, s, a, w of each axis of S1 over STAGE_DECAY_S from where its drive ends; both axes together
  *              share a and w; a second mode adds its own four. No offset, no hum among the unknowns.
- *   lag        A, t_p, T of S2 and gain, delay, frequency, damping of S1, all samples of both
+ *   lag        A, t_p, T of S2 and gain, delay, frequency, damping of S1, all samples of both; S1's peak
  *
  * The noise counts with what the converter's steps add. Standard deviations, mean square over onsets across
  * the sample grid.
@@ -23,12 +23,15 @@ struct bounds {
 	double frequency_hz[2], damping[2], natural_hz[2];
 	double joint_hz, joint_damping, joint_natural_hz;
 	double lag_s[2], joint_lag_s;
+	double plate_g[2], plate_s[2]; /* S1's peak and its time */
 };
 
-/* Without those of the lag, which take long, unless lags. Moves the stage's onset and leaves it anywhere. */
+/* Without those of the lag and of S1's peak, which take long, unless lags. Moves the stage's onset and leaves
+ * it anywhere. */
 void bounds_find(struct stage *stage, bool lags, struct bounds *bounds);
 
-/* The true resultant of S2 in the present drop, and when. */
+/* The true resultant of S2 in the present drop, and when; that of S1. */
 double stage_resultant(const struct stage *stage, double *at);
+double stage_plate_resultant(const struct stage *stage, double *at);
 
 #endif

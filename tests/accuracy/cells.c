@@ -134,6 +134,18 @@ static void read_plate(const struct analysis *analysis, struct reading *reading)
 		reading[QUANTITY_FREQUENCY_X + i] = in_order(r->frequency_hz, r->sigma_hz);
 		reading[QUANTITY_DAMPING_X + i] = in_order(r->damping_ratio, r->sigma_damping);
 	}
+	for (int i = 0; i < 2; i++) {
+		const struct estimate_peak *peak = &analysis->channels[i == 0 ? STAGE_S1X : STAGE_S1Y].peak;
+
+		reading[QUANTITY_PLATE_PEAK_X + i] = in_order(peak->value_g, peak->sigma_g);
+		reading[QUANTITY_PLATE_TIME_X + i] = in_order(peak->time_s, peak->sigma_time_s);
+	}
+	if (analysis->resultant_count == 2) {
+		const struct estimate_resultant *r = &analysis->resultants[0];
+
+		reading[QUANTITY_PLATE_RESULTANT] = in_order(r->peak_g, r->sigma_g);
+		reading[QUANTITY_PLATE_RESULTANT_TIME] = in_order(r->time_s, r->sigma_time_s);
+	}
 	if (analysis->has_plate) {
 		const struct estimate_ringdown *r = &analysis->plate;
 
@@ -155,7 +167,7 @@ static void find_truth(const struct stage *stage, double *truth)
 {
 	const struct stage_axis *axis = stage->axis;
 	double area = synth_pulse_area(stage->scene.shape) * STAGE_CONTACT_S * axis[0].s2_g * G_M_S2;
-	double natural = stage->damped_hz / sqrt(1 - STAGE_DAMPING * STAGE_DAMPING);
+	double natural = stage->damped_hz / sqrt(1 - STAGE_DAMPING * STAGE_DAMPING), height;
 
 	for (int i = 0; i < 2; i++) {
 		truth[QUANTITY_PEAK_X + i] = axis[i].s2_g;
@@ -174,6 +186,12 @@ static void find_truth(const struct stage *stage, double *truth)
 		truth[i] = STAGE_DAMPING;
 	for (int i = QUANTITY_LAG_X; i <= QUANTITY_LAG; i++)
 		truth[i] = stage->interval_s;
+	stage_plate_peak(stage->plate, &height);
+	for (int i = 0; i < 2; i++) {
+		truth[QUANTITY_PLATE_PEAK_X + i] = axis[i].gain * height;
+		truth[QUANTITY_PLATE_TIME_X + i] = stage->onset_s + axis[i].skew_s + axis[i].s1_peak_s;
+	}
+	truth[QUANTITY_PLATE_RESULTANT] = stage_plate_resultant(stage, &truth[QUANTITY_PLATE_RESULTANT_TIME]);
 }
 
 /* Base of the pulse at 10 % of its height. */
@@ -314,6 +332,8 @@ static void find_bounds(const struct cell_scene *cell, double *bound)
 		bound[QUANTITY_FREQUENCY_X + i] = b.frequency_hz[i];
 		bound[QUANTITY_DAMPING_X + i] = b.damping[i];
 		bound[QUANTITY_LAG_X + i] = lags ? b.lag_s[i] : (double)NAN;
+		bound[QUANTITY_PLATE_PEAK_X + i] = lags ? b.plate_g[i] : (double)NAN;
+		bound[QUANTITY_PLATE_TIME_X + i] = lags ? b.plate_s[i] : (double)NAN;
 	}
 	bound[QUANTITY_CONTACT_X] = b.contact_s[0];
 	bound[QUANTITY_FITTED_VELOCITY_X] = bound[QUANTITY_VELOCITY_X] = b.velocity_m_s[0];

@@ -40,6 +40,9 @@ struct limit {
 #define FREQUENCIES QUANTITY_FREQUENCY_X, QUANTITY_FREQUENCY
 #define DECAY QUANTITY_FREQUENCY_X, QUANTITY_DAMPING
 #define LAGS QUANTITY_LAG_X, QUANTITY_LAG
+#define PLATE_PEAKS QUANTITY_PLATE_PEAK_X, QUANTITY_PLATE_PEAK_Y
+#define PLATE_TIMES QUANTITY_PLATE_TIME_X, QUANTITY_PLATE_TIME_Y
+#define PLATE_RESULTANT QUANTITY_PLATE_RESULTANT, QUANTITY_PLATE_RESULTANT_TIME
 
 static const struct limit limits[] = {
         {GROUP_KNOWN, PEAKS, RATIO_LOW, 1.04, 0.1, 0, COVER_LOW, 0},
@@ -52,6 +55,9 @@ static const struct limit limits[] = {
         {GROUP_KNOWN, JUST(RESULTANT_TIME), 0, 0, 0, 0, COVER_LOW, 0},
         {GROUP_KNOWN, DECAY, DECAY_LOW, 1.05, 0, 0, COVER_LOW, 0},
         {GROUP_KNOWN, LAGS, RATIO_LOW, 1.3, 0, 1e-6, COVER_LOW, BY_CHANCE},
+        {GROUP_KNOWN, PLATE_PEAKS, RATIO_LOW, 1.1, 0, 0, COVER_LOW, 0},
+        {GROUP_KNOWN, PLATE_TIMES, RATIO_LOW, 1.2, 0, 0, COVER_LOW, 0},
+        {GROUP_KNOWN, PLATE_RESULTANT, 0, 0, 0, 0, COVER_LOW, 0},
         {GROUP_UNKNOWN, PEAKS, RATIO_LOW, 1.6, 0, 0, COVER_LOW, 0},
         {GROUP_UNKNOWN, JUST(PEAK_Z), 0, 0, 0, 0, COVER_LOW, NEVER_MIND},
         {GROUP_UNKNOWN, PEAK_TIMES, RATIO_LOW, 4.4, 0, 0, COVER_LOW, 0},
@@ -60,10 +66,17 @@ static const struct limit limits[] = {
         {GROUP_UNKNOWN, JUST(RESULTANT_TIME), 0, 0, 0, 0, COVER_LOW, 0},
         {GROUP_UNKNOWN, DECAY, DECAY_LOW, 1.05, 0, 0, COVER_LOW, 0},
         {GROUP_UNKNOWN, LAGS, RATIO_LOW, 1.3, 0, 1e-6, COVER_LOW, BY_CHANCE},
+        {GROUP_UNKNOWN, PLATE_PEAKS, RATIO_LOW, 1.1, 0, 0, COVER_LOW, 0},
+        {GROUP_UNKNOWN, PLATE_TIMES, RATIO_LOW, 1.2, 0, 0, COVER_LOW, 0},
+        {GROUP_UNKNOWN, PLATE_RESULTANT, 0, 0, 0, 0, COVER_LOW, 0},
         {GROUP_SKEWED, PEAKS, 0, 0, 0, 0.3, COVER_LOW, 0},
         {GROUP_SKEWED, PEAK_TIMES, 0, 0, 0, 4e-6, 0.85, 0},
         {GROUP_SKEWED, JUST(RESULTANT), 0, 0, 0, 0.3, COVER_LOW, 0},
         {GROUP_SKEWED, DECAY, SKEWED_DECAY_LOW, 1.05, 0, 0, COVER_LOW, 0},
+        {GROUP_SKEWED, PLATE_PEAKS, 0, 0, 0, 0.3, COVER_LOW, 0},
+        {GROUP_SKEWED, PLATE_TIMES, 0, 0, 0, 4e-6, 0.85, 0},
+        {GROUP_SKEWED, JUST(PLATE_RESULTANT), 0, 0, 0, 0.3, COVER_LOW, 0},
+        {GROUP_SKEWED, JUST(PLATE_RESULTANT_TIME), 0, 0, 0, 4e-6, 0.85, 0},
         {GROUP_APART_KNOWN, JUST(RESULTANT), RATIO_LOW, 1.06, 0, 0, COVER_LOW, 0},
         {GROUP_APART, JUST(RESULTANT), RATIO_LOW, 1.5, 0, 0, COVER_LOW, 0},
         {GROUP_DISTURBED, DECAY, DECAY_LOW, 1.15, 0, 0, 0, RARELY},
@@ -79,9 +92,10 @@ static const struct limit limits[] = {
 #define CURED_G 0.5
 
 static const char *const quantity_names[QUANTITIES] = {
-        "peak X",    "peak Y",      "peak Z",    "peak time X", "peak time Y", "10 % width X", "velocity X",
-        "contact X", "fitted dv X", "resultant", "its time",    "frequency X", "frequency Y",  "frequency",
-        "natural",   "damping X",   "damping Y", "damping",     "lag X",       "lag Y",        "lag",
+        "peak X",    "peak Y",      "peak Z",    "peak time X", "peak time Y",  "10 % width X", "velocity X",
+        "contact X", "fitted dv X", "resultant", "its time",    "frequency X",  "frequency Y",  "frequency",
+        "natural",   "damping X",   "damping Y", "damping",     "lag X",        "lag Y",        "lag",
+        "S1 peak X", "S1 peak Y",   "S1 time X", "S1 time Y",   "S1 resultant", "S1 its time",
 };
 
 struct judgement {

@@ -59,7 +59,8 @@ static void make(struct bench *b, enum synth_shape shape, bool on_plate, double 
 static void analyse(struct bench *b, double noise_g, double hz)
 {
 	struct lag_sensor sensor[2];
-	double free_s[2];
+	struct driven driven[2];
+	struct driven_curve curve;
 
 	for (int i = 0; i < 4; i++) {
 		assert_int_equal(trace_open(&b->trace[i], &b->channel[i], -INFINITY, INFINITY), 0);
@@ -67,11 +68,9 @@ static void analyse(struct bench *b, double noise_g, double hz)
 		peak_find(&b->trace[i], &(struct estimate_options){0}, &b->peak[i]);
 	}
 	for (int i = 0; i < 2; i++) {
-		sensor[i].axes = (struct resultant_axes){{&b->trace[2 * i], &b->trace[2 * i + 1]},
-		                                         {&b->peak[2 * i], &b->peak[2 * i + 1]}};
+		sensor[i].axes = (struct resultant_axes){.trace = {&b->trace[2 * i], &b->trace[2 * i + 1]},
+		                                         .peak = {&b->peak[2 * i], &b->peak[2 * i + 1]}};
 		sensor[i].resultant = &b->resultant[i];
-		sensor[i].ringdown[0] = &b->ringdown[0];
-		sensor[i].ringdown[1] = &b->ringdown[1];
 		b->ringdown[i].result = (struct estimate_ringdown){
 		        .frequency_hz = hz,
 		        .damping_ratio = isnan(hz) ? NAN : 0.1,
@@ -79,7 +78,12 @@ static void analyse(struct bench *b, double noise_g, double hz)
 		        .how.status = isnan(hz) ? ESTIMATE_NO_PEAK : ESTIMATE_OK};
 		resultant_find(&sensor[i].axes, &b->resultant[i]);
 	}
-	lag_find(&sensor[0], &sensor[1], &b->lag, free_s);
+	for (int i = 0; i < 2; i++)
+		driven_find(&(struct driven_axis){{&b->trace[i], &b->trace[2 + i]},
+		                                  {&b->peak[i], &b->peak[2 + i]},
+		                                  &b->ringdown[i]},
+		            &driven[i], &curve);
+	lag_find(&sensor[0], &sensor[1], driven, &b->lag);
 	for (int i = 0; i < 4; i++)
 		trace_close(&b->trace[i]);
 }

@@ -47,7 +47,8 @@ static struct resultant find_to(struct scene *s, double noise_g, enum estimate_f
                                 double tolerance)
 {
 	struct estimate_options options = {.family = family, .tolerance = tolerance};
-	struct resultant_axes axes = {{&s->trace[0], &s->trace[1]}, {&s->peak[0], &s->peak[1]}};
+	struct resultant_axes axes = {.trace = {&s->trace[0], &s->trace[1]},
+	                              .peak = {&s->peak[0], &s->peak[1]}};
 	struct resultant resultant;
 
 	assert_int_equal(trace_open(&s->trace[0], &s->x, -INFINITY, INFINITY), 0);
@@ -244,7 +245,7 @@ static void weak_axis(void **state)
 	}
 	assert_true(
 	        peak_weak(&s.trace[1], &(struct estimate_options){0}, &s.trace[0], &s.peak[0], &s.peak[1]));
-	axes = (struct resultant_axes){{&s.trace[0], &s.trace[1]}, {&s.peak[0], &s.peak[1]}};
+	axes = (struct resultant_axes){.trace = {&s.trace[0], &s.trace[1]}, .peak = {&s.peak[0], &s.peak[1]}};
 	resultant_find(&axes, &r);
 	assert_int_equal(r.result.how.status, ESTIMATE_OK);
 	assert_true(r.result.how.flags & ESTIMATE_FLAG_WEAK);
