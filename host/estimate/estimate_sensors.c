@@ -11,6 +11,10 @@
  * where S1 is clipped nothing else tells. */
 #define UNSEEN 1e-3
 
+/* Cycles of the plate that S2's pulse may last: a plate that follows the case through a longer one has that
+ * pulse's shape, which its own samples tell better than any model of S2's. */
+#define PULSE_CYCLES 0.8
+
 /* Standard deviations between a smooth curve's peak and the oscillator's that chance makes. */
 #define PEAK_AGREE 3.0
 
@@ -60,17 +64,18 @@ static void add_to_path(struct estimate_how *how, const char *method)
 }
 
 /* S1 peaks near the kink at the end of the contact, which no smooth curve follows, and a clipped S1's flanks
- * tell less than the oscillator that S2 drives. True where S1's peak is taken from that. */
+ * tell less than the oscillator that S2 drives, where S2's shape is no guess. True where S1's peak is taken
+ * from that. */
 static bool take_driven(const struct estimate_peak *s2, const struct driven *driven,
                         const struct driven_curve *curve, double tolerance, struct estimate_peak *s1)
 {
 	bool clipped = s1->how.flags & ESTIMATE_FLAG_EXTRAPOLATED;
 	double sigma;
 
-	if (isnan(driven->peak_g))
+	if (isnan(driven->peak_g) || s2->how.status == ESTIMATE_CLIPPED)
 		return false;
 	sigma = hypot(driven->sigma_peak_g, clipped ? UNSEEN * driven->peak_g : apart(s1, driven, curve));
-	if (clipped && (s2->how.status == ESTIMATE_CLIPPED || !(sigma < s1->sigma_g)))
+	if (clipped && !(sigma < s1->sigma_g))
 		return false;
 	s1->value_g = driven->peak_g;
 	s1->sigma_g = sigma;
@@ -96,7 +101,8 @@ static void drive(const struct desk *desk, unsigned axis, const struct sensor *s
 	        {&work->trace, s2->axes.trace[axis]}, {&work->peak, peak}, &work->ringdown};
 
 	driven_find(&pair, driven, curve);
-	if (take_driven(&peak->result, driven, curve, tolerance, &work->peak.result))
+	if (peak->width_s * work->ringdown.result.frequency_hz < PULSE_CYCLES &&
+	    take_driven(&peak->result, driven, curve, tolerance, &work->peak.result))
 		s1->axes.curve[axis] = curve;
 	if (isnan(driven->free_s))
 		return;
