@@ -15,7 +15,7 @@
 
 /* In a peak of less noise than this a curve may have found one hump of it: its feet then are not the pulse's.
  */
-#define AREA_SIGMAS 8.0
+#define GUIDE_SIGMAS 8.0
 
 struct edge {
 	double time_s;
@@ -331,13 +331,14 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	               (baseline->doubtful ? ESTIMATE_FLAG_ZERO : 0u);
 	pulse->sigma_duration_s =
 	        hypot(hypot(edge[0].sigma_s, edge[1].sigma_s), EDGE_LEVEL * peak->result.sigma_g * tilt);
-	guided = peak->model != PEAK_MODEL_NONE && contact(trace, peak, family, pulse, &guide);
-	if (guided && fabs(peak->result.value_g) > AREA_SIGMAS * trace->noise_g)
-		guided_velocity(trace, peak, baseline, &guide, pulse);
-	else
+	guided = peak->model != PEAK_MODEL_NONE && contact(trace, peak, family, pulse, &guide) &&
+	         fabs(peak->result.value_g) > GUIDE_SIGMAS * trace->noise_g;
+	if (!guided) {
 		velocity(trace, peak, baseline, edge, pulse);
-	if (guided)
-		guided_width(trace, peak, &guide, pulse);
+		return;
+	}
+	guided_velocity(trace, peak, baseline, &guide, pulse);
+	guided_width(trace, peak, &guide, pulse);
 }
 
 void pulse_of_weak(const struct peak *weak, const struct estimate_pulse *strong, struct estimate_pulse *pulse)

@@ -282,7 +282,11 @@ void ringdown_find(const struct trace *trace, const struct ringdown_span *span, 
 		if (*status == ESTIMATE_OK) {
 			escalate(&job);
 			ringdown_reach_back(&job);
-			*status = decays(&job.modes) ? ESTIMATE_OK : ESTIMATE_NOT_CONVERGED;
+			/* outliers may have taken the last sample to spare */
+			if (job.series.used <= modes_size(&job.modes))
+				*status = ESTIMATE_SHORT;
+			else if (!decays(&job.modes))
+				*status = ESTIMATE_NOT_CONVERGED;
 		}
 		if (*status == ESTIMATE_OK) {
 			conclude(&job, &found);

@@ -205,6 +205,41 @@ static void faint(void **state)
 	assert_true(most >= TIMES - 2);
 }
 
+/* Whatever hardly stands out of the noise: a width is one, or there is none. */
+static void faint_width(void **state)
+{
+	struct synth_random random = {37};
+	int given = 0;
+
+	(void)state;
+	for (int i = 0; i < 5000; i++) {
+		double height_g = 3 + 5 * synth_uniform(&random),
+		       base_s = 0.3e-3 + 6e-3 * synth_uniform(&random);
+		double w = 2 * PI * (100 + 300 * synth_uniform(&random));
+		struct channel channel = synth_channel("S1X", 7000, -0.1, 1400);
+		struct estimate_baseline baseline;
+		struct estimate_pulse pulse;
+
+		for (size_t k = 0; k < channel.count; k++) {
+			double t = -0.1 + (double)k / 7000;
+
+			channel.value_g[k] = synth_normal(&random);
+			if (t > 0)
+				channel.value_g[k] +=
+				        i % 2 ? height_g * synth_pulse(SYNTH_HAVERSINE, t / base_s)
+				              : height_g * exp(-0.1 * w * t) * sin(w * t);
+		}
+		pulse = measure(&channel, &baseline);
+		given += isfinite(pulse.duration_s);
+		assert_true(isnan(pulse.duration_s) ||
+		            (pulse.duration_s > 0 && pulse.duration_s < 0.1 && pulse.sigma_duration_s > 0));
+		assert_true(isnan(pulse.duration_s) || pulse.start_s < pulse.end_s);
+		synth_free(&channel);
+	}
+	printf("seed 37: %d of 5000 have a width\n", given);
+	assert_true(given > 500);
+}
+
 /* A lost frame inside the pulse is bridged where no family fits, and said in the uncertainty; a family that
  * fits knows what was there. */
 static void hole(void **state)
@@ -418,10 +453,11 @@ static void starts_inside(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(families),        cmocka_unit_test(clipped), cmocka_unit_test(of_weak),
-	        cmocka_unit_test(reference),       cmocka_unit_test(shapes),  cmocka_unit_test(noise),
-	        cmocka_unit_test(faint),           cmocka_unit_test(hole),    cmocka_unit_test(hole_covered),
-	        cmocka_unit_test(between_samples), cmocka_unit_test(cut),     cmocka_unit_test(starts_inside),
+	        cmocka_unit_test(families),      cmocka_unit_test(clipped),         cmocka_unit_test(of_weak),
+	        cmocka_unit_test(reference),     cmocka_unit_test(shapes),          cmocka_unit_test(noise),
+	        cmocka_unit_test(faint_width),   cmocka_unit_test(faint),           cmocka_unit_test(hole),
+	        cmocka_unit_test(hole_covered),  cmocka_unit_test(between_samples), cmocka_unit_test(cut),
+	        cmocka_unit_test(starts_inside),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -750,6 +750,42 @@ static void too_short(void **state)
 	synth_free(&channel);
 }
 
+/* A dozen samples with outliers among them: a value has an uncertainty, or there is none. */
+static void hardly_enough(void **state)
+{
+	struct synth_random random = {950};
+	int given = 0;
+
+	(void)state;
+	for (int i = 0; i < 20000; i++) {
+		struct decay d = {.rate_hz = 1000, .hz = 100 + 300 * synth_uniform(&random)};
+		struct channel channel;
+		struct ringdown r;
+
+		d.damping = 0.02 + 0.7 * synth_uniform(&random);
+		d.amplitude_g = 100;
+		d.noise_g = 3;
+		d.phase = 2 * PI * synth_uniform(&random);
+		d.length_s = 0.01 + 0.006 * synth_uniform(&random);
+		channel = make(&d, &random);
+		for (int k = 0; k < 3; k++)
+			channel.value_g[(size_t)((double)channel.count * synth_uniform(&random))] +=
+			        300 * (synth_uniform(&random) - 0.5);
+		r = find(&channel, 3, INFINITY);
+		if (r.result.how.status == ESTIMATE_OK) {
+			given++;
+			assert_true(r.result.sigma_hz > 0 && isfinite(r.result.sigma_hz));
+			assert_true(r.result.sigma_damping > 0 && isfinite(r.result.sigma_damping));
+			assert_true(isfinite(r.result.how.chi_square));
+		} else {
+			assert_true(isnan(r.result.frequency_hz));
+		}
+		synth_free(&channel);
+	}
+	printf("seed 950: %d of 20000 have a value\n", given);
+	assert_true(given > 100);
+}
+
 static void combined(void **state)
 {
 	struct ringdown x = {.result = {.frequency_hz = 129,
@@ -809,15 +845,16 @@ static void combined(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(exact),         cmocka_unit_test(noise),
-	        cmocka_unit_test(troubles),      cmocka_unit_test(not_separable),
-	        cmocka_unit_test(offset),        cmocka_unit_test(holes),
-	        cmocka_unit_test(follows_swing), cmocka_unit_test(softening_mount),
-	        cmocka_unit_test(refused),       cmocka_unit_test(reaches_back),
-	        cmocka_unit_test(refines),       cmocka_unit_test(reaches_outlier),
-	        cmocka_unit_test(decays),        cmocka_unit_test(tolerance),
-	        cmocka_unit_test(against_gsl),   cmocka_unit_test(nothing),
-	        cmocka_unit_test(too_short),     cmocka_unit_test(combined),
+	        cmocka_unit_test(exact),           cmocka_unit_test(noise),
+	        cmocka_unit_test(troubles),        cmocka_unit_test(not_separable),
+	        cmocka_unit_test(offset),          cmocka_unit_test(holes),
+	        cmocka_unit_test(follows_swing),   cmocka_unit_test(softening_mount),
+	        cmocka_unit_test(hardly_enough),   cmocka_unit_test(refused),
+	        cmocka_unit_test(reaches_back),    cmocka_unit_test(refines),
+	        cmocka_unit_test(reaches_outlier), cmocka_unit_test(decays),
+	        cmocka_unit_test(tolerance),       cmocka_unit_test(against_gsl),
+	        cmocka_unit_test(nothing),         cmocka_unit_test(too_short),
+	        cmocka_unit_test(combined),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
