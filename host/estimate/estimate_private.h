@@ -5,7 +5,7 @@
  * What the parts of estimate share: one record while it is analysed.
  *   estimate.c          the order of it all; each channel by itself
  *   estimate_decay.c    where a channel's decay begins and ends; the plate's of two axes
- *   estimate_sensors.c  resultants and lag, and what the lag says of S1
+ *   estimate_sensors.c  S1 on S2, and what that says of S1's peaks and decays; resultants and lag
  *   estimate_name.c     words for status, flags and families
  */
 #include "host/estimate/estimate.h"
@@ -34,8 +34,8 @@ size_t estimate_find(const struct desk *desk, const char *sensor, char axis);
 /* Every channel's ring-down, from the peaks and pulses. */
 void estimate_decays(const struct desk *desk, struct analysis *analysis);
 
-/* The resultants of the sensors that have X and Y, and where both have the lag, and what it says of S1's
- * peaks and decays. */
+/* The resultants of the sensors that have X and Y, and where both have the lag; before them S1's peaks and
+ * decays, by the oscillator that S2 drives. */
 void estimate_sensors(const struct desk *desk, struct analysis *analysis);
 
 /* X's and Y's ring-down of S1 as one, where it rings on its own. */
