@@ -230,12 +230,19 @@ static int add_decays(struct synthetic *synthetic, struct bound *sum)
 	return 0;
 }
 
+static double plate_peak_of_x(const struct synthetic_signal signal[2])
+{
+	return synthetic_plate_peak(&signal[0]);
+}
+
 static int add_lag(struct synthetic *synthetic, struct bound *sum)
 {
 	struct fisher fisher;
 	int status = fisher_open(&fisher, synthetic, 0, WHOLE);
 
-	return status ? status : variance_of(&fisher, lag_of_x, &sum->lag_s);
+	if (!status)
+		status = variance_of(&fisher, lag_of_x, &sum->lag_s);
+	return status ? status : variance_of(&fisher, plate_peak_of_x, &sum->plate_peak_g);
 }
 
 int bound_find(struct synthetic *synthetic, struct bound *bound)

@@ -9,7 +9,7 @@
  *   resultant                       the same of both axes
  *   frequency, damping              gain, delay, frequency, damping (of both modes) over the free decay of
  *                                   S1 X; pair_*: X and Y together
- *   lag                             all of them, S1 X and S2 X
+ *   lag, S1's peak                  all of them, S1 X and S2 X
  *
  * Samples that the scene clips or loses do not count; those missing by chance count by their share. The
  * mean square over onsets across the sample grid.
@@ -20,7 +20,7 @@ struct bound {
 	double peak_g, peak_s, contact_s, velocity_m_s;
 	double resultant_g;
 	double damped_hz, damping, pair_hz, pair_damping;
-	double lag_s;
+	double lag_s, plate_peak_g;
 };
 
 /* Moves the onset. DT_E_MEMORY; DT_E_ARGUMENT when the samples do not determine the parameters. */

@@ -14,6 +14,7 @@ static const struct quantity_text texts[QUANTITIES] = {
         /* without a family an instant costs four times the bound: that is no failure */
         [QUANTITY_PEAK_TIME] = {"peak-time", "Instant of one axis' peak (S2 X)", "us", 1e6, 6},
         [QUANTITY_RESULTANT] = {"resultant", "Resultant of X and Y (S2)", "g", 1, 3},
+        [QUANTITY_PLATE_PEAK] = {"plate-peak", "Peak of the plate (S1 X)", "g", 1, 3},
         [QUANTITY_LAG] = {"lag", "Time from S2's peak to S1's (X)", "us", 1e6, 3},
         [QUANTITY_FREQUENCY] = {"frequency", "Damped frequency of the plate (S1)", "Hz", 1, 3},
         [QUANTITY_DAMPING] = {"damping", "Damping ratio of the plate (S1)", "%", 100, 3},
@@ -175,6 +176,16 @@ static double drawn(const struct trial *t)
 	return reference_resultant(&t->series[SYNTHETIC_S2X], &t->series[SYNTHETIC_S2Y]);
 }
 
+static double plate_largest(const struct trial *t)
+{
+	return reference_maximum(&t->series[SYNTHETIC_S1X]).value;
+}
+
+static double plate_parabola(const struct trial *t)
+{
+	return reference_parabola(&t->series[SYNTHETIC_S1X]).value;
+}
+
 static double maxima_apart(const struct trial *t)
 {
 	return reference_maximum(&t->series[SYNTHETIC_S1X]).time_s -
@@ -319,6 +330,21 @@ static void our_told_resultant_work(const struct trial *t)
 	product_resultant(t->product);
 }
 
+static double our_smooth_plate_peak(const struct trial *t)
+{
+	return product_plate_peak(t->product);
+}
+
+static double our_plate_peak(const struct trial *t)
+{
+	return t->analysis[TELL_NOTHING].channels[SYNTHETIC_S1X].peak.value_g;
+}
+
+static const struct estimate_how *our_plate_peak_how(const struct trial *t)
+{
+	return &t->analysis[TELL_NOTHING].channels[SYNTHETIC_S1X].peak.how;
+}
+
 static double our_peaks_apart(const struct trial *t)
 {
 	return t->analysis[TELL_NOTHING].lag.largest_peak_s;
@@ -423,6 +449,13 @@ static const struct method methods[] = {
         OURS("default", QUANTITY_RESULTANT, resultant_g, our_resultant, our_resultant),
         OURS_TOLD("half-sine", QUANTITY_RESULTANT, resultant_g, our_told_resultant, our_told_resultant),
 
+        OTHERS("largest sample", QUANTITY_PLATE_PEAK, plate_peak_g, plate_largest),
+        OTHERS("parabola", QUANTITY_PLATE_PEAK, plate_peak_g, plate_parabola),
+        {"smooth curve", QUANTITY_PLATE_PEAK, true, false, BOUND(plate_peak_g), our_smooth_plate_peak, NULL,
+         NULL},
+        {"driven oscillator", QUANTITY_PLATE_PEAK, true, false, BOUND(plate_peak_g), our_plate_peak,
+         our_lag_work, our_plate_peak_how},
+
         OTHERS("largest samples", QUANTITY_LAG, lag_s, maxima_apart),
         OTHERS("parabolas", QUANTITY_LAG, lag_s, parabolas_apart),
         OTHERS("cross-correlation", QUANTITY_LAG, lag_s, correlation),
@@ -465,9 +498,17 @@ const struct method *method_table(size_t *count)
 double method_truth(const struct method *method, const struct trial *trial)
 {
 	const struct synthetic_truth *truth = &trial->truth;
-	const double values[QUANTITIES] = {truth->peak_g,    truth->peak_s,      truth->resultant_g,
-	                                   truth->lag_s,     truth->damped_hz,   truth->damping,
-	                                   truth->contact_s, truth->velocity_m_s};
+	const double values[QUANTITIES] = {
+	        [QUANTITY_PEAK] = truth->peak_g,
+	        [QUANTITY_PEAK_TIME] = truth->peak_s,
+	        [QUANTITY_RESULTANT] = truth->resultant_g,
+	        [QUANTITY_PLATE_PEAK] = truth->plate_peak_g,
+	        [QUANTITY_LAG] = truth->lag_s,
+	        [QUANTITY_FREQUENCY] = truth->damped_hz,
+	        [QUANTITY_DAMPING] = truth->damping,
+	        [QUANTITY_CONTACT] = truth->contact_s,
+	        [QUANTITY_VELOCITY] = truth->velocity_m_s,
+	};
 
 	return values[method->quantity];
 }

@@ -98,6 +98,15 @@ void product_peak(struct product *product, enum estimate_family family)
 	peak_find(&product->trace[SYNTHETIC_S2X], &options, &peak);
 }
 
+double product_plate_peak(struct product *product)
+{
+	const struct estimate_options options = {0};
+	struct peak peak;
+
+	peak_find(&product->trace[SYNTHETIC_S1X], &options, &peak);
+	return peak.result.value_g;
+}
+
 void product_pulse(struct product *product, enum estimate_family family)
 {
 	struct estimate_pulse pulse;

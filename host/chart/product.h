@@ -13,6 +13,9 @@ struct product;
 struct product *product_open(const struct record *record, double contact_end_s);
 void product_close(struct product *product);
 
+/* S1 X as a smooth curve has it. */
+double product_plate_peak(struct product *product);
+
 /* The results are thrown away: estimate_record's are the same. S2 X, or X and Y, or S1's. */
 void product_peak(struct product *product, enum estimate_family family);
 void product_pulse(struct product *product, enum estimate_family family);

@@ -185,7 +185,7 @@ static double resultant_of(const void *context, double t)
 }
 
 /* The first swing has one maximum between the onset and a period of the plate after it. */
-double synthetic_lag(const struct synthetic_signal *signal)
+static double plate_summit(const struct synthetic_signal *signal)
 {
 	const struct synthetic_axis *axis = &signal->axis;
 	double from = axis->onset_s + axis->delay_s, step = 0.01 / axis->damped_hz, at = from;
@@ -193,7 +193,19 @@ double synthetic_lag(const struct synthetic_signal *signal)
 	for (double t = from; t < from + axis->contact_s + 1 / axis->damped_hz; t += step)
 		if (synthetic_plate(signal, t) > synthetic_plate(signal, at))
 			at = t;
-	return summit_of(plate_of, signal, at - step, at + step) - axis->onset_s -
+	return summit_of(plate_of, signal, at - step, at + step);
+}
+
+double synthetic_plate_peak(const struct synthetic_signal *signal)
+{
+	return synthetic_plate(signal, plate_summit(signal));
+}
+
+double synthetic_lag(const struct synthetic_signal *signal)
+{
+	const struct synthetic_axis *axis = &signal->axis;
+
+	return plate_summit(signal) - axis->onset_s -
 	       synthetic_pulse_summit(signal->family) * axis->contact_s;
 }
 
@@ -219,6 +231,7 @@ struct synthetic_truth synthetic_truth(const struct synthetic *synthetic)
 	        .peak_g = x->peak_g,
 	        .peak_s = synthetic->onset_s + x->onset_s + synthetic_pulse_summit(family) * x->contact_s,
 	        .resultant_g = synthetic_resultant(synthetic->signal),
+	        .plate_peak_g = synthetic_plate_peak(&synthetic->signal[0]),
 	        .lag_s = synthetic_lag(&synthetic->signal[0]),
 	        .damped_hz = x->damped_hz,
 	        .damping = x->damping,

@@ -65,6 +65,7 @@ struct synthetic_scene synthetic_scene(void);
 struct synthetic_truth {
 	double peak_g, peak_s; /* S2 X */
 	double resultant_g;    /* S2 */
+	double plate_peak_g;   /* S1 X */
 	double lag_s;          /* X */
 	double damped_hz, damping;
 	double contact_s, velocity_m_s; /* S2 X */
@@ -111,7 +112,8 @@ void synthetic_signal_close(struct synthetic_signal *signal);
 double synthetic_box(const struct synthetic_signal *signal, double time_s);
 double synthetic_plate(const struct synthetic_signal *signal, double time_s);
 
-/* S1's peak after S2's. */
+/* S1's peak, and its time after S2's. */
+double synthetic_plate_peak(const struct synthetic_signal *signal);
 double synthetic_lag(const struct synthetic_signal *signal);
 
 /* The largest hypot of the two axes' pulses. */

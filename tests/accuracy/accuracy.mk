@@ -26,7 +26,8 @@ accuracy: setup ## every estimate against its Cramer-Rao bound, thousands of dro
 	@$(BUILD)/tests/accuracy --drops $(DROPS)
 
 # What README.md and host/chart/README.md show; the other pictures stay in the build folder.
-SHOWN = accuracy-peak accuracy-frequency stability-peak stability-frequency model-tables model-integrators \
+SHOWN = accuracy-peak accuracy-plate-peak accuracy-frequency stability-peak stability-frequency \
+	model-tables model-integrators \
 	$(addprefix model-stability-,resonance step restitution angle dent decrement)
 
 chart: setup ## error against cost, and where methods fail; renews the pictures of host/chart

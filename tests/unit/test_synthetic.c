@@ -106,6 +106,7 @@ static void the_peaks_are_apart_as_asked(void **state)
 		assert_near(when[0] - when[1], 2e-3, 2.1e-6);
 		assert_near(synthetic_truth(&synthetic).lag_s, 2e-3, 1e-7);
 		assert_near(synthetic_truth(&synthetic).peak_s, when[1], 1.1e-6);
+		assert_near(synthetic_truth(&synthetic).plate_peak_g, 310.1, 1e-6);
 		synthetic_close(&synthetic);
 	}
 }
