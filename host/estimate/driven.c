@@ -10,7 +10,6 @@
 #include "host/estimate/gram.h"
 #include "host/estimate/lm.h"
 #include "host/estimate/product.h"
-#include "host/estimate/respond.h"
 
 /* After the contact S1 is followed this long. A mount that stiffens as it swings out is one oscillator only
  * as long as the swing stays large: where the long window is refused the short one is tried. */

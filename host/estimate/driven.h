@@ -2,11 +2,11 @@
 #ifndef DT_HOST_ESTIMATE_DRIVEN_H
 #define DT_HOST_ESTIMATE_DRIVEN_H
 /*
- * The lag of one axis when S1 sits on S2 as a damped oscillator: S1 is gain times the response (respond.h) to
- * S2, later by a delay, on a slope that ends in an offset (the sensors' high-pass leaves one). Gain, delay,
- * frequency, damping and offset are fitted to S1 from the contact to four cycles after it, the decay in
- * block means; to half a cycle where the residual refuses that, and half a cycle fits far better. The lag is
- * the fitted response's largest peak less S2's.
+ * One axis when S1 sits on S2 as a damped oscillator, its lag and S1's peak: S1 is gain times the response
+ * (respond.h) to S2, later by a delay, on a slope that ends in an offset (the sensors' high-pass leaves one).
+ * Gain, delay, frequency, damping and offset are fitted to S1 from the contact to four cycles after it, the
+ * decay in block means; to half a cycle where the residual refuses that, and half a cycle fits far better.
+ * The lag is the fitted response's largest peak less S2's.
  *
  * S2 enters as smooth pulse (bell.h) where it is one, since the noise of its samples would count as input,
  * otherwise by its samples from the pulse's foot to 1.1 widths after the peak. The delay is free because no
@@ -31,8 +31,9 @@ struct driven_axis {
 
 struct driven {
 	double lag_s, sigma_s;
-	double peak_g, sigma_peak_g; /* S1's by the fitted response, with the fit's uncertainty and no doubt
-	                                of the model; NAN unless ok and not refused */
+	double peak_g,
+	        sigma_peak_g; /* S1's by the fitted response, with the fit's uncertainty alone: no doubt
+	                         of the model, nothing of S2's noise; NAN unless ok and not refused */
 	double peak_s, sigma_peak_s; /* its time, likewise */
 	double free_s; /* from when on S1's decay is as good as free; NAN likewise, or where S2 is no smooth
 	                  pulse */
@@ -55,5 +56,16 @@ void driven_find(const struct driven_axis *axis, struct driven *driven, struct d
 
 /* As peak_at, of S1. */
 void driven_at(const struct driven_curve *curve, double time_s, double derivative[3], double variance[2]);
+
+/* S1's peak by the oscillator, in place of the smooth curve's: that has twice the error, and a bias near the
+ * kink at the end of contact. What the two differ by beyond chance enters sigma; where S1 is clipped, and
+ * nothing tells, a thousandth does, and the value is flagged as extrapolated. True when it was taken; peak's
+ * result then is no longer of its model, span and sample.
+ *
+ * Not where S2's peak is clipped or below 12 sigma, so that its shape is a guess, nor through a pulse of 0.8
+ * cycles and more unless S1 is clipped: there the smooth curve's value stays, and its time is less certain by
+ * what the two differ. */
+bool peak_driven(const struct driven_axis *axis, const struct driven *driven,
+                 const struct driven_curve *curve, const struct estimate_options *options, struct peak *peak);
 
 #endif

@@ -103,7 +103,7 @@ struct estimate_peak {
 	double time_s;
 	double sigma_time_s;
 	struct estimate_how how; /* "poly4/poly6" "sine-power" "half-sine" "haversine" "strong-axis"
-	                            "parabola" "sample"; of S1 "driven-oscillator" where that explains it */
+	                            "parabola" "sample"; of S1 "driven-oscillator" (driven.h) */
 };
 
 struct estimate_pulse {

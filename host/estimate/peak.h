@@ -55,7 +55,7 @@ struct peak {
 	/* for pulse_measure and resultant_find */
 	struct shape_start start;               /* of a family's fit */
 	double clipped_from_s, clipped_until_s; /* where samples only say "at least"; equal when nowhere */
-	enum peak_model model;                  /* what gave the value */
+	enum peak_model model;                  /* what gave the value, unless an oscillator did (driven.h) */
 	struct local local;
 	struct shape shape;     /* the family's fit asked for last; its family is AUTO when there was none */
 	struct shape half_sine; /* that fit, likewise */

@@ -6,6 +6,7 @@
  *   peak.c          the highest sample, the order of methods, the model at an instant
  *   peak_clipped.c  samples at a limit or beyond the range: from the flanks
  *   peak_weak.c     an axis by the shape of its sensor's strongest one
+ *   peak_driven.c   S1's by the oscillator that S2 drives (driven.h)
  */
 #include "host/estimate/peak.h"
 

@@ -13,8 +13,8 @@
  * pulse may fall on the same place, so that their errors add up. */
 #define KINK 0.0372677996249965
 
-/* In a peak of less noise than this a curve may have found one hump of it: its feet then are not the pulse's.
- */
+/* In a peak of less than this many times the noise a curve may have found one hump of it: its feet then are
+ * not the pulse's. */
 #define GUIDE_SIGMAS 8.0
 
 struct edge {

@@ -298,8 +298,10 @@ void resultant_find(const struct resultant_axes *axes, struct resultant *resulta
 	resultant->result.how.status = ESTIMATE_SHORT;
 	found.width_s = lead->width_s;
 	at = largest(axes, fast, fabs(axes->trace[strong]->value_g[lead->at]), &top);
-	/* Where no instant has both axes, their models may meet all the same. */
-	near = at < axes->trace[fast]->count ? trace_time(axes->trace[fast], at) : lead->result.time_s;
+	/* Where no instant has both axes, their models may meet all the same; a curve knows its own pulse. */
+	near = at < axes->trace[fast]->count && axes->curve[strong] == NULL
+	               ? trace_time(axes->trace[fast], at)
+	               : lead->result.time_s;
 	found.span = span_around(axes, strong, near);
 	if (!(two && combine(axes, strong, near, &found)) && !refit(axes, near, &found) &&
 	    !(two && combine(axes, strong, lead->result.time_s, &found)))
