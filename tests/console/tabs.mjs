@@ -12,8 +12,9 @@ import { note } from "./tap.mjs";
 
 const SERIES = "tabs";
 const BUSY = 4; // requests of each tab
+const ARMED_MS = 9000; // after which the tower may have ended it by itself
 
-let server, relay, browser, desks, last;
+let server, relay, browser, desks, last, armedMs;
 let held = null; // what is kept back, once something is
 
 /* What is asked for; the stream, the page itself and what is done go through. */
@@ -87,6 +88,7 @@ async function abortArmed() {
 async function busyAndArmed() {
 	await desks[0].page.bringToFront();
 	await desks[0].arm();
+	armedMs = Date.now();
 	held ??= [];
 	for (const desk of desks.slice(0, 3)) {
 		await desk.page.bringToFront();
@@ -104,6 +106,7 @@ async function abortBusy() {
 	await desks[0].again(busyAndArmed);
 	await last.abort("the others are busy");
 	await desks[0].until({ step: "arm", state: "READY" });
+	assert.ok(Date.now() - armedMs < ARMED_MS, "the arming may have ended by itself");
 	letGo();
 }
 
