@@ -260,6 +260,7 @@ struct solution {
 	double chi_square;            /* reduced */
 	double noise_g;
 	double free_s; /* S1's decay, from then on */
+	unsigned late; /* half cycles from where S1 would peak without a delay to its peak */
 	bool refused;
 };
 
@@ -294,45 +295,55 @@ static bool judge(const struct driven_axis *axis, const struct scene *scene, con
 	return isfinite(solution->spread_s);
 }
 
-/* Delay and gain by S1's peak, or half a cycle before: a clipped one is as high as the limit on either side,
- * and noise may lift the next swing above the first. */
-static void start_by_peak(const struct driven_axis *axis, const struct respond_crest *crest, double *p)
-{
-	const struct estimate_peak *peak = &axis->peak[0]->result;
-	double half_s = UNITS_PI / p[OMEGA], reading;
-
-	p[DELAY] = peak->time_s - crest->time_s;
-	p[GAIN] = peak->value_g / crest->value;
-	if (p[DELAY] < half_s / 2 || !trace_at(axis->trace[0], crest->time_s, &reading) ||
-	    reading * peak->value_g > 0)
-		return;
-	p[DELAY] -= half_s;
-	p[GAIN] *= -exp(p[DECAY] * half_s);
-}
-
-/* From the ring-down's frequency and damping, and S1's peak. */
-static bool solve(const struct driven_axis *axis, struct scene *scene, double cycles,
+/* From the ring-down's frequency and damping, and S1's peak or, when that is of a later swing, from so many
+ * half cycles before it. */
+static bool solve(const struct driven_axis *axis, struct scene *scene, double cycles, unsigned back,
                   struct solution *solution)
 {
 	const struct estimate_ringdown *ring = &axis->ringdown->result;
-	double *p = solution->p, part = ring->damping_ratio;
+	const struct estimate_peak *peak = &axis->peak[0]->result;
+	double *p = solution->p, part = ring->damping_ratio, half_s;
 	struct lm_problem problem = {.size = PARAMETERS, .model = scene, .normal = normal};
 	struct lm_result result;
 	struct respond respond;
 	struct respond_crest crest;
 
+	solution->late = 0;
 	p[OMEGA] = 2 * UNITS_PI * ring->frequency_hz;
 	p[DECAY] = p[OMEGA] * part / sqrt(1 - part * part);
+	half_s = UNITS_PI / p[OMEGA];
 	respond_make(&respond, scene->input, p[DECAY], p[OMEGA]);
 	if (!respond_crest(&respond, axis->peak[1]->sign, &crest))
 		return false;
-	start_by_peak(axis, &crest, p);
+	if (peak->time_s > crest.time_s)
+		solution->late = (unsigned)((peak->time_s - crest.time_s) / half_s + 0.5);
+	p[DELAY] = peak->time_s - crest.time_s - back * half_s;
+	p[GAIN] = (back % 2 ? -1 : 1) * peak->value_g / crest.value * exp(back * p[DECAY] * half_s);
 	p[OFFSET] = 0;
 	collect(axis, p[DELAY], cycles * 2 * UNITS_PI / p[OMEGA], p[OMEGA], scene);
 	if (!lm_fit(&problem, p, &result))
 		return false;
 	respond_make(&respond, scene->input, p[DECAY], p[OMEGA]);
 	return judge(axis, scene, &respond, &result, solution);
+}
+
+static bool better(const struct solution *a, const struct solution *than)
+{
+	return a->chi_square - 1 < BETTER * (than->chi_square - 1);
+}
+
+/* Noise may lift a later swing above the first, and a clipped one is as high as the limit on either side. */
+static bool solve_window(const struct driven_axis *axis, struct scene *scene, double cycles,
+                         struct solution *solution)
+{
+	bool found = solve(axis, scene, cycles, 0, solution);
+	struct solution first;
+
+	if ((found && !solution->refused) || solution->late == 0 ||
+	    !solve(axis, scene, cycles, solution->late, &first) || (found && !better(&first, solution)))
+		return found;
+	*solution = first;
+	return true;
 }
 
 static bool has_peak(const struct peak *peak, enum estimate_status *status)
@@ -372,19 +383,15 @@ static unsigned flaws(const struct driven_axis *axis)
 	return flags;
 }
 
-static bool better(const struct solution *a, const struct solution *than)
-{
-	return a->chi_square - 1 < BETTER * (than->chi_square - 1);
-}
-
 /* Over the long window, and over the short one if that is refused. */
 static bool solve_both(const struct driven_axis *axis, struct scene *scene, struct solution *solution)
 {
 	struct solution brief;
 
-	if (!solve(axis, scene, CYCLES, solution))
+	if (!solve_window(axis, scene, CYCLES, solution))
 		return false;
-	if (solution->refused && solve(axis, scene, CYCLES_SHORT, &brief) && better(&brief, solution)) {
+	if (solution->refused && solve_window(axis, scene, CYCLES_SHORT, &brief) &&
+	    better(&brief, solution)) {
 		*solution = brief;
 		solution->refused = true;
 	}
