@@ -344,7 +344,8 @@ static void outcome(const struct stage *stage, const double *p, double out[OUTCO
 	double height;
 
 	synth_plate(plate, STAGE_TABLE, stage->scene.shape, p[2], p[5], p[6]);
-	out[LAG] = p[4] + stage_plate_peak(plate, &height) - synth_pulse_summit(stage->scene.shape) * p[2];
+	out[LAG] = p[4] + synth_plate_peak(plate, STAGE_TABLE, &height) -
+	           synth_pulse_summit(stage->scene.shape) * p[2];
 	out[PLATE_G] = p[3] * height;
 	out[PLATE_S] = p[1] + out[LAG];
 }

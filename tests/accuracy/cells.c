@@ -186,7 +186,7 @@ static void find_truth(const struct stage *stage, double *truth)
 		truth[i] = STAGE_DAMPING;
 	for (int i = QUANTITY_LAG_X; i <= QUANTITY_LAG; i++)
 		truth[i] = stage->interval_s;
-	stage_plate_peak(stage->plate, &height);
+	synth_plate_peak(stage->plate, STAGE_TABLE, &height);
 	for (int i = 0; i < 2; i++) {
 		truth[QUANTITY_PLATE_PEAK_X + i] = axis[i].gain * height;
 		truth[QUANTITY_PLATE_TIME_X + i] = stage->onset_s + axis[i].skew_s + axis[i].s1_peak_s;

@@ -35,20 +35,6 @@ double stage_noise(const struct scene *scene)
 	return sqrt(scene->noise_g * scene->noise_g + STEP_G * STEP_G / 12);
 }
 
-double stage_plate_peak(const double *plate, double *height)
-{
-	size_t at = 1;
-	double a, b, c, shift;
-
-	for (size_t k = 1; k < STAGE_TABLE - 1; k++)
-		if (plate[k] > plate[at])
-			at = k;
-	a = plate[at - 1], b = plate[at], c = plate[at + 1];
-	shift = (a - c) / (2 * (a - 2 * b + c));
-	*height = b - (a - c) * shift / 4;
-	return ((double)at + shift) * SYNTH_STEP_S;
-}
-
 static double *make_plate(enum synth_shape shape, double damped_hz)
 {
 	double *plate = calloc(STAGE_TABLE, sizeof(*plate));
@@ -63,7 +49,7 @@ static double *make_plate(enum synth_shape shape, double damped_hz)
 static void make_axes(struct stage *stage)
 {
 	const struct scene *scene = &stage->scene;
-	double height, at = stage_plate_peak(stage->plate, &height);
+	double height, at = synth_plate_peak(stage->plate, STAGE_TABLE, &height);
 
 	for (int i = 0; i < 2; i++) {
 		double sign = geometries[scene->geometry].sign;

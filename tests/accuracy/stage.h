@@ -76,9 +76,6 @@ double stage_signal(const struct stage *stage, enum stage_channel channel, doubl
 /* Whether a sample is there and shows the signal: what a bound may count. Not for `missing`. */
 bool stage_keeps(const struct stage *stage, enum stage_channel channel, size_t k);
 
-/* A unit pulse's oscillator: where it peaks after the onset, and how high. */
-double stage_plate_peak(const double *plate, double *height);
-
 /* Standard deviation of a sample, with what the steps add. */
 double stage_noise(const struct scene *scene);
 

@@ -136,6 +136,20 @@ void synth_plate(double *value, size_t count, enum synth_shape shape, double bas
 	}
 }
 
+double synth_plate_peak(const double *value, size_t count, double *height)
+{
+	size_t at = 1;
+	double a, b, c, shift;
+
+	for (size_t k = 1; k + 1 < count; k++)
+		if (value[k] > value[at])
+			at = k;
+	a = value[at - 1], b = value[at], c = value[at + 1];
+	shift = (a - c) / (2 * (a - 2 * b + c));
+	*height = b - (a - c) * shift / 4;
+	return ((double)at + shift) * SYNTH_STEP_S;
+}
+
 struct channel synth_channel(const char *name, double rate_hz, double start_s, size_t count)
 {
 	struct channel channel = {.rate_hz = rate_hz, .start_s = start_s, .count = count};

@@ -31,6 +31,9 @@ double synth_pulse_area(enum synth_shape shape);
 void synth_plate(double *value, size_t count, enum synth_shape shape, double base_s, double natural_hz,
                  double damping);
 
+/* When such a plate peaks, and how high: a parabola through its largest value. */
+double synth_plate_peak(const double *value, size_t count, double *height);
+
 /* Between its points by straight lines; 0 before the first and after the last. */
 double synth_table(const double *value, size_t count, double step, double x);
 

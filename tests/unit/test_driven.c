@@ -200,26 +200,11 @@ struct pair {
 
 static double plate[PLATE];
 
-static double summit(double *value)
-{
-	size_t top = 1;
-	double a, b, c;
-
-	for (size_t k = 1; k + 1 < PLATE; k++)
-		if (plate[k] > plate[top])
-			top = k;
-	a = plate[top - 1];
-	b = plate[top];
-	c = plate[top + 1];
-	*value = b;
-	return ((double)top + (a - c) / (2 * (a - 2 * b + c))) * SYNTH_STEP_S;
-}
-
 /* S1 and S2 of that cell; the pulse begins onset_s after the record. */
 static void make(struct pair *pair, const struct cell *cell, enum synth_shape shape, double noise_g,
                  double onset_s, struct synth_random *random)
 {
-	double height, late = summit(&height) - synth_pulse_summit(shape) * BASE_S;
+	double height, late = synth_plate_peak(plate, PLATE, &height) - synth_pulse_summit(shape) * BASE_S;
 
 	for (unsigned i = 0; i < 2; i++) {
 		struct channel *channel = &pair->channel[i];

@@ -119,12 +119,9 @@ static void copies(void **state)
 
 static double table_summit(void)
 {
-	size_t top = 0;
+	double height;
 
-	for (size_t k = 0; k < PLATE; k++)
-		if (plate[k] > plate[top])
-			top = k;
-	return (double)top * SYNTH_STEP_S;
+	return synth_plate_peak(plate, PLATE, &height);
 }
 
 /* Both axes, and the two as one: more certain than either, and between them. */

@@ -41,22 +41,6 @@ struct drop {
 
 static double plate[TABLE];
 
-/* Height of a unit pulse's plate, and when. */
-static double plate_summit(double *at)
-{
-	size_t top = 1;
-	double a, b, c;
-
-	for (size_t k = 1; k + 1 < TABLE; k++)
-		if (plate[k] > plate[top])
-			top = k;
-	a = plate[top - 1];
-	b = plate[top];
-	c = plate[top + 1];
-	*at = ((double)top + (a - c) / (2 * (a - 2 * b + c))) * SYNTH_STEP_S;
-	return b;
-}
-
 static void fill(struct drop *drop, const struct scene *scene, int i, struct synth_random *random)
 {
 	struct channel *channel = &drop->channel[i];
@@ -81,12 +65,13 @@ static void make(struct drop *drop, const struct scene *scene, double tolerance,
 {
 	static const char *const names[CHANNELS] = {"S1X", "S1Y", "S2X", "S2Y"};
 	struct estimate_options options = {.tolerance = tolerance};
-	double at;
+	double height, at;
 
 	memset(drop, 0, sizeof(*drop));
 	synth_plate(plate, TABLE, SYNTH_HALF_SINE, scene->base_s, 129, scene->damping);
 	drop->onset_s = ONSET_S + 1e-3 * synth_uniform(random);
-	drop->s1_g = HEIGHT_G * plate_summit(&at);
+	at = synth_plate_peak(plate, TABLE, &height);
+	drop->s1_g = HEIGHT_G * height;
 	drop->s1_s = drop->onset_s + at;
 	for (int i = 0; i < CHANNELS; i++) {
 		double rate_hz = i == S1X || i == S2X ? 7000 : 10000;
