@@ -26,8 +26,8 @@ enum { TABLE = 33000 };
 struct scene {
 	double base_s, damping, noise_g;
 	double y_part; /* Y over X */
-	double clip_s1, clip_s2,
-	        beyond_s1; /* parts of the peak on X: cut there, or only marked from there; 0: not */
+	/* parts of the peak on X: cut there, or only marked from there; 0: not */
+	double clip_s1, clip_s2, beyond_s1;
 };
 
 static const struct scene plain = {3e-3, 0.1, 1, 0.45, 0, 0, 0};
