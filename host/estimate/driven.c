@@ -34,6 +34,9 @@
  * tried after a refusal costs a right model much of its certainty. */
 #define REFUSE 6.0
 
+/* Beyond this it is not for a peak, which has a smooth curve to go back to. */
+#define STRAINED 5.0
+
 /* No plate is an oscillator to better than this part of its peak: less noise is taken for as much. */
 #define MISFIT 3e-4
 
@@ -259,9 +262,9 @@ struct solution {
 	double peak_g, peak_spread_g; /* likewise */
 	double chi_square;            /* reduced */
 	double noise_g;
-	double free_s; /* S1's decay, from then on */
-	unsigned late; /* half cycles from where S1 would peak without a delay to its peak */
-	bool refused;
+	double free_s;          /* S1's decay, from then on */
+	unsigned late;          /* half cycles from where S1 would peak without a delay to its peak */
+	bool refused, strained; /* for a lag, for a peak */
 };
 
 static bool judge(const struct driven_axis *axis, const struct scene *scene, const struct respond *respond,
@@ -292,6 +295,7 @@ static bool judge(const struct driven_axis *axis, const struct scene *scene, con
 	                   solution->p[DELAY];
 	solution->chi_square = result->squares / freedom / (noise * noise);
 	solution->refused = solution->chi_square > 1 + REFUSE * sqrt(2 / freedom);
+	solution->strained = solution->chi_square > 1 + STRAINED * sqrt(2 / freedom);
 	return isfinite(solution->spread_s);
 }
 
@@ -337,13 +341,17 @@ static bool solve_window(const struct driven_axis *axis, struct scene *scene, do
                          struct solution *solution)
 {
 	bool found = solve(axis, scene, cycles, 0, solution);
+	unsigned late = solution->late;
 	struct solution first;
 
-	if ((found && !solution->refused) || solution->late == 0 ||
-	    !solve(axis, scene, cycles, solution->late, &first) || (found && !better(&first, solution)))
-		return found;
-	*solution = first;
-	return true;
+	/* with a delay of its own S1 peaks later by up to one more */
+	for (unsigned back = late; back > 0 && back + 2 > late && !(found && !solution->refused); back--) {
+		if (!solve(axis, scene, cycles, back, &first) || (found && !better(&first, solution)))
+			continue;
+		*solution = first;
+		found = true;
+	}
+	return found;
 }
 
 static bool has_peak(const struct peak *peak, enum estimate_status *status)
@@ -403,7 +411,7 @@ static bool solve_both(const struct driven_axis *axis, struct scene *scene, stru
 static void express(const struct driven_axis *axis, const struct solution *solution, double from_s,
                     double sigma_from_s, double input_s, struct driven *driven)
 {
-	double fit = solution->spread_s * solution->noise_g, sigma;
+	double fit = solution->spread_s * solution->noise_g, sigma, strain;
 
 	if (solution->refused)
 		fit = hypot(fit * sqrt(fmax(solution->chi_square, 1)),
@@ -420,10 +428,12 @@ static void express(const struct driven_axis *axis, const struct solution *solut
 	driven->sigma_s = sigma;
 	if (solution->refused)
 		return;
+	strain = sqrt(fmax(solution->chi_square, 1));
 	driven->peak_g = solution->peak_g;
-	driven->sigma_peak_g = solution->peak_spread_g * solution->noise_g;
+	driven->sigma_peak_g = strain * solution->peak_spread_g * solution->noise_g;
 	driven->peak_s = solution->peak_s;
-	driven->sigma_peak_s = fit;
+	driven->sigma_peak_s = strain * fit;
+	driven->strained = solution->strained;
 }
 
 static void draw(const struct solution *solution, const struct driven *driven, struct driven_curve *curve)

@@ -31,12 +31,12 @@ struct driven_axis {
 
 struct driven {
 	double lag_s, sigma_s;
-	double peak_g,
-	        sigma_peak_g; /* S1's by the fitted response, with the fit's uncertainty alone: no doubt
-	                         of the model, nothing of S2's noise; NAN unless ok and not refused */
-	double peak_s, sigma_peak_s; /* its time, likewise */
-	double free_s; /* from when on S1's decay is as good as free; NAN likewise, or where S2 is no smooth
-	                  pulse */
+	/* S1's by the fitted response and its time, with the fit's uncertainty alone: no doubt of the model,
+	 * nothing of S2's noise; NAN unless ok and not refused. */
+	double peak_g, sigma_peak_g, peak_s, sigma_peak_s;
+	bool strained; /* the residual is less content than a peak should have it */
+	/* From when on S1's decay is as good as free; NAN likewise, or where S2 is no smooth pulse. */
+	double free_s;
 	bool smooth, sampled; /* inputs tried */
 	double chi_square;    /* reduced */
 	unsigned flags;
@@ -58,13 +58,14 @@ void driven_find(const struct driven_axis *axis, struct driven *driven, struct d
 void driven_at(const struct driven_curve *curve, double time_s, double derivative[3], double variance[2]);
 
 /* S1's peak by the oscillator, in place of the smooth curve's: that has twice the error, and a bias near the
- * kink at the end of contact. What the two differ by beyond chance enters sigma; where S1 is clipped, and
- * nothing tells, a thousandth does, and the value is flagged as extrapolated. True when it was taken; peak's
- * result then is no longer of its model, span and sample.
+ * kink at the end of contact. What the two heights differ by beyond chance enters sigma; where S1 is clipped,
+ * and nothing tells, a thousandth does, and the value is flagged as extrapolated. True when it was taken;
+ * peak's result then is no longer of its model, span and sample.
  *
- * Not where S2's peak is clipped or below 12 sigma, so that its shape is a guess, nor through a pulse of 0.8
- * cycles and more unless S1 is clipped: there the smooth curve's value stays, and its time is less certain by
- * what the two differ. */
+ * Not where S2's peak is clipped or below 12 sigma, so that its shape is a guess, nor where the fit is
+ * strained or the pulse lasts 0.8 cycles and more, or, of a clipped S1, where its flanks are as certain:
+ * there the smooth curve's value stays, and its time is less certain by what the two differ. Nor where S1's
+ * largest sample is of another contact: nothing is changed. */
 bool peak_driven(const struct driven_axis *axis, const struct driven *driven,
                  const struct driven_curve *curve, const struct estimate_options *options, struct peak *peak);
 

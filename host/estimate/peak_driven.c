@@ -19,15 +19,32 @@
 /* Standard deviations between a smooth curve's peak and the oscillator's that chance makes. */
 #define AGREE 3.0
 
-static bool knows_better(const struct driven_axis *axis, double sigma_g)
+/* S1's largest sample may lie above the oscillator by this part of the peak and so much noise; higher, it is
+ * of another contact. */
+#define ABOVE_PART 0.05
+#define ABOVE_NOISE 6.0
+
+static bool same_contact(const struct driven_axis *axis, const struct driven *driven,
+                         const struct driven_curve *curve)
+{
+	const struct trace *trace = axis->trace[0];
+	size_t at = axis->peak[0]->at;
+	double there[3];
+
+	driven_at(curve, trace_time(trace, at), there, NULL);
+	return fabs(trace->value_g[at]) - fabs(there[0]) <
+	       ABOVE_PART * fabs(driven->peak_g) + ABOVE_NOISE * fmax(trace->noise_g, 0);
+}
+
+static bool knows_better(const struct driven_axis *axis, double sigma_g, bool strained)
 {
 	const struct estimate_peak *s1 = &axis->peak[0]->result, *s2 = &axis->peak[1]->result;
 
 	if (s2->how.status == ESTIMATE_CLIPPED || fabs(s2->value_g) < SHAPE_SIGMAS * axis->trace[1]->noise_g)
 		return false;
 	if (s1->how.status == ESTIMATE_CLIPPED)
-		return sigma_g < s1->sigma_g;
-	return axis->peak[1]->width_s * axis->ringdown->result.frequency_hz < PULSE_CYCLES;
+		return !(sigma_g >= s1->sigma_g);
+	return !strained && axis->peak[1]->width_s * axis->ringdown->result.frequency_hz < PULSE_CYCLES;
 }
 
 /* What the oscillator differs from the smooth curve's peak beyond chance, there: noise may have lifted
@@ -42,30 +59,38 @@ static double apart(const struct estimate_peak *s1, const struct driven *driven,
 	return sqrt(fmax(beyond, 0));
 }
 
+static void take(const struct driven *driven, double sigma_g, struct estimate_peak *s1)
+{
+	s1->value_g = driven->peak_g;
+	s1->sigma_g = sigma_g;
+	s1->time_s = driven->peak_s;
+	/* where it rests on S2's shape alone, S2's own uncertainty is in it */
+	s1->sigma_time_s = s1->how.status == ESTIMATE_CLIPPED ? driven->sigma_s : driven->sigma_peak_s;
+	s1->how.method = "driven-oscillator";
+	peak_tried(&s1->how, s1->how.method);
+	s1->how.chi_square = driven->chi_square;
+	s1->how.flags &= ~(unsigned)(ESTIMATE_FLAG_MODEL | ESTIMATE_FLAG_WEAK);
+	if (s1->how.status == ESTIMATE_CLIPPED)
+		s1->how.flags |= ESTIMATE_FLAG_EXTRAPOLATED;
+}
+
 bool peak_driven(const struct driven_axis *axis, const struct driven *driven,
                  const struct driven_curve *curve, const struct estimate_options *options, struct peak *peak)
 {
 	struct estimate_peak *s1 = &peak->result;
-	bool clipped = s1->how.status == ESTIMATE_CLIPPED;
+	bool clipped = s1->how.status == ESTIMATE_CLIPPED, taken;
 	double sigma;
 
-	if (isnan(driven->peak_g))
+	if (isnan(driven->peak_g) || !same_contact(axis, driven, curve))
 		return false;
 	sigma = hypot(driven->sigma_peak_g, clipped ? UNSEEN * driven->peak_g : apart(s1, driven, curve));
-	if (!knows_better(axis, sigma)) {
+	taken = knows_better(axis, sigma, driven->strained);
+	if (taken)
+		take(driven, sigma, s1);
+	else
 		s1->sigma_time_s = hypot(s1->sigma_time_s, s1->time_s - driven->peak_s);
-		return false;
-	}
-	s1->value_g = driven->peak_g;
-	s1->sigma_g = sigma;
-	s1->time_s = driven->peak_s;
-	s1->sigma_time_s = clipped ? driven->sigma_s : driven->sigma_peak_s;
-	s1->how.method = "driven-oscillator";
-	peak_tried(&s1->how, s1->how.method);
-	s1->how.chi_square = driven->chi_square;
-	s1->how.flags &= ~(unsigned)(ESTIMATE_FLAG_MODEL | ESTIMATE_FLAG_WEAK | ESTIMATE_FLAG_TOLERANCE);
-	s1->how.flags |= clipped ? ESTIMATE_FLAG_EXTRAPOLATED : 0;
+	s1->how.flags &= ~(unsigned)ESTIMATE_FLAG_TOLERANCE;
 	if (!peak_meets(peak, options))
 		s1->how.flags |= ESTIMATE_FLAG_TOLERANCE;
-	return true;
+	return taken;
 }

@@ -196,6 +196,13 @@ static void spread(const struct resultant_axes *axes, double time_s, double vari
 	}
 }
 
+/* Models of different swings say nothing together; a polynomial does not reach that far, a curve does. */
+static bool reach(const struct resultant_axes *axes, double slack_s)
+{
+	return (axes->curve[0] == NULL && axes->curve[1] == NULL) ||
+	       fabs(axes->peak[1]->result.time_s - axes->peak[0]->result.time_s) <= slack_s;
+}
+
 /* By the axes' own models. False when they are not of the pulse whose largest sample is at near_s. */
 static bool combine(const struct resultant_axes *axes, unsigned strong, double near_s,
                     struct resultant *found)
@@ -205,7 +212,8 @@ static bool combine(const struct resultant_axes *axes, unsigned strong, double n
 	double x = axes->peak[0]->result.time_s, y = axes->peak[1]->result.time_s;
 	double slack = SAME_PULSE * found->width_s, time, half[3], variance[2];
 
-	if (!(near_s >= fmin(x, y) - slack && near_s <= fmax(x, y) + slack) || !summit(axes, &time, half))
+	if (!(near_s >= fmin(x, y) - slack && near_s <= fmax(x, y) + slack) || !reach(axes, slack) ||
+	    !summit(axes, &time, half))
 		return false;
 	spread(axes, time, variance);
 	result->how.method = lead->result.how.method;

@@ -18,6 +18,7 @@
 #define HEIGHT_G 480.0
 #define ONSET_S 0.15
 #define LENGTH_S 0.3
+#define AGAIN_S 0.031
 
 enum { S1X, S1Y, S2X, S2Y, CHANNELS };
 enum { TABLE = 33000 };
@@ -26,11 +27,12 @@ enum { TABLE = 33000 };
 struct scene {
 	double base_s, damping, noise_g;
 	double y_part; /* Y over X */
+	double again;  /* the same once more 31 ms later, so much of it; 0: not */
 	/* parts of the peak on X: cut there, or only marked from there; 0: not */
 	double clip_s1, clip_s2, beyond_s1;
 };
 
-static const struct scene plain = {3e-3, 0.1, 1, 0.45, 0, 0, 0};
+static const struct scene plain = {3e-3, 0.1, 1, 0.45, 0, 0, 0, 0};
 
 struct drop {
 	struct channel channel[CHANNELS];
@@ -54,6 +56,10 @@ static void fill(struct drop *drop, const struct scene *scene, int i, struct syn
 		double value = s1 ? synth_table(plate, TABLE, SYNTH_STEP_S, t)
 		                  : synth_pulse(SYNTH_HALF_SINE, t / scene->base_s);
 
+		if (scene->again > 0)
+			value += scene->again *
+			         (s1 ? synth_table(plate, TABLE, SYNTH_STEP_S, t - AGAIN_S)
+			             : synth_pulse(SYNTH_HALF_SINE, (t - AGAIN_S) / scene->base_s));
 		value = height * value + scene->noise_g * synth_normal(random);
 		channel->value_g[k] = fmax(fmin(value, limit), -limit);
 		if (i == S1X && scene->beyond_s1 > 0 && value > scene->beyond_s1 * drop->s1_g)
@@ -141,7 +147,7 @@ static void taken(void **state)
 	struct score score = play(&plain, 1);
 
 	(void)state;
-	assert_int_equal(score.driven, TIMES);
+	assert_in_range(score.driven, TIMES - 1, TIMES);
 	assert_true(sqrt(score.square) > 0.18 && sqrt(score.square) < 0.3);
 	assert_true(sqrt(score.time_square) < 1.5e-6);
 	assert_in_range(score.covered, 182, 198);
@@ -255,6 +261,31 @@ static void another_swing(void **state)
 	assert_true(known >= 95 && flagged > 10);
 }
 
+/* A hardly damped plate that is hit again swings higher: its peak is not the first contact's, cut or not. */
+static void another_contact(void **state)
+{
+	static const double part[3][2] = {{0, 0}, {1.2, 0}, {0, 1.2}};
+	struct synth_random random = {10};
+
+	(void)state;
+	for (int i = 0; i < 3; i++) {
+		struct scene scene = plain;
+		const struct estimate_peak *x;
+		struct drop drop;
+
+		scene.damping = 0.03;
+		scene.again = 0.95;
+		scene.clip_s1 = part[i][0];
+		scene.beyond_s1 = part[i][1];
+		make(&drop, &scene, 0, &random);
+		x = &drop.analysis.channels[S1X].peak;
+		assert_true(x->time_s - drop.s1_s > 0.02);
+		assert_true(fabs(x->value_g) > 1.19 * drop.s1_g); /* cut on both sides */
+		assert_true(i > 0 || fabs(drop.analysis.resultants[0].time_s - x->time_s) < 0.5e-3);
+		drop_free(&drop);
+	}
+}
+
 /* What was asked for is asked of height and time. */
 static void tolerance(void **state)
 {
@@ -272,6 +303,13 @@ static void tolerance(void **state)
 		printf("asked for %g: %.2g of the height\n", asked[i], peak->sigma_g / peak->value_g);
 		assert_int_equal((peak->how.flags & ESTIMATE_FLAG_TOLERANCE) != 0, i > 1);
 		drop_free(&drop);
+		/* the smooth curve's time is off by half a percent */
+		scene.clip_s2 = 0.8;
+		make(&drop, &scene, 1.5e-3, &random);
+		peak = &drop.analysis.channels[S1X].peak;
+		assert_true(peak->sigma_g < 1.5e-3 * peak->value_g);
+		assert_true(peak->how.flags & ESTIMATE_FLAG_TOLERANCE);
+		drop_free(&drop);
 	}
 }
 
@@ -281,7 +319,7 @@ int main(void)
 	        cmocka_unit_test(taken),        cmocka_unit_test(long_pulse),
 	        cmocka_unit_test(clipped_case), cmocka_unit_test(beyond_the_range),
 	        cmocka_unit_test(weak_case),    cmocka_unit_test(another_swing),
-	        cmocka_unit_test(tolerance),
+	        cmocka_unit_test(tolerance),    cmocka_unit_test(another_contact),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
