@@ -392,9 +392,18 @@ async function history() {
 	await desk.click("#view-drop");
 }
 
-async function abortAfterRelease() {
-	await desk.click("#change-series");
-	await desk.setUp({ name: "aborted", scene: "geometry-2A", angle: 25, planned: 1 });
+/* The series' drops once none is under way: a number is given back when nothing fell. */
+async function settled(series) {
+	for (let tries = 0; tries < 100; tries++) {
+		const found = (await drops(series)).drops;
+		if (found.every((drop) => drop.state === "recorded"))
+			return found;
+		await new Promise((resolve) => setTimeout(resolve, 200));
+	}
+	throw new Error(`${series}: a drop that is neither kept nor given back: ${JSON.stringify(await drops(series))}`);
+}
+
+async function abortOnce() {
 	await desk.arm();
 	await desk.releaseAnd(() => desk.abort("after the release"));
 	await desk.until({ phase: "idle", step: "fault" });
@@ -402,9 +411,21 @@ async function abortAfterRelease() {
 	await look(desk, "13-aborted");
 	await desk.key("Shift+C");
 	await desk.until({ phase: "idle", state: ["SAFE", "READY"] });
+	return (await settled("aborted"))[0];
+}
+
+/* On a busy machine ABORT may come before the latch has let go: then nothing falls. */
+async function abortAfterRelease() {
+	await desk.click("#change-series");
+	await desk.setUp({ name: "aborted", scene: "geometry-2A", angle: 25, planned: 1 });
+	let drop;
+	for (let tries = 0; !drop && tries < 3; tries++) {
+		drop = await abortOnce();
+		if (!drop)
+			note("aborted before the latch had let go: nothing fell");
+	}
+	assert.ok(drop, "the latch never let go");
 	await desk.page.waitForSelector('#series-table tr[data-drop="aborted/1"]');
-	const { drops: [drop] } = await drops("aborted");
-	assert.equal(drop.state, "recorded");
 	assert.match(drop.note, /abort/i);
 	assert.match(await desk.text('#series-table tr[data-drop="aborted/1"]'), /abort/i);
 }
