@@ -335,14 +335,19 @@ static double our_smooth_plate_peak(const struct trial *t)
 	return product_plate_peak(t->product);
 }
 
+static const struct estimate_channel *plate_x(const struct trial *t)
+{
+	return &t->analysis[TELL_NOTHING].channels[SYNTHETIC_S1X];
+}
+
 static double our_plate_peak(const struct trial *t)
 {
-	return t->analysis[TELL_NOTHING].channels[SYNTHETIC_S1X].peak.value_g;
+	return plate_x(t)->peak.value_g;
 }
 
 static const struct estimate_how *our_plate_peak_how(const struct trial *t)
 {
-	return &t->analysis[TELL_NOTHING].channels[SYNTHETIC_S1X].peak.how;
+	return &plate_x(t)->peak.how;
 }
 
 static double our_peaks_apart(const struct trial *t)
@@ -367,7 +372,7 @@ static void our_lag_work(const struct trial *t)
 
 static const struct estimate_ringdown *decay_of(const struct trial *t)
 {
-	return &t->analysis[TELL_NOTHING].channels[SYNTHETIC_S1X].ringdown;
+	return &plate_x(t)->ringdown;
 }
 
 static double our_hz(const struct trial *t)
