@@ -12,6 +12,8 @@ const WAIT_MS = 20000;
 const SOON = { timeout: 4000 };
 const PROMISED = "droptower-test";
 
+const CRASHED = 3; // exit status
+
 export function browse() {
 	return chromium.launch({
 		executablePath: "/usr/bin/chromium",
@@ -48,6 +50,10 @@ export class Desk {
 		this.allowed = []; // patterns of errors that a test makes on purpose
 		page.setDefaultTimeout(WAIT_MS);
 		page.addInitScript(watch, PROMISED);
+		page.on("crash", () => {
+			note("a tab of Chromium crashed");
+			process.exit(CRASHED); // nothing that is asked of such a tab is ever answered
+		});
 		page.on("console", (message) => message.type() === "error" && this.wrong(`${message.text()} ${message.location().url}`));
 		page.on("pageerror", (error) => this.wrong(error.stack));
 	}
@@ -92,7 +98,13 @@ export class Desk {
 		});
 	}
 
-	async picture(name, options = {}) {
+	/* for the eye: only when PICTURES is set */
+	async picture(name, options) {
+		if (process.env.PICTURES)
+			await this.photograph(name, options);
+	}
+
+	async photograph(name, options = {}) {
 		mkdirSync(pictures, { recursive: true });
 		await this.page.screenshot({ path: join(pictures, `${name}.png`), ...options });
 	}
@@ -163,10 +175,13 @@ export class Desk {
 	}
 
 	async release() {
-		await this.again(async () => {
+		const underWay = ["moving", "wait", "decide"];
+		await this.again(async (tries) => {
+			if (tries > 1 && underWay.includes(await this.data("step")))
+				return; // it was only slow to show
 			await this.arm();
 			await this.click("#release", SOON);
-			await this.until({ step: ["moving", "wait", "decide"] }, SOON.timeout);
+			await this.until({ step: underWay }, SOON.timeout);
 		});
 	}
 
@@ -174,7 +189,7 @@ export class Desk {
 	async again(action) {
 		for (let tries = 1; ; tries++) {
 			try {
-				return await action();
+				return await action(tries);
 			} catch (error) {
 				if (tries === 3)
 					throw error;

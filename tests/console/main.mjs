@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// main.mjs BUILD SANITIZED: the browser tests, as TAP. Pictures of every step go into BUILD/tests/console.
+// main.mjs BUILD SANITIZED: the browser tests, as TAP; with PICTURES=1 pictures of every step
+// go into BUILD/tests/console. Ends at once, with 3, when a tab of Chromium crashes.
 import assert from "node:assert/strict";
 import { found } from "./looks.mjs";
 import restart from "./restart.mjs";

@@ -101,7 +101,7 @@ async function end() {
 }
 
 async function onFailure() {
-	await desk?.picture("failed-restart").catch(() => {});
+	await desk?.photograph("failed-restart").catch(() => {});
 	note(`the console said: ${server?.said}`);
 	note(`the tower said: ${bench?.said}`);
 }

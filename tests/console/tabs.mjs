@@ -131,7 +131,7 @@ async function end() {
 }
 
 async function onFailure() {
-	await last?.picture("failed-tabs").catch(() => {});
+	await last?.photograph("failed-tabs").catch(() => {});
 	note(`the console said: ${server?.said}`);
 	note(`kept back: ${held?.length ?? "nothing"}`);
 }

@@ -210,8 +210,7 @@ async function reloadInMidDrop() {
 	await desk.arm();
 	await watcher.until({ state: "ARMED" });
 	await watcher.picture("5-release-watched");
-	await desk.click("#release");
-	await desk.until({ step: ["moving", "wait"] });
+	await desk.release();
 	await desk.page.reload();
 	await desk.until({ connected: "yes" });
 	await desk.result(`${SERIES}/2`);
@@ -447,7 +446,7 @@ async function end() {
 }
 
 async function onFailure() {
-	await desk?.picture("failed").catch(() => {});
+	await desk?.photograph("failed").catch(() => {});
 	note(`the console said: ${server?.said}`);
 	if (desk?.errors.length)
 		note(`the page said: ${desk.errors.join("\n")}`);
