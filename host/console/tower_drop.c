@@ -124,25 +124,38 @@ void tower_drop_end(struct tower *tower)
 	enter(tower, TOWER_IDLE);
 }
 
+static void add_note(struct tower_drop *drop, const char *text)
+{
+	size_t length = strlen(drop->note);
+
+	snprintf(drop->note + length, sizeof(drop->note) - length, "%s%s", length > 0 ? "; " : "", text);
+}
+
 void tower_drop_leave(struct tower *tower)
 {
 	if (tower->phase == TOWER_ARMED) {
 		atomic_fetch_add(&tower->aborts, 1);
 		tower_obey_abort(tower);
 	}
-	if (tower->drop != NULL)
-		tower_drop_end(tower);
+	if (tower->drop == NULL)
+		return;
+	add_note(tower->drop, "the console ended before it was collected");
+	tower_drop_end(tower);
 }
 
 static void __attribute__((format(printf, 2, 3))) give_up(struct tower *tower, const char *format, ...)
 {
+	char why[sizeof(tower->drop_trouble)];
 	va_list arguments;
 
-	tower->origin = "was given up before it was collected";
-	tower_drop_end(tower);
 	va_start(arguments, format);
-	vsnprintf(tower->drop_trouble, sizeof(tower->drop_trouble), format, arguments);
+	vsnprintf(why, sizeof(why), format, arguments);
 	va_end(arguments);
+	tower->origin = "was given up before it was collected";
+	if (tower->drop != NULL)
+		add_note(tower->drop, why);
+	tower_drop_end(tower);
+	strcpy(tower->drop_trouble, why);
 }
 
 /* ---- collecting ---- */
@@ -157,13 +170,6 @@ static struct tower_drop *without_recording(const struct tower *tower)
 	drop->released = true;
 	snprintf(drop->note, sizeof(drop->note), "%s", tower->origin);
 	return drop;
-}
-
-static void add_note(struct tower_drop *drop, const char *text)
-{
-	size_t length = strlen(drop->note);
-
-	snprintf(drop->note + length, sizeof(drop->note) - length, "%s%s", length > 0 ? "; " : "", text);
 }
 
 /* The drop that the record belongs to, no longer the tower's; NULL without memory. */

@@ -164,13 +164,25 @@ static void keep(struct job *way)
 	free(drop);
 }
 
+/* What there is of it stays, partial, with a word why. */
+static void leave(struct work *work, struct tower_drop *drop)
+{
+	char name[ARCHIVE_NAME_MAX + 16];
+
+	archive_abandon(&drop->recording);
+	snprintf(name, sizeof(name), "%s/%u", drop->recording.series, drop->recording.number);
+	if (drop->note[0] != '\0' &&
+	    archive_note(work->archive, name, work->options.operator_name, drop->note) != 0)
+		work_trouble(work, archive_message(work->archive));
+}
+
 static void discard(struct job *way)
 {
 	struct tower_drop *drop = way->maker;
 	struct work *work = way->console->work;
 
 	if (drop->recording.lock >= 0 && drop->released)
-		archive_abandon(&drop->recording);
+		leave(work, drop);
 	else if (drop->recording.lock >= 0)
 		archive_discard(work->archive, &drop->recording);
 	work_changed(work);

@@ -827,6 +827,27 @@ static void a_fault_in_motion_is_kept_with_its_text(void **state)
 	assert_string_equal(found.note, wire_fault_text(WIRE_FAULT_DOOR));
 }
 
+static void a_release_without_a_capture_leaves_a_word(void **state)
+{
+	struct tower_view view;
+	struct found found;
+
+	(void)state;
+	select_box();
+	behave(0, 0, false);
+	release(arm());
+	wait_view(is_moving);
+	pthread_mutex_lock(&fake.lock);
+	fake.state = WIRE_STATE_READY;
+	pthread_mutex_unlock(&fake.lock);
+	view = wait_view(is_ready);
+	assert_string_equal(view.trouble, "nothing was captured: the frame did not move");
+	found = archived();
+	assert_int_equal(found.count, 1);
+	assert_string_equal(found.state, "interrupted");
+	assert_string_equal(found.note, view.trouble);
+}
+
 static void a_drop_from_before_waits_for_a_series(void **state)
 {
 	struct found found;
@@ -925,6 +946,7 @@ int main(void)
 	        TEST(abort_goes_to_a_tower_that_was_never_heard),
 	        TEST(an_abort_in_motion_is_kept_with_its_note),
 	        TEST(a_fault_in_motion_is_kept_with_its_text),
+	        TEST(a_release_without_a_capture_leaves_a_word),
 	        cmocka_unit_test_setup_teardown(a_drop_from_before_waits_for_a_series, set_up_holding,
 	                                        tear_down),
 	        TEST(a_drop_survives_the_loss_of_the_link),

@@ -1006,12 +1006,14 @@ static void test_a_drop_that_did_not_come(void **state)
 	drop = begin("one");
 	assert_int_equal(drop->recording.number, 4);
 	drop->released = true;
+	strcpy(drop->note, "nothing was heard of it");
 	work_discard(console.work, drop);
 	work_discard(console.work, new_drop("one"));
 	tree = ask_json(work_drops, NULL, "series=one", NULL);
 	drops = cJSON_GetObjectItem(tree, "drops");
 	assert_int_equal(cJSON_GetArraySize(drops), 4);
 	assert_string_equal(text_of(cJSON_GetArrayItem(drops, 3), "state"), "interrupted");
+	assert_string_equal(text_of(cJSON_GetArrayItem(drops, 3), "note"), "nothing was heard of it");
 	cJSON_Delete(tree);
 	refused.luggage = new_drop("two");
 	assert_null(hand_over(&refused, 404));
