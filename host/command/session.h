@@ -21,9 +21,10 @@ enum { SESSION_MESSAGE_MAX = 256 };
 
 /* What is known of the tower, from its own messages. */
 struct session_view {
-	bool seen;        /* a status arrived */
-	bool hash_known;  /* a heartbeat arrived */
-	bool hash_agrees; /* it carried our wire hash */
+	bool seen;         /* a status arrived */
+	uint64_t statuses; /* so many did; ten a second */
+	bool hash_known;   /* a heartbeat arrived */
+	bool hash_agrees;  /* it carried our wire hash */
 	uint32_t wire_hash;
 	uint8_t state;   /* WIRE_STATE_* */
 	uint8_t fault;   /* WIRE_FAULT_* */

@@ -120,6 +120,7 @@ static void follow_tower(struct session *session, const struct frame *frame)
 
 	if (frame->id == WIRE_ID_STATUS && wire_unpack_status(frame, &status) == 0) {
 		view->seen = true;
+		view->statuses++;
 		view->state = status.state;
 		view->fault = status.fault;
 		view->checks = status.checks;

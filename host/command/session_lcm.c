@@ -34,6 +34,7 @@ static void on_state(const lcm_recv_buf_t *buffer, const char *channel, const dr
 	(void)buffer;
 	(void)channel;
 	session->view.seen = true;
+	session->view.statuses++;
 	session->view.hash_known = true;
 	session->view.hash_agrees = true; /* LCM types carry a fingerprint of their own */
 	session->view.state = (uint8_t)state->state;

@@ -14,8 +14,7 @@
 enum {
 	DROP_MS = 20000,    /* fall, capture and upload take about one second */
 	ARM_LATE_MS = 2000, /* after the tower should have disarmed by itself */
-	SETTLE_MS =
-	        100, /* a state is believed: the last blocks on their way may still carry the one before */
+	SETTLED = 2, /* statuses: of what was on its way while the state changed there is one at most */
 };
 
 struct tower_drop *tower_drop_new(const struct tower *tower, const char *series)
@@ -229,14 +228,19 @@ static void take_saved(struct tower *tower)
 
 /* ---- following ---- */
 
-/* Whether what is there of the tower's state has been so for long enough to be believed. */
+/* Whether what is there of the tower's state has been so for long enough to be believed: by what was heard
+ * since, as a link that is silent for a while says nothing. */
 static bool settled(struct tower *tower, bool now)
 {
-	if (!now)
+	uint64_t statuses = session_view(tower->session)->statuses;
+
+	if (!now) {
 		tower->rest_ms = 0;
-	else if (tower->rest_ms == 0)
+	} else if (tower->rest_ms == 0) {
 		tower->rest_ms = session_now_ms();
-	return now && session_now_ms() - tower->rest_ms >= SETTLE_MS;
+		tower->rest_statuses = statuses;
+	}
+	return now && statuses - tower->rest_statuses >= SETTLED;
 }
 
 static void follow_idle(struct tower *tower, unsigned state)

@@ -59,6 +59,7 @@ struct tower {
 	char drop_name[ARCHIVE_NAME_MAX + 16];
 	int64_t phase_ms;       /* since when */
 	int64_t rest_ms;        /* since when it is at rest; 0: it is not */
+	uint64_t rest_statuses; /* and how many had been heard then */
 	int64_t armed_until_ms; /* 0: not armed */
 	uint8_t fault;          /* seen in it */
 	bool abort_moving;      /* the operator aborted it after its release */

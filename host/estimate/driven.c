@@ -267,6 +267,12 @@ struct solution {
 	bool refused, strained; /* for a lag, for a peak */
 };
 
+/* What S1 is later by than an oscillator is no more than the contact and a swing. */
+static bool same_contact(const struct driven_axis *axis, const struct solution *solution)
+{
+	return fabs(solution->p[DELAY]) < axis->peak[1]->width_s + 2 * UNITS_PI / solution->p[OMEGA];
+}
+
 static bool judge(const struct driven_axis *axis, const struct scene *scene, const struct respond *respond,
                   const struct lm_result *result, struct solution *solution)
 {
@@ -276,7 +282,7 @@ static bool judge(const struct driven_axis *axis, const struct scene *scene, con
 	struct respond_crest crest;
 	struct respond_point top;
 
-	if (result->squares > UNEXPLAINED_MAX * scene->squares ||
+	if (result->squares > UNEXPLAINED_MAX * scene->squares || !same_contact(axis, solution) ||
 	    !respond_crest(respond, axis->peak[1]->sign, &crest))
 		return false;
 	row[DECAY] = crest.time_by_decay;

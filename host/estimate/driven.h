@@ -14,10 +14,10 @@
  *
  * Uncertainty: the fit's, S2's peak time and, with samples, S2's noise as input. Where the residual test
  * refuses (ESTIMATE_FLAG_MODEL) the residual takes the noise's place, and what the fitted peak misses S1's
- * own by is added. NAN with not_converged where S1 does not follow an oscillator at all, or the lag is less
- * certain than a tenth of the pulse's width. S1's or S2's status where they have no peak, S1's ring-down's
- * where it has none. Clipped samples are left out, and flagged as extrapolated; clipped with S2's shape not
- * known.
+ * own by is added. NAN with not_converged where S1 does not follow an oscillator at all or that of
+ * another contact, or the lag is less certain than a tenth of the pulse's width. S1's or S2's status where
+ * they have no peak, S1's ring-down's where it has none. Clipped samples are left out, and flagged as
+ * extrapolated; not_converged where S2 is clipped and no smooth pulse.
  */
 #include "host/estimate/peak.h"
 #include "host/estimate/respond.h"
@@ -31,8 +31,8 @@ struct driven_axis {
 
 struct driven {
 	double lag_s, sigma_s;
-	/* S1's by the fitted response and its time, with the fit's uncertainty alone: no doubt of the model,
-	 * nothing of S2's noise; NAN unless ok and not refused. */
+	/* S1's by the fitted response and its time, with the fit's uncertainty, and S2's noise where its
+	 * samples are the input: no doubt of the model; NAN unless ok and not refused. */
 	double peak_g, sigma_peak_g, peak_s, sigma_peak_s;
 	bool strained; /* the residual is less content than a peak should have it */
 	/* From when on S1's decay is as good as free; NAN likewise, or where S2 is no smooth pulse. */

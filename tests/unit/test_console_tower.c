@@ -697,6 +697,24 @@ static void disarmed_without_a_release_leaves_no_drop(void **state)
 	assert_int_equal(archived().count, 0);
 }
 
+/* The link stalls right behind the reply to ARM: the last that was heard is a tower at rest. */
+static void an_arm_outlasts_a_silence(void **state)
+{
+	(void)state;
+	select_box();
+	pthread_mutex_lock(&fake.lock);
+	fake.dumb = true;
+	pthread_mutex_unlock(&fake.lock);
+	(void)arm();
+	usleep(300000);
+	pthread_mutex_lock(&fake.lock);
+	fake.dumb = false;
+	pthread_mutex_unlock(&fake.lock);
+	wait_view(is_armed);
+	must(tower_abort, "{}");
+	wait_view(is_idle);
+}
+
 /* By the order of things: an ARM that is not answered is repeated TRIES times unless it is given up. */
 static void abort_does_not_wait_for_an_unanswered_arm(void **state)
 {
@@ -940,6 +958,7 @@ int main(void)
 	        TEST(a_drop_is_collected_and_kept),
 	        TEST(a_wrong_token_leaves_it_armed),
 	        TEST(disarmed_without_a_release_leaves_no_drop),
+	        TEST(an_arm_outlasts_a_silence),
 	        TEST(abort_does_not_wait_for_an_unanswered_arm),
 	        TEST(an_arm_from_before_an_abort_is_void),
 	        TEST(abort_goes_past_a_full_queue),

@@ -607,6 +607,22 @@ static void wrong_model(void **state)
 	struct pair pair;
 
 	(void)state;
+	/* S1 of a contact 13 ms before S2's, or 20 ms after it. */
+	for (int i = 0; i < 2; i++) {
+		size_t count, by = i ? 140 : 91;
+
+		one(&pair, 1, 506);
+		count = pair.channel[0].count;
+		for (size_t k = 0; k < count; k++) {
+			size_t to = i ? count - 1 - k : k, from = i ? to - by : to + by;
+
+			pair.channel[0].value_g[to] = from < count ? pair.channel[0].value_g[from] : 0;
+		}
+		analyse(&pair, 1, cells[0].hz);
+		assert_int_equal(pair.driven.status, ESTIMATE_NOT_CONVERGED);
+		assert_true(isnan(pair.driven.lag_s) && isnan(pair.driven.peak_g));
+		drop(&pair);
+	}
 	/* The same signal: nothing rings. A start is forced on it all the same. */
 	one(&pair, 1, 500);
 	for (size_t k = 0; k < pair.channel[0].count; k++)
