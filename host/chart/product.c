@@ -11,6 +11,7 @@
 #include "host/estimate/pulse.h"
 #include "host/estimate/resultant.h"
 #include "host/estimate/ringdown.h"
+#include "host/estimate/spike.h"
 
 /* As far before the given end of the contact as estimate_record looks for the decay's true start. */
 #define MARGIN_S 0.5e-3
@@ -70,6 +71,8 @@ struct product *product_open(const struct record *record, double contact_end_s)
 			break;
 		}
 		baseline_find(&product->trace[i], scratch, &product->baseline[i]);
+		if (spike_mark(&product->trace[i], product->baseline[i].noise_g))
+			trace_marked(&product->trace[i]);
 		baseline_remove(&product->trace[i], &product->baseline[i]);
 	}
 	if (product && scratch) {
