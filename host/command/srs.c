@@ -15,7 +15,7 @@ static const char help[] =
         "\n"
         "Shock response spectrum of every channel (ramp-invariant, ISO 18431-4), one table on standard "
         "output.\n"
-        "FILE and --columns are those of 'droptower analyze'.\n"
+        "FILE and --columns are those of 'droptower analyze'; a sensor's high-pass is not undone.\n"
         "\n"
         "  --columns SPEC    for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\"\n"
         "  --q Q             quality factor (10)\n"
