@@ -146,6 +146,7 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 		return result;
 	e->report = (struct report){.record = record,
 	                            .analysis = &e->analysis,
+	                            .options = estimate,
 	                            .scene = scene,
 	                            .version = DT_VERSION,
 	                            .simulated = options->simulated,

@@ -5,9 +5,8 @@
 
 #include "host/estimate/filter.h"
 
-/* Corner of one pass and of both, over the class: the standards' constant, and 100 Hz for CFC60. */
+/* Corner of one pass over the class: the standards' constant. */
 #define ONE_PASS 2.0775
-#define TWO_PASSES (5.0 / 3.0)
 
 #define RATE_MIN 10.0 /* over the class */
 
@@ -41,5 +40,5 @@ int cfc_filter(struct trace *trace, unsigned class)
 	if (result != 0)
 		return result;
 	section = filter_section(ONE_PASS * class / trace->rate_hz, sqrt(2));
-	return filter_two_pass(trace, &section, 1, TWO_PASSES * class / trace->rate_hz);
+	return filter_two_pass(trace, &section, 1, CFC_CORNER * class / trace->rate_hz);
 }

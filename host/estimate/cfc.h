@@ -11,6 +11,9 @@
  */
 #include "host/estimate/trace.h"
 
+/* Corner of both passes over the class: 100 Hz for CFC60. */
+#define CFC_CORNER (5.0 / 3.0)
+
 /* 0; DT_E_UNKNOWN for a class other than 60, 180, 600 and 1000; DT_E_RANGE when the rate is too low. */
 DT_MUST_USE int cfc_check(unsigned class, double rate_hz);
 

@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "host/record/drop.h"
+
 const struct estimate_channel *report_estimate(const struct report *report, const char *name)
 {
 	const struct channel *channel = record_channel(report->record, name);
@@ -91,6 +93,46 @@ bool report_verdict(const struct report *report, char *line, size_t size)
 	else
 		snprintf(line, size, "complete: every sample arrived, and the CRC-32 agrees");
 	return !r->lost_samples && (!r->is_drop || (r->crc_known && r->crc_agrees));
+}
+
+void report_filter(const struct report *report, char *name, size_t size)
+{
+	const struct estimate_options *done = &report->options;
+	char class[16] = "", corner[32] = "";
+
+	if (done->cfc > 0)
+		snprintf(class, sizeof(class), "CFC%u", done->cfc);
+	if (done->lowpass_hz > 0.0)
+		snprintf(corner, sizeof(corner), "lowpass %g Hz", done->lowpass_hz);
+	snprintf(name, size, "%s%s%s", class, class[0] && corner[0] ? ", " : "", corner);
+}
+
+/* Of sensors of which nothing is known nothing is said. */
+static void highpass(const struct report *report, char *words, size_t size)
+{
+	double undone_s = report->options.iepe_time_constant_s;
+	double known_s = report->scene ? report->scene->sensor_iepe_time_constant_s : 0.0;
+
+	words[0] = '\0';
+	if (undone_s > 0.0)
+		snprintf(words, size, "sensor high-pass of %g s undone", undone_s);
+	else if (!drop_has_channel(report->record))
+		return;
+	else if (known_s > 0.0)
+		snprintf(words, size, "sensor high-pass of %g s not undone", known_s);
+	else if (!report->scene)
+		snprintf(words, size, "sensor high-pass not undone, which takes --scene or --iepe");
+}
+
+bool report_processing(const struct report *report, char *line, size_t size)
+{
+	char filter[48], words[80];
+
+	report_filter(report, filter, sizeof(filter));
+	highpass(report, words, sizeof(words));
+	snprintf(line, size, "%s%s%s%s", filter[0] ? "filter " : "", filter,
+	         filter[0] && words[0] ? "; " : "", words);
+	return line[0] != '\0';
 }
 
 unsigned report_flags(const struct report *report)

@@ -2,8 +2,9 @@
 #ifndef DT_HOST_REPORT_FACTS_H
 #define DT_HOST_REPORT_FACTS_H
 /*
- * What the text, the JSON and the page say alike: the verdict, where their time 0 lies, flags in plain
- * words, and the model beside the measurement. Functions of the report alone, no memory kept.
+ * What the text, the JSON and the page say alike: the verdict, what was done to the samples, where their
+ * time 0 lies, flags in plain words, and the model beside the measurement. Functions of the report alone, no
+ * memory kept.
  */
 #include "host/report/report.h"
 
@@ -18,6 +19,14 @@ struct report_zero report_zero(const struct report *report);
 
 /* One line: is all of it there? Returns whether nothing is missing. */
 bool report_verdict(const struct report *report, char *line, size_t size);
+
+/* "CFC180", "lowpass 1650 Hz" or both; "" when nothing was filtered. */
+void report_filter(const struct report *report, char *name, size_t size);
+
+/* What was done to the samples beyond taking the baseline off: "filter CFC180; sensor high-pass of 0.3 s
+ * undone". Of the tower's sensors also that their high-pass was left. False and an empty line when there is
+ * nothing to say. */
+bool report_processing(const struct report *report, char *line, size_t size);
 
 /* RECORD_FLAG_* of the record and of every channel as analysed. */
 unsigned report_flags(const struct report *report);

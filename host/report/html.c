@@ -21,7 +21,7 @@ static void head(struct page *page)
 {
 	const struct report *report = page->report;
 	const struct record *r = report->record;
-	char verdict[160];
+	char verdict[160], processing[160];
 	bool good = report_verdict(report, verdict, sizeof(verdict));
 	FILE *out = page->out;
 
@@ -41,6 +41,8 @@ static void head(struct page *page)
 	        good ? "good" : "bad", good ? "&#10003;" : "&#9888;", verdict);
 	if (report->simulated)
 		fputs("<p><b>Simulated tower: no product fell.</b></p>\n", out);
+	if (report_processing(report, processing, sizeof(processing)))
+		fprintf(out, "<p class=\"soft\">Processing: %s.</p>\n", processing);
 }
 
 static void band(struct page *page)

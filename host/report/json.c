@@ -5,6 +5,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "host/estimate/cfc.h"
 #include "host/report/facts.h"
 #include "host/report/put.h"
 #include "host/report/shock.h"
@@ -114,6 +115,25 @@ static void put_channel(struct builder *b, cJSON *array, const struct channel *c
 	put_peak(b, item, &e->peak);
 	put_pulse(b, item, &e->pulse);
 	put_ringdown(b, item, "ringdown", &e->ringdown);
+}
+
+/* The corner of two filters is at most the lower of theirs. */
+static void put_processing(struct builder *b, cJSON *root, const struct report *report)
+{
+	const struct estimate_options *done = &report->options;
+	double class_hz = done->cfc > 0 ? CFC_CORNER * done->cfc : (double)INFINITY;
+	double corner_hz = done->lowpass_hz > 0.0 ? done->lowpass_hz : (double)INFINITY;
+	cJSON *item = put_object(b, root, "processing");
+	double undone_s = done->iepe_time_constant_s;
+	char filter[48];
+
+	report_filter(report, filter, sizeof(filter));
+	if (filter[0])
+		put_text(b, item, "filter", filter);
+	else
+		put_item(b, item, "filter", cJSON_CreateNull());
+	put_number(b, item, "cutoff_hz", fmin(class_hz, corner_hz));
+	put_number(b, item, "highpass_undone_s", undone_s > 0.0 ? undone_s : (double)NAN);
 }
 
 static void put_drop(struct builder *b, cJSON *root, const struct record *r)
@@ -277,6 +297,7 @@ static cJSON *build(struct builder *b, const struct report *report)
 	put_text(b, root, "format", r->format);
 	put_flags(b, root, report_flags(report), record_flag_name);
 	put_number(b, root, "lost_samples", (double)r->lost_samples);
+	put_processing(b, root, report);
 	put_drop(b, root, r);
 	put_scene(b, root, report->scene);
 	channels = put_array(b, root, "channels");

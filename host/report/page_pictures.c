@@ -103,7 +103,8 @@ static void traces(struct page *page)
 	size_t tower = 0, drawn = 0;
 	char video[96];
 
-	fputs("<h2>Traces around the impact</h2>\n<p class=\"soft\">Baselines taken off. Time 0: ",
+	fputs("<h2>Traces around the impact</h2>\n<p class=\"soft\">Baselines taken off, otherwise as "
+	      "recorded. Time 0: ",
 	      page->out);
 	page_text(page->out, page->zero.name);
 	if (report_video(page->report, &page->zero, video, sizeof(video)))

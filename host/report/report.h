@@ -18,7 +18,8 @@
 struct report {
 	const struct record *record;
 	const struct analysis *analysis;
-	const struct scene *scene;                 /* NULL: none was given */
+	struct estimate_options options; /* by which it was analysed: what was done to the samples */
+	const struct scene *scene;       /* NULL: none was given */
 	const struct model_prediction *prediction; /* NULL: no scene */
 	const struct model_prediction *below;      /* by the rung below; NULL: none */
 	const struct events *events;               /* NULL: none were looked for */

@@ -37,6 +37,14 @@ static void write_head(const struct report *report, FILE *out)
 		fprintf(out, "  %s: %s\n", record_flag_name(flags), report_flag_words(flags & ~(flags - 1)));
 }
 
+static void write_processing(const struct report *report, FILE *out)
+{
+	char line[160];
+
+	if (report_processing(report, line, sizeof(line)))
+		fprintf(out, "processing: %s\n", line);
+}
+
 static int name_width(const struct record *record)
 {
 	size_t width = 7;
@@ -260,6 +268,7 @@ int report_text(const struct report *report, FILE *out)
 	struct report_zero zero = report_zero(report);
 
 	write_head(report, out);
+	write_processing(report, out);
 	write_channels(report, &zero, out);
 	write_joint(report, out);
 	write_notes(report, out);

@@ -528,6 +528,59 @@ static void test_text(void **state)
 	free(text);
 }
 
+/* What was done, in one line of the text and in the JSON; nothing of it of a foreign record's. */
+static void check_processing(const struct report *report, const char *text, const char *filter,
+                             double cutoff_hz, double undone_s)
+{
+	char *table = print(report), line[200];
+	cJSON *root = parse(report);
+
+	snprintf(line, sizeof(line), "\nprocessing: %s\n", text);
+	if (text[0])
+		check_has(table, line);
+	assert_int_equal(count_of(table, "processing:"), text[0] ? 1 : 0);
+	assert_int_equal(cJSON_IsNull(item(root, "processing.filter")), filter == NULL);
+	assert_int_equal(cJSON_IsNull(item(root, "processing.cutoff_hz")), filter == NULL);
+	if (filter) {
+		check_string(root, "processing.filter", filter);
+		check_number(root, "processing.cutoff_hz", cutoff_hz);
+	}
+	if (undone_s > 0)
+		check_number(root, "processing.highpass_undone_s", undone_s);
+	else
+		assert_true(cJSON_IsNull(item(root, "processing.highpass_undone_s")));
+	cJSON_Delete(root);
+	free(table);
+}
+
+static void test_processing(void **state)
+{
+	struct fixture *f = *state;
+	struct estimate_options *done = &f->report.options;
+
+	check_processing(&f->report, "", NULL, 0, 0); /* a scene without such sensors */
+	f->scene.sensor_iepe_time_constant_s = 0.3;
+	check_processing(&f->report, "sensor high-pass of 0.3 s not undone", NULL, 0, 0);
+	done->iepe_time_constant_s = 0.25;
+	check_processing(&f->report, "sensor high-pass of 0.25 s undone", NULL, 0, 0.25);
+	done->cfc = 180;
+	check_processing(&f->report, "filter CFC180; sensor high-pass of 0.25 s undone", "CFC180", 300, 0.25);
+	done->lowpass_hz = 1650;
+	check_processing(&f->report, "filter CFC180, lowpass 1650 Hz; sensor high-pass of 0.25 s undone",
+	                 "CFC180, lowpass 1650 Hz", 300, 0.25);
+	*done = (struct estimate_options){.lowpass_hz = 1650};
+	f->report.scene = NULL;
+	f->report.prediction = NULL;
+	check_processing(&f->report,
+	                 "filter lowpass 1650 Hz; sensor high-pass not undone, which takes --scene or --iepe",
+	                 "lowpass 1650 Hz", 1650, 0);
+	for (size_t i = 0; i < CHANNELS; i++)
+		f->record.channels[i].name[0] = 'a';
+	check_processing(&f->report, "filter lowpass 1650 Hz", "lowpass 1650 Hz", 1650, 0);
+	done->lowpass_hz = 0;
+	check_processing(&f->report, "", NULL, 0, 0);
+}
+
 static void test_text_of_holes(void **state)
 {
 	struct fixture *f = *state;
@@ -739,15 +792,18 @@ static void check_self_contained(const char *page)
 static void test_html(void **state)
 {
 	struct fixture *f = *state;
-	char *page = make_page(&f->report);
+	char *page;
 
+	f->report.options = (struct estimate_options){.cfc = 180, .iepe_time_constant_s = 0.3};
+	page = make_page(&f->report);
 	check_self_contained(page);
 	assert_int_equal(count_of(page, "<svg"), 6 + 1 + 2 + 1); /* traces, resultants, ring-down, whole */
 	check_has(page, "<h1>Box &lt;b&gt;&amp; &quot;plate&quot;&lt;/b&gt;</h1>");
 	assert_null(strstr(page, "<b>&"));
 	check_has(page, "&lt;name&gt;.log");
 	check_has(page, "test &lt;version&gt;");
-	check_has(page, "complete: every sample arrived");
+	check_has(page, "complete: every sample arrived, and the CRC-32 agrees</div>\n"
+	                "<p class=\"soft\">Processing: filter CFC180; sensor high-pass of 0.3 s undone.</p>");
 	check_has(page, "300.33 &plusmn; 0.34");
 	check_has(page, "time 0 is in frame 441, S2 X peaks in 442. ");
 	check_has(page, "+6.6 %");
@@ -801,6 +857,7 @@ static void test_html_foreign(void **state)
 	assert_int_equal(count_of(page, "<svg"), 6 + 1); /* the other channels hold nothing */
 	check_has(page, "&lt;i&gt;strange");
 	assert_int_equal(count_of(page, "<i>strange"), 0);
+	assert_null(strstr(page, "Processing"));
 	check_has(page, "The first 12 of 15 channels");
 	free(page);
 	free(many);
@@ -867,6 +924,7 @@ int main(void)
 	        TEST(test_text_notes),
 	        TEST(test_text_lines_fit_the_table),
 	        TEST(test_text),
+	        TEST(test_processing),
 	        TEST(test_text_of_holes),
 	        TEST(test_verdicts),
 	        TEST(test_video_frames),
