@@ -288,6 +288,15 @@ static void fact_sampling(FILE *out, const struct series_drop *drop)
 	end_fact(out);
 }
 
+static void fact_processing(FILE *out, const struct series_drop *drop)
+{
+	if (!(drop->highpass_undone_s > 0.0))
+		return;
+	begin_fact(out, "processing");
+	fprintf(out, "sensor high-pass of %g s undone", drop->highpass_undone_s);
+	end_fact(out);
+}
+
 static void fact_frame(const struct series_page *page)
 {
 	double low = (double)INFINITY, high = 0.0;
@@ -369,8 +378,10 @@ static void subject_method(const struct series_page *page)
 	fprintf(out, "%g m, %g&deg;", page->scene.drop_height_m, page->scene.drop_angle_deg);
 	end_fact(out);
 	fact_frame(page);
-	if (drop)
+	if (drop) {
 		fact_sampling(out, drop);
+		fact_processing(out, drop);
+	}
 	fact_operators(page);
 	fact_when(page);
 	begin_fact(out, "drops");

@@ -19,6 +19,7 @@ struct series_drop {
 	char no_log[128];         /* why there is no trace to draw; "": there is one */
 	struct record record;     /* from the log; without it, what the result knows of it, without samples */
 	struct analysis analysis; /* from the result: what pictures and remarks need */
+	double highpass_undone_s; /* says the result; NAN or 0: does not */
 	struct report report;     /* of these */
 	struct report_zero zero;
 	double model_s; /* the model's first touch, after zero; NAN: no model to lay over it */

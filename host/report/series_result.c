@@ -171,6 +171,7 @@ static int take(struct series_drop *drop, const cJSON *root)
 	for (size_t i = 0; i < a->channel_count; i++)
 		a->channels[i] = channel_of(root, record->channels[i].name);
 	record->flags = flags(root, record_flag_name);
+	drop->highpass_undone_s = number(at(root, "processing"), "highpass_undone_s");
 	take_resultants(a, root);
 	take_joint(a, root);
 	return 0;

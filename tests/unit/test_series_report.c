@@ -121,7 +121,10 @@ static void give_result(const char *drop, double v, const char *status, const ch
 	FILE *out = open_memstream(&json, &size);
 
 	assert_non_null(out);
-	fprintf(out, "{\"flags\":[%s],\"lost_samples\":0,\"drop\":null,\"channels\":[", flags);
+	fprintf(out,
+	        "{\"flags\":[%s],\"lost_samples\":0,\"drop\":null,\"processing\":"
+	        "{\"filter\":null,\"cutoff_hz\":null,\"highpass_undone_s\":0.25},\"channels\":[",
+	        flags);
 	put_channel(out, "S1X", v, "ok", "");
 	put_channel(out, "S1Y", 0.5 * v + 0.3, "ok", "");
 	put_channel(out, "S1Z", -0.1 * v, "ok", "");
@@ -414,6 +417,7 @@ static void test_proof_of_the_logs(void **state)
 	assert_has(page, "<td class=\"text\">1.0-test</td>");
 	assert_has(page, "2001-09-09 01:46"); /* second 1 000 000 000 */
 	assert_has(page, "Calibrations noted</h2>\n<p class=\"soft\">None.");
+	assert_has(page, "<th>processing</th><td>sensor high-pass of 0.25 s undone</td>");
 	assert_has(page, "Taken: <b>planar</b>");
 	free(page);
 }
