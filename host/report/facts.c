@@ -75,19 +75,50 @@ static uint64_t missing_ticks(const struct record *record)
 	return ticks;
 }
 
+const char *report_plural(uint64_t count)
+{
+	return count == 1 ? "" : "s";
+}
+
+/* "ends at tick 463 (0.464 s) without a capture end"; false when there is one, or none to expect. */
+static bool tell_end(const struct record *r, char *line, size_t size)
+{
+	bool open = r->is_drop && !r->crc_known;
+
+	line[0] = '\0';
+	if (open)
+		snprintf(line, size, "ends at tick %" PRIu32 " (%.3f s) without a capture end",
+		         r->last_tick_ms, ((double)(r->last_tick_ms - r->first_tick_ms) + 1.0) * 1e-3);
+	return open;
+}
+
+/* "27 samples lost in 1 gap, 1 block" */
+static void tell_lost(const struct record *r, char *line, size_t size)
+{
+	uint64_t blocks = missing_ticks(r);
+
+	if (r->gap_count)
+		snprintf(line, size, "%" PRIu64 " sample%s lost in %zu gap%s, %" PRIu64 " block%s",
+		         r->lost_samples, report_plural(r->lost_samples), r->gap_count,
+		         report_plural(r->gap_count), blocks, report_plural(blocks));
+	else
+		snprintf(line, size, "%" PRIu64 " sample%s lost", r->lost_samples,
+		         report_plural(r->lost_samples));
+}
+
 bool report_verdict(const struct report *report, char *line, size_t size)
 {
 	const struct record *r = report->record;
+	char end[96], lost[96];
+	bool open = tell_end(r, end, sizeof(end));
 
-	if (r->lost_samples && !r->gap_count)
-		snprintf(line, size, "INCOMPLETE: %" PRIu64 " samples lost", r->lost_samples);
-	else if (r->lost_samples)
-		snprintf(line, size, "INCOMPLETE: %" PRIu64 " samples lost in %zu gap%s, %" PRIu64 " blocks",
-		         r->lost_samples, r->gap_count, r->gap_count == 1 ? "" : "s", missing_ticks(r));
+	tell_lost(r, lost, sizeof(lost));
+	if (r->lost_samples)
+		snprintf(line, size, "INCOMPLETE: %s%s%s", end, open ? "; " : "", lost);
 	else if (!r->is_drop)
 		snprintf(line, size, "no sample lost");
-	else if (!r->crc_known)
-		snprintf(line, size, "UNPROVEN: no capture end, so nothing says what the tower sent");
+	else if (open)
+		snprintf(line, size, "UNPROVEN: %s; nothing says what the tower sent", end);
 	else if (!r->crc_agrees)
 		snprintf(line, size, "CORRUPT: no sample is missing, yet the CRC-32 does not agree");
 	else
@@ -190,6 +221,8 @@ const char *report_flag_words(unsigned flag)
 		return "the record begins or ends inside its pulse, or has hardly a sample";
 	case RECORD_FLAG_ZERO_UNSURE:
 		return "more than noise before the pulse: zero, and what hangs on it, is unsure";
+	case RECORD_FLAG_UNFILTERED:
+		return "sampled too slowly for the low-pass asked for; left as it was";
 	default:
 		return record_flag_name(flag);
 	}
@@ -209,7 +242,8 @@ const char *report_note_words(unsigned flag)
 	case ESTIMATE_FLAG_TWO_MODES:
 		return "two modes; the value is the stronger one's";
 	case ESTIMATE_FLAG_AMPLITUDE:
-		return "the frequency follows the swing; the value is the mean of the first three cycles";
+		return "the frequency follows the swing; the value is fitted, the mean of the first three "
+		       "cycles";
 	case ESTIMATE_FLAG_TOLERANCE:
 		return "less certain than asked for";
 	case ESTIMATE_FLAG_MODEL:
@@ -381,6 +415,17 @@ bool report_driven(const struct report *report)
 	       !(lag->driven.flags & ESTIMATE_FLAG_MODEL) && isfinite(lag->driven_s);
 }
 
+/* The model counts three oscillations between zero crossings: against it stands what was counted likewise.
+ * Where too few could be counted, it is the fitted one. A count has no uncertainty of its own. */
+static void measured_frequency(const struct estimate_ringdown *plate, struct report_row *row)
+{
+	bool counted = isfinite(plate->three_cycle_frequency_hz);
+
+	row->label = counted ? "plate, 3 cycles" : "plate frequency";
+	row->measured = counted ? plate->three_cycle_frequency_hz : plate->frequency_hz;
+	row->sigma = counted ? (double)NAN : plate->sigma_hz;
+}
+
 /* Rows of one prediction, with what was measured. */
 static size_t compare(const struct report *report, struct report_row rows[REPORT_ROWS_MAX])
 {
@@ -388,11 +433,8 @@ static size_t compare(const struct report *report, struct report_row rows[REPORT
 	const struct model_prediction *p = report->prediction;
 	struct report_row lag = {
 	        .key = "lag_s", .label = "S1 after S2", .unit = "ms", .scale = 1e3, .decimals = 3};
-	struct report_row frequency = {.key = "plate_frequency_hz",
-	                               .label = "plate frequency",
-	                               .unit = "Hz",
-	                               .scale = 1.0,
-	                               .decimals = 2};
+	struct report_row frequency = {
+	        .key = "plate_frequency_hz", .unit = "Hz", .scale = 1.0, .decimals = 2};
 	struct report_row damping = {.key = "plate_damping_ratio",
 	                             .label = "plate damping",
 	                             .unit = "",
@@ -413,8 +455,7 @@ static size_t compare(const struct report *report, struct report_row rows[REPORT
 		rows[count - 1].difference_percent = (double)NAN;
 	if (p->has_plate) {
 		frequency.predicted = p->plate_frequency_hz;
-		frequency.measured = a->plate.frequency_hz;
-		frequency.sigma = a->plate.sigma_hz;
+		measured_frequency(&a->plate, &frequency);
 		damping.predicted = p->plate_damping_ratio;
 		damping.measured = a->plate.damping_ratio;
 		damping.sigma = a->plate.sigma_damping;

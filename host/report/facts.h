@@ -28,6 +28,9 @@ void report_filter(const struct report *report, char *name, size_t size);
  * nothing to say. */
 bool report_processing(const struct report *report, char *line, size_t size);
 
+/* "" for one, "s" for any other number: "1 gap", "2 gaps". */
+const char *report_plural(uint64_t count);
+
 /* RECORD_FLAG_* of the record and of every channel as analysed. */
 unsigned report_flags(const struct report *report);
 
@@ -75,13 +78,13 @@ enum { REPORT_ROWS_MAX = 10 };
  * not ok. */
 struct report_row {
 	const char *key;   /* "s1x_peak_g" */
-	const char *label; /* "S1 X peak" */
+	const char *label; /* "S1 X peak"; "plate, 3 cycles" where they could be counted */
 	const char *unit;  /* "g" */
 	double scale;      /* value times scale is in unit */
 	int decimals;      /* in unit */
 	double predicted, measured;
 	double rungs_apart; /* the rung below from predicted: how much the model itself may be off; or NAN */
-	double sigma;       /* standard uncertainty of measured */
+	double sigma;       /* standard uncertainty of measured; NAN where there is none */
 	double difference_percent; /* (predicted - measured)/measured */
 };
 

@@ -69,6 +69,13 @@ static const char *unless_ok(enum estimate_status status, const char *note)
 	return status == ESTIMATE_OK ? note : estimate_status_name(status);
 }
 
+static const char *axes_note(const struct estimate_resultant *r)
+{
+	if (!isfinite(r->axes_apart_s))
+		return "one axis has no peak";
+	return r->axes_coincide ? "X and Y peak together" : "X and Y peak apart";
+}
+
 static void cards(struct page *page)
 {
 	const struct analysis *a = page->report->analysis;
@@ -84,9 +91,7 @@ static void cards(struct page *page)
 		snprintf(label, sizeof(label), "%s, resultant peak", r->sensor);
 		page_begin_card(out, label);
 		page_with_sigma(out, 1, r->peak_g, r->sigma_g);
-		page_end_card(out, "g",
-		              unless_ok(r->how.status,
-		                        r->axes_coincide ? "X and Y peak together" : "X and Y peak apart"));
+		page_end_card(out, "g", unless_ok(r->how.status, axes_note(r)));
 	}
 	if (a->has_lag) {
 		page_begin_card(out, "S1 after S2");
@@ -162,9 +167,10 @@ static void foot(struct page *page)
 		const struct record_counters *c = &r->counters;
 
 		fprintf(out,
-		        "<p>Frames: %" PRIu64 " blocks held, %" PRIu64 " gaps, %" PRIu64 " resent, %" PRIu64
+		        "<p>Frames: %" PRIu64 " block%s held, %" PRIu64 " gap%s, %" PRIu64 " resent, %" PRIu64
 		        " repeated, %" PRIu64 " reordered, %" PRIu64 " corrupt, %" PRIu64 " conflicting. ",
-		        c->blocks, c->gaps, c->resent, c->repeated, c->reordered, c->corrupt, c->conflicting);
+		        c->blocks, report_plural(c->blocks), c->gaps, report_plural(c->gaps), c->resent,
+		        c->repeated, c->reordered, c->corrupt, c->conflicting);
 		if (r->crc_known)
 			fprintf(out, "Capture CRC-32 %08" PRIX32 ". ", r->crc32);
 		fprintf(out, "Ticks %" PRIu32 " to %" PRIu32 " ms.</p>\n", r->first_tick_ms, r->last_tick_ms);

@@ -49,10 +49,11 @@ static void results(struct page *page)
 		page_with_sigma(out, 2, r->peak_g, r->sigma_g);
 		fputs("</td><td>", out);
 		page_with_sigma(out, 4, (r->time_s - page->zero.time_s) * 1e3, r->sigma_time_s * 1e3);
-		fputs("</td><td colspan=\"3\" class=\"text soft\">Y peaks ", out);
-		page_number(out, 3, fabs(r->axes_apart_s) * 1e3);
-		fprintf(out, " ms %s X</td><td class=\"text\">%s</td></tr>\n",
-		        r->axes_apart_s < 0.0 ? "before" : "after", estimate_status_name(r->how.status));
+		fputs("</td><td colspan=\"3\" class=\"text soft\">", out);
+		if (isfinite(r->axes_apart_s))
+			fprintf(out, "Y peaks %.3f ms %s X", fabs(r->axes_apart_s) * 1e3,
+			        r->axes_apart_s < 0.0 ? "before" : "after");
+		fprintf(out, "</td><td class=\"text\">%s</td></tr>\n", estimate_status_name(r->how.status));
 	}
 	fputs("</table></div>\n<p class=\"note\">&plusmn; is one standard uncertainty. Velocity change: the "
 	      "integral over the pulse.</p>\n",
@@ -99,8 +100,11 @@ static void joint(struct page *page)
 		          p->how.status);
 		joint_row(out, "plate frequency, undamped", "Hz", 2, p->natural_frequency_hz,
 		          p->sigma_natural_hz, p->how.status);
-		joint_row(out, "plate frequency over three cycles", "Hz", 2, p->three_cycle_frequency_hz,
-		          (double)NAN, p->how.status);
+		joint_row(out, "plate frequency, counted over three cycles", "Hz", 2,
+		          p->three_cycle_frequency_hz, (double)NAN, p->how.status);
+		if (isfinite(p->small_swing_hz))
+			joint_row(out, "plate frequency as the swing vanishes", "Hz", 2, p->small_swing_hz,
+			          (double)NAN, p->how.status);
 		joint_row(out, "plate damping ratio", "", 4, p->damping_ratio, p->sigma_damping,
 		          p->how.status);
 		if (isfinite(p->second_frequency_hz))

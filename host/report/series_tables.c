@@ -21,7 +21,7 @@ static const struct column others[] = {
         {ARCHIVE_LAG_FIRST, "first peaks, ms", 1e3, 3},
         {ARCHIVE_LAG_DRIVEN, "driven, ms", 1e3, 3},
         {ARCHIVE_FREQUENCY, "plate, Hz", 1.0, 2},
-        {ARCHIVE_THREE_CYCLE, "over three cycles, Hz", 1.0, 2},
+        {ARCHIVE_THREE_CYCLE, "counted over three cycles, Hz", 1.0, 2},
         {ARCHIVE_DAMPING, "damping ratio", 1.0, 4},
 };
 enum { PEAKS = sizeof(peaks) / sizeof(peaks[0]), OTHERS = sizeof(others) / sizeof(others[0]) };
@@ -192,6 +192,7 @@ static void fill_means(struct means *means, const struct series_page *page)
 	a->lag.driven.status = ESTIMATE_SHORT;
 	a->plate.frequency_hz = m[ARCHIVE_FREQUENCY].mean;
 	a->plate.sigma_hz = m[ARCHIVE_FREQUENCY].sd;
+	a->plate.three_cycle_frequency_hz = m[ARCHIVE_THREE_CYCLE].mean;
 	a->plate.damping_ratio = m[ARCHIVE_DAMPING].mean;
 	a->plate.sigma_damping = m[ARCHIVE_DAMPING].sd;
 	a->plate.how.status = mean_status(&m[ARCHIVE_FREQUENCY]);
@@ -225,6 +226,15 @@ static void model_reason(const struct series_page *page)
 	fputs("</p>\n", out);
 }
 
+/* One drop's count of cycles has no uncertainty, that of several has their SD. */
+static double row_sd(const struct means *means, const struct archive_mean *m, const struct report_row *row)
+{
+	bool counted = strcmp(row->key, "plate_frequency_hz") == 0 && isfinite(row->measured) &&
+	               isfinite(means->analysis.plate.three_cycle_frequency_hz);
+
+	return counted ? m[ARCHIVE_THREE_CYCLE].sd : row->sigma;
+}
+
 static void model_rows(const struct series_page *page)
 {
 	struct report_row rows[REPORT_ROWS_MAX];
@@ -242,7 +252,8 @@ static void model_rows(const struct series_page *page)
 		page_begin_compared(out, &rows[i]);
 		page_number(out, rows[i].decimals, rows[i].measured * rows[i].scale);
 		fputs("</td><td>", out);
-		page_number(out, rows[i].decimals, rows[i].sigma * rows[i].scale);
+		page_number(out, rows[i].decimals,
+		            row_sd(&means, page->cell.value, &rows[i]) * rows[i].scale);
 		page_end_compared(out, &rows[i]);
 	}
 	fputs("</tbody></table></div>\n", out);

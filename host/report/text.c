@@ -16,6 +16,53 @@ static void cell(FILE *out, int width, int decimals, double value)
 		fprintf(out, " %*s", width, "-");
 }
 
+/* Writes text behind what ends at column, a blank before each word, its last one followed by end; no line
+ * becomes longer than the table. Returns the column after it. */
+static int fill(FILE *out, int column, const char *text, const char *end)
+{
+	while (*text) {
+		size_t length = strcspn(text, " ");
+		const char *next = text + length + strspn(text + length, " ");
+		const char *behind = *next ? "" : end;
+
+		if (column + 1 + (int)(length + strlen(behind)) > TEXT_WIDTH)
+			column = fprintf(out, "\n ") - 1;
+		column += fprintf(out, " %.*s%s", (int)length, text, behind);
+		text = next;
+	}
+	return column;
+}
+
+/* Names the channels of a flag that some have and others have not. */
+static void write_flagged(const struct report *report, unsigned flag, int column, FILE *out)
+{
+	const struct analysis *a = report->analysis;
+	size_t flagged = 0, named = 0;
+	char name[48];
+
+	for (size_t i = 0; i < a->channel_count; i++)
+		flagged += (a->channels[i].flags & flag) != 0;
+	if (flagged == a->channel_count)
+		return;
+	for (size_t i = 0; i < a->channel_count; i++) {
+		if (!(a->channels[i].flags & flag))
+			continue;
+		snprintf(name, sizeof(name), "%s%s", named++ ? "" : "(", report->record->channels[i].name);
+		column = fill(out, column, name, named == flagged ? ")" : ",");
+	}
+}
+
+static void write_flags(const struct report *report, FILE *out)
+{
+	for (unsigned flags = report_flags(report); flags; flags &= flags - 1) {
+		unsigned flag = flags & ~(flags - 1);
+		int column = fprintf(out, "  %s: %s", record_flag_name(flag), report_flag_words(flag));
+
+		write_flagged(report, flag, column, out);
+		fputc('\n', out);
+	}
+}
+
 static void write_head(const struct report *report, FILE *out)
 {
 	const struct record *r = report->record;
@@ -33,8 +80,7 @@ static void write_head(const struct report *report, FILE *out)
 		        report->scene->drop_angle_deg, report->scene->drop_height_m);
 	(void)report_verdict(report, verdict, sizeof(verdict));
 	fprintf(out, "%s\n", verdict);
-	for (unsigned flags = report_flags(report); flags; flags &= flags - 1)
-		fprintf(out, "  %s: %s\n", record_flag_name(flags), report_flag_words(flags & ~(flags - 1)));
+	write_flags(report, out);
 }
 
 static void write_processing(const struct report *report, FILE *out)
@@ -88,8 +134,11 @@ static void write_channels(const struct report *report, const struct report_zero
 		cell(out, 9, 3, (r->time_s - zero->time_s) * 1e3);
 		cell(out, 7, 1, r->sigma_time_s * 1e6);
 		fprintf(out, "  %s", estimate_status_name(r->how.status));
-		fprintf(out, r->axes_coincide ? ", X and Y peak together\n" : ", Y peaks %+.3f ms after X\n",
-		        r->axes_apart_s * 1e3);
+		if (isfinite(r->axes_apart_s))
+			fprintf(out,
+			        r->axes_coincide ? ", X and Y peak together" : ", Y peaks %+.3f ms after X",
+			        r->axes_apart_s * 1e3);
+		fputc('\n', out);
 	}
 	fprintf(out, "Time 0: %s. Width at 10 %% of the peak; dv from foot to foot.\n", zero->name);
 	if (report_video(report, zero, video, sizeof(video)))
@@ -135,7 +184,7 @@ static void write_plate(const struct estimate_ringdown *plate, FILE *out)
 	with_sigma(out, 2, plate->natural_frequency_hz, plate->sigma_natural_hz);
 	fprintf(out, " undamped,");
 	cell(out, 1, 2, plate->three_cycle_frequency_hz);
-	fprintf(out, " over three cycles\n  damping");
+	fprintf(out, " counted over three cycles\n  damping");
 	with_sigma(out, 4, plate->damping_ratio, plate->sigma_damping);
 	if (isfinite(plate->small_swing_hz)) {
 		fprintf(out, ";");
@@ -172,23 +221,6 @@ static void write_joint(const struct report *report, FILE *out)
 		write_plate(&a->plate, out);
 	if (a->has_rebound)
 		write_rebound(&a->rebound, out);
-}
-
-/* Writes text behind what ends at column, a blank before each word, its last one followed by end; no line
- * becomes longer than the table. Returns the column after it. */
-static int fill(FILE *out, int column, const char *text, const char *end)
-{
-	while (*text) {
-		size_t length = strcspn(text, " ");
-		const char *next = text + length + strspn(text + length, " ");
-		const char *behind = *next ? "" : end;
-
-		if (column + 1 + (int)(length + strlen(behind)) > TEXT_WIDTH)
-			column = fprintf(out, "\n ") - 1;
-		column += fprintf(out, " %.*s%s", (int)length, text, behind);
-		text = next;
-	}
-	return column;
 }
 
 /* "note: S1X peak, S2X peak: clipped; ..." for each flag. */
@@ -249,10 +281,11 @@ static void write_frames(const struct record *r, FILE *out)
 	    !r->gap_count)
 		return;
 	fprintf(out,
-	        "\nframes: %" PRIu64 " blocks held, %" PRIu64 " gaps, %" PRIu64 " resent, %" PRIu64
+	        "\nframes: %" PRIu64 " block%s held, %" PRIu64 " gap%s, %" PRIu64 " resent, %" PRIu64
 	        " repeated, "
 	        "%" PRIu64 " reordered, %" PRIu64 " corrupt, %" PRIu64 " conflicting\n",
-	        c->blocks, c->gaps, c->resent, c->repeated, c->reordered, c->corrupt, c->conflicting);
+	        c->blocks, report_plural(c->blocks), c->gaps, report_plural(c->gaps), c->resent, c->repeated,
+	        c->reordered, c->corrupt, c->conflicting);
 	for (size_t i = 0; i < r->gap_count && i < TEXT_GAPS_MAX; i++) {
 		fprintf(out, "  missing: S%u tick %" PRIu32, r->gaps[i].sensor, r->gaps[i].first_tick_ms);
 		if (r->gaps[i].last_tick_ms != r->gaps[i].first_tick_ms)

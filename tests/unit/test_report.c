@@ -279,7 +279,8 @@ static void test_json(void **state)
 	check_number(root, "model.predicted.lag_s", 0.0017);
 	check_number(root, "model.predicted.velocity_change_m_s", 6.28125);
 	check_number(root, "model.difference_percent.s1_resultant_g", 100.0 * (363.0 - 340.5) / 340.5);
-	check_number(root, "model.difference_percent.plate_frequency_hz", 100.0 * (121.0 - 129.37) / 129.37);
+	check_number(root, "model.difference_percent.plate_frequency_hz",
+	             100.0 * (121.0 - 128.125) / 128.125);
 	cJSON_Delete(root);
 }
 
@@ -610,12 +611,87 @@ static void test_verdicts(void **state)
 	check_has(line, "CORRUPT");
 	f->record.crc_known = false;
 	assert_false(report_verdict(&f->report, line, sizeof(line)));
-	check_has(line, "UNPROVEN");
+	assert_string_equal(line,
+	                    "UNPROVEN: ends at tick 61733 (0.500 s) without a capture end; nothing says "
+	                    "what the tower sent");
 	f->record.is_drop = false;
 	assert_true(report_verdict(&f->report, line, sizeof(line)));
 	f->record.lost_samples = 3;
 	assert_false(report_verdict(&f->report, line, sizeof(line)));
-	check_has(line, "3 samples lost");
+	assert_string_equal(line, "INCOMPLETE: 3 samples lost");
+	f->record.lost_samples = 1;
+	assert_false(report_verdict(&f->report, line, sizeof(line)));
+	assert_string_equal(line, "INCOMPLETE: 1 sample lost");
+}
+
+/* A log that was cut off says where, and counts one as one. */
+static void test_verdict_of_a_cut_log(void **state)
+{
+	struct fixture *f = *state;
+	char line[160], *text;
+
+	make_holes(f);
+	f->record.gaps[0].last_tick_ms = f->record.gaps[0].first_tick_ms;
+	f->record.lost_samples = 27;
+	f->record.crc_known = false;
+	f->record.counters.gaps = 1;
+	assert_false(report_verdict(&f->report, line, sizeof(line)));
+	assert_string_equal(line,
+	                    "INCOMPLETE: ends at tick 61733 (0.500 s) without a capture end; 27 samples "
+	                    "lost in 1 gap, 1 block");
+	text = print(&f->report);
+	check_has(text, "1000 blocks held, 1 gap, ");
+	free(text);
+}
+
+/* A flag that some channels have and others have not names those. */
+static void test_text_names_flagged_channels(void **state)
+{
+	struct fixture *f = *state;
+	char *text;
+
+	f->estimates[0].flags = f->estimates[3].flags = RECORD_FLAG_UNFILTERED;
+	for (size_t i = 0; i < CHANNELS; i++)
+		f->estimates[i].flags |= RECORD_FLAG_SHORT;
+	text = print(&f->report);
+	check_has(text,
+	          "  unfiltered: sampled too slowly for the low-pass asked for; left as it was (S1X, S2X)\n");
+	check_has(text, "has hardly a sample\n");
+	free(text);
+}
+
+/* One axis has no peak: nothing is said of the other's distance, and no "nan". */
+static void test_resultant_of_one_axis(void **state)
+{
+	struct fixture *f = *state;
+	cJSON *root;
+	char *text;
+
+	for (size_t i = 0; i < 2; i++) {
+		f->analysis.resultants[i].axes_coincide = false;
+		f->analysis.resultants[i].axes_apart_s = (double)NAN;
+	}
+	text = print(&f->report);
+	assert_null(strstr(text, "Y peaks"));
+	check_has(text, "S2 XY");
+	free(text);
+	root = parse(&f->report);
+	assert_true(cJSON_IsNull(item(root, "resultants.0.axes_apart_s")));
+	cJSON_Delete(root);
+}
+
+/* The model counts cycles: it is held against what was counted, or against the fit where nothing was. */
+static void test_frequency_against_model(void **state)
+{
+	struct fixture *f = *state;
+	char *text = print(&f->report);
+
+	check_has(text, "plate, 3 cycles   Hz     121.00     128.12        -       -5.6 %");
+	free(text);
+	f->analysis.plate.three_cycle_frequency_hz = (double)NAN;
+	text = print(&f->report);
+	check_has(text, "plate frequency   Hz     121.00     129.37     0.02       -6.5 %");
+	free(text);
 }
 
 static void test_video_frames(void **state)
@@ -809,6 +885,8 @@ static void test_html(void **state)
 	check_has(page, "+6.6 %");
 	check_has(page, "129.37 &plusmn; 0.02 Hz");
 	check_has(page, "because it is by hand");
+	check_has(page, "Y peaks 0.400 ms before X");
+	assert_null(strstr(page, "as the swing vanishes"));
 	free(page);
 }
 
@@ -818,11 +896,16 @@ static void test_html_of_holes(void **state)
 	char *page;
 
 	make_holes(f);
+	f->analysis.plate.small_swing_hz = 139.7;
+	f->analysis.resultants[1].axes_apart_s = (double)NAN;
 	page = make_page(&f->report);
 	check_self_contained(page);
 	check_has(page, "INCOMPLETE: 54 samples lost");
 	check_has(page, "<td>61338</td><td>61339</td><td>2</td>");
 	check_has(page, "samples missing");
+	check_has(page, "as the swing vanishes</td><td>139.70 Hz</td>");
+	check_has(page, "one axis has no peak");
+	assert_int_equal(count_of(page, "Y peaks "), 1);
 	check_has(page, "beyond the sensor's range");
 	free(page);
 }
@@ -927,6 +1010,10 @@ int main(void)
 	        TEST(test_processing),
 	        TEST(test_text_of_holes),
 	        TEST(test_verdicts),
+	        TEST(test_verdict_of_a_cut_log),
+	        TEST(test_text_names_flagged_channels),
+	        TEST(test_resultant_of_one_axis),
+	        TEST(test_frequency_against_model),
 	        TEST(test_video_frames),
 	        TEST(test_traces_keep_gaps_open),
 	        TEST(test_no_foreign_text_in_scripts),

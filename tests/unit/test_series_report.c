@@ -435,8 +435,10 @@ static void test_remarks_in_words(void **state)
 	assert_cell(page, "<h2>Peaks", "mean", 6, "640.8*");
 	assert_has(page, "the true value lies beyond what the sensor shows: <b>S2 X of drop 2</b>");
 	assert_has(page, "the true peak may be higher: <b>S2X of drop 2</b>");
-	assert_has(page, "the frequency follows the swing; the value is the mean of the first three cycles: "
-	                 "<b>plate frequency of all drops</b>");
+	assert_has(
+	        page,
+	        "the frequency follows the swing; the value is fitted, the mean of the first three cycles: "
+	        "<b>plate frequency of all drops</b>");
 	free(page);
 }
 
