@@ -35,6 +35,23 @@ static struct piece cut(struct piece *rest, char separator)
 	return piece;
 }
 
+static bool is_blank(char c)
+{
+	return c == ' ' || c == '\t';
+}
+
+/* Without the blanks around it. */
+static struct piece trim(struct piece piece)
+{
+	while (piece.length > 0 && is_blank(piece.text[piece.length - 1]))
+		piece.length--;
+	while (piece.length > 0 && is_blank(piece.text[0])) {
+		piece.text++;
+		piece.length--;
+	}
+	return piece;
+}
+
 /* Number in the file / divisor = s or g; 0 for an unknown unit. */
 static double unit_divisor(enum column_kind kind, struct piece unit)
 {
@@ -48,6 +65,8 @@ static double unit_divisor(enum column_kind kind, struct piece unit)
 	        {COLUMN_TIME, "us", 1e6},
 	        {COLUMN_CHANNEL, "g", 1},
 	        {COLUMN_CHANNEL, "m/s2", UNITS_G_M_S2},
+	        {COLUMN_CHANNEL, "m/s^2", UNITS_G_M_S2},
+	        {COLUMN_CHANNEL, "m/s\302\262", UNITS_G_M_S2}, /* a raised 2 in UTF-8 */
 	};
 
 	for (size_t i = 0; i < sizeof(table) / sizeof(table[0]); i++)
@@ -88,7 +107,7 @@ static int parse_rate(struct columns *columns, struct piece entry, struct piece 
 static int parse_entry(struct columns *columns, struct piece entry, char *message)
 {
 	struct column *column = &columns->column[columns->count];
-	struct piece rate = entry, unit = cut(&rate, '@'), name = cut(&unit, ':');
+	struct piece rate = entry, unit = cut(&rate, '@'), name = trim(cut(&unit, ':'));
 	double sign = 1;
 
 	*column = (struct column){.kind = COLUMN_SKIP};
@@ -99,12 +118,12 @@ static int parse_entry(struct columns *columns, struct piece entry, char *messag
 		              "name:unit with a name of 1 to 31 characters, or - to skip a column");
 	memcpy(column->name, name.text, name.length);
 	column->kind = COLUMN_CHANNEL;
+	unit = trim(unit);
 	if (strcmp(column->name, "time") == 0 && !columns->has_time)
 		column->kind = COLUMN_TIME;
 	if (column->kind == COLUMN_CHANNEL && unit.length > 0 && unit.text[0] == '-') {
 		sign = -1;
-		unit.text++;
-		unit.length--;
+		unit = trim((struct piece){unit.text + 1, unit.length - 1});
 	}
 	column->divisor = sign * unit_divisor(column->kind, unit);
 	if (column->divisor == 0)
@@ -114,7 +133,7 @@ static int parse_entry(struct columns *columns, struct piece entry, char *messag
 		return refuse(message, entry, "every name once");
 	columns->has_time |= column->kind == COLUMN_TIME;
 	columns->channels += column->kind == COLUMN_CHANNEL;
-	return rate.text ? parse_rate(columns, entry, rate, message) : 0;
+	return rate.text ? parse_rate(columns, entry, trim(rate), message) : 0;
 }
 
 int columns_parse(struct columns *columns, const char *text, char message[READ_MESSAGE_MAX])
@@ -123,7 +142,7 @@ int columns_parse(struct columns *columns, const char *text, char message[READ_M
 	struct columns parsed = {.count = 0};
 
 	while (rest.text) {
-		struct piece entry = cut(&rest, ',');
+		struct piece entry = trim(cut(&rest, ','));
 		int error;
 
 		if (parsed.count == COLUMNS_MAX)

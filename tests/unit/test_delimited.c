@@ -112,6 +112,33 @@ static void test_units_and_signs(void **state)
 	record_free(&record);
 }
 
+static void test_blanks_around_entries(void **state)
+{
+	static const double values[] = {-1, -2 / 9.81, -3, 4.905 / 9.81};
+	static const char *const columns[] = {
+	        " time : ms,\tup : -g , side:m/s2, - ",
+	        "time:ms, up:- g, side:m/s^2,-",
+	        "time:ms,up :-g,side: m/s\302\262 , -\t",
+	};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(columns) / sizeof(columns[0]); i++) {
+		struct record record = expect("0 1 -2 x\n0.25 3 4.905 y\n", columns[i], 2, values);
+
+		assert_int_equal(record.channel_count, 2);
+		assert_string_equal(record.channels[0].name, "up");
+		assert_string_equal(record.channels[1].name, "side");
+		assert_near(record.channels[0].rate_hz, 4000, 1e-9);
+		record_free(&record);
+	}
+	{
+		struct record record = expect("-1 2\n-3 -4.905\n", "up:g @ 10, side: -m/s^2", 2, values);
+
+		assert_true(record.channels[1].rate_hz == 10);
+		record_free(&record);
+	}
+}
+
 static void test_headers(void **state)
 {
 	static const double values[] = {1, 2, 3, 4};
@@ -231,6 +258,9 @@ static void test_refused_columns(void **state)
 	        {"time:s,a:g@5", "--columns: \"time:s,a:g@5\", expected a time column or a rate"},
 	        {"a name that is longer than there is room for:g", "--columns: \"a name"},
 	        {"a\tb:g", "--columns: \"a\tb:g\", expected name:unit"},
+	        {"time:s, ,a:g", "--columns: \"\", expected name:unit"},
+	        {"time:s, :g", "--columns: \":g\", expected name:unit"},
+	        {" time:ms,a:m/s^3", "--columns: \"a:m/s^3\", expected unit g"},
 	};
 
 	(void)state;
@@ -427,13 +457,21 @@ static void test_real_phones(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(test_separators),      cmocka_unit_test(test_units_and_signs),
-	        cmocka_unit_test(test_headers),         cmocka_unit_test(test_cells_that_are_no_numbers),
-	        cmocka_unit_test(test_uneven_times),    cmocka_unit_test(test_refused_texts),
-	        cmocka_unit_test(test_refused_columns), cmocka_unit_test(test_too_many_columns),
-	        cmocka_unit_test(test_labview),         cmocka_unit_test(test_damage),
-	        cmocka_unit_test(test_real_shocks),     cmocka_unit_test(test_real_impacts),
-	        cmocka_unit_test(test_real_labview),    cmocka_unit_test(test_real_phones),
+	        cmocka_unit_test(test_separators),
+	        cmocka_unit_test(test_units_and_signs),
+	        cmocka_unit_test(test_blanks_around_entries),
+	        cmocka_unit_test(test_headers),
+	        cmocka_unit_test(test_cells_that_are_no_numbers),
+	        cmocka_unit_test(test_uneven_times),
+	        cmocka_unit_test(test_refused_texts),
+	        cmocka_unit_test(test_refused_columns),
+	        cmocka_unit_test(test_too_many_columns),
+	        cmocka_unit_test(test_labview),
+	        cmocka_unit_test(test_damage),
+	        cmocka_unit_test(test_real_shocks),
+	        cmocka_unit_test(test_real_impacts),
+	        cmocka_unit_test(test_real_labview),
+	        cmocka_unit_test(test_real_phones),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
