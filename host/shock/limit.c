@@ -78,19 +78,18 @@ static int read_points(struct limit_curve *curve, const struct source *source, e
 	bool first = true;
 
 	while (source_next_line(source, &line)) {
-		double number[NUMBERS_MAX] = {0};
+		double number[NUMBERS_MAX] = {NAN};
 		struct limit_point point;
 		const char *why;
-		bool numbers;
+		bool numbers, header;
 		size_t words = split(&line, number, &numbers);
 
 		if (words == 0 || line.text[0] == '#')
 			continue;
-		if (first && !numbers && words == columns) {
-			first = false;
-			continue;
-		}
+		header = first && isnan(number[0]);
 		first = false;
+		if (header)
+			continue;
 		if (words != columns || !numbers)
 			return source_refuse(message, DT_E_FORMAT, source->file, line.number,
 			                     "not a point of the curve, expected the %zu numbers %s", columns,

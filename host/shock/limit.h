@@ -9,9 +9,10 @@
  *     5,20                              0,-5,50
  *     100,400                           0.0015,420,520
  *
- * The first line may name the columns, lines that begin with # and empty ones are skipped; separators are
- * commas, semicolons, tabs and blanks. Frequencies and times must increase. Between its points a limit curve
- * is straight on double logarithmic paper, a band on plain. Beyond its ends neither says anything.
+ * The first line may name the columns, in any words: it does when it begins with no number. Lines that begin
+ * with # and empty ones are skipped; separators are commas, semicolons, tabs and blanks. Frequencies and
+ * times must increase. Between its points a limit curve is straight on double logarithmic paper, a band on
+ * plain. Beyond its ends neither says anything.
  *
  * A curve belongs to its owner: limit_read, limit_free. Errors are told in one line, "FILE:LINE: ...".
  */

@@ -81,6 +81,17 @@ static void reading(void **state)
 	assert_near(curve.point[0].lower, -5, 0);
 	assert_near(curve.point[1].upper, 50.5, 0);
 	limit_free(&curve);
+	curve = made(LIMIT_SPECTRUM, "Frequency (Hz),Limit (g)\n10,20\n100,200\n");
+	assert_int_equal(curve.count, 2);
+	assert_near(curve.point[0].x, 10, 0);
+	limit_free(&curve);
+	curve = made(LIMIT_BAND, "# by hand\n\"t in s\";lower;upper limit\n0;-5;5\n1;-5;6\n");
+	assert_int_equal(curve.count, 2);
+	assert_near(curve.point[1].upper, 6, 0);
+	limit_free(&curve);
+	refuses(LIMIT_SPECTRUM, "10,high\n20,30\n30,40\n", ":1:", "2 numbers");
+	refuses(LIMIT_SPECTRUM, "10,20,g\n20,30\n30,40\n", ":1:", "2 numbers");
+	refuses(LIMIT_SPECTRUM, "Frequency (Hz),Limit (g)\nHz,g\n10,20\n", ":2:", "2 numbers");
 	refuses(LIMIT_SPECTRUM, "", ":", "empty");
 	refuses(LIMIT_SPECTRUM, "10,20\n", ":", "1 points");
 	refuses(LIMIT_SPECTRUM, "10,20\n5,20\n", ":2:", "increase");
