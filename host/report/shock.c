@@ -86,7 +86,7 @@ static void write_events(const struct events *events, double zero_s, FILE *out)
 	fprintf(out, "\n%zu shock%s, largest first", events->found, events->found == 1 ? "" : "s");
 	if (events->found > events->count)
 		fprintf(out, ", of which %zu", events->count);
-	fputc('\n', out);
+	fputs(", of the samples as they are: neither filtered nor fitted\n", out);
 	if (events->count > 0)
 		fprintf(out, "%4s %-12s %12s %10s %9s %9s\n", "", "of", "at ms", "peak g", "width ms",
 		        "dv m/s");
