@@ -206,12 +206,12 @@ static const struct column {
 };
 enum { COLUMNS = sizeof(columns) / sizeof(columns[0]) };
 
-static void put_cell(FILE *out, double value, const struct column *column, char mark)
+static void put_cell(FILE *out, double value, int decimals, char mark)
 {
 	if (isnan(value))
 		fprintf(out, "%8s ", "-");
 	else
-		fprintf(out, "%8.*f%c", column->decimals, value * column->scale, mark);
+		fprintf(out, "%8.*f%c", decimals, value, mark);
 }
 
 static int drop_text(void *context, const struct archive_drop *drop)
@@ -235,7 +235,8 @@ static int drop_text(void *context, const struct archive_drop *drop)
 	for (int i = 0; i < COLUMNS; i++) {
 		bool not_ok = (drop->not_ok >> columns[i].value & 1u) != 0;
 
-		put_cell(p->out, drop->value[columns[i].value], &columns[i], not_ok ? '*' : ' ');
+		put_cell(p->out, drop->value[columns[i].value] * columns[i].scale, columns[i].decimals,
+		         not_ok ? '*' : ' ');
 		p->marked |= not_ok && !isnan(drop->value[columns[i].value]);
 	}
 	if (strcmp(drop->state, "missing") == 0)
@@ -254,10 +255,12 @@ static void total_text(const struct print *p)
 
 	fprintf(out, "\n%-49s", "mean");
 	for (int i = 0; i < COLUMNS; i++)
-		put_cell(out, p->total.value[columns[i].value].mean, &columns[i], ' ');
+		put_cell(out, p->total.value[columns[i].value].mean * columns[i].scale, columns[i].decimals,
+		         ' ');
 	fprintf(out, "\n%-49s", "SD");
 	for (int i = 0; i < COLUMNS; i++)
-		put_cell(out, p->total.value[columns[i].value].sd, &columns[i], ' ');
+		put_cell(out, p->total.value[columns[i].value].sd * columns[i].scale, columns[i].decimals + 1,
+		         ' ');
 	fprintf(out, "\n%-49s", p->undecided ? "n, accepted and undecided" : "n, accepted");
 	for (int i = 0; i < COLUMNS; i++)
 		fprintf(out, "%8u ", p->total.value[columns[i].value].n);

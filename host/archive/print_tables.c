@@ -149,6 +149,7 @@ static void number_text(FILE *out, double value, int width, int decimals)
 		fprintf(out, "%*.*f", width, decimals, value);
 }
 
+/* A row of means, and one of SDs with a decimal more: they are small against their means. */
 static void cell_text(FILE *out, const struct archive_cell *cell)
 {
 	char n[16];
@@ -162,10 +163,10 @@ static void cell_text(FILE *out, const struct archive_cell *cell)
 	snprintf(n, sizeof(n), "n=%u", cell->drops);
 	fprintf(out, "\n%5s  SD  ", n);
 	for (int k = 0; k < 2 * AXES; k++)
-		number_text(out, mean_of(cell, k / AXES, k % AXES)->sd, 9, 1);
-	number_text(out, cell->value[ARCHIVE_LAG].sd * 1000, 9, 2);
-	number_text(out, cell->value[ARCHIVE_FREQUENCY].sd, 9, 1);
-	number_text(out, cell->value[ARCHIVE_DAMPING].sd, 9, 3);
+		number_text(out, mean_of(cell, k / AXES, k % AXES)->sd, 9, 2);
+	number_text(out, cell->value[ARCHIVE_LAG].sd * 1000, 9, 3);
+	number_text(out, cell->value[ARCHIVE_FREQUENCY].sd, 9, 2);
+	number_text(out, cell->value[ARCHIVE_DAMPING].sd, 9, 4);
 	fputc('\n', out);
 }
 
