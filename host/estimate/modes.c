@@ -12,6 +12,8 @@
 /* Damping beyond this part of the angular frequency is no swing. */
 #define DECAY_MAX 3.0
 
+enum { MEAN_ROUNDS = 6 }; /* each leaves a few hundredths of what the time of a law's cycles is off by */
+
 unsigned modes_size(const struct modes *modes)
 {
 	return 1 + MODES_EACH * modes->count + (unsigned)modes->law + (modes->hum_hz > 0 ? 2 : 0);
@@ -203,11 +205,13 @@ unsigned modes_stronger(const struct modes *modes)
 
 double modes_mean_hz(const struct modes *modes, unsigned cycles)
 {
-	double decay = modes->p[MODES_DECAY], omega = modes->p[MODES_OMEGA], span, turned;
+	double decay = modes->p[MODES_DECAY], omega = modes->p[MODES_OMEGA];
+	double turns = 2 * UNITS_PI * cycles, span = turns / omega;
 
 	if (modes->law == MODES_LAW_SPRING)
 		return spring_mean_hz(modes->p, cycles);
-	span = 2 * UNITS_PI * cycles / omega;
-	turned = omega * span + modes->p[MODES_LAW] * (1 - exp(-2 * decay * span)) / (2 * decay);
-	return turned / (2 * UNITS_PI * span);
+	for (int i = 0; i < MEAN_ROUNDS; i++)
+		span *= turns /
+		        (omega * span + modes->p[MODES_LAW] * (1 - exp(-2 * decay * span)) / (2 * decay));
+	return cycles / span;
 }

@@ -88,19 +88,58 @@ static double spread(const struct ringdown_job *job, unsigned m, double by_decay
 	             hypot(by_decay * job->doubt_decay, by_omega * job->doubt_omega));
 }
 
+/* What a law's mean has instead of the vanishing swing's. */
+enum { MEAN_HZ, MEAN_NATURAL, MEAN_DAMPING, MEAN_VALUES };
+
+/* Of a difference for a derivative: this part of the unknown, and a little for one that is none. */
+#define DIFFERENCE 1e-5
+#define DIFFERENCE_LEAST 1e-9
+
+static void mean_values(const struct modes *modes, double value[MEAN_VALUES])
+{
+	const double *p = modes->p;
+
+	value[MEAN_HZ] = modes_mean_hz(modes, MEAN_CYCLES);
+	value[MEAN_NATURAL] = value[MEAN_HZ] * hypot(1, p[MODES_DECAY] / p[MODES_OMEGA]);
+	value[MEAN_DAMPING] = p[MODES_DECAY] / (2 * UNITS_PI * value[MEAN_NATURAL]);
+}
+
+/* The vanishing swing is extrapolated; a mean of cycles that are there is far more certain. */
+static void mean_sigmas(const struct ringdown_job *job, double sigma[MEAN_VALUES])
+{
+	double row[MEAN_VALUES][CHOLESKY_MAX] = {{0}}, point = ringdown_sigma_point(job, &job->modes);
+
+	for (unsigned i = 0; i < modes_size(&job->modes); i++) {
+		struct modes above = job->modes, below = job->modes;
+		double high[MEAN_VALUES], low[MEAN_VALUES];
+		double step = DIFFERENCE * fabs(job->modes.p[i]) + DIFFERENCE_LEAST;
+
+		above.p[i] += step;
+		below.p[i] -= step;
+		mean_values(&above, high);
+		mean_values(&below, low);
+		for (unsigned v = 0; v < MEAN_VALUES; v++)
+			row[v][i] = (high[v] - low[v]) / (2 * step);
+	}
+	for (unsigned v = 0; v < MEAN_VALUES; v++)
+		sigma[v] = point * sqrt(cholesky_variance(&job->modes.fit.factor, row[v]));
+}
+
 /* A frequency that follows the swing has a value only for a swing: that of the first three cycles, as the
  * study counts them. */
 static void express_mean(const struct ringdown_job *job, struct estimate_ringdown *result)
 {
-	double share = modes_mean_hz(&job->modes, MEAN_CYCLES) / result->frequency_hz;
+	double value[MEAN_VALUES], sigma[MEAN_VALUES];
 
+	mean_values(&job->modes, value);
+	mean_sigmas(job, sigma);
 	result->small_swing_hz = result->frequency_hz;
-	result->frequency_hz *= share;
-	result->sigma_hz *= share;
-	result->natural_frequency_hz *= share;
-	result->sigma_natural_hz *= share;
-	result->damping_ratio /= share;
-	result->sigma_damping /= share;
+	result->frequency_hz = value[MEAN_HZ];
+	result->sigma_hz = sigma[MEAN_HZ];
+	result->natural_frequency_hz = value[MEAN_NATURAL];
+	result->sigma_natural_hz = sigma[MEAN_NATURAL];
+	result->damping_ratio = value[MEAN_DAMPING];
+	result->sigma_damping = sigma[MEAN_DAMPING];
 }
 
 /* Values and uncertainties of the stronger mode, and the other's values. */

@@ -19,8 +19,11 @@
 #define B_MIN -0.9
 #define B_MAX 10.0
 
-/* Of spring_at's steps. */
+/* Of spring_at's steps and those of the first cycles. These are as good as done this near, in rad, and would
+ * take no spring this many times as long as a small swing. */
 #define STEPS_PER_CYCLE 64.0
+#define ANGLE_NEAR 1e-12
+#define SLOWEST 10.0
 
 enum { PLACE_Q = MODES_LAW, PLACE_B = MODES_LAW + 1, PAIRS = (SPRING_SIZE + 1) / 2 };
 
@@ -86,22 +89,29 @@ double spring_softness(const double *p)
 	return (1 + p[PLACE_B] / (1 + p[PLACE_Q] * swing)) / (1 + p[PLACE_B]);
 }
 
+/* The angle from one state to the next. */
+static double turned(const struct state *from, const struct state *to)
+{
+	return atan2(from->v * to->x - from->x * to->v, from->x * to->x + from->v * to->v);
+}
+
 double spring_mean_hz(const double *p, unsigned cycles)
 {
-	double q = p[PLACE_Q] * (p[MODES_COSINE] * p[MODES_COSINE] + p[MODES_SINE] * p[MODES_SINE]);
-	double decay = p[MODES_DECAY], natural2 = p[MODES_OMEGA] * p[MODES_OMEGA] + decay * decay, time = 0;
+	const double turns = 2 * UNITS_PI * cycles, longest = 2 * UNITS_PI / STEPS_PER_CYCLE;
+	const unsigned most = (unsigned)(SLOWEST * STEPS_PER_CYCLE) * cycles;
+	struct spring s = spring_of(p);
+	double left = turns, time = 0;
 
-	for (unsigned i = 0; i < cycles; i++) {
-		/* As large as the swing is in the middle of the cycle, near enough. */
-		double half = exp(-decay * UNITS_PI / p[MODES_OMEGA]), middle = q * half * half;
-		double felt = middle > 1e-6 ? 2 / middle * (1 - 1 / sqrt(1 + middle)) : 1;
-		double omega2 = natural2 * (1 + p[PLACE_B] * felt) / (1 + p[PLACE_B]) - decay * decay;
-		double cycle = 2 * UNITS_PI / sqrt(omega2);
+	/* What is left is a step too far or too short, each time a smaller one. */
+	for (unsigned i = 0; i < most && fabs(left) > ANGLE_NEAR; i++) {
+		const struct state before = s.at;
+		double step = fmin(longest, left);
 
-		time += cycle;
-		q *= exp(-2 * decay * cycle);
+		spring_step(&s, step);
+		time += step;
+		left -= turned(&before, &s.at);
 	}
-	return cycles / time;
+	return cycles * s.omega0 / time;
 }
 
 static bool possible(const double *p)

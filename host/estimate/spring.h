@@ -24,8 +24,7 @@ size_t spring_normal(const struct series *series, const double *p, double normal
 /* The acceleration at time_s. */
 double spring_at(const double *p, double time_s);
 
-/* Mean damped frequency over that many cycles from time 0 on, by the stiffness that a sinusoid of the swing
- * feels (describing function). */
+/* Mean damped frequency over that many cycles from time 0 on: turns of deflection and speed, integrated. */
 double spring_mean_hz(const double *p, unsigned cycles);
 
 /* Stiffness at the swing of time 0 over that of a small one. */
