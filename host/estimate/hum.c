@@ -11,6 +11,7 @@ enum {
 	BLOCK_SAMPLES_MIN = 4,
 	DRIFT_BLOCKS_MIN = 20,
 	HUM_BLOCKS_MIN = 40,
+	SHORT_BLOCKS = 40, /* of a quiet part that is too short for blocks of a length, at most */
 };
 
 /* Once in a million quiet records: F of two, and of one more unknown. */
@@ -41,6 +42,9 @@ enum { TONE_HALVINGS = 14 };
 
 /* The means may scatter by this much more, in squares, than the samples' noise asks. */
 #define COLOUR_MAX 3.0
+
+/* Means of few short blocks may scatter by so many standard deviations of their own scatter. */
+#define SHORT_SIGN 6.0
 
 /* Adds up the normal equations, means taken from that of the first block on. */
 static void add_blocks(struct hum_line *line, const struct quiet *quiet, double half_s, struct gram *gram)
@@ -312,6 +316,29 @@ static double find_tones(struct hum_line *best, const struct quiet *quiet, doubl
 	return variance;
 }
 
+/* Whether short blocks differ by more than what scatters within them: a part too short for a line still tells
+ * whether it is noise. */
+static bool short_coloured(const struct quiet *quiet, double about, double reach)
+{
+	size_t samples = quiet->until - quiet->from, length = (samples + SHORT_BLOCKS - 1) / SHORT_BLOCKS;
+	double between = 0, within, count, blocks = 0, limit;
+	struct quiet_moments moments;
+	struct quiet fine = *quiet;
+
+	fine.length = length > BLOCK_SAMPLES_MIN ? length : BLOCK_SAMPLES_MIN;
+	moments = quiet_take(&fine, about, reach);
+	for (size_t i = 0; i < fine.count; i++) {
+		between += fine.block[i].weight * pow(fine.block[i].mean - moments.mean, 2);
+		blocks += fine.block[i].weight > 0;
+	}
+	count = (double)moments.count;
+	if (blocks < 2 || count < blocks + 2)
+		return false;
+	within = (moments.deviation * moments.deviation * (count - 1) - between) / (count - blocks);
+	limit = 1 + SHORT_SIGN * sqrt(2 / (blocks - 1) + 2 / (count - blocks));
+	return between / (blocks - 1) > fmax(fmax(COLOUR_MAX, limit) * within, LEAST_G * LEAST_G);
+}
+
 struct hum_line hum_find(struct quiet *quiet, double half_s, const struct quiet_moments *moments,
                          double reach)
 {
@@ -320,7 +347,11 @@ struct hum_line hum_find(struct quiet *quiet, double half_s, const struct quiet_
 	size_t count = quiet->count;
 	double variance = moments->deviation * moments->deviation;
 
-	if (quiet->length < BLOCK_SAMPLES_MIN || count < DRIFT_BLOCKS_MIN || !fit_line(&best, quiet, half_s))
+	if (quiet->length < BLOCK_SAMPLES_MIN || count < DRIFT_BLOCKS_MIN) {
+		quiet->doubtful = short_coloured(quiet, moments->mean, reach);
+		return none;
+	}
+	if (!fit_line(&best, quiet, half_s))
 		return none;
 	start = best;
 	for (unsigned i = 0; count >= HUM_BLOCKS_MIN && left(&start, count) > HUM_SIGN * variance && i < 2;

@@ -4,7 +4,8 @@
 /*
  * What moves zero: drift and hum, by least squares over the block means of the quiet part (quiet.h), each by
  * an F-test, and only where what is left is as white as the samples' noise asks. Drift needs 20 blocks, hum
- * 40, both at least four samples to the block.
+ * 40, both at least four samples to the block. A part that has fewer is only tested: doubtful where the means
+ * of up to 40 short blocks scatter by far more than what is within them.
  *
  * Hum is 50 or 60 Hz where that explains it. Where the means still scatter by more than chance, mains get
  * their true frequency, and up to three tones of any are added, from 15 Hz and three cycles on to what the

@@ -60,12 +60,39 @@ static size_t largest(const struct trace *trace, double middle_g)
 	return at;
 }
 
+/* Whether the first samples lie within level_g of 0. */
+static bool starts_at_rest(const struct trace *trace, double level_g)
+{
+	bool rest = trace->count > QUIET_SAMPLES_MIN;
+
+	for (size_t k = 0; rest && k < QUIET_SAMPLES_MIN; k++)
+		rest = !trace_good(trace, k) || fabs(trace->value_g[k]) < level_g;
+	return rest;
+}
+
+/* The largest sample about the middle, whose place is returned. What is in motion for the most part has no
+ * zero in its middle, but where it begins if that is at rest. */
+static double find_peak(const struct trace *trace, size_t *peak)
+{
+	double sigma = 0, middle = quiet_glance(trace, 0, trace->count, &sigma), level;
+
+	*peak = largest(trace, middle);
+	if (*peak == trace->count)
+		return middle;
+	level = RISE_LEVEL * fabs(trace->value_g[*peak] - middle);
+	if (sigma > level && starts_at_rest(trace, level)) {
+		middle = quiet_glance(trace, 0, QUIET_SAMPLES_MIN, NULL);
+		*peak = largest(trace, middle);
+	}
+	return middle;
+}
+
 void quiet_find(const struct trace *trace, size_t *from, size_t *until)
 {
-	double middle = quiet_glance(trace, 0, trace->count, NULL), quiet = floor(QUIET_S * trace->rate_hz),
-	       level;
-	size_t peak = largest(trace, middle), k = peak, rise;
+	size_t peak, k, rise;
+	double middle = find_peak(trace, &peak), quiet = floor(QUIET_S * trace->rate_hz), level;
 
+	k = peak;
 	*from = 0;
 	*until = (double)trace->count > quiet ? (size_t)quiet : trace->count;
 	if (peak == trace->count)

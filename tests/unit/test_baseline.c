@@ -213,6 +213,69 @@ static void motion(void **state)
 	synth_free(&channel);
 }
 
+/* A quiet part too short for drift or hum, or of too few samples: hum makes its zero unsure, noise does not.
+ */
+static void short_quiet(void **state)
+{
+	static const struct {
+		double rate_hz, quiet_s;
+		int hummed; /* at least, of 200 */
+	} table[] = {{10000, 0.007, 150}, {10000, 0.009, 190}, {10000, 0.012, 200}, {7000, 0.02, 200},
+	             {10000, 0.03, 200},  {100000, 0.01, 200}, {1000, 0.1, 200},    {500, 0.1, 120}};
+	struct synth_random random = {45};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(table) / sizeof(table[0]); i++) {
+		double rate = table[i].rate_hz, from = ONSET_S - table[i].quiet_s;
+		struct channel channel = synth_channel("a", rate, from, (size_t)(rate * 0.15));
+		int white = 0, hummed = 0;
+
+		for (int run = 0; run < 1200; run++) {
+			struct under u = {.offset_g = 1, .noise_g = 0.3};
+			double phase = 2 * PI * synth_uniform(&random);
+			struct trace trace;
+			bool unsure;
+
+			fill(&channel, &u, &random);
+			for (size_t k = 0; run >= 1000 && k < channel.count; k++)
+				channel.value_g[k] += 5 * sin(2 * PI * 50 * (double)k / rate + phase);
+			(void)find(&channel, &trace);
+			unsure = trace.flags & RECORD_FLAG_ZERO_UNSURE;
+			white += run < 1000 && unsure;
+			hummed += run >= 1000 && unsure;
+			trace_close(&trace);
+		}
+		printf("%g Hz, %g ms: unsure in %d of 1000 with noise, %d of 200 with hum\n", rate,
+		       1e3 * table[i].quiet_s, white, hummed);
+		assert_true(white <= 10 && hummed >= table[i].hummed);
+		synth_free(&channel);
+	}
+}
+
+/* A record of little else than motion: zero is where it begins, unless it begins within. */
+static void mostly_motion(void **state)
+{
+	struct channel channel = synth_channel("a", 1e5, 0, 1400);
+	struct estimate_baseline b;
+	struct trace trace;
+
+	(void)state;
+	for (int within = 0; within < 2; within++) {
+		for (size_t k = 0; k < channel.count; k++) {
+			double t = (double)k * 1e-5 - (within ? -2e-3 : 2e-3);
+
+			channel.value_g[k] = t < 0 ? 0 : 390 * exp(-80 * t) * sin(2 * PI * 129 * t);
+		}
+		b = find(&channel, &trace);
+		assert_int_equal(b.samples, within ? 0 : 36);
+		assert_near(b.offset_g, 0, 1e-9);
+		if (!within)
+			assert_near(b.noise_g, 0, 1e-9);
+		trace_close(&trace);
+	}
+	synth_free(&channel);
+}
+
 /* Spikes and lost samples in the quiet part: neither moves zero nor widens the noise. */
 static void robust(void **state)
 {
@@ -385,7 +448,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(offset_and_noise), cmocka_unit_test(no_ghosts),
 	        cmocka_unit_test(drift_and_hum),    cmocka_unit_test(hum_in_noise),
-	        cmocka_unit_test(motion),           cmocka_unit_test(robust),
+	        cmocka_unit_test(motion),           cmocka_unit_test(short_quiet),
+	        cmocka_unit_test(mostly_motion),    cmocka_unit_test(robust),
 	        cmocka_unit_test(other_hum),        cmocka_unit_test(earlier_shock),
 	        cmocka_unit_test(without_quiet),    cmocka_unit_test(holds),
 	};
