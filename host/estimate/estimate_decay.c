@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "host/estimate/bump.h"
+#include "host/estimate/rebound.h"
 
 /* The force fades slowly beyond the pulse's 10 % point: the decay is surely free this part of a width later,
  * and may have been for this part of a width. */
@@ -15,10 +16,6 @@
  * force's less exactly. */
 #define PEAK_SURE 8.0
 #define BUMP_TAIL_WIDTHS 0.5
-
-/* The next contact is where the case reads this part of its peak again, and so much noise at least. */
-#define NEXT_CONTACT_LEVEL 0.3
-#define NEXT_CONTACT_NOISE 6.0
 
 /* A plate rings when its decay starts at this part of its peak or more, and, where the case rings too, at
  * this many times the case's. */
@@ -104,9 +101,8 @@ static void look_at_contact(const struct desk *desk, const struct analysis *anal
 	*span = (struct ringdown_span){.from_s = NAN, .until_s = INFINITY};
 	if (!doubtful(desk, analysis, i) || !window_by_bump(trace, span))
 		window_by_pulse(&hit->pulse, span);
-	contact->again_s = next_contact(
-	        trace, span->from_s + span->margin_s / MARGIN_WIDTHS,
-	        fmax(NEXT_CONTACT_LEVEL * fabs(hit->peak.value_g), NEXT_CONTACT_NOISE * trace->noise_g));
+	contact->again_s = next_contact(trace, span->from_s + span->margin_s / MARGIN_WIDTHS,
+	                                rebound_again_g(trace, hit->peak.value_g));
 }
 
 /* contact is what the channels before had; mostly it is the same one. */

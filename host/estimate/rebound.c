@@ -19,6 +19,14 @@
 
 #define SIGMAS 3.0
 
+#define AGAIN_LEVEL 0.3
+#define AGAIN_NOISE 6.0
+
+double rebound_again_g(const struct trace *trace, double peak_g)
+{
+	return fmax(AGAIN_LEVEL * fabs(peak_g), AGAIN_NOISE * trace->noise_g);
+}
+
 static bool measured(const struct rebound_axes *axes, unsigned i)
 {
 	return isfinite(axes->pulse[i]->velocity_change_m_s);
@@ -60,7 +68,7 @@ static void by_velocity(const struct rebound_axes *axes, double speed_m_s, struc
 static bool second_impact(const struct rebound_axes *axes, unsigned strong, double *impact_s, double *sigma_s)
 {
 	const struct estimate_pulse *first = axes->pulse[strong];
-	double level = REBOUND_AGAIN * fabs(axes->peak[strong]->result.value_g);
+	const double peak = axes->peak[strong]->result.value_g;
 
 	*impact_s = INFINITY;
 	for (unsigned i = 0; i < axes->count; i++) {
@@ -68,8 +76,7 @@ static bool second_impact(const struct rebound_axes *axes, unsigned strong, doub
 		double edge;
 		size_t k = trace_index(trace, first->end_s + first->duration_s), top;
 
-		while (k < trace->count && !(trace_good(trace, k) && fabs(trace->value_g[k]) > level))
-			k++;
+		k = trace_reaches(trace, k, trace->count, rebound_again_g(trace, peak));
 		if (k == trace->count)
 			continue;
 		for (top = k;

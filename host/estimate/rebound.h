@@ -10,13 +10,12 @@
  *              record has it: a clock is far better than a gain, as long as the product comes back to the
  *              height it left, on the corner it left with.
  *
- * The second impact is where the case reads REBOUND_AGAIN of its peak again. Status: short without a velocity
- * change, clipped when an axis is; ambiguous when the two differ by more than REBOUND_APART and by more than
- * three sigma.
+ * The second impact is where the case reads as much again as rebound_again_g says. Status: short without a
+ * velocity change, clipped when an axis is; ambiguous when the two differ by more than REBOUND_APART and by
+ * more than three sigma.
  */
 #include "host/estimate/peak.h"
 
-#define REBOUND_AGAIN 0.3
 #define REBOUND_APART 0.1
 
 enum { REBOUND_AXES = 3 };
@@ -28,6 +27,10 @@ struct rebound_axes {
 	const struct peak *peak[REBOUND_AXES];
 	const struct estimate_pulse *pulse[REBOUND_AXES];
 };
+
+/* What a channel reads when it is hit again, at least: this part of the first peak, peak_g, and so much noise
+ * that chance does not in a whole record. */
+double rebound_again_g(const struct trace *trace, double peak_g);
 
 /* impact_speed_m_s must be positive. */
 void rebound_find(const struct rebound_axes *axes, double impact_speed_m_s, struct estimate_rebound *rebound);
