@@ -161,6 +161,5 @@ void baseline_remove(struct trace *trace, const struct estimate_baseline *baseli
 	if (baseline->hum_g > 0)
 		trace->flags |= RECORD_FLAG_HUM;
 	trace->noise_g = baseline->noise_g;
-	trace->hum_g = baseline->hum_g;
 	trace->hum_hz = baseline->hum_hz;
 }

@@ -31,7 +31,8 @@ void baseline_find(const struct trace *trace, double *scratch, struct estimate_b
  * quiet part is the same and none of it is marked. */
 bool baseline_holds(const struct trace *trace, const struct estimate_baseline *baseline);
 
-/* Takes offset, drift and hum off every sample (zero.h), flags them, and notes noise and hum in the trace. */
+/* Takes offset, drift and hum off every sample (zero.h), flags them, and notes noise and the hum's frequency
+ * in the trace. */
 void baseline_remove(struct trace *trace, const struct estimate_baseline *baseline);
 
 #endif

@@ -7,6 +7,9 @@
  */
 #include <stddef.h>
 
+/* A Gaussian's standard deviation over its median absolute deviation. */
+#define MAD_TO_SIGMA 1.482602218505602
+
 double median_find(double *value, size_t n);
 
 #endif

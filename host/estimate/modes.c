@@ -95,10 +95,11 @@ static struct lm_problem make_problem(const struct modes *modes, const struct mo
 	return made;
 }
 
+/* Without a law: the offset, a mode's cosine and sine, the hum's. */
 static bool is_linear(const struct modes *modes, unsigned i)
 {
 	if (i == MODES_OFFSET || i > MODES_EACH * modes->count)
-		return modes->law == MODES_LAW_NONE || i == MODES_OFFSET;
+		return true;
 	return (i - MODES_DECAY) % MODES_EACH >= MODES_COSINE - MODES_DECAY;
 }
 

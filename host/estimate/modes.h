@@ -45,8 +45,8 @@ struct modes {
 /* Unknowns of that shape. */
 unsigned modes_size(const struct modes *modes);
 
-/* Fills in the linear unknowns (offset, cosines, sines) for the nonlinear ones in p by linear least squares.
- * False when the series does not determine them. */
+/* Fills in the linear unknowns (offset, cosines, sines) for the nonlinear ones in p by linear least squares;
+ * not with a law. False when the series does not determine them. */
 bool modes_linear(struct modes *modes, const struct series *series);
 
 /* Fits from p on. False when it does not converge; modes is then undefined. */

@@ -5,9 +5,6 @@
 
 #include "host/estimate/median.h"
 
-/* A Gaussian's standard deviation over its median absolute deviation. */
-#define MAD_TO_SIGMA 1.4826
-
 enum { NEIGHBOURS = 7, LEAST = 16 };
 
 /* The values about value i, itself among them. */

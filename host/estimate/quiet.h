@@ -12,9 +12,6 @@
 #include "host/estimate/estimate.h"
 #include "host/estimate/trace.h"
 
-/* A Gaussian's standard deviation over its median absolute deviation. */
-#define MAD_TO_SIGMA 1.482602218505602
-
 enum {
 	QUIET_SAMPLES_MIN = 32,
 	QUIET_BLOCKS_MAX = 128, /* 250 ms of 2 ms each, and one that is not full */

@@ -29,13 +29,17 @@ void ringdown_try(struct ringdown_job *job, const char *method)
 		job->path[job->tried++] = method;
 }
 
+bool ringdown_decays(const struct modes *modes, unsigned m)
+{
+	double decay = modes->p[MODES_DECAY + MODES_EACH * m], omega = modes->p[MODES_OMEGA + MODES_EACH * m];
+
+	return decay > 0 && decay < RINGDOWN_DAMPING_MAX * hypot(decay, omega);
+}
+
 /* Of the mode that the values are of. */
 static bool decays(const struct modes *modes)
 {
-	const double *p = modes->p + MODES_EACH * modes_stronger(modes);
-	double decay = p[MODES_DECAY];
-
-	return decay > 0 && decay < RINGDOWN_DAMPING_MAX * hypot(decay, p[MODES_OMEGA]);
+	return ringdown_decays(modes, modes_stronger(modes));
 }
 
 static enum estimate_status judge(const struct ringdown_job *job)

@@ -44,6 +44,9 @@ struct ringdown_job {
 /* Notes a method in the path. */
 void ringdown_try(struct ringdown_job *job, const char *method);
 
+/* Whether mode m loses its swing, and is damped less than the most. */
+bool ringdown_decays(const struct modes *modes, unsigned m);
+
 /* ---- ringdown_span.c ---- */
 
 /* Samples of a block where a cycle needs no more points. */
@@ -84,13 +87,14 @@ double ringdown_gain(const struct ringdown_job *job);
 
 /* ---- ringdown_richer.c ---- */
 
-/* Every sample, outliers left out: who is one shows better each time they are gone. False when that fails. */
+/* Every sample, outliers left out: who is one shows better each time they are gone. False, and nothing
+ * changed, when that fails. */
 bool ringdown_full(struct ringdown_job *job);
 
 /* Mains terms. */
 void ringdown_try_hum(struct ringdown_job *job);
 
-/* A law or two modes. */
+/* A law or two modes; nothing changes when one mode no longer fits. */
 void ringdown_try_richer(struct ringdown_job *job);
 
 #endif

@@ -20,36 +20,48 @@
 
 enum { OUTLIER_ROUNDS = 3, THIN_MIN = 48 };
 
-bool ringdown_full(struct ringdown_job *job)
+/* All samples of the series into it, and a fit through all but so many outliers. */
+static bool fit_inliers(struct ringdown_job *job, struct modes *modes, unsigned *out)
 {
-	struct modes modes = job->single;
 	struct series *series = &job->series;
-	struct series blocks = *series;
 	bool usable[SERIES_MAX];
-	unsigned out = 0;
 
 	series_take(series, job->trace, job->first, job->first + (size_t)series->count * series->block,
 	            job->span->from_s, 1);
 	memcpy(usable, series->good, series->count);
-	if (!modes_fit(&modes, series))
+	*out = 0;
+	if (!modes_fit(modes, series))
 		return false;
 	for (int i = 0; i < OUTLIER_ROUNDS; i++) {
-		unsigned before = out;
+		unsigned before = *out;
 
-		out = outlier_drop(series, &modes, usable);
-		if ((out > 0 || before > 0) && !modes_fit(&modes, series))
+		*out = outlier_drop(series, modes, usable);
+		if ((*out > 0 || before > 0) && !modes_fit(modes, series))
 			return false;
-		if (out == before)
+		if (*out == before)
 			break;
+	}
+	return true;
+}
+
+bool ringdown_full(struct ringdown_job *job)
+{
+	struct modes modes = job->single;
+	struct series blocks = job->series;
+	unsigned out;
+
+	if (!fit_inliers(job, &modes, &out)) {
+		job->series = blocks;
+		return false;
 	}
 	if (out > 0)
 		job->flags |= ESTIMATE_FLAG_SPIKE;
 	if (out == 0 && !ringdown_passes(job, &modes)) {
 		/* Nothing gained: what follows is cheaper on blocks. */
-		*series = blocks;
-		if (!modes_fit(&job->single, series))
-			return false;
+		job->series = blocks;
 		modes = job->single;
+		if (!modes_fit(&modes, &job->series))
+			return false;
 	}
 	job->modes = modes;
 	job->single = modes;
@@ -123,13 +135,6 @@ static void try_spring(struct ringdown_job *job, double k)
 		consider(job, &modes);
 }
 
-static bool real_mode(const struct modes *modes, unsigned m)
-{
-	double decay = modes->p[MODES_DECAY + MODES_EACH * m], omega = modes->p[MODES_OMEGA + MODES_EACH * m];
-
-	return decay > 0 && decay < RINGDOWN_DAMPING_MAX * hypot(decay, omega);
-}
-
 /* Two modes from a start; false unless both come out as decays. */
 static bool fit_two(struct modes *modes, const struct series *series, const struct pencil_pole pole[2])
 {
@@ -138,8 +143,8 @@ static bool fit_two(struct modes *modes, const struct series *series, const stru
 		modes->p[MODES_DECAY + MODES_EACH * m] = pole[m].decay;
 		modes->p[MODES_OMEGA + MODES_EACH * m] = pole[m].omega;
 	}
-	return modes_linear(modes, series) && modes_fit(modes, series) && real_mode(modes, 0) &&
-	       real_mode(modes, 1);
+	return modes_linear(modes, series) && modes_fit(modes, series) && ringdown_decays(modes, 0) &&
+	       ringdown_decays(modes, 1);
 }
 
 static bool start_two(const struct ringdown_job *job, struct pencil_pole pole[2])
@@ -276,8 +281,10 @@ void ringdown_try_richer(struct ringdown_job *job)
 {
 	const struct ringdown_job before = *job;
 
-	if (!ringdown_lengthen(job))
+	if (!ringdown_lengthen(job)) {
+		restore(job, &before);
 		return;
+	}
 	look_on_blocks(job, search);
 	if (ringdown_passes(job, &job->modes))
 		job->flags &= ~(unsigned)ESTIMATE_FLAG_NOT_SEPARABLE;

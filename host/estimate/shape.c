@@ -331,7 +331,6 @@ bool shape_fit(struct shape *shape, const struct trace *trace, enum estimate_fam
 	if (!(base > 0) || !lm_fit(&lm, p, &result) || !(p[SHAPE_PEAK] * start->peak_g > 0))
 		return false;
 	found.factor = result.factor;
-	found.iterations = result.iterations;
 	if (!shape_question(&problem, p, &found))
 		return false;
 	express(&problem, p, &found);

@@ -53,7 +53,6 @@ struct shape {
 	double skew_z, power_z; /* the scores; power_z 0 for sine-power; NAN like chi_square */
 	double noise_g;         /* the sigmas are for this */
 	struct cholesky factor; /* of the unknowns peak_g, peak_s - its start, base_s, power */
-	unsigned iterations;
 };
 
 /* False when the samples are too few or no such pulse comes out. */

@@ -38,8 +38,8 @@ struct trace {
 	uint8_t *sample;    /* [count], SAMPLE_* and TRACE_LIMIT */
 	size_t first, last; /* the event is looked for in [first, last) */
 	double noise_g;     /* per sample, before any filter; NAN while unknown */
-	double hum_g;   /* amplitude of the mains term that was taken off, 0 if none: a little may be left */
-	double hum_hz;  /* its frequency; NAN if none */
+	double hum_hz;  /* of the strongest hum that was taken off, a little of which may be left; NAN if none
+	                 */
 	unsigned flags; /* RECORD_FLAG_* */
 	double range_g; /* the channel's */
 	size_t twins;   /* the first of two extremes that are equal, perhaps by chance; count if none */

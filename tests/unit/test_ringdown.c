@@ -14,7 +14,7 @@
 #include <gsl/gsl_linalg.h>
 #include <gsl/gsl_multifit_nlinear.h>
 
-#include "host/estimate/ringdown.h"
+#include "host/estimate/ringdown_private.h"
 #include "tests/unit/near.h"
 #include "tests/unit/synth.h"
 
@@ -470,6 +470,42 @@ static void bars_of_laws(void **state)
 	synth_free(&channel);
 }
 
+/* A step that fails leaves series and fit as they were, of one another. */
+static void fails_whole(void **state)
+{
+	struct synth_random random = {775};
+	struct decay d = plain;
+	struct channel channel;
+	struct trace trace;
+
+	(void)state;
+	d.noise_g = 1;
+	channel = make(&d, &random);
+	assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+	trace.noise_g = 1;
+	for (int richer = 0; richer < 2; richer++) {
+		struct ringdown_span span = {.until_s = INFINITY, .peak_g = 400};
+		static struct ringdown_job job, before;
+
+		job = (struct ringdown_job){.trace = &trace, .span = &span, .last = channel.count};
+		assert_int_equal(ringdown_start(&job), ESTIMATE_OK);
+		assert_true(job.series.block > 1);
+		before = job;
+		job.single.p[MODES_OMEGA] *= richer ? 1 : -1;
+		job.single.p[MODES_DECAY] *= richer ? -1e-3 : 1; /* no time constant */
+		if (richer)
+			ringdown_try_richer(&job);
+		else
+			assert_false(ringdown_full(&job));
+		assert_int_equal(job.series.block, before.series.block);
+		assert_int_equal(job.series.count, before.series.count);
+		assert_near(ringdown_chi_square(&job, &job.modes),
+		            ringdown_chi_square(&before, &before.modes), 0);
+	}
+	trace_close(&trace);
+	synth_free(&channel);
+}
+
 /* A law that nothing here follows: flagged, and the bar is wide. */
 static void refused(void **state)
 {
@@ -911,16 +947,17 @@ static void combined(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(exact),         cmocka_unit_test(noise),
-	        cmocka_unit_test(troubles),      cmocka_unit_test(not_separable),
-	        cmocka_unit_test(offset),        cmocka_unit_test(holes),
-	        cmocka_unit_test(follows_swing), cmocka_unit_test(softening_mount),
-	        cmocka_unit_test(bars_of_laws),  cmocka_unit_test(hardly_enough),
-	        cmocka_unit_test(refused),       cmocka_unit_test(reaches_back),
-	        cmocka_unit_test(refines),       cmocka_unit_test(reaches_outlier),
-	        cmocka_unit_test(decays),        cmocka_unit_test(tolerance),
-	        cmocka_unit_test(against_gsl),   cmocka_unit_test(nothing),
-	        cmocka_unit_test(too_short),     cmocka_unit_test(combined),
+	        cmocka_unit_test(exact),           cmocka_unit_test(noise),
+	        cmocka_unit_test(troubles),        cmocka_unit_test(not_separable),
+	        cmocka_unit_test(offset),          cmocka_unit_test(holes),
+	        cmocka_unit_test(follows_swing),   cmocka_unit_test(softening_mount),
+	        cmocka_unit_test(bars_of_laws),    cmocka_unit_test(fails_whole),
+	        cmocka_unit_test(hardly_enough),   cmocka_unit_test(refused),
+	        cmocka_unit_test(reaches_back),    cmocka_unit_test(refines),
+	        cmocka_unit_test(reaches_outlier), cmocka_unit_test(decays),
+	        cmocka_unit_test(tolerance),       cmocka_unit_test(against_gsl),
+	        cmocka_unit_test(nothing),         cmocka_unit_test(too_short),
+	        cmocka_unit_test(combined),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
