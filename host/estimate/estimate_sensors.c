@@ -27,6 +27,7 @@ static bool find_sensor(const struct desk *desk, const char *name, struct sensor
 		sensor->axes.peak[i] = &desk->work[sensor->at[i]].peak;
 		sensor->axes.curve[i] = NULL;
 	}
+	sensor->axes.tolerance = desk->options->tolerance;
 	return true;
 }
 

@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "host/estimate/bridge.h"
 #include "host/estimate/crest.h"
 
 /* A local maximum is one once the resultant has come down from it by this part of the largest, and by this
@@ -14,6 +15,9 @@
 /* The axes' own models are of the resultant's pulse when its largest sample lies no further from between
  * their peaks than this part of its width. */
 #define SAME_PULSE 0.3
+
+/* Two pulses of a family whose summits lie further apart than this part of a width are not both there. */
+#define OVERLAP 0.5
 
 /* Instants tried between the peaks of the axes, and Newton's steps from the best. */
 enum { STEPS = 8, NEWTON = 8 };
@@ -196,11 +200,17 @@ static void spread(const struct resultant_axes *axes, double time_s, double vari
 	}
 }
 
-/* Models of different swings say nothing together; a polynomial does not reach that far, a curve does. */
-static bool reach(const struct resultant_axes *axes, double slack_s)
+/* Models of different swings or pulses say nothing together; a polynomial does not reach that far, a curve
+ * and a family do. */
+static bool reach(const struct resultant_axes *axes, double width_s)
 {
-	return (axes->curve[0] == NULL && axes->curve[1] == NULL) ||
-	       fabs(axes->peak[1]->result.time_s - axes->peak[0]->result.time_s) <= slack_s;
+	double apart = fabs(axes->peak[1]->result.time_s - axes->peak[0]->result.time_s);
+
+	for (unsigned i = 0; i < 2; i++)
+		if ((axes->curve[i] != NULL && apart > SAME_PULSE * width_s) ||
+		    (axes->peak[i]->model == PEAK_MODEL_SHAPE && apart > OVERLAP * width_s))
+			return false;
+	return true;
 }
 
 /* By the axes' own models. False when they are not of the pulse whose largest sample is at near_s. */
@@ -212,7 +222,7 @@ static bool combine(const struct resultant_axes *axes, unsigned strong, double n
 	double x = axes->peak[0]->result.time_s, y = axes->peak[1]->result.time_s;
 	double slack = SAME_PULSE * found->width_s, time, half[3], variance[2];
 
-	if (!(near_s >= fmin(x, y) - slack && near_s <= fmax(x, y) + slack) || !reach(axes, slack) ||
+	if (!(near_s >= fmin(x, y) - slack && near_s <= fmax(x, y) + slack) || !reach(axes, found->width_s) ||
 	    !summit(axes, &time, half))
 		return false;
 	spread(axes, time, variance);
@@ -244,6 +254,35 @@ static bool refit(const struct resultant_axes *axes, double near_s, struct resul
 	return true;
 }
 
+/* Whether the stronger axis' own peak tells more than samples of both: the other one has none, or samples are
+ * at a limit, which that peak sees beyond. */
+static bool leads(const struct resultant_axes *axes, unsigned strong)
+{
+	return !usable(axes->peak[1 - strong]) || axes->peak[strong]->result.how.status == ESTIMATE_CLIPPED;
+}
+
+/* By the stronger axis' own peak, and what the other one reads there if it has one elsewhere. False where
+ * the other one's samples are missing. */
+static bool follow(const struct resultant_axes *axes, unsigned strong, struct resultant *found)
+{
+	const struct estimate_peak *lead = &axes->peak[strong]->result;
+	const struct trace *other = axes->trace[1 - strong];
+	double reading = 0;
+
+	if (!refit(axes, lead->time_s, found))
+		return false;
+	if (usable(axes->peak[1 - strong]))
+		reading = bridge_at(other, lead->time_s);
+	found->result.peak_g = hypot(lead->value_g, reading);
+	found->result.sigma_g = hypot(lead->value_g * lead->sigma_g, reading * fmax(other->noise_g, 0)) /
+	                        found->result.peak_g;
+	found->result.time_s = lead->time_s;
+	found->result.sigma_time_s = lead->sigma_time_s;
+	found->result.how.chi_square = lead->how.chi_square;
+	found->result.how.method = lead->how.method;
+	return true;
+}
+
 /* X and Y against each other, and what a hole or a limit under the pulse does to the resultant. */
 static void compare_axes(const struct resultant_axes *axes, unsigned strong, struct resultant *found)
 {
@@ -253,7 +292,6 @@ static void compare_axes(const struct resultant_axes *axes, unsigned strong, str
 	if (usable(x) && usable(y)) {
 		found->result.axes_apart_s = y->result.time_s - x->result.time_s;
 		found->result.axes_coincide = fabs(found->result.axes_apart_s) <= RESULTANT_COINCIDE_S;
-		found->result.how.flags = x->result.how.flags | y->result.how.flags;
 	}
 	if (status == ESTIMATE_OK && usable(axes->peak[1 - strong]))
 		status = axes->peak[1 - strong]->result.how.status;
@@ -261,6 +299,26 @@ static void compare_axes(const struct resultant_axes *axes, unsigned strong, str
 	    trace_any(axes->trace[1], found->span.from_s, found->span.until_s, SAMPLE_CLIPPED))
 		status = ESTIMATE_CLIPPED;
 	found->result.how.status = status;
+}
+
+static bool meets(const struct resultant_axes *axes, const struct resultant *found)
+{
+	double tolerance = axes->tolerance > 0 ? axes->tolerance : ESTIMATE_TOLERANCE;
+
+	return found->result.sigma_g <= tolerance * found->result.peak_g &&
+	       found->result.sigma_time_s <= tolerance * found->width_s;
+}
+
+static void take_flags(const struct resultant_axes *axes, struct resultant *found)
+{
+	unsigned *flags = &found->result.how.flags;
+
+	for (unsigned i = 0; i < 2; i++)
+		if (usable(axes->peak[i]))
+			*flags |= axes->peak[i]->result.how.flags;
+	*flags &= ~(unsigned)ESTIMATE_FLAG_TOLERANCE;
+	if (!meets(axes, found))
+		*flags |= ESTIMATE_FLAG_TOLERANCE;
 }
 
 static void find_first(const struct resultant_axes *axes, unsigned fast, unsigned strong, size_t at,
@@ -311,11 +369,13 @@ void resultant_find(const struct resultant_axes *axes, struct resultant *resulta
 	               ? trace_time(axes->trace[fast], at)
 	               : lead->result.time_s;
 	found.span = span_around(axes, strong, near);
-	if (!(two && combine(axes, strong, near, &found)) && !refit(axes, near, &found) &&
+	if (!(two && combine(axes, strong, near, &found)) &&
+	    !(leads(axes, strong) ? follow(axes, strong, &found) : refit(axes, near, &found)) &&
 	    !(two && combine(axes, strong, lead->result.time_s, &found)))
 		return;
 	found.result.how.path[0] = found.result.how.method;
 	find_first(axes, fast, strong, at, top, &found);
 	compare_axes(axes, strong, &found);
+	take_flags(axes, &found);
 	*resultant = found;
 }

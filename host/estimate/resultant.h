@@ -5,11 +5,13 @@
  * The resultant of a sensor's X and Y: the maximum over continuous time of hypot(X(t), Y(t)), each axis by
  * the model that gave its own peak (peak.h), a family's or a local polynomial, or a driven oscillator's, at
  * its own rate. Never the hypot of two maxima, which lie at different instants, nor of nearest samples. Where
- * the axes' own peaks are not of the resultant's pulse, or one has none, polynomials are fitted to both
- * around the resultant's (crest.h).
+ * the axes' own peaks are not of the resultant's pulse, polynomials are fitted to both around the resultant's
+ * (crest.h); not to a stronger axis that is clipped: its own peak stands, with what the other one reads then.
+ * Where the weaker axis has no peak, though samples, the resultant is the stronger one's own peak.
  *
  * The axes coincide when their own maxima lie no further apart than RESULTANT_COINCIDE_S, about two samples.
- * Flags are those of both axes. Status: the stronger axis' when that is short or no_peak; short when the
+ * Flags are those of the axes that have a peak, but "tolerance_not_met" is the resultant's own, judged as a
+ * peak's. Status: the stronger axis' when that is short or no_peak; short when the
  * weaker axis has too few samples under the pulse to say what it did; clipped and ambiguous as for a peak.
  */
 #include "host/estimate/driven.h"
@@ -22,6 +24,7 @@ struct resultant_axes {
 	const struct trace *trace[2]; /* X, Y */
 	const struct peak *peak[2];
 	const struct driven_curve *curve[2]; /* what gave the peak; NULL: its own model did */
+	double tolerance;                    /* as in estimate_options */
 };
 
 struct resultant {

@@ -48,7 +48,8 @@ static struct resultant find_to(struct scene *s, double noise_g, enum estimate_f
 {
 	struct estimate_options options = {.family = family, .tolerance = tolerance};
 	struct resultant_axes axes = {.trace = {&s->trace[0], &s->trace[1]},
-	                              .peak = {&s->peak[0], &s->peak[1]}};
+	                              .peak = {&s->peak[0], &s->peak[1]},
+	                              .tolerance = tolerance};
 	struct resultant resultant;
 
 	assert_int_equal(trace_open(&s->trace[0], &s->x, -INFINITY, INFINITY), 0);
@@ -299,6 +300,100 @@ static void flawed(void **state)
 	drop(&s);
 }
 
+/* Y says nothing, or something else than of X's pulse, whose peak X has by its family: the samples around it
+ * are at a limit. */
+static void lead_alone(void **state)
+{
+	enum { TIMES = 50 };
+	static const double elsewhere_g[2] = {0, 8};
+	struct synth_random random = {72};
+
+	(void)state;
+	for (int i = 0; i < 2; i++) {
+		int covered = 0;
+
+		for (int j = 0; j < TIMES; j++) {
+			const struct estimate_peak *x;
+			struct resultant r;
+			struct scene s;
+
+			make(&s, synth_uniform(&random), 0, 1, &random);
+			for (size_t k = 0; k < s.x.count; k++)
+				s.x.value_g[k] = fmin(s.x.value_g[k], 0.7 * X_G);
+			for (size_t k = 0; k < s.y.count; k++)
+				s.y.value_g[k] =
+				        elsewhere_g[i] * half_sine((double)k / 10000 - ONSET_S - 0.015) +
+				        synth_normal(&random);
+			r = find_by(&s, 1, ESTIMATE_FAMILY_HALF_SINE);
+			x = &s.peak[0].result;
+			assert_int_equal(s.peak[1].result.how.status,
+			                 i == 0 ? ESTIMATE_NO_PEAK : ESTIMATE_OK);
+			assert_int_equal(r.result.how.status, ESTIMATE_CLIPPED);
+			assert_true(r.result.how.flags & ESTIMATE_FLAG_EXTRAPOLATED);
+			assert_string_equal(r.result.how.method, "half-sine");
+			assert_near(r.result.peak_g, x->value_g, i == 0 ? 1e-9 : 0.05);
+			assert_near(r.result.sigma_g, x->sigma_g, i == 0 ? 1e-9 : 0.05);
+			assert_near(r.result.time_s, x->time_s, 0);
+			assert_near(r.result.sigma_time_s, x->sigma_time_s, 0);
+			covered += fabs(r.result.peak_g - X_G) < 2 * r.result.sigma_g;
+			drop(&s);
+		}
+		printf("seed 72, Y %g g elsewhere: covered %d of %d\n", elsewhere_g[i], covered, TIMES);
+		assert_in_range(covered, TIMES - 7, TIMES);
+	}
+}
+
+/* Y's reading where X peaks counts though Y peaks elsewhere. */
+static void lead_and_reading(void **state)
+{
+	struct synth_random random = {73};
+	struct resultant r;
+	struct scene s;
+
+	(void)state;
+	make(&s, 0.3, 0, 1, &random);
+	for (size_t k = 0; k < s.x.count; k++)
+		s.x.value_g[k] = fmin(s.x.value_g[k], 0.7 * X_G);
+	for (size_t k = 0; k < s.y.count; k++)
+		s.y.value_g[k] += 1.2 * Y_G * half_sine((double)k / 10000 - ONSET_S - 0.015);
+	r = find_by(&s, 1, ESTIMATE_FAMILY_HALF_SINE);
+	assert_near(r.result.time_s, s.peak[0].result.time_s, 0);
+	assert_near(r.result.peak_g, hypot(X_G, Y_G), 3 * r.result.sigma_g);
+	assert_true(r.result.sigma_g > 0.5 && r.result.sigma_g < 1.5);
+	drop(&s);
+}
+
+/* What was asked for is asked of the resultant, not of its weaker axis; what else is remarkable about an axis
+ * that has a peak is so of the resultant. */
+static void flags(void **state)
+{
+	struct synth_random random = {74};
+	struct resultant r;
+	struct scene s;
+
+	(void)state;
+	make(&s, 0.3, 0, 1, &random);
+	for (size_t k = 0; k < s.y.count; k++)
+		s.y.value_g[k] *= 0.1;
+	synth_lose(&s.y, 205, 2);
+	for (int tight = 0; tight < 2; tight++) {
+		r = find_to(&s, 1, ESTIMATE_FAMILY_AUTO, tight ? 2e-4 : 0);
+		assert_true(s.peak[1].result.how.flags & ESTIMATE_FLAG_TOLERANCE);
+		assert_int_equal((s.peak[0].result.how.flags & ESTIMATE_FLAG_TOLERANCE) != 0, tight);
+		assert_true(r.result.sigma_g > 2e-4 * r.result.peak_g &&
+		            r.result.sigma_g < 2e-3 * r.result.peak_g);
+		assert_int_equal(r.result.how.flags,
+		                 ESTIMATE_FLAG_GAPS | (tight ? ESTIMATE_FLAG_TOLERANCE : 0));
+	}
+	/* Y has none: X's flags stand. */
+	for (size_t k = 0; k < s.y.count; k++)
+		s.y.value_g[k] = 0;
+	synth_lose(&s.x, 146, 1);
+	assert_int_equal(find(&s, 1).result.how.flags, ESTIMATE_FLAG_GAPS);
+	assert_int_equal(s.peak[1].result.how.status, ESTIMATE_NO_PEAK);
+	drop(&s);
+}
+
 /* Where samples of one axis or the other are missing at every instant around the summit the axes' own models
  * still meet: whenever both peaks are there, so is the resultant. */
 static void never_both(void **state)
@@ -347,10 +442,11 @@ static void never_both(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(continuous_time), cmocka_unit_test(noise),
-	        cmocka_unit_test(gain_of_noise),   cmocka_unit_test(first_peak),
-	        cmocka_unit_test(weak_axis),       cmocka_unit_test(flawed),
-	        cmocka_unit_test(never_both),
+	        cmocka_unit_test(continuous_time),  cmocka_unit_test(noise),
+	        cmocka_unit_test(gain_of_noise),    cmocka_unit_test(first_peak),
+	        cmocka_unit_test(weak_axis),        cmocka_unit_test(flawed),
+	        cmocka_unit_test(never_both),       cmocka_unit_test(lead_alone),
+	        cmocka_unit_test(lead_and_reading), cmocka_unit_test(flags),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
