@@ -19,6 +19,9 @@
 /* Two pulses of a family whose summits lie further apart than this part of a width are not both there. */
 #define OVERLAP 0.5
 
+/* A silent axis was so in this part of its samples under the pulse at least: a hole is not silence. */
+#define READ 0.5
+
 /* Instants tried between the peaks of the axes, and Newton's steps from the best. */
 enum { STEPS = 8, NEWTON = 8 };
 
@@ -261,26 +264,67 @@ static bool leads(const struct resultant_axes *axes, unsigned strong)
 	return !usable(axes->peak[1 - strong]) || axes->peak[strong]->result.how.status == ESTIMATE_CLIPPED;
 }
 
-/* By the stronger axis' own peak, and what the other one reads there if it has one elsewhere. False where
- * the other one's samples are missing. */
+/* The stronger axis' own peak, and what the other one has then. */
+static void add_to(const struct estimate_peak *lead, double other_g, double sigma_g, struct resultant *found)
+{
+	struct estimate_resultant *result = &found->result;
+
+	result->peak_g = hypot(lead->value_g, other_g);
+	result->sigma_g = hypot(lead->value_g * lead->sigma_g, other_g * sigma_g) / result->peak_g;
+	result->time_s = lead->time_s;
+	result->sigma_time_s = lead->sigma_time_s;
+	result->how.chi_square = lead->how.chi_square;
+	result->how.method = lead->how.method;
+}
+
+/* A weak axis has the stronger one's shape, so that both peak at once. */
+static bool share(const struct resultant_axes *axes, unsigned strong, struct resultant *found)
+{
+	const struct estimate_peak *lead = &axes->peak[strong]->result,
+	                           *weak = &axes->peak[1 - strong]->result;
+
+	if (!(weak->how.flags & ESTIMATE_FLAG_WEAK) ||
+	    fabs(weak->time_s - lead->time_s) > SAME_PULSE * found->width_s)
+		return false;
+	add_to(lead, weak->value_g, weak->sigma_g, found);
+	return true;
+}
+
+/* Whether most of the samples within are there. */
+static bool was_read(const struct trace *trace, const struct local_span *span)
+{
+	double good = 0;
+
+	for (size_t k = trace_index(trace, span->from_s);
+	     k < trace->count && trace_time(trace, k) <= span->until_s; k++)
+		good += trace_good(trace, k);
+	return good > READ * (span->until_s - span->from_s) * trace->rate_hz;
+}
+
+/* What the other axis reads counts if it has a peak elsewhere. False where its samples are missing. */
 static bool follow(const struct resultant_axes *axes, unsigned strong, struct resultant *found)
 {
 	const struct estimate_peak *lead = &axes->peak[strong]->result;
 	const struct trace *other = axes->trace[1 - strong];
-	double reading = 0;
 
-	if (!refit(axes, lead->time_s, found))
+	found->span = span_around(axes, strong, lead->time_s);
+	if (!was_read(other, &found->span))
 		return false;
-	if (usable(axes->peak[1 - strong]))
-		reading = bridge_at(other, lead->time_s);
-	found->result.peak_g = hypot(lead->value_g, reading);
-	found->result.sigma_g = hypot(lead->value_g * lead->sigma_g, reading * fmax(other->noise_g, 0)) /
-	                        found->result.peak_g;
-	found->result.time_s = lead->time_s;
-	found->result.sigma_time_s = lead->sigma_time_s;
-	found->result.how.chi_square = lead->how.chi_square;
-	found->result.how.method = lead->how.method;
+	add_to(lead, usable(axes->peak[1 - strong]) ? bridge_at(other, lead->time_s) : 0,
+	       fmax(other->noise_g, 0), found);
 	return true;
+}
+
+/* near_s: the largest sample. */
+static bool solve(const struct resultant_axes *axes, unsigned strong, double near_s, struct resultant *found)
+{
+	bool two = usable(axes->peak[0]) && usable(axes->peak[1]);
+
+	if (two && (share(axes, strong, found) || combine(axes, strong, near_s, found)))
+		return true;
+	if (leads(axes, strong) ? follow(axes, strong, found) : refit(axes, near_s, found))
+		return true;
+	return two && combine(axes, strong, axes->peak[strong]->result.time_s, found);
 }
 
 /* X and Y against each other, and what a hole or a limit under the pulse does to the resultant. */
@@ -353,7 +397,6 @@ void resultant_find(const struct resultant_axes *axes, struct resultant *resulta
 	                                     .axes_apart_s = NAN,
 	                                     .how = {.method = "", .chi_square = NAN}},
 	                          .first_peak_s = NAN};
-	bool two = usable(x) && usable(y);
 	double top, near;
 	size_t at;
 
@@ -369,9 +412,7 @@ void resultant_find(const struct resultant_axes *axes, struct resultant *resulta
 	               ? trace_time(axes->trace[fast], at)
 	               : lead->result.time_s;
 	found.span = span_around(axes, strong, near);
-	if (!(two && combine(axes, strong, near, &found)) &&
-	    !(leads(axes, strong) ? follow(axes, strong, &found) : refit(axes, near, &found)) &&
-	    !(two && combine(axes, strong, lead->result.time_s, &found)))
+	if (!solve(axes, strong, near, &found))
 		return;
 	found.result.how.path[0] = found.result.how.method;
 	find_first(axes, fast, strong, at, top, &found);

@@ -7,7 +7,8 @@
  * its own rate. Never the hypot of two maxima, which lie at different instants, nor of nearest samples. Where
  * the axes' own peaks are not of the resultant's pulse, polynomials are fitted to both around the resultant's
  * (crest.h); not to a stronger axis that is clipped: its own peak stands, with what the other one reads then.
- * Where the weaker axis has no peak, though samples, the resultant is the stronger one's own peak.
+ * Where the weaker axis has no peak, though samples, the resultant is the stronger one's own peak; where it
+ * has the stronger one's shape ("weak_axis"), both are at that one's time.
  *
  * The axes coincide when their own maxima lie no further apart than RESULTANT_COINCIDE_S, about two samples.
  * Flags are those of the axes that have a peak, but "tolerance_not_met" is the resultant's own, judged as a

@@ -228,6 +228,41 @@ static void weak_case(void **state)
 	}
 }
 
+/* A weak Y beside X by the oscillator: both are of one swing, and so is the resultant. */
+static void weak_axis(void **state)
+{
+	struct synth_random random = {12};
+	struct scene scene = plain;
+	int weak = 0, covered = 0;
+	double late = 0, sigma = 0;
+
+	(void)state;
+	scene.noise_g = 10;
+	scene.y_part = 0.12;
+	for (int i = 0; i < TIMES; i++) {
+		const struct estimate_resultant *r;
+		struct drop drop;
+
+		make(&drop, &scene, 0, &random);
+		r = &drop.analysis.resultants[0];
+		if (strcmp(drop.analysis.channels[S1Y].peak.how.method, "strong-axis") == 0) {
+			weak++;
+			assert_true(driven(&r->how));
+			assert_true(r->how.flags & ESTIMATE_FLAG_WEAK);
+			late += r->time_s - drop.s1_s;
+			sigma += r->sigma_time_s;
+			covered += fabs(r->time_s - drop.s1_s) < 2 * r->sigma_time_s;
+		}
+		drop_free(&drop);
+	}
+	printf("seed 12: %d weak, %+.2f us, said %.2f, covered %d\n", weak, 1e6 * late / weak,
+	       1e6 * sigma / weak, covered);
+	assert_true(weak > TIMES / 4);
+	assert_true(fabs(late) < 3e-6 * weak);
+	assert_true(sigma > 4e-6 * weak && sigma < 9e-6 * weak);
+	assert_in_range(100 * covered / weak, 88, 99);
+}
+
 /* Nothing on Y: the resultant of S1 is X's peak by the oscillator, without the smooth curve's bias of 17 us
  * near the kink, and the lag is so. */
 static void silent_axis(void **state)
@@ -353,7 +388,7 @@ int main(void)
 	        cmocka_unit_test(clipped_case), cmocka_unit_test(beyond_the_range),
 	        cmocka_unit_test(weak_case),    cmocka_unit_test(another_swing),
 	        cmocka_unit_test(tolerance),    cmocka_unit_test(another_contact),
-	        cmocka_unit_test(silent_axis),
+	        cmocka_unit_test(silent_axis),  cmocka_unit_test(weak_axis),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -319,7 +319,7 @@ static void lead_alone(void **state)
 
 			make(&s, synth_uniform(&random), 0, 1, &random);
 			for (size_t k = 0; k < s.x.count; k++)
-				s.x.value_g[k] = fmin(s.x.value_g[k], 0.7 * X_G);
+				s.x.value_g[k] = fmin(s.x.value_g[k], (j % 2 ? 0.7 : 0.4) * X_G);
 			for (size_t k = 0; k < s.y.count; k++)
 				s.y.value_g[k] =
 				        elsewhere_g[i] * half_sine((double)k / 10000 - ONSET_S - 0.015) +
