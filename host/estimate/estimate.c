@@ -99,7 +99,9 @@ static void analyse_weak(const struct desk *desk, const char *sensor, struct ana
 		    !peak_weak(&work->trace, desk->options, &desk->work[strong].trace,
 		               &desk->work[strong].peak, &work->peak))
 			continue;
-		pulse_of_weak(&work->peak, &analysis->channels[strong].pulse, &analysis->channels[i].pulse);
+		work->strong = &desk->work[strong].peak;
+		pulse_of_weak(&work->trace, &work->peak, &analysis->channels[i].baseline,
+		              &analysis->channels[strong].pulse, &analysis->channels[i].pulse);
 		analysis->channels[i].peak = work->peak.result;
 	}
 }

@@ -16,6 +16,7 @@
 struct work {
 	struct trace trace;
 	struct peak peak;
+	const struct peak *strong; /* whose shape peak has (peak_weak); NULL: its own */
 	struct ringdown_span span;
 	struct ringdown ringdown;
 };

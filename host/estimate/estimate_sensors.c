@@ -49,6 +49,21 @@ static void drive(const struct desk *desk, unsigned i, const struct sensor *s2, 
 	ringdown_refine(&work->trace, &work->span, &work->ringdown);
 }
 
+/* S1's weak axes, where no oscillator of their own gave their peak, peak with the strong one. */
+static void time_weak(const struct desk *desk, struct analysis *analysis)
+{
+	for (const char *axis = "XYZ"; *axis; axis++) {
+		size_t i = estimate_find(desk, "S1", *axis);
+		struct work *work = &desk->work[i];
+
+		if (i == analysis->channel_count || !work->strong ||
+		    !(work->peak.result.how.flags & ESTIMATE_FLAG_WEAK))
+			continue;
+		peak_weak_time(desk->options, work->strong, &work->peak);
+		analysis->channels[i].peak = work->peak.result;
+	}
+}
+
 static void add_resultant(const char *name, struct sensor *sensor, struct analysis *analysis)
 {
 	struct estimate_resultant *result = &analysis->resultants[analysis->resultant_count++];
@@ -76,6 +91,7 @@ void estimate_sensors(const struct desk *desk, struct analysis *analysis)
 		channel->peak = desk->work[s1.at[i]].peak.result;
 		channel->ringdown = desk->work[s1.at[i]].ringdown.result;
 	}
+	time_weak(desk, analysis);
 	if (has_s1)
 		add_resultant("S1", &s1, analysis);
 	if (has_s2)

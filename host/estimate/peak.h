@@ -75,6 +75,9 @@ bool peak_is_weak(const struct trace *trace, const struct peak *peak);
 bool peak_weak(const struct trace *trace, const struct estimate_options *options,
                const struct trace *strong_trace, const struct peak *strong, struct peak *peak);
 
+/* The time of peak, which peak_weak gave strong's shape, once strong's has changed. */
+void peak_weak_time(const struct estimate_options *options, const struct peak *strong, struct peak *peak);
+
 /* Value, slope per s and curvature per s^2 of the axis' model at an instant, and the variances of the first
  * two unless that is NULL; false where it does not reach. */
 bool peak_at(const struct peak *peak, double time_s, double derivative[3], double variance[2]);

@@ -84,3 +84,12 @@ bool peak_weak(const struct trace *trace, const struct estimate_options *options
 		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
 	return true;
 }
+
+void peak_weak_time(const struct estimate_options *options, const struct peak *strong, struct peak *peak)
+{
+	peak->result.time_s = strong->result.time_s;
+	peak->result.sigma_time_s = strong->result.sigma_time_s;
+	peak->result.how.flags &= ~(unsigned)ESTIMATE_FLAG_TOLERANCE;
+	if (!peak_meets(peak, options))
+		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
+}

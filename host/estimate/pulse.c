@@ -341,14 +341,17 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	guided_width(trace, peak, &guide, pulse);
 }
 
-void pulse_of_weak(const struct peak *weak, const struct estimate_pulse *strong, struct estimate_pulse *pulse)
+void pulse_of_weak(const struct trace *trace, const struct peak *weak,
+                   const struct estimate_baseline *baseline, const struct estimate_pulse *strong,
+                   struct estimate_pulse *pulse)
 {
-	double part = weak->result.sigma_g / fabs(weak->result.value_g), scale = weak->scale;
+	double part = weak->result.sigma_g / fabs(weak->result.value_g), scale = weak->scale, sigma;
 
 	*pulse = *strong;
 	pulse->velocity_change_m_s *= scale;
-	pulse->sigma_velocity_m_s =
-	        hypot(scale * pulse->sigma_velocity_m_s, part * pulse->velocity_change_m_s);
+	sigma = hypot(scale * pulse->sigma_velocity_m_s, part * pulse->velocity_change_m_s);
+	take_velocity_sigma(trace, baseline, sigma / UNITS_G_M_S2, pulse->duration_s, pulse);
+	pulse->flags |= baseline->doubtful ? ESTIMATE_FLAG_ZERO : 0u;
 	pulse->fitted_velocity_m_s *= scale;
 	pulse->sigma_fitted_velocity_m_s =
 	        hypot(scale * pulse->sigma_fitted_velocity_m_s, part * pulse->fitted_velocity_m_s);

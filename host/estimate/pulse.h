@@ -25,8 +25,9 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
                    const struct estimate_baseline *baseline, enum estimate_family family,
                    struct estimate_pulse *pulse);
 
-/* Of a weak axis (peak_weak): strong's pulse at the weak axis' height. */
-void pulse_of_weak(const struct peak *weak, const struct estimate_pulse *strong,
+/* Of a weak axis (peak_weak): strong's pulse at the weak axis' height, with the doubt of both axes' zeros. */
+void pulse_of_weak(const struct trace *trace, const struct peak *weak,
+                   const struct estimate_baseline *baseline, const struct estimate_pulse *strong,
                    struct estimate_pulse *pulse);
 
 #endif

@@ -399,13 +399,34 @@ static void of_weak(void **state)
 	                                .fitted_velocity_m_s = NAN},
 	                      pulse;
 	struct peak weak = {.result = {.value_g = -20, .sigma_g = 0.5}, .scale = -0.05};
+	struct estimate_baseline baseline = {.samples = 100};
+	struct trace trace = {.noise_g = 0};
 
 	(void)state;
-	pulse_of_weak(&weak, &strong, &pulse);
+	pulse_of_weak(&trace, &weak, &baseline, &strong, &pulse);
 	assert_near(pulse.duration_s, 2e-3, 0);
 	assert_near(pulse.velocity_change_m_s, -0.4, 1e-12);
 	assert_near(pulse.sigma_velocity_m_s, hypot(0.0005, 0.01), 1e-12);
 	assert_true(isnan(pulse.fitted_velocity_m_s));
+	assert_int_equal(pulse.flags, 0);
+	/* its own zero over the pulse */
+	trace.noise_g = 10;
+	pulse_of_weak(&trace, &weak, &baseline, &strong, &pulse);
+	assert_near(pulse.sigma_velocity_m_s, hypot(hypot(0.0005, 0.01), 9.81 * 1 * 2e-3), 1e-12);
+	baseline.doubtful = true;
+	pulse_of_weak(&trace, &weak, &baseline, &strong, &pulse);
+	assert_int_equal(pulse.flags, ESTIMATE_FLAG_ZERO);
+	assert_true(isfinite(pulse.sigma_velocity_m_s));
+	baseline.samples = 0;
+	pulse_of_weak(&trace, &weak, &baseline, &strong, &pulse);
+	assert_true(isnan(pulse.sigma_velocity_m_s));
+	/* and the strong one's */
+	baseline = (struct estimate_baseline){.samples = 100};
+	strong.flags = ESTIMATE_FLAG_ZERO;
+	strong.sigma_velocity_m_s = NAN;
+	pulse_of_weak(&trace, &weak, &baseline, &strong, &pulse);
+	assert_int_equal(pulse.flags, ESTIMATE_FLAG_ZERO);
+	assert_true(isnan(pulse.sigma_velocity_m_s));
 }
 
 static void cut(void **state)
