@@ -257,11 +257,16 @@ static bool refit(const struct resultant_axes *axes, double near_s, struct resul
 	return true;
 }
 
+static bool silent(const struct peak *peak)
+{
+	return peak->result.how.status == ESTIMATE_NO_PEAK;
+}
+
 /* Whether the stronger axis' own peak tells more than samples of both: the other one has none, or samples are
  * at a limit, which that peak sees beyond. */
 static bool leads(const struct resultant_axes *axes, unsigned strong)
 {
-	return !usable(axes->peak[1 - strong]) || axes->peak[strong]->result.how.status == ESTIMATE_CLIPPED;
+	return silent(axes->peak[1 - strong]) || axes->peak[strong]->result.how.status == ESTIMATE_CLIPPED;
 }
 
 /* The stronger axis' own peak, and what the other one has then. */
@@ -301,7 +306,7 @@ static bool was_read(const struct trace *trace, const struct local_span *span)
 	return good > READ * (span->until_s - span->from_s) * trace->rate_hz;
 }
 
-/* What the other axis reads counts if it has a peak elsewhere. False where its samples are missing. */
+/* What the other axis reads counts unless it is silent. False where its samples are missing. */
 static bool follow(const struct resultant_axes *axes, unsigned strong, struct resultant *found)
 {
 	const struct estimate_peak *lead = &axes->peak[strong]->result;
@@ -310,7 +315,7 @@ static bool follow(const struct resultant_axes *axes, unsigned strong, struct re
 	found->span = span_around(axes, strong, lead->time_s);
 	if (!was_read(other, &found->span))
 		return false;
-	add_to(lead, usable(axes->peak[1 - strong]) ? bridge_at(other, lead->time_s) : 0,
+	add_to(lead, silent(axes->peak[1 - strong]) ? 0 : bridge_at(other, lead->time_s),
 	       fmax(other->noise_g, 0), found);
 	return true;
 }

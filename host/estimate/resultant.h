@@ -12,8 +12,8 @@
  *
  * The axes coincide when their own maxima lie no further apart than RESULTANT_COINCIDE_S, about two samples.
  * Flags are those of the axes that have a peak, but "tolerance_not_met" is the resultant's own, judged as a
- * peak's. Status: the stronger axis' when that is short or no_peak; short when the
- * weaker axis has too few samples under the pulse to say what it did; clipped and ambiguous as for a peak.
+ * peak's. Status: the stronger axis' when that is short or no_peak; short when the weaker axis has too few
+ * samples under the pulse to say what it did; clipped and ambiguous as for a peak.
  */
 #include "host/estimate/driven.h"
 #include "host/estimate/peak.h"

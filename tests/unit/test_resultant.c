@@ -291,6 +291,18 @@ static void flawed(void **state)
 	assert_near(r.result.peak_g, hypot(X_G, Y_G), 3 * r.result.sigma_g);
 	assert_true(r.result.sigma_g > 0.01 && r.result.sigma_g < 1);
 	drop(&s);
+	/* Y never falls to half: no peak to speak of, but a reading. */
+	for (int clipped = 0; clipped < 2; clipped++) {
+		make(&s, 0.3, 0, 0, NULL);
+		for (size_t k = 0; k < s.y.count; k++)
+			s.y.value_g[k] = 100 + 1e-3 * (double)k;
+		for (size_t k = 0; clipped && k < s.x.count; k++)
+			s.x.value_g[k] = fmin(s.x.value_g[k], 460);
+		r = find(&s, 0.3);
+		assert_int_equal(s.peak[1].result.how.status, ESTIMATE_SHORT);
+		assert_near(r.result.peak_g, hypot(X_G, 100), clipped ? 3 * r.result.sigma_g : 0.3);
+		drop(&s);
+	}
 	/* A few samples missing at the summit of X. */
 	make(&s, 0.3, 0, 0, NULL);
 	synth_lose(&s.x, 150, 2);
