@@ -46,7 +46,7 @@ enum {
 /* Name of the lowest flag bit in flags; "" for 0. */
 const char *estimate_flag_name(unsigned flags);
 
-enum { ESTIMATE_PATH_MAX = 5 };
+enum { ESTIMATE_PATH_MAX = 6 };
 
 /* How a value was got: cheapest method first, the next one only while the residual refuses it or its
  * uncertainty exceeds the tolerance. */

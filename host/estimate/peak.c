@@ -2,6 +2,7 @@
 #include "host/estimate/peak_private.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "host/estimate/crest.h"
 
@@ -41,12 +42,15 @@
 /* No parabola tells a time better than to this part of a sample. */
 #define SHIFT_MIN 1e-2
 
-enum { SAMPLES_MIN = 3 };
+enum {
+	SAMPLES_MIN = 3,
+	END = 4, /* so many samples at an end of the trace, and so narrow, a spike may pass for a peak */
+};
 
 void peak_tried(struct estimate_how *how, const char *name)
 {
 	for (int i = 0; i < ESTIMATE_PATH_MAX; i++) {
-		if (how->path[i])
+		if (how->path[i] && strcmp(how->path[i], name) != 0)
 			continue;
 		how->path[i] = name;
 		return;
@@ -178,16 +182,16 @@ static bool parabola(const struct trace *trace, const struct peak *peak, double 
 static bool take_parabola(const struct trace *trace, struct peak *peak)
 {
 	struct estimate_peak *result = &peak->result;
-	double shift, rise, bend;
+	double shift, rise, bend, late;
 
 	if (!parabola(trace, peak, &shift, &rise, &bend))
 		return false;
+	late = hypot(trace->noise_g / (sqrt(2.0) * bend), shift / 2);
 	result->how.method = "parabola";
 	result->value_g = trace->value_g[peak->at] + rise;
 	result->time_s = trace_time(trace, peak->at) + shift / trace->rate_hz;
 	result->sigma_g = hypot(trace->noise_g, fmax(fabs(rise), fabs(bend) / 8));
-	result->sigma_time_s =
-	        fmax(hypot(trace->noise_g / (sqrt(2.0) * bend), shift / 2), SHIFT_MIN) / trace->rate_hz;
+	result->sigma_time_s = (late < SHIFT_MIN ? SHIFT_MIN : late) / trace->rate_hz;
 	return true;
 }
 
@@ -229,6 +233,12 @@ void peak_take_samples(const struct trace *trace, struct peak *peak)
 
 bool peak_fit(const struct trace *trace, enum estimate_family family, struct peak *peak)
 {
+	if (peak->shape.family == family)
+		return true;
+	if (peak->half_sine.family == family) {
+		peak->shape = peak->half_sine;
+		return true;
+	}
 	peak_tried(&peak->result.how, estimate_family_name(family));
 	if (!shape_fit(&peak->shape, trace, family, &peak->start))
 		return false;
@@ -296,12 +306,33 @@ static void reach_across(const struct trace *trace, struct peak *peak)
 	        hypot(peak->result.sigma_g, PEAK_OTHER_FAMILY * (fabs(peak->shape.peak_g) - sample));
 }
 
+/* The family that is given; half of what is there without it differs by enters its uncertainty. */
+static void take_doubtful(struct peak *peak)
+{
+	struct estimate_peak *result = &peak->result, plain = *result;
+
+	peak_take_shape(peak);
+	result->sigma_g = hypot(result->sigma_g, (result->value_g - plain.value_g) / 2);
+	result->sigma_time_s = hypot(result->sigma_time_s, (result->time_s - plain.time_s) / 2);
+}
+
+/* Without polynomials. */
+static void climb_samples(const struct trace *trace, enum shape_verdict verdict, struct peak *peak)
+{
+	struct estimate_how *how = &peak->result.how;
+
+	peak_take_samples(trace, peak);
+	if (verdict == SHAPE_DOUBTFUL)
+		take_doubtful(peak);
+	else if (how->status == ESTIMATE_AMBIGUOUS && how->flags & ESTIMATE_FLAG_GAPS)
+		reach_across(trace, peak);
+}
+
 /* The family that is given, or the ladder. */
 void peak_climb(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
 {
 	struct estimate_how *how = &peak->result.how;
 	enum shape_verdict verdict = SHAPE_REFUSED;
-	struct estimate_peak *result = &peak->result;
 
 	if (options->family != ESTIMATE_FAMILY_AUTO) {
 		if (peak_fit(trace, options->family, peak))
@@ -312,22 +343,13 @@ void peak_climb(const struct trace *trace, const struct estimate_options *option
 		}
 		how->flags |= ESTIMATE_FLAG_MODEL;
 	}
-	if (!take_crest(trace, peak)) {
-		peak_take_samples(trace, peak);
-		if (how->status == ESTIMATE_AMBIGUOUS && how->flags & ESTIMATE_FLAG_GAPS)
-			reach_across(trace, peak);
-		return;
-	}
-	if (verdict == SHAPE_DOUBTFUL) {
-		struct estimate_peak local = *result;
-
-		peak_take_shape(peak);
-		result->sigma_g = hypot(result->sigma_g, (result->value_g - local.value_g) / 2);
-		result->sigma_time_s = hypot(result->sigma_time_s, (result->time_s - local.time_s) / 2);
-	} else if ((how->status == ESTIMATE_AMBIGUOUS || !peak_meets(peak, options)) &&
-	           options->family != ESTIMATE_FAMILY_SINE_POWER) {
+	if (!take_crest(trace, peak))
+		climb_samples(trace, verdict, peak);
+	else if (verdict == SHAPE_DOUBTFUL)
+		take_doubtful(peak);
+	else if ((how->status == ESTIMATE_AMBIGUOUS || !peak_meets(peak, options)) &&
+	         options->family != ESTIMATE_FAMILY_SINE_POWER)
 		sharpen(trace, peak);
-	}
 }
 
 /* Whether another pulse of the event is as high: sampling and noise then decided which one was taken. */
@@ -341,6 +363,13 @@ static bool has_rival(const struct trace *trace, const struct peak *peak)
 		return false;
 	return (trace->first < from && trace_reaches(trace, trace->first, from, level) < from) ||
 	       (until < trace->last && trace_reaches(trace, until, trace->last, level) < trace->last);
+}
+
+/* Whether it may be a spike that is too near an end to be found out (spike.h), whatever fits it. */
+static bool may_be_spike(const struct trace *trace, const struct peak *peak)
+{
+	return (peak->at < END || peak->at + END >= trace->count) &&
+	       (peak->model == PEAK_MODEL_NONE || peak->start.half_width_s * trace->rate_hz < END);
 }
 
 void peak_find(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
@@ -370,6 +399,8 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 		peak->result.how.flags |= ESTIMATE_FLAG_RIVAL;
 	if (!peak_unclip(trace, options, peak))
 		peak_climb(trace, options, peak);
+	if (peak->result.how.status == ESTIMATE_OK && may_be_spike(trace, peak))
+		peak->result.how.status = ESTIMATE_AMBIGUOUS;
 	if (!peak_meets(peak, options))
 		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
 }

@@ -17,7 +17,8 @@
  *
  * A family that is given is asked first, and at the statistical limit where it is the pulse's. Flagged
  * "model_refused" when its residual speaks against it: doubtful, its value stands with half of what the
- * polynomials differ by in its sigma; refused, it gives nothing and the ladder above does.
+ * polynomials, parabola or sample differ by in its sigma; refused, it gives nothing and the ladder above
+ * does.
  *
  * Clipped, status clipped, is either of two things. Samples at a limit (trace.h), or marked ones no further
  * apart than noise, say "at least this": the value follows from the flanks by the family given, otherwise
@@ -33,7 +34,8 @@
  *
  * Status besides: short below three good samples, or when the pulse falls to half on neither side; no_peak
  * below 5 sigma of noise, value NAN; ambiguous when the summit may hide in a hole, or beyond the end of the
- * trace.
+ * trace, and within four samples of an end where it may be a spike: narrower than four, or with too few
+ * samples for polynomials.
  */
 #include "host/estimate/estimate.h"
 #include "host/estimate/local.h"

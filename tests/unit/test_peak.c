@@ -251,6 +251,14 @@ static void ladder(void **state)
 	assert_int_equal(peak.how.flags, 0);
 	assert_true(peak.sigma_g < 3e-3 * HEIGHT_G);
 	synth_free(&channel);
+	/* What was asked before is not asked again. */
+	channel = pulse_channel(SYNTH_HAVERSINE, 0.3 / RATE_HZ, 1, &random);
+	peak = find_by(&channel, 1, ESTIMATE_FAMILY_HALF_SINE, 1e-5);
+	assert_string_equal(peak.how.path[0], "half-sine");
+	assert_string_equal(peak.how.path[1], "poly4/poly6");
+	assert_string_equal(peak.how.path[2], "sine-power");
+	assert_null(peak.how.path[3]);
+	synth_free(&channel);
 }
 
 /* Sharper than the polynomials are, on a pulse that is nearly of the family: what no residual shows is in the
@@ -526,6 +534,67 @@ static void few_samples(void **state)
 	synth_free(&channel);
 }
 
+/* A family that is given and doubtful stands where there are too few samples for polynomials, too: a
+ * half-sine that is told a haversine, under less and less noise. */
+static void doubtful_of_few(void **state)
+{
+	static const double noise[] = {0.58, 0.41, 0.2};
+	static const char *const method[] = {"haversine", "haversine", "parabola"};
+	struct channel channel = synth_channel("a", 200, 1, 40);
+
+	(void)state;
+	for (size_t k = 0; k < channel.count; k++)
+		channel.value_g[k] = 17 * synth_pulse(SYNTH_HALF_SINE, ((double)k - 18.2) / 6);
+	for (int i = 0; i < 3; i++) {
+		struct estimate_peak told = find_by(&channel, noise[i], ESTIMATE_FAMILY_HAVERSINE, 0);
+		struct estimate_peak plain = find(&channel, noise[i]);
+		double apart = fabs(told.value_g - plain.value_g);
+
+		assert_string_equal(plain.how.method, "parabola");
+		assert_string_equal(told.how.method, method[i]);
+		assert_int_equal((told.how.flags & ESTIMATE_FLAG_MODEL) != 0, i > 0);
+		assert_int_equal(told.how.status, ESTIMATE_OK);
+		assert_near(told.value_g, 17, 2 * told.sigma_g);
+		if (i == 1)
+			assert_true(apart > 0.5 && told.sigma_g > apart / 2 && told.sigma_g < apart);
+	}
+	synth_free(&channel);
+}
+
+/* What stands alone within four samples of an end may be a spike. */
+static void near_the_end(void **state)
+{
+	static const size_t at[] = {1, 3, 4, 35, 36, 38};
+	struct channel channel = synth_channel("a", 1000, 0, 40);
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(at) / sizeof(at[0]); i++) {
+		struct estimate_peak peak;
+
+		memset(channel.value_g, 0, channel.count * sizeof(double));
+		channel.value_g[at[i]] = 300;
+		peak = find(&channel, 1);
+		assert_string_equal(peak.how.method, "parabola");
+		assert_int_equal(peak.how.status, at[i] < 4 || at[i] > 35 ? ESTIMATE_AMBIGUOUS : ESTIMATE_OK);
+		assert_true(isfinite(peak.sigma_g) && peak.sigma_time_s > 1e-6 && peak.sigma_time_s < 0.1e-3);
+		/* How well without the noise nobody knows. */
+		peak = find(&channel, NAN);
+		assert_near(peak.time_s, (double)at[i] / 1000, 1e-9);
+		assert_true(isnan(peak.sigma_g) && isnan(peak.sigma_time_s));
+	}
+	/* Two side by side, which a family explains. */
+	for (size_t first = 1; first < 8; first++) {
+		struct estimate_peak peak;
+
+		memset(channel.value_g, 0, channel.count * sizeof(double));
+		channel.value_g[first] = channel.value_g[first + 1] = 300;
+		peak = find_by(&channel, 1, ESTIMATE_FAMILY_HALF_SINE, 0);
+		assert_string_equal(peak.how.method, "half-sine");
+		assert_int_equal(peak.how.status, first < 4 ? ESTIMATE_AMBIGUOUS : ESTIMATE_OK);
+	}
+	synth_free(&channel);
+}
+
 /* A hundred and more samples over the pulse, and a baseline of noise far below. */
 static void many_samples(void **state)
 {
@@ -581,6 +650,7 @@ static void no_peak(void **state)
 	synth_free(&channel);
 }
 
+/* All of it lies within four samples of an end. */
 static void degenerate(void **state)
 {
 	struct channel channel = synth_channel("a", 10000, 0, 5);
@@ -590,7 +660,7 @@ static void degenerate(void **state)
 		channel.count = n;
 		for (size_t k = 0; k < n; k++)
 			channel.value_g[k] = k == n / 2 ? 1 : 0;
-		assert_int_equal(find(&channel, NAN).how.status, n < 3 ? ESTIMATE_SHORT : ESTIMATE_OK);
+		assert_int_equal(find(&channel, NAN).how.status, n < 3 ? ESTIMATE_SHORT : ESTIMATE_AMBIGUOUS);
 	}
 	for (size_t k = 0; k < 5; k++)
 		channel.value_g[k] = k % 2 ? NAN : 1e300;
@@ -620,6 +690,8 @@ int main(void)
 	        cmocka_unit_test(weak_axis),
 	        cmocka_unit_test(ripple),
 	        cmocka_unit_test(few_samples),
+	        cmocka_unit_test(doubtful_of_few),
+	        cmocka_unit_test(near_the_end),
 	        cmocka_unit_test(many_samples),
 	        cmocka_unit_test(no_peak),
 	        cmocka_unit_test(rivals),
