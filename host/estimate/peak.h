@@ -22,8 +22,9 @@
  *
  * Clipped, status clipped, is either of two things. Samples at a limit (trace.h), or marked ones no further
  * apart than noise, say "at least this": the value follows from the flanks by the family given, otherwise
- * the first of half-sine, haversine and sine-power that fits, flagged "extrapolated"; when none does, one of
- * them is the value all the same, "model_refused", and half of what it adds enters sigma.
+ * the first of half-sine, haversine and sine-power that fits, flagged "extrapolated"; its sigma holds what
+ * the others say, by their likelihoods (Hoeting 1999). When none fits, one of them is the value all the same,
+ * "model_refused", and half of what it adds enters sigma.
  * Marked samples that go on above the range are readings of less trust: used as read, and a tenth of what
  * they add to the least of them enters sigma.
  *

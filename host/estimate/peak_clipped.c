@@ -75,6 +75,42 @@ static enum shape_verdict fit_flanks(const struct trace *trace, enum estimate_fa
 	return best;
 }
 
+/* About the value of the family that is taken, where every other one may be the pulse's, as likely as its
+ * residual is beside that one's: the root mean square of all their errors, so weighted. Without a noise to
+ * hold the residuals against one is as likely as another. */
+static double sigma_of_all(const struct trace *trace, struct peak *peak)
+{
+	const struct shape taken = peak->shape;
+	double square = pow(taken.sigma_peak_g, 2), sum = 1;
+
+	for (unsigned i = 0; i < SHAPE_LADDER; i++) {
+		const struct shape *other = &peak->shape;
+		double worse, chance;
+
+		if (shape_ladder[i] == taken.family || !peak_fit(trace, shape_ladder[i], peak))
+			continue;
+		worse = other->chi_square * other->freedom - taken.chi_square * taken.freedom;
+		chance = isnan(worse) ? 1 : exp(-worse / 2);
+		square += chance * (pow(other->sigma_peak_g, 2) + pow(other->peak_g - taken.peak_g, 2));
+		sum += chance;
+	}
+	peak->shape = taken;
+	return sqrt(square / sum);
+}
+
+/* The family was not given. */
+static void take_choice(const struct trace *trace, enum shape_verdict verdict, const struct clipped *clipped,
+                        struct peak *peak)
+{
+	double *sigma_g = &peak->result.sigma_g;
+
+	/* Of the other ones none was left. */
+	if (peak->shape.family == ESTIMATE_FAMILY_SINE_POWER)
+		*sigma_g = hypot(*sigma_g, PEAK_OTHER_FAMILY * (fabs(peak->shape.peak_g) - clipped->low));
+	else if (verdict == SHAPE_FITS)
+		*sigma_g = sigma_of_all(trace, peak);
+}
+
 /* From the flanks alone. */
 static void extrapolate(const struct trace *trace, const struct estimate_options *options,
                         const struct clipped *clipped, struct peak *peak)
@@ -91,9 +127,8 @@ static void extrapolate(const struct trace *trace, const struct estimate_options
 		peak_take_shape(peak);
 	else
 		take_suspect(peak, clipped);
-	if (options->family != peak->shape.family && peak->shape.family == ESTIMATE_FAMILY_SINE_POWER)
-		peak->result.sigma_g = hypot(peak->result.sigma_g,
-		                             PEAK_OTHER_FAMILY * (fabs(peak->shape.peak_g) - clipped->low));
+	if (options->family == ESTIMATE_FAMILY_AUTO)
+		take_choice(trace, verdict, clipped, peak);
 	peak->result.how.flags |= ESTIMATE_FLAG_EXTRAPOLATED;
 }
 
