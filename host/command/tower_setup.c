@@ -45,12 +45,80 @@ int tower_setup_hear(struct session *session, char message[SESSION_MESSAGE_MAX])
 	return COMMAND_REFUSED;
 }
 
+struct setting {
+	enum wire_parameter_number number;
+	double value;
+};
+
+/* The first that the tower could not have whatever the others are; NULL: none. */
+static const struct setting *out_of_range(const struct setting *settings, size_t count)
+{
+	for (size_t i = 0; i < count; i++) {
+		const struct wire_parameter_info *parameter = &wire_parameters[settings[i].number];
+		double value = round(settings[i].value);
+
+		if (!(value >= parameter->min && value <= parameter->max))
+			return &settings[i];
+	}
+	return NULL;
+}
+
+/* Writes what the tower takes. What does not agree with the others that it still has is moved to the front:
+ * count is how many those are. Another refusal ends it, with that setting at the front. */
+static int write_round(struct session *session, struct setting *settings, size_t *count)
+{
+	size_t left = 0;
+
+	for (size_t i = 0; i < *count; i++) {
+		int result = session_set_parameter(session, settings[i].number,
+		                                   (uint32_t)llround(settings[i].value));
+
+		if (result == DT_E_RANGE) {
+			settings[left++] = settings[i];
+		} else if (result != 0) {
+			settings[0] = settings[i];
+			return result;
+		}
+	}
+	*count = left;
+	return 0;
+}
+
+/* In rounds, until all are written or a round has moved nothing. */
+static int write_all(struct session *session, struct setting *settings, size_t count)
+{
+	size_t before = count + 1;
+	int result = 0;
+
+	while (result == 0 && count > 0 && count < before) {
+		before = count;
+		result = write_round(session, settings, &count);
+	}
+	return result == 0 && count > 0 ? DT_E_RANGE : result;
+}
+
+static int refused(const struct setting *setting, int result, char message[SESSION_MESSAGE_MAX])
+{
+	const struct wire_parameter_info *parameter = &wire_parameters[setting->number];
+
+	if (out_of_range(setting, 1) != NULL)
+		snprintf(message, SESSION_MESSAGE_MAX,
+		         "the tower cannot have %s = %.0f, expected %u to %u %s", parameter->name,
+		         setting->value, parameter->min, parameter->max, parameter->unit);
+	else if (result == DT_E_RANGE)
+		snprintf(message, SESSION_MESSAGE_MAX,
+		         "the tower cannot have %s = %.0f beside its other parameters, expected upper gate, "
+		         "lower gate, separation and dampers in this order",
+		         parameter->name, setting->value);
+	else
+		snprintf(message, SESSION_MESSAGE_MAX, "the tower refuses %s = %.0f: %s", parameter->name,
+		         setting->value, error_text(result));
+	return result == DT_E_STATE || result == DT_E_RANGE ? COMMAND_REFUSED : COMMAND_LINK;
+}
+
 int tower_setup_write(struct session *session, const struct scene *scene, char message[SESSION_MESSAGE_MAX])
 {
-	const struct {
-		enum wire_parameter_number number;
-		double value;
-	} parameters[] = {
+	struct setting settings[] = {
 	        {WIRE_PARAMETER_gate_upper_um, scene->tower_gate_upper_m * 1e6},
 	        {WIRE_PARAMETER_gate_lower_um, scene->tower_gate_lower_m * 1e6},
 	        {WIRE_PARAMETER_separation_um, scene->tower_separation_m * 1e6},
@@ -58,21 +126,14 @@ int tower_setup_write(struct session *session, const struct scene *scene, char m
 	        {WIRE_PARAMETER_dropout_us, scene->tower_magnet_dropout_s * 1e6},
 	        {WIRE_PARAMETER_range_counts, scene->sensor_range_g * WIRE_COUNTS_PER_G},
 	};
+	size_t count = sizeof(settings) / sizeof(settings[0]);
+	const struct setting *beyond = out_of_range(settings, count);
+	int result;
 
-	for (size_t i = 0; i < sizeof(parameters) / sizeof(parameters[0]); i++) {
-		int result = session_set_parameter(session, parameters[i].number,
-		                                   (uint32_t)llround(parameters[i].value));
-
-		if (result == DT_E_UNKNOWN)
-			return COMMAND_DONE; /* over LCM: the bridge has set them */
-		if (result != 0 && command_interrupted())
-			return stopped(message);
-		if (result != 0) {
-			snprintf(message, SESSION_MESSAGE_MAX, "the tower refuses %s = %.0f: %s",
-			         wire_parameters[parameters[i].number].name, parameters[i].value,
-			         error_text(result));
-			return result == DT_E_STATE || result == DT_E_RANGE ? COMMAND_REFUSED : COMMAND_LINK;
-		}
-	}
-	return COMMAND_DONE;
+	if (beyond != NULL)
+		return refused(beyond, DT_E_RANGE, message);
+	result = write_all(session, settings, count);
+	if (result == 0 || result == DT_E_UNKNOWN) /* over LCM: the bridge has set them */
+		return COMMAND_DONE;
+	return command_interrupted() ? stopped(message) : refused(&settings[0], result, message);
 }

@@ -12,7 +12,9 @@
  * than COMMAND_DONE with one line in message. */
 int tower_setup_hear(struct session *session, char message[SESSION_MESSAGE_MAX]);
 
-/* Writes the parameters; over LCM there is nothing to do. Returns as above. */
+/* Writes the parameters, in an order in which the tower takes them: it refuses a place that is not in order
+ * with the others that it has. What no tower can have is refused before anything is written. Over LCM nothing
+ * is written. Returns as above. */
 int tower_setup_write(struct session *session, const struct scene *scene, char message[SESSION_MESSAGE_MAX]);
 
 #endif

@@ -74,6 +74,7 @@ static void add_tower(cJSON *root, const struct state *state)
 	cJSON_AddStringToObject(tower, "fault", wire_fault_name(session->fault));
 	cJSON_AddStringToObject(tower, "fault_text", wire_fault_text(session->fault));
 	cJSON_AddStringToObject(tower, "trouble", view->trouble);
+	cJSON_AddBoolToObject(tower, "blocked", view->blocked);
 	cJSON_AddStringToObject(tower, "phase", tower_phase_name(view->phase));
 	cJSON_AddStringToObject(tower, "drop", view->drop);
 	add_number(tower, "armed_s", armed_ms > 0 ? (double)armed_ms / 1000.0 : 0.0);

@@ -158,8 +158,8 @@ void tower_publish(struct tower *tower)
 
 	pthread_mutex_lock(&tower->lock);
 	publish_session(tower);
-	tower->blocked = trouble[0] != '\0';
-	snprintf(view->trouble, sizeof(view->trouble), "%s", tower->blocked ? trouble : tower->drop_trouble);
+	view->blocked = trouble[0] != '\0';
+	snprintf(view->trouble, sizeof(view->trouble), "%s", view->blocked ? trouble : tower->drop_trouble);
 	snprintf(view->url, sizeof(view->url), "%s", tower->url);
 	snprintf(view->series, sizeof(view->series), "%s", tower->series);
 	snprintf(view->drop, sizeof(view->drop), "%s", tower->drop_name);

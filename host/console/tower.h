@@ -43,7 +43,8 @@ struct tower_view {
 	struct link_counters link;   /* ... and this a copy */
 	char url[256];
 	bool open;                      /* the link is */
-	char trouble[ARCHIVE_TEXT_MAX]; /* one line: why no drop can be made now; "" */
+	char trouble[ARCHIVE_TEXT_MAX]; /* one line: why no drop can be made now, or what became of one; "" */
+	bool blocked;                   /* by it nothing can be armed */
 	enum tower_phase phase;
 	char series[ARCHIVE_NAME_MAX + 1]; /* selected; "" */
 	struct scene scene;                /* of the series, when there is one */

@@ -32,8 +32,7 @@ struct tower {
 	atomic_uint aborts; /* asked for */
 	pthread_mutex_t lock;
 	struct tower_view view;
-	bool blocked; /* trouble is such that nothing can be armed */
-	bool saved;   /* tower_saved was called */
+	bool saved; /* tower_saved was called */
 	char saved_trouble[ARCHIVE_TEXT_MAX];
 
 	/* the link */

@@ -77,7 +77,7 @@ bool tower_check_arm(struct job *job)
 	pthread_mutex_lock(&tower->lock);
 	if (!check_heard(job, view) || !check_idle(job, view))
 		may = false;
-	else if (tower->blocked)
+	else if (view->blocked)
 		job_refuse(job, 409, "%s", view->trouble);
 	else if (view->series[0] == '\0')
 		job_refuse(job, 409, "no series is selected");

@@ -21,6 +21,7 @@
 #include <unistd.h>
 
 #include "common/wire_table.h"
+#include "firmware/parameter.h"
 #include "host/console/console.h"
 #include "tests/unit/drop_by_hand.h"
 
@@ -56,7 +57,8 @@ static struct {
 	/* what it heard: ops; of parameters only how many */
 	uint8_t heard[HEARD_MAX];
 	unsigned heard_count, parameters, resends;
-	atomic_uint ends; /* said so often that it holds a drop */
+	struct parameters values; /* and what it took of them */
+	atomic_uint ends;         /* said so often that it holds a drop */
 } fake = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
 static void send(struct frame frame)
@@ -193,6 +195,10 @@ static void hear_parameter(const struct frame *frame)
 		return;
 	fake.parameters++;
 	sdo.specifier = 0x60;
+	if (parameters_set(&fake.values, sdo.index, sdo.value) != 0) {
+		sdo.specifier = 0x80;
+		sdo.value = PARAMETER_INCOMPATIBLE;
+	}
 	wire_pack_sdo(&answer, WIRE_ID_SDO_REPLY, &sdo);
 	send(answer);
 }
@@ -259,6 +265,15 @@ static void fake_leave(void)
 	(void)link_close(fake.link);
 }
 
+/* Series from other heights; each next one is selected after the one before, on one tower. */
+static const struct {
+	const char *series;
+	double height_m;
+} heights[] = {{"mid", 1.0}, {"top", 2.49}, {"low", 0.3}, {"high", 2.0}, {"lower", 0.5}, {"five", 5.0}};
+
+/* geometry-2A's dampers, above what its product falls on. */
+#define DAMPERS_ABOVE_M 0.094
+
 static void make_archive(void)
 {
 	struct archive *archive = archive_open(archive_name, ARCHIVE_CREATE, message);
@@ -266,6 +281,11 @@ static void make_archive(void)
 	assert_non_null(archive);
 	assert_int_equal(archive_new_series(archive, "box", "c", "common/scenes/geometry-2A.ini", 25, NAN, 5),
 	                 0);
+	for (size_t i = 0; i < sizeof(heights) / sizeof(heights[0]); i++)
+		assert_int_equal(archive_new_series(archive, heights[i].series, "c",
+		                                    "common/scenes/geometry-2A.ini", 25, heights[i].height_m,
+		                                    1),
+		                 0);
 	archive_close(archive);
 }
 
@@ -300,6 +320,7 @@ static void set_up_fake(void)
 	fake.dumb = fake.captured = false;
 	fake.deaf = fake.hole = fake.heard_count = fake.parameters = fake.resends = 0;
 	fake.refusal = 0;
+	parameters_init(&fake.values);
 	fake.falls = true;
 	fake.fault = WIRE_FAULT_NONE;
 	fake.state = WIRE_STATE_READY;
@@ -494,6 +515,12 @@ static bool is_moving(const struct tower_view *view)
 static bool holds_drop(const struct tower_view *view)
 {
 	return view->session.state == WIRE_STATE_CAPTURED && strstr(view->trouble, "holds a drop") != NULL;
+}
+
+static bool is_blocked(const struct tower_view *view)
+{
+	return view->session.state == WIRE_STATE_READY && view->blocked &&
+	       strstr(view->trouble, "gate_lower_um") != NULL;
 }
 
 static bool is_set_up(const struct tower_view *view)
@@ -940,6 +967,36 @@ static void a_tower_that_starts_again_is_set_up_again(void **state)
 	wait_view(is_set_up);
 }
 
+static void a_tower_is_set_up_from_any_height_for_any_other(void **state)
+{
+	char text[512];
+
+	(void)state;
+	wait_view(is_heard);
+	for (size_t i = 0; heights[i].height_m < 5; i++) {
+		double wanted_um = (heights[i].height_m - DAMPERS_ABOVE_M) * 1e6;
+
+		snprintf(text, sizeof(text), "{\"series\":\"%s\"}", heights[i].series);
+		must(tower_select, text);
+		wait_view(is_set_up);
+		assert_float_equal(fake.values.value[WIRE_PARAMETER_dampers_um], wanted_um, 1);
+	}
+}
+
+static void what_no_tower_can_have_is_refused_with_its_range(void **state)
+{
+	unsigned before;
+	char text[512];
+
+	(void)state;
+	select_box();
+	before = fake.parameters;
+	assert_int_equal(say(tower_select, "{\"series\":\"five\"}", text), 409);
+	assert_non_null(strstr(text, "10000 to 2400000 um"));
+	assert_int_equal(fake.parameters, before);
+	wait_view(is_blocked); /* green, and yet the page must not call it ready */
+}
+
 static void the_end_aborts_what_is_armed(void **state)
 {
 	(void)state;
@@ -970,6 +1027,8 @@ int main(void)
 	                                        tear_down),
 	        TEST(a_drop_survives_the_loss_of_the_link),
 	        TEST(a_tower_that_starts_again_is_set_up_again),
+	        TEST(a_tower_is_set_up_from_any_height_for_any_other),
+	        TEST(what_no_tower_can_have_is_refused_with_its_range),
 	        TEST(the_end_aborts_what_is_armed),
 	};
 

@@ -90,6 +90,7 @@ function interlocks(inputs, resting) {
 function stateWords(tower) {
 	if (!tower.open) return ["NO LINK", tower.trouble || "the link to the tower is not open"];
 	if (!tower.seen) return ["NO TOWER", tower.trouble || "nothing was heard of the tower yet"];
+	if (tower.state === "READY" && tower.blocked) return ["NOT READY", tower.trouble];
 	const fault = tower.fault && tower.fault !== "NONE" ? tower.fault_text : "";
 	return [tower.state.replace("_", " "), [fault || (STATES[tower.state] ?? tower.text), tower.trouble].filter(Boolean).join(". ")];
 }
@@ -97,12 +98,14 @@ function stateWords(tower) {
 function stateTile(tower) {
 	const known = tower.open && tower.seen;
 	const [name, text] = stateWords(tower);
+	const shown = tower.blocked && tower.state === "READY" ? "SAFE" : tower.state;
 	const changed = byId("state").textContent !== name;
 	setText(byId("state"), name);
 	setText(byId("state-text"), text);
 	byId("state-text").title = text;
-	setData(byId("state-tile"), "state", known ? tower.state : "NONE");
-	byId("state-sign").setAttribute("href", `#sign-${(known && SIGNS[tower.state]) || "unknown"}`);
+	setData(byId("state-tile"), "state", known ? shown : "NONE");
+	setData(byId("state-tile"), "trouble", tower.trouble ? "yes" : "no");
+	byId("state-sign").setAttribute("href", `#sign-${(known && SIGNS[shown]) || "unknown"}`);
 	if (changed) setText(byId("announce"), `${name}: ${text}`);
 	document.title = `${name} – drop tower`;
 }
