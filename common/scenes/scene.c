@@ -140,6 +140,11 @@ int scene_read(struct scene *scene, const char *file, char message[SCENE_MESSAGE
 	struct reading reading = {.settings = {.file = file, .message = message, .entry = read_entry}};
 	int result = settings_read(&reading.settings);
 
+	if (result == DT_E_SYSTEM) {
+		size_t said = strlen(message);
+
+		snprintf(message + said, SCENE_MESSAGE_MAX - said, ", expected a scene file");
+	}
 	if (result == 0)
 		result = complete(&reading);
 	if (result == 0)

@@ -7,6 +7,8 @@
 #include <sys/types.h>
 #include <unistd.h>
 
+enum { SCENE_NAME_MAX = 100 };
+
 int beside(const char *relative, char path[PATH_MAX])
 {
 	ssize_t length = readlink("/proc/self/exe", path, PATH_MAX);
@@ -34,4 +36,19 @@ int beside_scene(const char *name, char path[PATH_MAX])
 	}
 	snprintf(relative, sizeof(relative), "../share/droptower/scenes/%s", name);
 	return beside(relative, path);
+}
+
+const char *beside_scene_file(const char *name, char path[PATH_MAX])
+{
+	static const char *const endings[] = {"", ".ini"};
+	char file[NAME_MAX];
+
+	if (access(name, F_OK) == 0 || strchr(name, '/') != NULL || strlen(name) > SCENE_NAME_MAX)
+		return name;
+	for (size_t i = 0; i < sizeof(endings) / sizeof(endings[0]); i++) {
+		snprintf(file, sizeof(file), "%s%s", name, endings[i]);
+		if (beside_scene(file, path) == 0 && access(path, F_OK) == 0)
+			return path;
+	}
+	return name;
 }

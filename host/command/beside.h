@@ -14,4 +14,8 @@ int beside(const char *relative, char path[PATH_MAX]);
  * installed. As beside. */
 int beside_scene(const char *name, char path[PATH_MAX]);
 
+/* The scene file that a user means by name: that file, if there is one; else, when it names no folder, the
+ * scene of that name that comes along, with or without its .ini, if there is one, in path; else name. */
+const char *beside_scene_file(const char *name, char path[PATH_MAX]);
+
 #endif

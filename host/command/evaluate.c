@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "common/units.h"
+#include "host/command/beside.h"
 #include "host/command/command.h"
 #include "host/estimate/cfc.h"
 #include "host/estimate/filter.h"
@@ -224,8 +225,8 @@ char *evaluate_json(const struct record *record, const struct scene *scene)
 
 int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg)
 {
-	char message[SCENE_MESSAGE_MAX];
-	int result = scene_read(scene, file, message);
+	char message[SCENE_MESSAGE_MAX], path[PATH_MAX];
+	int result = scene_read(scene, beside_scene_file(file, path), message);
 
 	if (result == 0 && !isnan(angle_deg)) {
 		scene->drop_angle_deg = angle_deg;

@@ -24,8 +24,9 @@ static const char help[] =
         "Ctrl-C aborts: at rest nothing is released, in motion the frame is braked and the record kept.\n"
         "\n"
         "  --link URL     unix:PATH, can:IF, slcan:DEV, or udpm://... for a running 'droptower bridge';\n"
-        "                 without it a simulated tower is started\n"
-        "  --scene FILE   what is dropped (default geometry-2A.ini, which comes along)\n"
+        "                 it needs --scene or --series; without it a simulated tower is started\n"
+        "  --scene FILE   what is dropped: a file, or one of those that come along by its name (for a\n"
+        "                 simulated tower geometry-2A without it)\n"
         "  --angle DEG    contact angle, instead of the scene's\n"
         "  --out DIR      where the files go (default .)\n"
         "  --series NAME  into an archive, as the series' next drop; 'droptower series new' makes a series,\n"
@@ -65,14 +66,6 @@ static const struct option long_options[] = {
         {0},
 };
 
-/* NULL: it did not come along. */
-static const char *default_scene(void)
-{
-	static char path[PATH_MAX];
-
-	return beside_scene("geometry-2A.ini", path) == 0 && access(path, F_OK) == 0 ? path : NULL;
-}
-
 /* A series says what is dropped, and where the files go. */
 static int check_archive(struct run *run)
 {
@@ -84,13 +77,27 @@ static int check_archive(struct run *run)
 	run->operator_name = archived_operator(run->operator_name);
 	if (run->out == NULL)
 		run->out = ".";
-	run->scene_assumed = run->scene_file == NULL && run->series == NULL;
-	if (run->scene_assumed)
-		run->scene_file = default_scene();
-	if (!run->scene_assumed || run->scene_file != NULL)
+	return COMMAND_DONE;
+}
+
+/* A real tower is set up for a scene, and its product falls: that one nobody assumes. */
+static int choose_scene(struct run *run)
+{
+	const char *name = run->scene_file != NULL ? run->scene_file : "geometry-2A.ini";
+
+	if (run->series != NULL)
 		return COMMAND_DONE;
-	command_error("no scenes came along; --scene FILE names one");
-	return COMMAND_INPUT;
+	if (run->scene_file == NULL && run->link != NULL)
+		return command_usage(
+		        "run",
+		        "--link sets a tower up for what is dropped, expected --scene FILE or --series NAME");
+	name = beside_scene_file(name, run->scene_path);
+	if (run->scene_file == NULL && access(name, F_OK) != 0) {
+		command_error("no scenes came along; --scene FILE names one");
+		return COMMAND_INPUT;
+	}
+	run->scene_file = name;
+	return COMMAND_DONE;
 }
 
 static int parse(struct run *run, int argc, char **argv)
@@ -144,7 +151,9 @@ static int parse(struct run *run, int argc, char **argv)
 		code = command_usage("run", "'%s' is too much", argv[optind]);
 	if (code == COMMAND_DONE && run->link != NULL && run->bench_word_count > 0)
 		code = command_usage("run", "--bench is for the simulated tower, --link for another one");
-	return code == COMMAND_DONE && !run->help ? check_archive(run) : code;
+	if (code == COMMAND_DONE)
+		code = check_archive(run);
+	return code == COMMAND_DONE ? choose_scene(run) : code;
 }
 
 void run_progress(const struct run *run, const char *format, ...)
@@ -185,9 +194,6 @@ static int run_drop(struct run *run)
 	char seed[32], angle[32], message[256];
 	int code;
 
-	if (run->link != NULL && run->scene_assumed)
-		run_progress(run, "scene     %s at %g deg, for want of --scene", run->scene.name,
-		             run->scene.drop_angle_deg);
 	if (run->link == NULL) {
 		say_to_bench(run, seed, angle);
 		if (simulated_start(&tower, run->bench_words, message, sizeof(message)) != 0) {

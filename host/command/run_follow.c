@@ -55,6 +55,11 @@ static int wait_until_ready(struct run *run)
 	return COMMAND_DONE;
 }
 
+static bool unanswered(int result)
+{
+	return result == DT_E_TIMEOUT || result == DT_E_CLOSED || result == DT_E_LINK;
+}
+
 static int arm_and_release(struct run *run)
 {
 	uint16_t token = session_token();
@@ -68,6 +73,7 @@ static int arm_and_release(struct run *run)
 	if (result == 0) {
 		run_progress(run, "armed");
 		result = session_command(run->session, WIRE_OP_RELEASE, token);
+		run->released = result == 0 || unanswered(result); /* it may have worked */
 	}
 	/* an interrupted release may have worked: what follows aborts it and looks */
 	if (result == 0 || command_interrupted()) {
@@ -76,8 +82,7 @@ static int arm_and_release(struct run *run)
 	}
 	command_error("the tower refuses: %s", error_text(result));
 	tell_checks(run, session_view(run->session)->checks);
-	return result == DT_E_TIMEOUT || result == DT_E_CLOSED || result == DT_E_LINK ? COMMAND_LINK
-	                                                                              : COMMAND_REFUSED;
+	return unanswered(result) ? COMMAND_LINK : COMMAND_REFUSED;
 }
 
 static void tell_state(const struct run *run, unsigned state, uint32_t *told)
@@ -90,17 +95,28 @@ static void tell_state(const struct run *run, unsigned state, uint32_t *told)
 	*told |= bit;
 }
 
+/* The status that names a fault comes after the blocks that have its state. */
+static void tell_fault(const struct run *run, unsigned fault, unsigned *told)
+{
+	if (fault != WIRE_FAULT_NONE && fault != *told)
+		run_progress(run, "fault     %s: %s", wire_fault_name(fault), wire_fault_text(fault));
+	*told = fault;
+}
+
 /* Follows the drop until it is collected. */
 static int follow_to_end(struct run *run, struct record *record)
 {
 	const struct session_view *view = session_view(run->session);
 	int64_t start_ms = session_now_ms();
 	uint32_t told = 1u << WIRE_STATE_ARMED;
+	unsigned told_fault = WIRE_FAULT_NONE;
 
 	for (;;) {
 		int result = session_poll(run->session, 50);
 		int taken = result == 0 ? session_take_drop(run->session, record) : result;
 
+		if (result == 0)
+			tell_fault(run, view->fault, &told_fault);
 		if (taken == 1)
 			return COMMAND_DONE;
 		if (taken < 0)
@@ -155,7 +171,7 @@ static int release_and_follow(struct run *run, struct record *record)
 		code = wait_until_ready(run);
 	if (code == COMMAND_DONE)
 		code = arm_and_release(run);
-	run->released = code == COMMAND_DONE;
+	run->released |= code == COMMAND_DONE;
 	return code == COMMAND_DONE ? follow_to_end(run, record) : code;
 }
 

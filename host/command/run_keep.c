@@ -162,12 +162,10 @@ int run_keep_report(struct run *run, struct record *record)
 	return run->archive != NULL ? report_archived(run, record) : report_files(run, record);
 }
 
-/* A run that never heard a tower leaves no file. */
-static void forget_empty_log(const struct run *run)
+/* A run that released nothing, and fetched nothing, leaves no file. */
+static void forget_log(const struct run *run)
 {
-	struct stat there;
-
-	if (stat(run->log, &there) == 0 && there.st_size == 0)
+	if (run->log[0] != '\0' && !run->released && !run->earlier)
 		unlink(run->log);
 }
 
@@ -185,7 +183,7 @@ static void leave_recording(struct run *run)
 void run_keep_end(struct run *run)
 {
 	if (run->series == NULL) {
-		forget_empty_log(run);
+		forget_log(run);
 		return;
 	}
 	leave_recording(run);

@@ -6,6 +6,7 @@
  * drop on its way from the first check to the last sample, run_keep.c what stays of it: files, archive,
  * report. Every function that returns an int returns a COMMAND_* exit code and has printed what was wrong.
  */
+#include <limits.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -21,16 +22,16 @@ struct run {
 	const char *archive_folder, *series, *operator_name;
 	double angle_deg;
 	bool json, strict, help;
-	bool scene_assumed; /* neither --scene nor --series was given */
 	const char *bench_words[RUN_BENCH_WORDS_MAX + 8];
 	int bench_word_count;
 	/* while it runs */
 	struct scene scene;
 	struct session *session;
 	int64_t start_ms;
-	bool aborted;    /* by the operator, after the release */
-	bool earlier;    /* the drop is one that the tower still held */
-	bool released;   /* what comes now is a drop, whatever becomes of it */
+	bool aborted;  /* by the operator, after the release */
+	bool earlier;  /* the drop is one that the tower still held */
+	bool released; /* what comes now is, or may be, a drop, whatever becomes of it */
+	char scene_path[PATH_MAX];
 	char stem[4096]; /* OUT/drop-NNNN */
 	char log[ARCHIVE_PATH_MAX];
 	struct archive *archive; /* NULL: files in OUT */
@@ -50,7 +51,7 @@ int run_follow(struct run *run, const char *url, struct record *record);
 /* Analyses and reports what was recorded. */
 int run_keep_report(struct run *run, struct record *record);
 
-/* Takes the log away again when there is nothing in it; to be called after any run_keep_begin. */
+/* Takes the log away again when nothing was released or fetched; to be called after any run_keep_begin. */
 void run_keep_end(struct run *run);
 
 #endif

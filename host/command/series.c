@@ -35,7 +35,7 @@ static const char help[] =
         "  --archive DIR    the archive's folder; without it $DROPTOWER_ARCHIVE, else ./archive\n"
         "  --rebuild        make its index again from the raw files (no verb)\n"
         "  --campaign NAME  those of a campaign; for new: which it belongs to (default)\n"
-        "  --scene NAME     those of a scene; for new: the scene's file\n"
+        "  --scene NAME     those of a scene; for new: the scene's file, or one that comes along\n"
         "  --angle DEG      those at an angle; for new: instead of the scene's\n"
         "  --height M       for new: instead of the scene's\n"
         "  --date DAY       drops of a day, month or year (UTC), or FROM..TO: 2026-11, "

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "host/command/archived.h"
+#include "host/command/beside.h"
 #include "host/command/command.h"
 #include "host/command/series_private.h"
 #include "host/record/drop.h"
@@ -21,9 +22,10 @@
 int series_verb_new(struct archive *archive, struct series_arguments *a)
 {
 	const char *campaign = a->filter.campaign != NULL ? a->filter.campaign : "default";
+	char path[PATH_MAX];
 
-	if (archive_new_series(archive, a->word[0], campaign, a->scene, a->filter.angle_deg, a->height_m,
-	                       (unsigned)a->drops) != 0)
+	if (archive_new_series(archive, a->word[0], campaign, beside_scene_file(a->scene, path),
+	                       a->filter.angle_deg, a->height_m, (unsigned)a->drops) != 0)
 		return archived_failed(archive);
 	printf("series %s\n", a->word[0]);
 	return COMMAND_DONE;
