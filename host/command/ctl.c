@@ -10,7 +10,8 @@
 #include "host/command/session.h"
 
 static const char help[] =
-        "usage: droptower ctl [--link URL] status|arm|release TOKEN|abort|clear|set NAME VALUE\n"
+        "usage: droptower ctl [--link URL] status|arm|release TOKEN|abort|clear|set NAME VALUE|get "
+        "[NAME]\n"
         "\n"
         "  status         state, checks, faults and every counter\n"
         "  arm            prints the token that release needs within 10 s\n"
@@ -20,6 +21,7 @@ static const char help[] =
         "  set NAME VALUE a parameter, until the tower starts again: bus_mode (0 CAN FD, 1 classic CAN), "
         "data_kbit_s,\n"
         "                 trigger_counts, ...; a name that is none lists them\n"
+        "  get [NAME]     what a parameter is, without NAME every one\n"
         "\n"
         "The tower arms only while a host keeps its heartbeat going: run 'droptower bridge' beside.\n"
         "--link is unix:PATH, can:IF, slcan:DEV or udpm://...; default $DROPTOWER_LINK, else can:can0.\n";
@@ -28,9 +30,11 @@ enum { STATUS_WAIT_MS = 1500, COUNTERS_WAIT_MS = 5000 };
 
 static void print_status(const struct session_view *view)
 {
-	printf("state    %s\nfault    %s%s%s\ndrop     %u\n", wire_state_name(view->state),
+	printf("state    %s\nfault    %s%s%s%s\ndrop     %u\n", wire_state_name(view->state),
 	       wire_fault_name(view->fault), view->fault != 0 ? ": " : "",
-	       view->fault != 0 ? wire_fault_text(view->fault) : "", view->drop_id);
+	       view->fault != 0 ? wire_fault_text(view->fault) : "",
+	       view->state == WIRE_STATE_FAULT_HELD ? "; 'droptower ctl clear' when its cause is gone" : "",
+	       view->drop_id);
 	if (view->checks == 0)
 		printf("checks   all green\n");
 	for (unsigned i = 0; i < WIRE_CHECKS; i++)
@@ -108,6 +112,12 @@ static int act(struct session *session, const char *verb, uint16_t token)
 	return COMMAND_USAGE;
 }
 
+static int not_over_lcm(const char *verb)
+{
+	command_error("%s: over LCM parameters are the bridge's business, expected --link to the bus", verb);
+	return COMMAND_LINK;
+}
+
 static int set(struct session *session, enum wire_parameter_number number, uint32_t value)
 {
 	const struct wire_parameter_info *parameter = &wire_parameters[number];
@@ -117,11 +127,8 @@ static int set(struct session *session, enum wire_parameter_number number, uint3
 		printf("%s %u\n", parameter->name, value);
 		return COMMAND_DONE;
 	}
-	if (result == DT_E_UNKNOWN) {
-		command_error(
-		        "set: over LCM parameters are the bridge's business, expected --link to the bus");
-		return COMMAND_LINK;
-	}
+	if (result == DT_E_UNKNOWN)
+		return not_over_lcm("set");
 	if (result == DT_E_RANGE) {
 		command_error("set: the tower cannot have %s = %u beside its other parameters: %s",
 		              parameter->name, value, parameter->doc);
@@ -131,12 +138,31 @@ static int set(struct session *session, enum wire_parameter_number number, uint3
 	return refused("set", result, session_view(session));
 }
 
+/* From first to last. */
+static int get(struct session *session, unsigned first, unsigned last)
+{
+	for (unsigned i = first; i <= last; i++) {
+		uint32_t value;
+		int result = session_get_parameter(session, (enum wire_parameter_number)i, &value);
+
+		if (result == DT_E_UNKNOWN)
+			return not_over_lcm("get");
+		if (result != 0) {
+			command_error("get: %s: %s", wire_parameters[i].name, error_text(result));
+			return result == DT_E_EMPTY ? COMMAND_REFUSED : COMMAND_LINK;
+		}
+		printf("%s = %u\n", wire_parameters[i].name, value);
+	}
+	return COMMAND_DONE;
+}
+
 /* ---- words ---- */
 
 struct order {
 	const char *verb;
 	uint16_t token;                    /* of release */
-	enum wire_parameter_number number; /* of set */
+	enum wire_parameter_number number; /* of set and get */
+	bool all;                          /* of get */
 	uint32_t value;
 };
 
@@ -151,7 +177,7 @@ static int parse_token(const char *text, uint16_t *token)
 	return COMMAND_DONE;
 }
 
-static int parse_parameter(const char *name, enum wire_parameter_number *number)
+static int parse_parameter(const char *verb, const char *name, enum wire_parameter_number *number)
 {
 	char names[24 * WIRE_PARAMETERS];
 	size_t length = 0;
@@ -164,7 +190,7 @@ static int parse_parameter(const char *name, enum wire_parameter_number *number)
 		length += (size_t)snprintf(names + length, sizeof(names) - length, " %s",
 		                           wire_parameters[i].name);
 	}
-	return command_usage("ctl", "set: no parameter '%s', expected one of%s", name, names);
+	return command_usage("ctl", "%s: no parameter '%s', expected one of%s", verb, name, names);
 }
 
 static int parse_set(char **words, int count, struct order *order)
@@ -175,7 +201,7 @@ static int parse_set(char **words, int count, struct order *order)
 
 	if (count < 2)
 		return command_usage("ctl", "set: expected NAME VALUE");
-	code = parse_parameter(words[0], &order->number);
+	code = parse_parameter("set", words[0], &order->number);
 	if (code != COMMAND_DONE)
 		return code;
 	parameter = &wire_parameters[order->number];
@@ -206,9 +232,14 @@ static int parse_order(char **words, int count, struct order *order)
 	} else if (strcmp(words[0], "set") == 0) {
 		code = parse_set(words + 1, count - 1, order);
 		taken = 3;
+	} else if (strcmp(words[0], "get") == 0) {
+		order->all = count < 2;
+		code = order->all ? COMMAND_DONE : parse_parameter("get", words[1], &order->number);
+		taken = 2;
 	} else if (!known) {
-		return command_usage(
-		        "ctl", "no verb '%s', expected status, arm, release, abort, clear or set", words[0]);
+		return command_usage("ctl",
+		                     "no verb '%s', expected status, arm, release, abort, clear, set or get",
+		                     words[0]);
 	}
 	if (code == COMMAND_DONE && count > taken)
 		code = command_usage("ctl", "'%s' is too much", words[taken]);
@@ -223,6 +254,9 @@ static int carry_out(struct session *session, const char *url, const struct orde
 
 	if (strcmp(order->verb, "set") == 0)
 		return set(session, order->number, order->value);
+	if (strcmp(order->verb, "get") == 0)
+		return get(session, order->all ? 0 : order->number,
+		           order->all ? WIRE_PARAMETERS - 1 : order->number);
 	if (strcmp(order->verb, "status") != 0)
 		return act(session, order->verb, order->token);
 	result = wait_for_status(session, true);

@@ -18,8 +18,8 @@
 static const char help[] =
         "usage: droptower run [OPTIONS]\n"
         "\n"
-        "One drop: waits until every check is green, arms, releases, follows the fall, fetches every "
-        "sample,\n"
+        "One drop: waits until every check is green, then arms and releases AT ONCE (the last check that\n"
+        "turns green, say the door that closes, is the release), follows the fall, fetches every sample,\n"
         "analyses and reports. Writes drop-NNNN.log (candump text), .csv, .json and .html into --out.\n"
         "Ctrl-C aborts: at rest nothing is released, in motion the frame is braked and the record kept.\n"
         "\n"

@@ -74,6 +74,11 @@ int session_set_parameter(struct session *session, enum wire_parameter_number nu
 	return session->how->set_parameter(session, number, value);
 }
 
+int session_get_parameter(struct session *session, enum wire_parameter_number number, uint32_t *value)
+{
+	return session->how->get_parameter(session, number, value);
+}
+
 int session_take_drop(struct session *session, struct record *record)
 {
 	return session->how->take_drop(session, record);

@@ -78,6 +78,10 @@ DT_MUST_USE int session_command(struct session *session, enum wire_op op, uint16
 DT_MUST_USE int session_set_parameter(struct session *session, enum wire_parameter_number number,
                                       uint32_t value);
 
+/* Reads a parameter into value. As session_set_parameter; DT_E_EMPTY when the tower does not have it. */
+DT_MUST_USE int session_get_parameter(struct session *session, enum wire_parameter_number number,
+                                      uint32_t *value);
+
 /* 1 and a record (free it) when a drop was collected, complete or given up; 0 when there is none. */
 DT_MUST_USE int session_take_drop(struct session *session, struct record *record);
 

@@ -21,6 +21,9 @@ enum {
 	FRAMES_AT_ONCE = 64,     /* handled before anything else is done */
 };
 
+/* CiA 301, expedited transfer of four bytes: the first byte of a request and of its answer. */
+enum { SDO_WRITE = 0x23, SDO_WRITTEN = 0x60, SDO_READ = 0x40, SDO_VALUE = 0x43, SDO_ABORT = 0x80 };
+
 struct can_way {
 	struct link *link;
 	struct join *join;
@@ -142,6 +145,15 @@ static void follow_tower(struct session *session, const struct frame *frame)
 	}
 }
 
+/* Another host on the bus may ask for the same. */
+static bool is_answer(const struct wire_sdo *answer, const struct wire_sdo *request)
+{
+	unsigned wanted = request->specifier == SDO_READ ? SDO_VALUE : SDO_WRITTEN;
+
+	return answer->index == request->index &&
+	       (answer->specifier == wanted || answer->specifier == SDO_ABORT);
+}
+
 static void hear_answers(struct can_way *way, const struct frame *frame)
 {
 	struct wire_reply reply;
@@ -153,7 +165,7 @@ static void hear_answers(struct can_way *way, const struct frame *frame)
 			way->reply_awaited = false;
 		}
 	} else if (frame->id == WIRE_ID_SDO_REPLY && wire_unpack_sdo(frame, &sdo) == 0) {
-		if (way->sdo_awaited && sdo.index == way->sdo.index) {
+		if (way->sdo_awaited && is_answer(&sdo, &way->sdo)) {
 			way->sdo = sdo;
 			way->sdo_awaited = false;
 		}
@@ -366,25 +378,48 @@ static int can_command(struct session *session, enum wire_op op, uint16_t token)
 	return result;
 }
 
-static int can_set_parameter(struct session *session, enum wire_parameter_number number, uint32_t value)
+/* Sends request until it is answered; 0 with the answer in way->sdo. */
+static int ask_sdo(struct session *session, const struct wire_sdo *request)
 {
 	struct can_way *way = session->way;
-	struct wire_sdo write = {.specifier = 0x23, .index = wire_parameters[number].index, .value = value};
 	struct frame frame;
 	int result = DT_E_TIMEOUT;
 
-	wire_pack_sdo(&frame, WIRE_ID_SDO_REQUEST, &write);
+	wire_pack_sdo(&frame, WIRE_ID_SDO_REQUEST, request);
 	for (int attempt = 0; attempt < TRIES && result == DT_E_TIMEOUT && !session_cancelled(session);
 	     attempt++) {
-		way->sdo = write;
+		way->sdo = *request;
 		way->sdo_awaited = true;
 		result = send(session, &frame);
 		if (result == 0)
 			result = await(session, &way->sdo_awaited, false);
 	}
 	way->sdo_awaited = false;
-	if (result == 0 && way->sdo.specifier != 0x60)
+	return result;
+}
+
+static int can_set_parameter(struct session *session, enum wire_parameter_number number, uint32_t value)
+{
+	const struct can_way *way = session->way;
+	struct wire_sdo write = {
+	        .specifier = SDO_WRITE, .index = wire_parameters[number].index, .value = value};
+	int result = ask_sdo(session, &write);
+
+	if (result == 0 && way->sdo.specifier != SDO_WRITTEN)
 		result = way->sdo.value == 0x08000022u ? DT_E_STATE : DT_E_RANGE; /* CiA 301 abort codes */
+	return result;
+}
+
+static int can_get_parameter(struct session *session, enum wire_parameter_number number, uint32_t *value)
+{
+	const struct can_way *way = session->way;
+	struct wire_sdo read = {.specifier = SDO_READ, .index = wire_parameters[number].index};
+	int result = ask_sdo(session, &read);
+
+	if (result == 0 && way->sdo.specifier != SDO_VALUE)
+		result = DT_E_EMPTY;
+	if (result == 0)
+		*value = way->sdo.value;
 	return result;
 }
 
@@ -442,5 +477,6 @@ const struct session_way session_can = {
         .poll = can_poll,
         .command = can_command,
         .set_parameter = can_set_parameter,
+        .get_parameter = can_get_parameter,
         .take_drop = can_take_drop,
 };

@@ -111,6 +111,14 @@ static int lcm_way_set_parameter(struct session *session, enum wire_parameter_nu
 	return DT_E_UNKNOWN;
 }
 
+static int lcm_way_get_parameter(struct session *session, enum wire_parameter_number number, uint32_t *value)
+{
+	(void)session;
+	(void)number;
+	(void)value;
+	return DT_E_UNKNOWN;
+}
+
 static int log_frame(void *user, const struct frame *frame)
 {
 	return link_send(user, frame);
@@ -178,5 +186,6 @@ const struct session_way session_lcm = {
         .poll = lcm_way_poll,
         .command = lcm_way_command,
         .set_parameter = lcm_way_set_parameter,
+        .get_parameter = lcm_way_get_parameter,
         .take_drop = lcm_way_take_drop,
 };

@@ -15,6 +15,7 @@ struct session_way {
 	int (*poll)(struct session *session, int timeout_ms);
 	int (*command)(struct session *session, enum wire_op op, uint16_t token);
 	int (*set_parameter)(struct session *session, enum wire_parameter_number number, uint32_t value);
+	int (*get_parameter)(struct session *session, enum wire_parameter_number number, uint32_t *value);
 	int (*take_drop)(struct session *session, struct record *record);
 };
 
