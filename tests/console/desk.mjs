@@ -147,10 +147,12 @@ export class Desk {
 
 	/* ---- the workflow, by mouse ---- */
 
-	async setUp({ name, scene, angle, planned }) {
+	async setUp({ name, scene, angle, planned, height }) {
 		await this.until({ step: "setup" });
 		await this.page.selectOption("#scene", scene);
 		await this.page.fill("#angle", String(angle));
+		if (height !== undefined)
+			await this.page.fill("#height", String(height));
 		await this.page.fill("#planned", String(planned));
 		await this.page.fill("#series-name", name);
 		await this.click("#setup-go");

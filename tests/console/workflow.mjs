@@ -434,6 +434,18 @@ async function abortAfterRelease() {
 	assert.match(await desk.text(row), /abort/i);
 }
 
+/* Its checks are all green all the same. */
+async function tooHigh() {
+	await desk.click("#change-series");
+	await desk.setUp({ name: "high", scene: "geometry-2A", angle: 25, height: 4, planned: 1 });
+	await desk.untilText("#state", /^NOT READY$/);
+	assert.notEqual(await desk.page.getAttribute("#state-tile", "data-state"), "READY");
+	for (const where of ["#state-text", "#arm-say"])
+		await desk.untilText(where, /gate_lower_um = 3806000, expected 10000 to 2400000 um/);
+	const [full, shown] = await desk.page.$eval("#state-text", (node) => [node.scrollHeight, node.clientHeight]);
+	assert.ok(shown >= full, `the reason is cut off: ${shown} of ${full} px`);
+}
+
 async function nothingWrong() {
 	assert.deepEqual(desk.errors, []);
 	assert.equal(await stop(server), 0, server.said);
@@ -479,6 +491,7 @@ export default {
 		["table as CSV, report as one file", files],
 		["history: search, any drops over each other", history],
 		["ABORT after the release brakes, and the drop is kept with a note", abortAfterRelease],
+		["a tower that cannot be set up is not called ready, and why is shown in full", tooHigh],
 		["no error on the page; the console ends in order", nothingWrong],
 	],
 };

@@ -89,7 +89,7 @@ export function showArm(state) {
 		byId("arm-say"),
 		done
 			? `All ${series.planned} drops are accepted. Go on with the next series, or make one more drop of this one.`
-			: `Drop ${series.accepted + 1} of ${series.planned}. All checks are green.`,
+			: `Drop ${series.accepted + 1} of ${series.planned}. ${tower.blocked ? `Not now: ${tower.trouble}` : "All checks are green"}.`,
 	);
 	setText(byId("arm-head"), done ? "Series complete" : "Arm");
 	show(byId("next-series"), done);
