@@ -152,7 +152,8 @@ static void a_file_that_is_not_there(void **state)
 
 	(void)state;
 	assert_int_equal(scene_read(&scene, "common/scenes/none.ini", message), DT_E_SYSTEM);
-	assert_string_equal(message, "common/scenes/none.ini: No such file or directory, expected a scene file");
+	assert_string_equal(message,
+	                    "common/scenes/none.ini: No such file or directory, expected a scene file");
 	assert_string_equal(scene.name, "untouched");
 }
 
