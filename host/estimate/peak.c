@@ -268,6 +268,13 @@ bool peak_meets(const struct peak *peak, const struct estimate_options *options)
 	       peak->result.sigma_time_s <= tolerance * peak->width_s;
 }
 
+void peak_flag_tolerance(struct peak *peak, const struct estimate_options *options)
+{
+	peak->result.how.flags &= ~(unsigned)ESTIMATE_FLAG_TOLERANCE;
+	if (!peak_meets(peak, options))
+		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
+}
+
 /* Sine-power in place of the polynomials, if nothing speaks against it. */
 static void sharpen(const struct trace *trace, struct peak *peak)
 {
@@ -401,8 +408,7 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 		peak_climb(trace, options, peak);
 	if (peak->result.how.status == ESTIMATE_OK && may_be_spike(trace, peak))
 		peak->result.how.status = ESTIMATE_AMBIGUOUS;
-	if (!peak_meets(peak, options))
-		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
+	peak_flag_tolerance(peak, options);
 }
 
 bool peak_at(const struct peak *peak, double time_s, double derivative[3], double variance[2])

@@ -89,8 +89,6 @@ bool peak_driven(const struct driven_axis *axis, const struct driven *driven,
 		take(driven, sigma, s1);
 	else
 		s1->sigma_time_s = hypot(s1->sigma_time_s, s1->time_s - driven->peak_s);
-	s1->how.flags &= ~(unsigned)ESTIMATE_FLAG_TOLERANCE;
-	if (!peak_meets(peak, options))
-		s1->how.flags |= ESTIMATE_FLAG_TOLERANCE;
+	peak_flag_tolerance(peak, options);
 	return taken;
 }

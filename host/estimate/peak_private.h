@@ -23,6 +23,9 @@ void peak_tried(struct estimate_how *how, const char *name);
 /* Whether the tolerance is met. */
 bool peak_meets(const struct peak *peak, const struct estimate_options *options);
 
+/* Flags the tolerance that is not met, or takes the flag away. */
+void peak_flag_tolerance(struct peak *peak, const struct estimate_options *options);
+
 /* The family's fit into peak->shape; false when there is none. */
 bool peak_fit(const struct trace *trace, enum estimate_family family, struct peak *peak);
 

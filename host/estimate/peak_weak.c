@@ -80,8 +80,7 @@ bool peak_weak(const struct trace *trace, const struct estimate_options *options
 		peak->at--;
 	peak->sign = amplitude.value < 0 ? -1 : 1;
 	peak->scale = amplitude.value / from->value_g;
-	if (!peak_meets(peak, options))
-		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
+	peak_flag_tolerance(peak, options);
 	return true;
 }
 
@@ -89,7 +88,5 @@ void peak_weak_time(const struct estimate_options *options, const struct peak *s
 {
 	peak->result.time_s = strong->result.time_s;
 	peak->result.sigma_time_s = strong->result.sigma_time_s;
-	peak->result.how.flags &= ~(unsigned)ESTIMATE_FLAG_TOLERANCE;
-	if (!peak_meets(peak, options))
-		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
+	peak_flag_tolerance(peak, options);
 }

@@ -572,6 +572,15 @@ static void select_box(void)
 	wait_view(is_set_up);
 }
 
+/* Released and in motion, where it stays. */
+static void begin_to_fall(void)
+{
+	select_box();
+	behave(0, 0, false);
+	release(arm());
+	wait_view(is_moving);
+}
+
 static void wait_recorded(const char *drop)
 {
 	int64_t until_ms = session_now_ms() + WAIT_MS;
@@ -841,10 +850,7 @@ static void an_abort_in_motion_is_kept_with_its_note(void **state)
 	struct found found;
 
 	(void)state;
-	select_box();
-	behave(0, 0, false);
-	release(arm());
-	wait_view(is_moving);
+	begin_to_fall();
 	must(tower_abort, "{}");
 	wait_recorded("box/1");
 	found = archived();
@@ -858,10 +864,7 @@ static void a_fault_in_motion_is_kept_with_its_text(void **state)
 	struct found found;
 
 	(void)state;
-	select_box();
-	behave(0, 0, false);
-	release(arm());
-	wait_view(is_moving);
+	begin_to_fall();
 	pthread_mutex_lock(&fake.lock);
 	fake.fault = WIRE_FAULT_DOOR;
 	fake.state = WIRE_STATE_FAULT_MOVING;
@@ -878,10 +881,7 @@ static void a_release_without_a_capture_leaves_a_word(void **state)
 	struct found found;
 
 	(void)state;
-	select_box();
-	behave(0, 0, false);
-	release(arm());
-	wait_view(is_moving);
+	begin_to_fall();
 	pthread_mutex_lock(&fake.lock);
 	fake.state = WIRE_STATE_READY;
 	pthread_mutex_unlock(&fake.lock);
@@ -924,10 +924,7 @@ static void a_drop_survives_the_loss_of_the_link(void **state)
 
 	(void)state;
 	snprintf(elsewhere, sizeof(elsewhere), "%s/gone", directory);
-	select_box();
-	behave(0, 0, false);
-	release(arm());
-	wait_view(is_moving);
+	begin_to_fall();
 	fake_leave();
 	assert_int_equal(rename(bus, elsewhere), 0);
 	wait_view(is_broken);

@@ -28,6 +28,13 @@ static double half_sine(double t)
 	return synth_pulse(SYNTH_HALF_SINE, t / BASE_S);
 }
 
+/* Another pulse, from_s after the first one's onset. */
+static void add_pulse(struct channel *channel, double height_g, double from_s)
+{
+	for (size_t k = 0; k < channel->count; k++)
+		channel->value_g[k] += height_g * half_sine((double)k / channel->rate_hz - ONSET_S - from_s);
+}
+
 /* Y starts apart_s after X. */
 static void make(struct scene *s, double phase, double apart_s, double noise_g, struct synth_random *random)
 {
@@ -209,18 +216,15 @@ static void first_peak(void **state)
 
 	(void)state;
 	make(&s, 0, 0, 1, &random);
-	for (size_t k = 0; k < s.x.count; k++)
-		s.x.value_g[k] += 0.7 * X_G * half_sine((double)k / 7000 - ONSET_S + 4.2e-3);
-	for (size_t k = 0; k < s.y.count; k++)
-		s.y.value_g[k] += 0.7 * Y_G * half_sine((double)k / 10000 - ONSET_S + 4.2e-3);
+	add_pulse(&s.x, 0.7 * X_G, -4.2e-3);
+	add_pulse(&s.y, 0.7 * Y_G, -4.2e-3);
 	r = find(&s, 1);
 	assert_near(r.result.time_s, ONSET_S + BASE_S / 2, 10e-6);
 	assert_near(r.first_peak_s, ONSET_S + BASE_S / 2 - 4.2e-3, 15e-6);
 	drop(&s);
 	/* Below half of it the first does not count. */
 	make(&s, 0, 0, 1, &random);
-	for (size_t k = 0; k < s.x.count; k++)
-		s.x.value_g[k] += 0.4 * X_G * half_sine((double)k / 7000 - ONSET_S + 4.2e-3);
+	add_pulse(&s.x, 0.4 * X_G, -4.2e-3);
 	r = find(&s, 1);
 	assert_near(r.first_peak_s, r.result.time_s, 0);
 	drop(&s);
@@ -366,8 +370,7 @@ static void lead_and_reading(void **state)
 	make(&s, 0.3, 0, 1, &random);
 	for (size_t k = 0; k < s.x.count; k++)
 		s.x.value_g[k] = fmin(s.x.value_g[k], 0.7 * X_G);
-	for (size_t k = 0; k < s.y.count; k++)
-		s.y.value_g[k] += 1.2 * Y_G * half_sine((double)k / 10000 - ONSET_S - 0.015);
+	add_pulse(&s.y, 1.2 * Y_G, 0.015);
 	r = find_by(&s, 1, ESTIMATE_FAMILY_HALF_SINE);
 	assert_near(r.result.time_s, s.peak[0].result.time_s, 0);
 	assert_near(r.result.peak_g, hypot(X_G, Y_G), 3 * r.result.sigma_g);
