@@ -54,6 +54,8 @@ static struct place find(struct segment_join *join, uint32_t id)
 		                      WIRE_LENGTH_block};
 	case WIRE_ID_CAPTURE_END:
 		return (struct place){&join->end_copy, &join->end, 1, WIRE_LENGTH_capture_end};
+	case WIRE_ID_MEASURED:
+		return (struct place){&join->measured_copy, &join->measured, 1, WIRE_LENGTH_measured};
 	default:
 		return (struct place){0};
 	}

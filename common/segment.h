@@ -4,8 +4,8 @@
 /*
  * Messages longer than 8 bytes on classic CAN: cut into wire.def's segments, one byte of sequence and seven
  * of the message, under the message's own identifier, and put together again. Only the messages that the
- * tower sends after a drop travel so: resent blocks and the capture end. Different identifiers may
- * interleave.
+ * tower sends after a drop travel so: resent blocks, the capture end and what was measured. Different
+ * identifiers may interleave.
  *
  * What came of a message that lost segments is kept: when it is sent again, the second copy fills what is
  * missing. The first segment names the message (drop, tick), so that the others of a copy without it are of
@@ -42,9 +42,9 @@ struct segment_copy {
 };
 
 struct segment_join {
-	struct segment_copy block_copy[WIRE_SENSORS], end_copy;
-	struct segment_message block[WIRE_SENSORS][SEGMENT_BLOCKS],
-	        end; /* blocks at their tick modulo that */
+	struct segment_copy block_copy[WIRE_SENSORS], end_copy, measured_copy;
+	struct segment_message block[WIRE_SENSORS][SEGMENT_BLOCKS]; /* at their tick modulo that */
+	struct segment_message end, measured;
 	struct frame whole;
 	uint32_t incomplete; /* copies with a segment lost, out of order, or of the wrong length */
 };

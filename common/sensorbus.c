@@ -36,7 +36,7 @@ size_t sensorbus_put_request(uint8_t *out, const struct sensorbus_request *reque
 	*p++ = request->edges;
 	*p++ = request->frames;
 	*p++ = request->reset;
-	*p++ = 0;
+	*p++ = request->kept;
 	for (int i = 0; i < SENSORBUS_OUTPUTS; i++)
 		p = put32(p, request->edge_us[i]);
 	return (size_t)(p - out);
@@ -52,6 +52,7 @@ size_t sensorbus_get_request(const uint8_t *in, struct sensorbus_request *reques
 	        .edges = in[8],
 	        .frames = in[9],
 	        .reset = in[10],
+	        .kept = in[11],
 	};
 	for (int i = 0; i < SENSORBUS_OUTPUTS; i++)
 		request->edge_us[i] = get32(in + 12 + 4 * i);
@@ -67,15 +68,16 @@ size_t sensorbus_put_answer(uint8_t *out, const struct sensorbus_answer *answer)
 	p = put16(p, answer->inputs);
 	*p++ = answer->captures;
 	*p++ = answer->frames;
-	p = put32(p, answer->capture_us[0]);
-	p = put32(p, answer->capture_us[1]);
+	for (int i = 0; i < SENSORBUS_CAPTURES; i++)
+		p = put32(p, answer->capture_us[i]);
 	*p++ = answer->ready;
 	*p++ = answer->stop;
 	p = put16(p, answer->bus_errors);
-	*p++ = answer->bus_off;
+	*p++ = answer->bus_state;
 	*p++ = answer->tx_blocked;
 	*p++ = answer->bias_high;
 	*p++ = answer->hang;
+	p = put32(p, answer->random);
 	return (size_t)(p - out);
 }
 
@@ -85,17 +87,19 @@ size_t sensorbus_get_answer(const uint8_t *in, struct sensorbus_answer *answer)
 	        .inputs = get16(in + 12),
 	        .captures = in[14],
 	        .frames = in[15],
-	        .capture_us = {get32(in + 16), get32(in + 20)},
-	        .ready = in[24],
-	        .stop = in[25],
-	        .bus_errors = get16(in + 26),
-	        .bus_off = in[28],
-	        .tx_blocked = in[29],
-	        .bias_high = in[30],
-	        .hang = in[31],
+	        .ready = in[28],
+	        .stop = in[29],
+	        .bus_errors = get16(in + 30),
+	        .bus_state = in[32],
+	        .tx_blocked = in[33],
+	        .bias_high = in[34],
+	        .hang = in[35],
+	        .random = get32(in + 36),
 	};
 	for (int i = 0; i < 6; i++)
 		answer->codes[i] = (int16_t)get16(in + 2 * i);
+	for (int i = 0; i < SENSORBUS_CAPTURES; i++)
+		answer->capture_us[i] = get32(in + 16 + 4 * i);
 	return SENSORBUS_ANSWER_BYTES;
 }
 

@@ -24,10 +24,11 @@
 #include "common/frame.h"
 
 enum {
-	SENSORBUS_OUTPUTS = 4, /* bits 0-3 of the io word */
-	SENSORBUS_REQUEST_BYTES = 28,
-	SENSORBUS_ANSWER_BYTES = 32,
-	SENSORBUS_FRAMES_MAX = 16, /* in one request or answer */
+	SENSORBUS_OUTPUTS = 5,  /* bits 0-4 of the io word */
+	SENSORBUS_CAPTURES = 3, /* upper gate, lower gate, keeper current */
+	SENSORBUS_REQUEST_BYTES = 32,
+	SENSORBUS_ANSWER_BYTES = 40,
+	SENSORBUS_FRAMES_MAX = 32, /* in one request or answer; a capture end and what follows it are 24 */
 	SENSORBUS_FRAME_BYTES_MAX = 4 + 64,
 	SENSORBUS_MESSAGE_MAX = SENSORBUS_ANSWER_BYTES + SENSORBUS_FRAMES_MAX * SENSORBUS_FRAME_BYTES_MAX,
 };
@@ -45,25 +46,29 @@ struct sensorbus_request {
 	uint8_t edges;    /* bit i: output i changed at edge_us[i] since the request before */
 	uint8_t frames;   /* frames that follow */
 	uint8_t reset;    /* 1 in the first request after a reset */
-	uint8_t reserved;
+	uint8_t kept;     /* what the firmware keeps over a reset (port_keep); --kept gives it back */
 	uint32_t edge_us[SENSORBUS_OUTPUTS]; /* virtual us since reset, modulo 2^32 */
 };
 
 struct sensorbus_answer {
 	int16_t codes[6]; /* S1 X Y Z, S2 X Y Z, 1/32 g; only the group asked for counts */
 	uint16_t inputs;  /* io word's input bits */
-	uint8_t captures; /* bit 0, 1: upper, lower gate's beam was broken at capture_us[] */
+	uint8_t captures; /* bit 0, 1: upper, lower gate's beam was broken; 2: the keeper current fell, at
+	                     capture_us[] */
 	uint8_t frames;   /* frames that follow */
-	uint32_t capture_us[2];
+	uint32_t capture_us[SENSORBUS_CAPTURES];
 	uint8_t ready;       /* bit 0 X, bit 1 YZ: the converter delivered; 0 = overrun */
 	uint8_t stop;        /* 1: the bench ends the run, the port exits with 0 */
 	uint16_t bus_errors; /* CAN errors since the answer before */
-	uint8_t bus_off;     /* 1: the controller is bus-off now */
+	uint8_t bus_state;   /* SENSORBUS_BUS_* now */
 	uint8_t tx_blocked;  /* 1: the bus takes no frame now */
 	uint8_t bias_high;   /* bit 0 S1, 1 S2: where inputs say that the bias is lost, it is above its window
 	                      */
 	uint8_t hang;        /* 1: the firmware's main loop hangs from now on, until its watchdog resets it */
+	uint32_t random;     /* for port_random; from the bench's seed, so that a run repeats */
 };
+
+enum { SENSORBUS_BUS_ACTIVE, SENSORBUS_BUS_PASSIVE, SENSORBUS_BUS_OFF };
 
 /* Each returns the bytes it wrote or read. Buffers hold at least the fixed length. */
 size_t sensorbus_put_request(uint8_t *out, const struct sensorbus_request *request);

@@ -5,8 +5,9 @@
  * The one place for the numbers that turn units into each other.
  */
 
-/* Standard gravity as the study uses it, m/s^2. One g of a reading is this much. */
-#define UNITS_G_M_S2 9.81
+/* Standard gravity, m/s^2 (ISO 80000-3): what one g of a reading is, everywhere. What a product falls with is
+ * the scene's gravity_m_s2. */
+#define UNITS_G_M_S2 9.80665
 
 #define UNITS_PI 3.14159265358979323846
 

@@ -9,7 +9,7 @@
 #define WIRE_LAYOUT(layout, doc) _Static_assert(FD_HAS(WIRE_LENGTH_##layout), "wire.def: " #layout);
 #include "common/wire.def"
 _Static_assert(WIRE_SAMPLE_OFFSET + WIRE_SAMPLE_BYTES == WIRE_LENGTH_block, "block");
-_Static_assert(WIRE_CHECKS <= 16, "checks are a 16-bit word");
+_Static_assert(WIRE_CHECKS <= 32, "checks are a 32-bit word");
 _Static_assert(WIRE_STATES <= 16, "the state has 4 bits in block.status");
 
 static uint8_t *put_u8(uint8_t *p, uint8_t v)
@@ -127,6 +127,69 @@ int wire_check_block(const struct frame *frame)
 	if (!carries(frame, WIRE_LENGTH_block))
 		return DT_E_LENGTH;
 	return frame->data[WIRE_CRC8_OFFSET] == block_crc8(frame) ? 0 : DT_E_CORRUPT;
+}
+
+/* A layout whose last four bytes are the CRC-32 of those before. */
+static void seal_frame(struct frame *frame)
+{
+	(void)put_u32(frame->data + frame->length - 4, crc32(CRC32_INIT, frame->data, frame->length - 4u));
+}
+
+static int check_sealed(const struct frame *frame, uint8_t length)
+{
+	uint32_t crc;
+
+	if (!carries(frame, length))
+		return DT_E_LENGTH;
+	(void)get_u32(frame->data + length - 4, &crc);
+	return crc == crc32(CRC32_INIT, frame->data, length - 4u) ? 0 : DT_E_CORRUPT;
+}
+
+void wire_seal_capture_end(struct frame *frame)
+{
+	seal_frame(frame);
+}
+
+int wire_check_capture_end(const struct frame *frame)
+{
+	return check_sealed(frame, WIRE_LENGTH_capture_end);
+}
+
+void wire_seal_measured(struct frame *frame)
+{
+	seal_frame(frame);
+}
+
+int wire_check_measured(const struct frame *frame)
+{
+	return check_sealed(frame, WIRE_LENGTH_measured);
+}
+
+static uint32_t crc_u32(uint32_t crc, uint32_t value)
+{
+	uint8_t bytes[4];
+
+	(void)put_u32(bytes, value);
+	return crc32(crc, bytes, sizeof(bytes));
+}
+
+uint32_t wire_parameters_crc32(const uint32_t value[WIRE_PARAMETERS])
+{
+	uint32_t crc = CRC32_INIT;
+
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
+		crc = crc_u32(crc, value[i]);
+	return crc;
+}
+
+uint32_t wire_arm_key(uint32_t session, uint32_t parameters_crc32)
+{
+	return crc_u32(crc_u32(CRC32_INIT, session), parameters_crc32);
+}
+
+uint32_t wire_release_key(uint32_t nonce, uint16_t drop_id, uint32_t parameters_crc32)
+{
+	return crc_u32(crc_u32(crc_u32(CRC32_INIT, nonce), drop_id), parameters_crc32);
 }
 
 uint8_t wire_fd_length(size_t count)

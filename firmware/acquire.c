@@ -67,6 +67,9 @@ static void judge_clocks(struct acquire *acquire, const struct acquire_page *pag
 {
 	acquire->clock_x = (uint16_t)(acquire->clock_x + page->x_count);
 	acquire->clock_yz = (uint16_t)(acquire->clock_yz + page->yz_count);
+	acquire->total_x += page->x_count;
+	if (acquire->total_yz < ACQUIRE_CLOCK_MOST)
+		acquire->total_yz += page->yz_count;
 	if (++acquire->clock_ticks < ACQUIRE_CLOCK_TICKS)
 		return;
 	acquire->clocks_good = acquire->clock_x == ACQUIRE_CLOCK_TICKS * WIRE_X_PER_TICK &&
@@ -83,7 +86,6 @@ static void mark(struct acquire *acquire, unsigned sensor, uint8_t clip_bit, int
 
 	if (size > WIRE_SAMPLE_FULL_SCALE) {
 		tick->marks |= WIRE_MARK_OVERRUN;
-		tick->io |= WIRE_IO_OVERRUN;
 		acquire->counters[WIRE_COUNTER_samples_overrun]++;
 		return;
 	}
@@ -162,6 +164,22 @@ void acquire_open(struct acquire *acquire, const struct acquire_head *head)
 }
 
 /* ---- main ---- */
+
+int16_t acquire_clock_ppm(struct acquire *acquire)
+{
+	int64_t expected = (int64_t)acquire->total_yz * WIRE_X_PER_TICK;
+	int64_t more = (int64_t)acquire->total_x * WIRE_YZ_PER_TICK - expected, ppm;
+	bool long_enough = acquire->total_yz >= ACQUIRE_CLOCK_LEAST,
+	     full = acquire->total_yz >= ACQUIRE_CLOCK_MOST;
+
+	acquire->total_x = acquire->total_yz = 0;
+	if (!long_enough || full)
+		return ACQUIRE_NO_PPM;
+	ppm = more * 1000000 / expected;
+	if (ppm < -ACQUIRE_NO_PPM)
+		return -ACQUIRE_NO_PPM;
+	return (int16_t)(ppm < ACQUIRE_NO_PPM ? ppm : ACQUIRE_NO_PPM - 1);
+}
 
 int acquire_take(struct acquire *acquire, struct acquire_tick *tick)
 {

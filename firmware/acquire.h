@@ -22,6 +22,9 @@ enum {
 	ACQUIRE_CHANNELS = 6,      /* S1 X Y Z, S2 X Y Z */
 	ACQUIRE_QUEUE = 16,        /* ticks that main may be behind before one is lost */
 	ACQUIRE_CLOCK_TICKS = 100, /* the sample clocks are judged over this many */
+	ACQUIRE_CLOCK_LEAST = 1000 * WIRE_YZ_PER_TICK,
+	ACQUIRE_CLOCK_MOST = 4000000000,
+	ACQUIRE_NO_PPM = 0x7FFF,
 	ACQUIRE_SAMPLES_PER_TICK = 2 * (WIRE_X_PER_TICK + 2 * WIRE_YZ_PER_TICK),
 };
 
@@ -33,7 +36,7 @@ struct acquire_samples {
 struct acquire_tick {
 	uint32_t tick_ms;
 	uint16_t drop_id;
-	uint16_t io;    /* at the tick, and WIRE_IO_OVERRUN */
+	uint16_t io;    /* at the tick */
 	uint16_t marks; /* WIRE_MARK_* that this tick gives the drop */
 	uint8_t status[WIRE_SENSORS];
 	struct acquire_samples sensor[WIRE_SENSORS];
@@ -66,7 +69,8 @@ struct acquire {
 	bool open;
 	uint8_t clock_ticks;
 	uint16_t clock_x, clock_yz;
-	bool clocks_good; /* over the last ACQUIRE_CLOCK_TICKS X:YZ was 7:10 exactly */
+	bool clocks_good;           /* over the last ACQUIRE_CLOCK_TICKS X:YZ was 7:10 exactly */
+	uint32_t total_x, total_yz; /* instants since acquire_clock_ppm */
 	struct ring queue;
 	struct acquire_tick storage[ACQUIRE_QUEUE];
 };
@@ -88,6 +92,10 @@ void acquire_open(struct acquire *acquire, const struct acquire_head *head);
 void acquire_x(struct acquire *acquire, const int16_t code[WIRE_SENSORS], bool ready);
 void acquire_yz(struct acquire *acquire, const int16_t y[WIRE_SENSORS], const int16_t z[WIRE_SENSORS],
                 bool ready);
+
+/* Main, between port_lock and port_unlock: X against 7/10 of YZ since the call before, in 1e-6, within the 16
+ * bits of the wire; ACQUIRE_NO_PPM for less than a second, and for more than some days. */
+int16_t acquire_clock_ppm(struct acquire *acquire);
 
 /* Main: the oldest finished tick, or DT_E_EMPTY. */
 DT_MUST_USE int acquire_take(struct acquire *acquire, struct acquire_tick *tick);

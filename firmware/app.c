@@ -47,24 +47,39 @@ void app_init(enum port_reset cause)
 	parameters_init(&app.parameters);
 	sequence_init(&app.sequence, &app.parameters, app.counters, cause); /* first: the magnet */
 	acquire_init(&app.acquire, &app.parameters, app.counters);
+	hosts_init(&app.hosts, &app.parameters, app.counters);
+	input_init(&app.input);
+	measure_init(&app.measure, &app.parameters);
 	health_init(&app.health, &app.parameters, app.counters);
 	capture_init(&app.capture, &app.parameters);
 	stream_init(&app.stream, app.counters);
+	app.wire_hash = wire_hash();
 	app.tick_ms = UINT32_MAX; /* the first tick is 0 */
 	app.seen_ms = UINT32_MAX;
 	start_bus();
 }
 
+/* Outputs as they are, inputs as they are agreed on. */
+static uint16_t io_now(const struct app *a)
+{
+	return (uint16_t)((port_io() & WIRE_IO_OUTPUTS) | a->input.agreed);
+}
+
 struct sequence_view app_view(const struct app *a)
 {
-	uint16_t io = port_io();
+	struct health_view health = {
+	        .io = io_now(a),
+	        .bias_high = port_bias_high(),
+	        .host_good = hosts_here(&a->hosts, a->sequence.session),
+	        .clocks_good = a->acquire.clocks_good,
+	        .brown_out_set = port_brown_out_set(),
+	};
 
 	return (struct sequence_view){
 	        .now_us = port_time_us(),
-	        .io = io,
-	        .checks = health_checks(&a->health, io, port_bias_high()),
-	        .clocks_good = a->acquire.clocks_good,
-	        .hash_differs = a->health.host_here && !a->health.host_hash_good,
+	        .io = health.io,
+	        .known = a->input.known,
+	        .checks = health_checks(&a->health, &health),
 	};
 }
 
@@ -78,13 +93,15 @@ void app_on_tick(void)
 	if (begun == 0)
 		return;
 	app.tick_ms += begun;
-	health_tick(&app.health, app.tick_ms);
+	app.tick_us = port_time_us();
+	input_read(&app.input, port_io() & (uint16_t)~WIRE_IO_OUTPUTS);
+	hosts_tick(&app.hosts, app.tick_ms);
 	view = app_view(&app);
 	sequence_tick(&app.sequence, &view, app.tick_ms);
 	acquire_open(&app.acquire, &(struct acquire_head){
 	                                   .tick_ms = app.tick_ms,
 	                                   .drop_id = app.sequence.drop_id,
-	                                   .io = port_io(),
+	                                   .io = io_now(&app),
 	                                   .marks = sequence_tick_marks(&app.sequence),
 	                                   .state = app.sequence.state,
 	                           });
@@ -93,6 +110,11 @@ void app_on_tick(void)
 void app_on_gate(unsigned gate, uint32_t time_us)
 {
 	sequence_gate(&app.sequence, gate, time_us);
+}
+
+void app_on_keeper(uint32_t time_us)
+{
+	sequence_keeper(&app.sequence, time_us);
 }
 
 /* ---- sample interrupts ---- */
@@ -126,7 +148,7 @@ static struct sequence snapshot(void)
 
 static void send_heartbeat(void)
 {
-	struct wire_heartbeat heartbeat = {.nmt_state = NMT_OPERATIONAL, .wire_hash = app.health.wire_hash};
+	struct wire_heartbeat heartbeat = {.nmt_state = NMT_OPERATIONAL, .wire_hash = app.wire_hash};
 	struct frame frame;
 
 	if (!app.started)
@@ -138,19 +160,16 @@ static void send_heartbeat(void)
 
 static void send_status(const struct sequence *now)
 {
-	uint16_t io = port_io();
-	struct wire_status status = {
-	        .state = now->state,
-	        .fault = now->fault,
-	        .drop_id = now->drop_id,
-	        .io = io,
-	};
+	struct wire_status status = {.state = now->state, .fault = now->fault};
+	struct sequence_view view;
 	struct wire_counter counter = {.index = app.next_counter};
 	struct frame frame;
 
 	port_lock();
-	status.checks = health_checks(&app.health, io, port_bias_high());
+	view = app_view(&app);
 	port_unlock();
+	status.io = view.io;
+	status.checks = sequence_checks(now, view.checks);
 	wire_pack_status(&frame, WIRE_ID_STATUS, &status);
 	stream_send(&app.stream, &frame);
 	counter.value = app.counters[app.next_counter]; /* now: frames_sent counts all before this one */
@@ -190,43 +209,94 @@ static void send_emergency(uint8_t fault)
 	stream_send(&app.stream, &frame);
 }
 
-void app_send_capture_end(struct app *a)
+static void send_capture_end(const struct app *a)
 {
 	struct sequence now = snapshot();
 	struct wire_capture_end end = {
 	        .drop_id = now.drop_id,
-	        .marks = (uint16_t)(now.marks | a->capture.marks),
+	        .marks = (uint16_t)(now.marks | a->capture.marks | a->measured_marks),
 	        .first_tick_ms = a->capture.first_ms,
 	        .last_tick_ms = a->capture.last_ms,
 	        .trigger_us = a->capture.trigger_us,
 	        .crc32 = a->capture.crc32,
 	        .frame_speed_mm_s = now.frame_speed_mm_s,
 	        .camera_frame = (int16_t)(a->capture.first_ms - now.released_ms), /* seconds, at most */
+	        .parameters_crc32 = now.parameters_crc32,
 	};
 	struct frame frame;
 
 	wire_pack_capture_end(&frame, WIRE_ID_CAPTURE_END, &end);
+	wire_seal_capture_end(&frame);
+	stream_send(&app.stream, &frame);
+}
+
+void app_send_capture(struct app *a)
+{
+	static const uint16_t indices[WIRE_PARAMETERS] = {
+#define WIRE_PARAMETER(name, index, unit, min, max, initial, doc) index,
+#include "common/wire.def"
+	};
+	struct wire_parameter parameter = {.drop_id = a->measured.drop_id};
+	struct frame frame;
+
+	send_capture_end(a);
+	wire_pack_measured(&frame, WIRE_ID_MEASURED, &a->measured);
+	wire_seal_measured(&frame);
 	stream_send(&a->stream, &frame);
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++) {
+		parameter.index = indices[i];
+		parameter.value = a->set.value[i];
+		wire_pack_parameter(&frame, WIRE_ID_PARAMETER, &parameter);
+		stream_send(&a->stream, &frame);
+	}
 	a->capture_end_ms = a->tick_ms;
+}
+
+/* The window is complete: what the drop says of its tower. */
+static void measure(const struct sequence *now)
+{
+	app.measured.drop_id = now->drop_id;
+	port_lock();
+	app.measured.clock_ppm = acquire_clock_ppm(&app.acquire);
+	port_unlock();
+	app.measured.trigger_latency_us = app.trigger_latency_us;
+	app.measured_marks = measure_drop(&app.measure, &now->plan, &now->times, &app.measured);
 }
 
 static void finish_capture(void)
 {
 	uint32_t limit = app.parameters.value[WIRE_PARAMETER_zero_shift_counts];
-	bool captured;
+	struct sequence now;
 
 	port_lock();
 	sequence_full(&app.sequence);
-	captured = app.sequence.state == WIRE_STATE_CAPTURED;
 	port_unlock();
-	if (!captured) { /* triggered just when the release turned out to be none */
+	now = snapshot();
+	if (!sequence_captured(now.state)) { /* triggered just when the release turned out to be none */
 		capture_release(&app.capture);
 		return;
 	}
 	if (capture_zero_shift(&app.capture, app.health.zero, limit))
 		app.capture.marks |= WIRE_MARK_ZERO_SHIFT;
-	app_send_capture_end(&app);
+	measure(&now);
+	app_send_capture(&app);
 	stream_upload(&app.stream, &app.capture);
+}
+
+/* From the sample beyond the level until now; a window that was forced has none. */
+static void note_trigger(void)
+{
+	uint32_t tick_ms = app.capture.first_ms + app.capture.trigger_us / 1000u;
+	uint32_t began_us; /* that tick */
+
+	port_lock();
+	sequence_triggered(&app.sequence);
+	began_us = app.tick_us - (app.tick_ms - tick_ms) * 1000u;
+	port_unlock();
+	app.trigger_latency_us = MEASURE_NONE;
+	if (!app.capture.forced)
+		app.trigger_latency_us =
+		        measure_us((int32_t)(port_time_us() - began_us - app.capture.trigger_us % 1000u));
 }
 
 /* The ticks that the interrupt has finished: into the ring, and out. */
@@ -240,11 +310,8 @@ static void take_ticks(void)
 		capture_put(&app.capture, &tick);
 		stream_tick(&app.stream, &tick);
 	}
-	if (before == CAPTURE_ROLLING && app.capture.phase != CAPTURE_ROLLING) {
-		port_lock();
-		sequence_triggered(&app.sequence);
-		port_unlock();
-	}
+	if (before == CAPTURE_ROLLING && app.capture.phase != CAPTURE_ROLLING)
+		note_trigger();
 	if (capture_work(&app.capture))
 		finish_capture();
 }
@@ -266,18 +333,25 @@ static void disarm(void)
 	port_unlock();
 }
 
+/* Off the bus is told once it is back, error-passive at once: that can still be sent. */
 static void watch_bus(const struct sequence *now)
 {
-	bool bus_off;
+	enum port_bus bus, before = app.bus;
 
-	app.counters[WIRE_COUNTER_bus_errors] = port_can_errors(&bus_off);
-	if (bus_off && !app.bus_was_off) {
+	app.counters[WIRE_COUNTER_bus_errors] = port_can_errors(&bus);
+	app.bus = bus;
+	if (bus == before)
+		return;
+	if (bus == PORT_BUS_OFF) {
 		app.counters[WIRE_COUNTER_bus_offs]++;
 		disarm();
 	}
-	if (!bus_off && app.bus_was_off && now->fault != WIRE_FAULT_BUS_OFF)
+	if (before == PORT_BUS_OFF && now->fault != WIRE_FAULT_BUS_OFF)
 		send_emergency(WIRE_FAULT_BUS_OFF);
-	app.bus_was_off = bus_off;
+	if (bus == PORT_BUS_PASSIVE && before == PORT_BUS_ACTIVE) {
+		app.counters[WIRE_COUNTER_bus_passives]++;
+		send_emergency(WIRE_FAULT_BUS_PASSIVE);
+	}
 }
 
 static void watch_fault(const struct sequence *now)
@@ -308,8 +382,8 @@ static void beat(const struct sequence *now, uint32_t tick_ms)
 	app.seen_ms = tick_ms;
 	if (!app.bus_ready && !sequence_moving(now->state))
 		start_bus();
-	if (now->state == WIRE_STATE_CAPTURED && tick_ms - app.capture_end_ms >= BEAT_MS)
-		app_send_capture_end(&app);
+	if (sequence_captured(now->state) && tick_ms - app.capture_end_ms >= BEAT_MS)
+		app_send_capture(&app);
 	stream_resend(&app.stream, &app.capture);
 }
 

@@ -8,9 +8,9 @@
  *
  * The sample interrupts come first and are short, whatever else goes on: app_on_turn where a millisecond
  * begins, then app_on_x and app_on_yz. They never interrupt each other. The control interrupt, one of lower
- * priority, is requested by each turn: app_on_gate for what was captured before, then app_on_tick; it should
- * be over before the next millisecond. Where the gates have an interrupt of their own, it has control's
- * priority. The first turn after app_init begins tick 0. Codes are 1/32 g.
+ * priority, is requested by each turn: app_on_gate and app_on_keeper for what was captured before, then
+ * app_on_tick; it should be over before the next millisecond. Where gates and keeper have an interrupt of
+ * their own, it has control's priority. The first turn after app_init begins tick 0. Codes are 1/32 g.
  */
 #include <stdbool.h>
 #include <stdint.h>
@@ -18,6 +18,9 @@
 #include "firmware/acquire.h"
 #include "firmware/capture.h"
 #include "firmware/health.h"
+#include "firmware/hosts.h"
+#include "firmware/input.h"
+#include "firmware/measure.h"
 #include "firmware/parameter.h"
 #include "firmware/port.h"
 #include "firmware/sequence.h"
@@ -26,18 +29,27 @@
 struct app {
 	struct parameters parameters;
 	volatile uint32_t counters[WIRE_COUNTERS]; /* each is written in one context only */
-	volatile uint32_t tick_ms;                 /* now; written by control */
+	volatile uint32_t tick_ms;                 /* now; written by control ... */
+	uint32_t tick_us;                          /* ... and when it began */
+	uint32_t wire_hash;                        /* our own: takes too long to be worked out each time */
+	struct input input;
+	struct hosts hosts;
 	struct acquire acquire;
 	struct sequence sequence;
 	struct health health;
 	struct capture capture;
 	struct stream stream;
 	/* main only */
+	struct parameters set; /* that the last ARM confirmed */
+	struct measure measure;
+	struct wire_measured measured; /* by the last capture */
+	uint16_t measured_marks, trigger_latency_us;
 	uint32_t seen_ms;        /* last tick that main has seen */
 	uint32_t capture_end_ms; /* when the capture end was last sent */
 	uint8_t fault_reported;
 	uint8_t next_counter, sync_counter;
-	bool started, bus_ready, bus_was_off;
+	bool started, bus_ready;
+	enum port_bus bus; /* as last seen */
 };
 
 /* Interrupts off. */
@@ -52,13 +64,17 @@ void app_on_yz(int16_t s1y, int16_t s1z, int16_t s2y, int16_t s2z, bool ready);
 void app_on_tick(void);
 void app_on_gate(unsigned gate, uint32_t time_us);
 
+/* Control: the keeper current fell, the product is free. */
+void app_on_keeper(uint32_t time_us);
+
 /* Main. */
 void app_poll(void);
 
-/* For command.c, main: what is seen now, between port_lock and port_unlock; the capture end, sent; the bus as
- * the parameters want it, at rest, 0 or DT_E_ARGUMENT with everything as it was. */
+/* For command.c, main: what is seen now, between port_lock and port_unlock; the capture end and what
+ * follows it, sent; the bus as the parameters want it, at rest, 0 or DT_E_ARGUMENT with everything as it was.
+ */
 struct sequence_view app_view(const struct app *app);
-void app_send_capture_end(struct app *app);
+void app_send_capture(struct app *app);
 DT_MUST_USE int app_set_up_bus(struct app *app);
 
 #endif

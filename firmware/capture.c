@@ -67,7 +67,8 @@ static void look_for_trigger(struct capture *capture, const struct acquire_tick 
 	if (!sequence_separated(tick->status[0] & WIRE_STATUS_STATE))
 		return;
 	offset_us = capture_impact_us(&tick->sensor[1], level);
-	if (offset_us < 1000)
+	capture->forced = offset_us >= 1000;
+	if (!capture->forced)
 		open_window(capture, tick->tick_ms, offset_us);
 	else if (tick->marks & WIRE_MARK_NO_IMPACT)
 		open_window(capture, tick->tick_ms, 0);
@@ -93,7 +94,6 @@ static void mark_triggered(const struct capture *capture, struct acquire_tick *t
 
 static void take_samples_away(struct acquire_tick *tick)
 {
-	tick->io |= WIRE_IO_OVERRUN;
 	tick->marks = WIRE_MARK_OVERRUN;
 	for (unsigned s = 0; s < WIRE_SENSORS; s++) {
 		tick->status[s] &= WIRE_STATUS_STATE;

@@ -36,6 +36,7 @@ struct capture {
 	uint32_t newest_ms, count;  /* the ring holds count ticks up to newest_ms */
 	uint32_t first_ms, last_ms; /* the window */
 	uint32_t trigger_us;        /* after first_ms */
+	bool forced;                /* by time, not by an impact */
 	uint32_t crc_ms;            /* next tick for the CRC */
 	uint32_t crc32;
 	uint16_t marks; /* WIRE_MARK_* of the window's ticks */
@@ -66,7 +67,7 @@ bool capture_zero_shift(const struct capture *capture, const int16_t before[ACQU
 /* The tick, or NULL if the ring does not hold it; good until the next capture_put. */
 const struct acquire_tick *capture_find(const struct capture *capture, uint32_t tick_ms);
 
-/* The host has it: roll again, from empty. */
+/* The window is not needed any more: roll again, from empty. */
 void capture_release(struct capture *capture);
 
 #endif

@@ -23,42 +23,72 @@ static void count(struct app *app, enum wire_counter_number counter)
 	app->counters[counter]++;
 }
 
+/* What takes long is done before control is kept off: it is main's alone. */
+static struct sequence_order prepare(struct app *app, const struct wire_command *command)
+{
+	struct sequence_order order = {
+	        .command = *command, .hosts = &app->hosts, .capture_crc32 = app->capture.crc32};
+
+	if (command->op != WIRE_OP_ARM || sequence_moving(app->sequence.state))
+		return order;
+	sequence_plan(&app->sequence);
+	order.parameters_crc32 = wire_parameters_crc32(app->parameters.value);
+	order.dropout_us = measure_dropout_us(&app->measure);
+	order.nonce_good = port_random(&order.nonce) == 0;
+	return order;
+}
+
+/* Says again, if need be, what the arming host has to know. The window of the drop before goes. */
+static void armed(struct app *app, const struct wire_armed *message, bool again)
+{
+	struct frame frame;
+
+	if (!again) {
+		app->set = app->parameters;
+		capture_release(&app->capture);
+	}
+	wire_pack_armed(&frame, WIRE_ID_ARMED, message);
+	stream_send(&app->stream, &frame);
+}
+
 static void operate(struct app *app, const struct wire_command *command)
 {
-	struct sequence *sequence = &app->sequence;
+	const struct sequence *sequence = &app->sequence;
+	struct sequence_order order = prepare(app, command);
 	struct sequence_view view;
-	struct wire_reply reply;
+	struct wire_armed message;
+	struct wire_reply reply = {.op = command->op, .sequence = command->sequence};
 	struct frame frame;
+	bool again;
 	int result;
 
 	port_lock();
 	view = app_view(app);
-	result = sequence_command(sequence, &view, command, app->capture.crc32);
-	reply = (struct wire_reply){
-	        .op = command->op,
-	        .sequence = command->sequence,
-	        .result = (int8_t)result,
-	        .state = sequence->state,
-	        .checks = view.checks,
-	        .drop_id = sequence->drop_id,
-	};
+	again = sequence->state == WIRE_STATE_ARMED;
+	result = sequence_command(&app->sequence, &view, &order);
+	message.drop_id = sequence_next_drop(sequence);
+	message.host = command->host;
+	message.nonce = sequence->nonce;
+	reply.state = sequence->state;
+	reply.checks = sequence_checks(sequence, view.checks);
 	port_unlock();
 	if (result != 0)
 		count(app, WIRE_COUNTER_commands_refused);
-	else if (reply.state == WIRE_STATE_UPLOADED && command->op != WIRE_OP_ABORT)
-		capture_release(&app->capture);
+	else if (command->op == WIRE_OP_ARM)
+		armed(app, &message, again);
+	reply.result = (int8_t)result;
 	wire_pack_reply(&frame, WIRE_ID_REPLY, &reply);
 	stream_send(&app->stream, &frame);
 }
 
 static void reset(struct app *app)
 {
-	bool moving;
+	uint8_t state;
 
 	port_lock();
-	moving = sequence_moving(app->sequence.state);
+	state = app->sequence.state;
 	port_unlock();
-	if (moving)
+	if (sequence_moving(state) || sequence_captured(state)) /* the only copy of a drop */
 		count(app, WIRE_COUNTER_commands_refused);
 	else
 		port_reset();
@@ -109,7 +139,7 @@ static int handle_resend(struct app *app, const struct frame *frame)
 	if (request.count > 0)
 		stream_request(&app->stream, &app->capture, &request);
 	else if (app->capture.phase == CAPTURE_COMPLETE)
-		app_send_capture_end(app);
+		app_send_capture(app);
 	else
 		count(app, WIRE_COUNTER_resends_out_of_range);
 	return 0;
@@ -131,10 +161,11 @@ static uint32_t write_parameter(struct app *app, uint16_t index, uint32_t value)
 	if (sequence->state == WIRE_STATE_SAFE || sequence->state == WIRE_STATE_READY ||
 	    sequence->state == WIRE_STATE_FAULT_HELD) {
 		abort_code = parameters_set(&app->parameters, index, value);
-		if (abort_code == 0)
-			sequence_plan(sequence);
+		sequence_replan(sequence);
 	}
 	port_unlock();
+	if (app->parameters.value[WIRE_PARAMETER_dropout_us] != before.value[WIRE_PARAMETER_dropout_us])
+		measure_forget(&app->measure); /* calibrated anew; written again as it is it stays learned */
 	if (!bus_differs(&before, &app->parameters) || app_set_up_bus(app) == 0)
 		return abort_code;
 	port_lock();
@@ -176,13 +207,16 @@ static int handle_sdo(struct app *app, const struct frame *frame)
 
 static int handle_heartbeat(struct app *app, const struct frame *frame)
 {
-	struct wire_heartbeat heartbeat;
-	int result = wire_unpack_heartbeat(frame, &heartbeat);
+	struct wire_host_heartbeat heartbeat;
+	int result = wire_unpack_host_heartbeat(frame, &heartbeat);
 
 	if (result != 0)
 		return result;
+	if (heartbeat.session == 0)
+		return DT_E_RANGE;
 	port_lock();
-	health_host(&app->health, app->tick_ms, heartbeat.wire_hash);
+	hosts_heard(&app->hosts, app->tick_ms, heartbeat.session,
+	            heartbeat.wire_hash_low == (uint16_t)app->wire_hash);
 	port_unlock();
 	return 0;
 }

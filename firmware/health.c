@@ -10,7 +10,6 @@ void health_init(struct health *health, const struct parameters *parameters, vol
 	memset(health, 0, sizeof(*health));
 	health->parameters = parameters;
 	health->counters = counters;
-	health->wire_hash = wire_hash();
 	health->sensor_checks = WIRE_CHECK_SENSOR_S1 | WIRE_CHECK_SENSOR_S2; /* until seen */
 }
 
@@ -62,9 +61,9 @@ static void keep_zero(struct health *health, unsigned channel)
 
 static void judge_window(struct health *health)
 {
-	static const uint16_t sensor_check[WIRE_SENSORS] = {WIRE_CHECK_SENSOR_S1, WIRE_CHECK_SENSOR_S2};
+	static const uint32_t sensor_check[WIRE_SENSORS] = {WIRE_CHECK_SENSOR_S1, WIRE_CHECK_SENSOR_S2};
 	int64_t limit = health->parameters->value[WIRE_PARAMETER_noise_counts];
-	uint16_t checks = health->window_triggered ? WIRE_CHECK_TRIGGER : 0;
+	uint32_t checks = health->window_triggered ? WIRE_CHECK_TRIGGER : 0;
 
 	for (unsigned i = 0; i < ACQUIRE_CHANNELS; i++) {
 		struct health_channel *channel = &health->channel[i];
@@ -104,34 +103,18 @@ void health_samples(struct health *health, struct acquire_tick *tick)
 		judge_window(health);
 }
 
-void health_host(struct health *health, uint32_t tick_ms, uint32_t hash)
+static uint32_t cable_checks(uint16_t io, uint16_t bias_high)
 {
-	health->host_here = true;
-	health->host_ms = tick_ms;
-	health->host_hash_good = hash == health->wire_hash;
-}
+	uint32_t checks = 0;
 
-void health_tick(struct health *health, uint32_t tick_ms)
-{
-	if (health->host_here &&
-	    tick_ms - health->host_ms > health->parameters->value[WIRE_PARAMETER_host_timeout_ms]) {
-		health->host_here = false;
-		health->counters[WIRE_COUNTER_host_heartbeats_lost]++;
-	}
-}
-
-static uint16_t cable_checks(uint16_t io, uint16_t bias_high)
-{
-	uint16_t lost = (uint16_t)~io, checks = 0;
-
-	if (lost & WIRE_IO_IEPE_S1)
+	if ((io & WIRE_IO_IEPE_S1) == 0)
 		checks |= bias_high & WIRE_IO_IEPE_S1 ? WIRE_CHECK_OPEN_S1 : WIRE_CHECK_SHORT_S1;
-	if (lost & WIRE_IO_IEPE_S2)
+	if ((io & WIRE_IO_IEPE_S2) == 0)
 		checks |= bias_high & WIRE_IO_IEPE_S2 ? WIRE_CHECK_OPEN_S2 : WIRE_CHECK_SHORT_S2;
 	return checks;
 }
 
-uint16_t health_checks(const struct health *health, uint16_t io, uint16_t bias_high)
+static uint32_t input_checks(uint16_t io)
 {
 	static const struct {
 		uint16_t input, check;
@@ -140,7 +123,7 @@ uint16_t health_checks(const struct health *health, uint16_t io, uint16_t bias_h
 	        {WIRE_IO_DAMPERS_ENGAGED, WIRE_CHECK_DAMPERS}, {WIRE_IO_DOOR_CLOSED, WIRE_CHECK_DOOR},
 	        {WIRE_IO_ESTOP_CLEAR, WIRE_CHECK_ESTOP},       {WIRE_IO_SUPPLY_GOOD, WIRE_CHECK_SUPPLY},
 	};
-	uint16_t checks = health->sensor_checks | cable_checks(io, bias_high);
+	uint32_t checks = 0;
 
 	for (unsigned i = 0; i < sizeof(needed) / sizeof(needed[0]); i++)
 		if ((io & needed[i].input) == 0)
@@ -149,7 +132,19 @@ uint16_t health_checks(const struct health *health, uint16_t io, uint16_t bias_h
 		checks |= WIRE_CHECK_LATCH;
 	if (io & (WIRE_IO_GATE_UPPER | WIRE_IO_GATE_LOWER))
 		checks |= WIRE_CHECK_GATES;
-	if (!health->host_here || !health->host_hash_good)
+	return checks;
+}
+
+uint32_t health_checks(const struct health *health, const struct health_view *view)
+{
+	uint32_t checks =
+	        health->sensor_checks | input_checks(view->io) | cable_checks(view->io, view->bias_high);
+
+	if (!view->host_good)
 		checks |= WIRE_CHECK_HOST;
+	if (!view->clocks_good)
+		checks |= WIRE_CHECK_CLOCKS;
+	if (!view->brown_out_set)
+		checks |= WIRE_CHECK_BROWN_OUT_LEVEL;
 	return checks;
 }

@@ -2,7 +2,8 @@
 #ifndef DT_FIRMWARE_HEALTH_H
 #define DT_FIRMWARE_HEALTH_H
 /*
- * Is everything fit for a drop? The check bits of wire.def from the inputs, the sensors and the host.
+ * Is everything fit for a drop? The check bits of wire.def from the inputs, the sensors, the sample clocks
+ * and the host.
  *
  * A sensor's cable is open or short when its bias is not in its window. A sensor is fit when, over the last
  * HEALTH_WINDOW_TICKS, offset and standard deviation of every axis stay within noise_counts (1/32 g) and at
@@ -38,10 +39,16 @@ struct health {
 	int16_t zero[ACQUIRE_CHANNELS]; /* offsets over the last window at rest */
 	uint8_t window_ticks;
 	bool window_moved, window_triggered;
-	volatile uint16_t sensor_checks; /* written by main */
-	uint32_t wire_hash;              /* our own: takes too long to be worked out each time */
-	bool host_here, host_hash_good;
-	uint32_t host_ms; /* last heartbeat */
+	volatile uint32_t sensor_checks; /* written by main */
+};
+
+/* What is seen at the moment of a call. */
+struct health_view {
+	uint16_t io;        /* debounced */
+	uint16_t bias_high; /* as port_bias_high */
+	bool host_good;     /* the host that counts is here */
+	bool clocks_good;
+	bool brown_out_set; /* as port_brown_out_set */
 };
 
 void health_init(struct health *health, const struct parameters *parameters, volatile uint32_t *counters);
@@ -49,13 +56,7 @@ void health_init(struct health *health, const struct parameters *parameters, vol
 /* Sets WIRE_MARK_STUCK in the tick where it applies. */
 void health_samples(struct health *health, struct acquire_tick *tick);
 
-/* A heartbeat of the host has come. */
-void health_host(struct health *health, uint32_t tick_ms, uint32_t hash);
-
-/* Every tick: notices that the host is gone. */
-void health_tick(struct health *health, uint32_t tick_ms);
-
-/* WIRE_CHECK_* bits that are not green; bias_high as port_bias_high. */
-uint16_t health_checks(const struct health *health, uint16_t io, uint16_t bias_high);
+/* WIRE_CHECK_* bits that are not green, those of the sequence apart. */
+uint32_t health_checks(const struct health *health, const struct health_view *view);
 
 #endif

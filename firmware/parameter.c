@@ -37,6 +37,8 @@ static bool agree(const uint32_t *value)
 	               value[WIRE_PARAMETER_gate_lower_um] &&
 	       value[WIRE_PARAMETER_gate_lower_um] < value[WIRE_PARAMETER_separation_um] &&
 	       value[WIRE_PARAMETER_separation_um] <= value[WIRE_PARAMETER_dampers_um] &&
+	       value[WIRE_PARAMETER_warning_ms] + PARAMETER_ARMED_MS <=
+	               value[WIRE_PARAMETER_arm_timeout_ms] &&
 	       value[WIRE_PARAMETER_pre_trigger_ms] + value[WIRE_PARAMETER_post_trigger_ms] <= CAPTURE_TICKS;
 }
 

@@ -11,6 +11,7 @@
 
 enum {
 	PARAMETER_GATE_DISTANCE_UM = 10000, /* least distance between the gates */
+	PARAMETER_ARMED_MS = 1000,          /* least time for a release, behind the warning */
 };
 
 struct parameters {
@@ -33,7 +34,8 @@ enum {
 void parameters_init(struct parameters *parameters);
 
 /* Both return 0 or an abort code. The gates, the separation and the dampers must come in this order on the
- * way down, and pre-trigger and post-trigger together fit the capture ring; else the value is refused. */
+ * way down, pre-trigger and post-trigger together fit the capture ring, and arm_timeout_ms leave
+ * PARAMETER_ARMED_MS behind warning_ms; else the value is refused. */
 DT_MUST_USE uint32_t parameters_get(const struct parameters *parameters, uint16_t index, uint32_t *value);
 DT_MUST_USE uint32_t parameters_set(struct parameters *parameters, uint16_t index, uint32_t value);
 

@@ -9,8 +9,9 @@
  * sample interrupts above it call nothing of this. Functions marked both may be called from either.
  *
  * Times are us since reset, 32 bits, wrapping; compare them by signed difference. Outputs and inputs are
- * bits of wire.def's io word. Inputs arrive debounced. While the controller is in reset the drivers hold
- * their fail-safe levels by themselves: latch and dampers de-energised, magnet energised.
+ * bits of wire.def's io word. Inputs are read as the pins stand: the core debounces. While the controller is
+ * in reset the drivers hold their fail-safe levels by themselves: latch and dampers de-energised, magnet
+ * energised.
  */
 #include <stdbool.h>
 #include <stdint.h>
@@ -23,8 +24,23 @@ enum port_reset {
 	PORT_RESET_COMMAND, /* port_reset */
 	PORT_RESET_WATCHDOG,
 	PORT_RESET_BROWN_OUT,
+	PORT_RESET_PIN, /* button, debugger, noise on the line */
 	PORT_RESETS
 };
+
+enum port_bus { PORT_BUS_ACTIVE, PORT_BUS_PASSIVE, PORT_BUS_OFF };
+
+/* Control, and main while interrupts are off: keeps one byte where no reset but the loss of power clears it;
+ * the byte of before the reset, 0 after a loss of power. The core keeps its state there. */
+void port_keep(uint8_t byte);
+uint8_t port_kept(void);
+
+/* Main: a number that nobody can foretell: from hardware on the board, the kernel on posix, the bench's seed
+ * in lockstep. 0, or DT_E_SYSTEM when the generator does not deliver, with *value unchanged. */
+DT_MUST_USE int port_random(uint32_t *value);
+
+/* Both: the controller resets itself at its highest brown-out level (option bytes). */
+bool port_brown_out_set(void);
 
 /* Both: the clock that also stamps the gates and times the edges. */
 uint32_t port_time_us(void);
@@ -40,7 +56,8 @@ uint16_t port_bias_high(void);
 void port_outputs(uint16_t on, uint16_t off);
 
 /* Both: de-energises one output at time_us exactly, by hardware compare. There is one such edge for
- * MAGNET_HOLD and one for DAMPERS_RELIEVE. 0, or 1 if the time had passed and it was done at once. */
+ * MAGNET_HOLD and one for DAMPERS_RELIEVE; planned anew it replaces the one before. 0, or 1 if the time had
+ * passed and it was done at once. */
 int port_off_at(uint16_t output, uint32_t time_us);
 
 /* Both: takes back a port_off_at that has not happened yet; else nothing. */
@@ -58,9 +75,9 @@ DT_MUST_USE int port_can_send(const struct frame *frame);
 /* Main: 1 with a frame, 0 without. */
 DT_MUST_USE int port_can_receive(struct frame *frame);
 
-/* Main: bus errors and received frames lost since reset. *bus_off tells the present state; the port restarts
- * the controller. */
-uint32_t port_can_errors(bool *bus_off);
+/* Main: bus errors and received frames lost since reset. *state tells the present one; the port restarts a
+ * controller that is bus-off. */
+uint32_t port_can_errors(enum port_bus *state);
 
 /* Main: must come at least every 50 ms or the controller is reset with PORT_RESET_WATCHDOG. */
 void port_watchdog_kick(void);

@@ -2,9 +2,6 @@
 #include "firmware/sequence.h"
 
 #include "common/memory.h"
-#include "common/units.h"
-
-#define STANDARD_GRAVITY_MM_S2 ((uint32_t)(UNITS_G_M_S2 * 1000.0))
 
 /* Short names for the tables. */
 enum {
@@ -14,50 +11,56 @@ enum {
 	NO = SEQUENCE_NO,
 	HELD = FAULT_HELD,
 	MOVING = FAULT_MOVING,
+	OUT = KEEP_OUT,
 	LATCH = WIRE_IO_LATCH_OPEN,
 	MAGNET = WIRE_IO_MAGNET_HOLD,
 	RELIEVE = WIRE_IO_DAMPERS_RELIEVE,
 	CAMERA = WIRE_IO_CAMERA,
+	WARN = WIRE_IO_WARNING,
 	FRAME_SEEN = WIRE_IO_GATE_UPPER | WIRE_IO_GATE_LOWER | WIRE_IO_FRAME_DOWN,
+	FRAME_AT_REST = WIRE_IO_LATCH_CLOSED | WIRE_IO_FRAME_DOWN,
+	GUARDS = WIRE_CHECK_ESTOP | WIRE_CHECK_DOOR | WIRE_CHECK_LATCH | WIRE_CHECK_PRODUCT,
 };
 
 /* clang-format off */
 static const uint8_t table[WIRE_STATES][SEQUENCE_EVENTS] = {
-/*                TESTED GREEN  RED   ARM    RELEASE  ABORT   CLEAR ACCEPT    DISCARD   EXPIRED FREE       BRAKE   FULL      DONE  STILL FAULT */
-[BOOT]         = {SAFE,  NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,   NO,   HELD},
-[SAFE]         = {NO,    READY, STAY, NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,   NO,   HELD},
-[READY]        = {NO,    STAY,  SAFE, ARMED, NO,      SAFE,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,   NO,   HELD},
-[ARMED]        = {NO,    STAY,  SAFE, NO,    FALLING, SAFE,   NO,   NO,       NO,       READY,  NO,        NO,     NO,       NO,   NO,   HELD},
-[FALLING]      = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     SEPARATED, NO,     NO,       NO,   NO,   MOVING},
-[SEPARATED]    = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     NO,        BRAKED, CAPTURED, NO,   NO,   MOVING},
-[BRAKED]       = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     NO,        NO,     CAPTURED, NO,   NO,   MOVING},
-[CAPTURED]     = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   UPLOADED, UPLOADED, NO,     NO,        NO,     NO,       NO,   NO,   STAY},
-[UPLOADED]     = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       SAFE, NO,   HELD},
-[FAULT_HELD]   = {NO,    NO,    NO,   NO,    NO,      STAY,   SAFE, NO,       NO,       NO,     NO,        NO,     NO,       NO,   NO,   STAY},
-[FAULT_MOVING] = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     CAPTURED, NO,   HELD, STAY},
+/*                TESTED GREEN  RED   ARM    RELEASE  ABORT   CLEAR ACCEPT    DISCARD   EXPIRED FREE       BRAKE   FULL      JAMMED DOWN      DONE  STILL FAULT */
+[BOOT]         = {SAFE,  NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,    NO,       NO,   NO,   HELD},
+[SAFE]         = {NO,    READY, STAY, NO,    NO,      STAY,   STAY, NO,       NO,       NO,     NO,        NO,     NO,       NO,    NO,       NO,   NO,   HELD},
+[READY]        = {NO,    STAY,  SAFE, ARMED, NO,      SAFE,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,    NO,       NO,   NO,   HELD},
+[ARMED]        = {NO,    STAY,  SAFE, STAY,  FALLING, SAFE,   NO,   NO,       NO,       READY,  NO,        NO,     NO,       NO,    NO,       NO,   NO,   HELD},
+[FALLING]      = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     SEPARATED, NO,     NO,       NO,    NO,       NO,   NO,   MOVING},
+[SEPARATED]    = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     NO,        BRAKED, CAPTURED, OUT,   NO,       NO,   NO,   MOVING},
+[BRAKED]       = {NO,    NO,    NO,   NO,    NO,      MOVING, NO,   NO,       NO,       NO,     NO,        NO,     CAPTURED, OUT,   NO,       NO,   NO,   MOVING},
+[CAPTURED]     = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   UPLOADED, UPLOADED, NO,     NO,        NO,     NO,       NO,    NO,       NO,   NO,   STAY},
+[UPLOADED]     = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,    NO,       SAFE, NO,   HELD},
+[FAULT_HELD]   = {NO,    NO,    NO,   NO,    NO,      STAY,   SAFE, NO,       NO,       NO,     NO,        NO,     NO,       NO,    NO,       NO,   NO,   STAY},
+[FAULT_MOVING] = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     CAPTURED, OUT,   NO,       NO,   HELD, STAY},
+[KEEP_OUT]     = {NO,    NO,    NO,   NO,    NO,      STAY,   NO,   NO,       NO,       NO,     NO,        NO,     NO,       NO,    CAPTURED, NO,   NO,   STAY},
 };
 
 /* What entering a state energises and de-energises. */
 static const struct {
 	uint8_t on, off;
 } outputs[WIRE_STATES] = {
-[BOOT]         = {MAGNET,                   LATCH | RELIEVE | CAMERA},
-[SAFE]         = {MAGNET,                   LATCH | RELIEVE | CAMERA},
-[READY]        = {0,                        LATCH | RELIEVE | CAMERA},
-[ARMED]        = {0,                        LATCH | RELIEVE | CAMERA},
-[FALLING]      = {LATCH | RELIEVE | CAMERA, 0},
-[SEPARATED]    = {0,                        LATCH},
-[BRAKED]       = {0,                        LATCH | RELIEVE},
-[CAPTURED]     = {0,                        LATCH | RELIEVE | CAMERA},
-[UPLOADED]     = {0,                        LATCH | RELIEVE | CAMERA},
-[FAULT_HELD]   = {0,                        LATCH | RELIEVE | CAMERA},
-[FAULT_MOVING] = {0,                        LATCH | RELIEVE | CAMERA},
+[BOOT]         = {MAGNET,                          LATCH | RELIEVE | CAMERA | WARN},
+[SAFE]         = {MAGNET,                          LATCH | RELIEVE | CAMERA | WARN},
+[READY]        = {0,                               LATCH | RELIEVE | CAMERA | WARN},
+[ARMED]        = {WARN,                            LATCH | RELIEVE | CAMERA},
+[FALLING]      = {LATCH | RELIEVE | CAMERA | WARN, 0},
+[SEPARATED]    = {WARN,                            LATCH},
+[BRAKED]       = {0,                               LATCH | RELIEVE | WARN},
+[CAPTURED]     = {0,                               LATCH | RELIEVE | CAMERA | WARN},
+[UPLOADED]     = {0,                               LATCH | RELIEVE | CAMERA | WARN},
+[FAULT_HELD]   = {0,                               LATCH | RELIEVE | CAMERA | WARN},
+[FAULT_MOVING] = {0,                               LATCH | RELIEVE | CAMERA | WARN},
+[KEEP_OUT]     = {0,                               LATCH | RELIEVE | CAMERA | WARN},
 };
 
 /* The fault that a check lost while armed, or also in motion, leads to; the first that fits. The sensors are
  * missing here: a touched product disarms without a fault. */
 static const struct {
-	uint16_t check;
+	uint32_t check;
 	uint8_t fault;
 	bool in_motion;
 } interlocks[] = {
@@ -72,7 +75,7 @@ static const struct {
 };
 
 /* The check that must be green before a fault may be cleared. */
-static const uint16_t causes[WIRE_FAULTS] = {
+static const uint32_t causes[WIRE_FAULTS] = {
 	[WIRE_FAULT_ESTOP] = WIRE_CHECK_ESTOP,
 	[WIRE_FAULT_DOOR] = WIRE_CHECK_DOOR,
 	[WIRE_FAULT_HOST_LOST] = WIRE_CHECK_HOST,
@@ -99,51 +102,24 @@ bool sequence_moving(unsigned state)
 
 bool sequence_separated(unsigned state)
 {
-	return sequence_moving(state) && state != FALLING;
+	return sequence_moving(state) && state != FALLING && state != KEEP_OUT;
 }
 
-/* ---- the plan of a fall ---- */
-
-/* Bit by bit, rounded down. */
-static uint32_t square_root(uint64_t value)
+bool sequence_captured(unsigned state)
 {
-	uint64_t root = 0;
-
-	for (uint64_t bit = (uint64_t)1 << 31; bit != 0; bit >>= 1)
-		if ((root + bit) * (root + bit) <= value)
-			root += bit;
-	return (uint32_t)root;
+	return state == CAPTURED || state == KEEP_OUT;
 }
 
-/* Time to fall travel_um from rest with g less permille. */
-static uint32_t fall_us(uint32_t travel_um, uint32_t permille)
+void sequence_replan(struct sequence *sequence)
 {
-	uint64_t um_s2 = (uint64_t)STANDARD_GRAVITY_MM_S2 * (1000u - permille);
-
-	return square_root(2u * travel_um * 1000000000000u / um_s2);
+	sequence->planned = false;
 }
 
 void sequence_plan(struct sequence *sequence)
 {
-	const uint32_t *value = sequence->parameters->value;
-	struct sequence_plan *plan = &sequence->plan;
-	uint32_t upper_um = value[WIRE_PARAMETER_gate_upper_um],
-	         lower_um = value[WIRE_PARAMETER_gate_lower_um];
-	uint32_t slow = value[WIRE_PARAMETER_slow_permille];
-	/* sqrt(um) with 16 fractional bits */
-	uint32_t upper = square_root((uint64_t)upper_um << 32);
-	uint32_t lower = square_root((uint64_t)lower_um << 32);
-	uint32_t separation = square_root((uint64_t)value[WIRE_PARAMETER_separation_um] << 32);
-	uint32_t dampers = square_root((uint64_t)value[WIRE_PARAMETER_dampers_um] << 32);
-
-	/* At most 120, with the gates PARAMETER_GATE_DISTANCE_UM apart and travels to 2.4 m. */
-	plan->separation_q24 = (uint32_t)(((uint64_t)(separation - lower) << 24) / (lower - upper));
-	plan->dampers_q24 = (uint32_t)(((uint64_t)(dampers - lower) << 24) / (lower - upper));
-	plan->gate_limit_us[0] = 2u * fall_us(upper_um, 0);
-	plan->gate_limit_us[1] = 2u * fall_us(lower_um, 0);
-	plan->fast_us = (fall_us(lower_um, 0) - fall_us(upper_um, 0)) / 8u * 7u;
-	plan->slow_us = fall_us(lower_um, slow) - fall_us(upper_um, slow);
-	plan->gate_distance_um = lower_um - upper_um;
+	if (!sequence->planned)
+		fall_plan(&sequence->plan, sequence->parameters);
+	sequence->planned = true;
 }
 
 /* ---- going from state to state ---- */
@@ -153,7 +129,7 @@ static void enter(struct sequence *sequence, uint8_t state)
 	sequence->state = state;
 	sequence->entered_ms = sequence->tick_ms;
 	if (state != ARMED)
-		sequence->token = 0;
+		sequence->session = sequence->arm_key = sequence->nonce = 0;
 	if (state != FALLING && state != SEPARATED) {
 		port_off_cancel(MAGNET);
 		port_off_cancel(RELIEVE);
@@ -163,6 +139,8 @@ static void enter(struct sequence *sequence, uint8_t state)
 	if (state == FAULT_MOVING && sequence->fault != WIRE_FAULT_NO_IMPACT)
 		sequence->no_impact_ms = sequence->tick_ms + SEQUENCE_NO_IMPACT_MS;
 	port_outputs(outputs[state].on, outputs[state].off);
+	if (state != BOOT) /* a reset in BOOT shall still know of the motion before */
+		port_keep(state);
 }
 
 /* 0, or DT_E_STATE if the event has no place here. */
@@ -213,86 +191,162 @@ void sequence_triggered(struct sequence *sequence)
 
 void sequence_full(struct sequence *sequence)
 {
-	happen(sequence, SEQUENCE_FULL);
+	if ((sequence->io & FRAME_AT_REST) != 0)
+		happen(sequence, SEQUENCE_FULL);
+	else if (step(sequence, SEQUENCE_JAMMED) == 0)
+		sequence->marks |= WIRE_MARK_FRAME_NOT_DOWN;
 }
 
 void sequence_init(struct sequence *sequence, const struct parameters *parameters,
                    volatile uint32_t *counters, enum port_reset cause)
 {
+	bool moved = sequence_moving(port_kept());
+
 	memset(sequence, 0, sizeof(*sequence));
 	sequence->parameters = parameters;
 	sequence->counters = counters;
-	sequence_plan(sequence);
 	enter(sequence, BOOT);
 	if (cause == PORT_RESET_WATCHDOG)
 		sequence_fault(sequence, WIRE_FAULT_WATCHDOG);
-	if (cause == PORT_RESET_BROWN_OUT)
+	else if (cause == PORT_RESET_BROWN_OUT)
 		sequence_fault(sequence, WIRE_FAULT_BROWN_OUT);
+	else if (moved)
+		sequence_fault(sequence, WIRE_FAULT_RESET);
 }
 
 /* ---- commands ---- */
 
-static int arm(struct sequence *sequence, const struct sequence_view *view, uint16_t token)
+uint16_t sequence_next_drop(const struct sequence *sequence)
 {
+	return (uint16_t)(sequence->drop_id == UINT16_MAX ? 1 : sequence->drop_id + 1);
+}
+
+uint32_t sequence_checks(const struct sequence *sequence, uint32_t checks)
+{
+	if (!sequence->acknowledged)
+		checks |= WIRE_CHECK_ACKNOWLEDGE;
+	return checks == 0 && !sequence->settled ? WIRE_CHECK_SETTLE : checks;
+}
+
+/* The host that has armed has not heard the answer. */
+static bool armed_by(const struct sequence *sequence, const struct wire_command *command)
+{
+	return sequence->state == ARMED && command->host == (uint16_t)sequence->session &&
+	       command->argument == sequence->arm_key;
+}
+
+static int arm(struct sequence *sequence, uint32_t checks, const struct sequence_order *order)
+{
+	const struct wire_command *command = &order->command;
+	uint32_t session;
+	int result;
+
+	if (armed_by(sequence, command))
+		return step(sequence, SEQUENCE_ARM);
 	if (sequence->state != SAFE && sequence->state != READY)
 		return DT_E_STATE;
-	if (view->hash_differs)
+	if (hosts_hash_differs(order->hosts, command->host))
 		return DT_E_HASH;
-	if (sequence->state == SAFE || view->checks != 0)
+	if (sequence->state == SAFE || checks != 0)
 		return DT_E_CHECKS;
-	if (token == 0)
-		return DT_E_TOKEN;
-	sequence->token = token;
+	result =
+	        hosts_find(order->hosts, command->host, command->argument, order->parameters_crc32, &session);
+	if (result != 0)
+		return result;
+	if (!order->nonce_good)
+		return DT_E_SYSTEM;
+	sequence->session = session;
+	sequence->arm_key = command->argument;
+	sequence->nonce = order->nonce;
+	sequence->parameters_crc32 = order->parameters_crc32;
+	sequence->times = (struct fall_times){.dropout_us = order->dropout_us};
 	return step(sequence, SEQUENCE_ARM);
 }
 
-static int release(struct sequence *sequence, const struct sequence_view *view, uint16_t token)
+static int refuse_release(const struct sequence *sequence, uint32_t checks,
+                          const struct wire_command *command)
 {
+	uint32_t key =
+	        wire_release_key(sequence->nonce, sequence_next_drop(sequence), sequence->parameters_crc32);
+	uint32_t warned_ms = sequence->tick_ms - sequence->entered_ms;
+
 	if (sequence->state != ARMED)
 		return DT_E_STATE;
-	if (token != sequence->token)
+	if (command->host != (uint16_t)sequence->session)
+		return DT_E_SESSION;
+	if (command->argument != key)
 		return DT_E_TOKEN;
-	if (view->checks != 0)
-		return DT_E_CHECKS;
-	sequence->drop_id = (uint16_t)(sequence->drop_id == UINT16_MAX ? 1 : sequence->drop_id + 1);
-	sequence->marks = 0;
-	sequence->frame_speed_mm_s = 0;
-	sequence->gates_seen = 0;
-	sequence->triggered = false;
-	sequence->moved = false;
-	sequence->released_ms = sequence->tick_ms;
-	sequence->released_us = view->now_us;
-	return step(sequence, SEQUENCE_RELEASE);
+	if (warned_ms < sequence->parameters->value[WIRE_PARAMETER_warning_ms])
+		return DT_E_EARLY;
+	return checks != 0 ? DT_E_CHECKS : 0;
 }
 
-static int clear(struct sequence *sequence, const struct sequence_view *view)
+/* When it is made: at its time, or at once and counted. */
+static uint32_t switch_off(struct sequence *sequence, uint16_t output, uint32_t time_us)
 {
-	if (sequence->state != FAULT_HELD)
+	if (port_off_at(output, time_us) == 0)
+		return time_us;
+	sequence->counters[WIRE_COUNTER_edges_late]++;
+	return port_time_us();
+}
+
+static int release(struct sequence *sequence, uint32_t checks, uint32_t now_us,
+                   const struct wire_command *command)
+{
+	int result = refuse_release(sequence, checks, command);
+
+	if (result != 0)
+		return result;
+	sequence->drop_id = sequence_next_drop(sequence);
+	sequence->marks = 0;
+	sequence->frame_speed_mm_s = 0;
+	sequence->triggered = false;
+	sequence->moved = false;
+	sequence->acknowledged = false;
+	sequence->released_ms = sequence->tick_ms;
+	sequence->times.released_us = now_us;
+	result = step(sequence, SEQUENCE_RELEASE);
+	/* The relief ends in time, whatever the gates say later or do not say. */
+	(void)switch_off(sequence, RELIEVE, now_us + sequence->plan.relief_us);
+	return result;
+}
+
+static int clear(struct sequence *sequence, uint32_t checks)
+{
+	if (sequence->state != SAFE && sequence->state != FAULT_HELD)
 		return DT_E_STATE;
-	if (!view->clocks_good || (view->checks & causes[sequence->fault]) != 0)
+	if (sequence->state == SAFE && (checks & GUARDS) != 0)
 		return DT_E_CHECKS;
+	if (sequence->state == FAULT_HELD && (checks & (WIRE_CHECK_CLOCKS | causes[sequence->fault])) != 0)
+		return DT_E_CHECKS;
+	sequence->acknowledged = (checks & GUARDS) == 0;
 	sequence->fault = WIRE_FAULT_NONE;
 	return step(sequence, SEQUENCE_CLEAR);
 }
 
 int sequence_command(struct sequence *sequence, const struct sequence_view *view,
-                     const struct wire_command *command, uint32_t capture_crc32)
+                     const struct sequence_order *order)
 {
+	const struct wire_command *command = &order->command;
+	uint32_t checks = sequence_checks(sequence, view->checks);
+
 	switch (command->op) {
 	case WIRE_OP_ARM:
-		return arm(sequence, view, command->token);
+		return arm(sequence, checks, order);
 	case WIRE_OP_RELEASE:
-		return release(sequence, view, command->token);
+		return release(sequence, checks, view->now_us, command);
 	case WIRE_OP_ABORT:
 		sequence_abort(sequence);
 		return 0;
 	case WIRE_OP_CLEAR:
-		return clear(sequence, view);
+		return clear(sequence, view->checks);
 	case WIRE_OP_ACCEPT:
-		if (sequence->state == CAPTURED && command->argument != capture_crc32)
+		if (sequence->state == CAPTURED && command->argument != order->capture_crc32)
 			return DT_E_CORRUPT;
 		return step(sequence, SEQUENCE_ACCEPT);
 	case WIRE_OP_DISCARD:
+		if (sequence->state == CAPTURED && command->argument != sequence->drop_id)
+			return DT_E_CORRUPT;
 		return step(sequence, SEQUENCE_DISCARD);
 	default:
 		return DT_E_UNKNOWN;
@@ -307,21 +361,11 @@ static void fail_gates(struct sequence *sequence)
 	sequence_fault(sequence, WIRE_FAULT_GATES);
 }
 
-static uint32_t part_of(uint32_t time_us, uint32_t factor_q24)
+static void plan_edges(struct sequence *sequence)
 {
-	return (uint32_t)(((uint64_t)time_us * factor_q24 + (1u << 23)) >> 24);
-}
-
-static void switch_off(struct sequence *sequence, uint16_t output, uint32_t time_us)
-{
-	if (port_off_at(output, time_us) != 0)
-		sequence->counters[WIRE_COUNTER_edges_late]++;
-}
-
-static void plan_edges(struct sequence *sequence, uint32_t lower_us)
-{
-	const struct sequence_plan *plan = &sequence->plan;
-	uint32_t between_us = lower_us - sequence->upper_us;
+	const struct fall_plan *plan = &sequence->plan;
+	struct fall_times *times = &sequence->times;
+	uint32_t between_us = times->lower_us - times->upper_us;
 	uint32_t speed_mm_s;
 
 	if (between_us < plan->fast_us) {
@@ -332,40 +376,67 @@ static void plan_edges(struct sequence *sequence, uint32_t lower_us)
 	sequence->frame_speed_mm_s = (uint16_t)(speed_mm_s > UINT16_MAX ? UINT16_MAX : speed_mm_s);
 	if (between_us > plan->slow_us)
 		sequence->marks |= WIRE_MARK_SLOW_FRAME;
-	switch_off(sequence, MAGNET,
-	           lower_us + part_of(between_us, plan->separation_q24) -
-	                   sequence->parameters->value[WIRE_PARAMETER_dropout_us]);
-	switch_off(sequence, RELIEVE, lower_us + part_of(between_us, plan->dampers_q24));
+	times->magnet_off_us =
+	        switch_off(sequence, MAGNET,
+	                   times->lower_us + fall_part(between_us, plan->separation_q24) - times->dropout_us);
+	times->magnet_planned = true;
+	if (port_io() & RELIEVE)
+		(void)switch_off(sequence, RELIEVE,
+		                 times->lower_us + fall_part(between_us, plan->dampers_q24));
+}
+
+static bool plausible(const struct sequence *sequence, unsigned gate, uint32_t time_us)
+{
+	uint32_t fallen_us = time_us - sequence->times.released_us;
+
+	return sequence->state == FALLING && (sequence->io & WIRE_IO_LATCH_CLOSED) == 0 &&
+	       sequence->times.gates < 2 && (int32_t)fallen_us >= (int32_t)sequence->plan.gate_first_us[gate];
 }
 
 void sequence_gate(struct sequence *sequence, unsigned gate, uint32_t time_us)
 {
+	struct fall_times *times = &sequence->times;
+
 	sequence->moved = true;
-	if (sequence->state != FALLING || gate < sequence->gates_seen)
-		return; /* not a fall, or the beam again */
-	if (gate > sequence->gates_seen) {
-		fail_gates(sequence);
+	if (!plausible(sequence, gate, time_us)) {
+		sequence->counters[WIRE_COUNTER_gates_ignored]++;
 		return;
 	}
-	sequence->gates_seen++;
-	if (gate == 0)
-		sequence->upper_us = time_us;
-	else
-		plan_edges(sequence, time_us);
+	if (gate == 0) {
+		times->upper_us = time_us;
+		times->gates = 1;
+	} else if (times->gates == 0) {
+		fail_gates(sequence);
+	} else {
+		times->lower_us = time_us;
+		times->gates = 2;
+		plan_edges(sequence);
+	}
+}
+
+void sequence_keeper(struct sequence *sequence, uint32_t time_us)
+{
+	struct fall_times *times = &sequence->times;
+
+	if (!sequence_moving(sequence->state) || !times->magnet_planned || times->keeper_fell ||
+	    (port_io() & MAGNET) != 0 || (int32_t)(time_us - times->magnet_off_us) < 0)
+		return;
+	times->keeper_us = time_us;
+	times->keeper_fell = true;
 }
 
 static void tick_falling(struct sequence *sequence, const struct sequence_view *view)
 {
-	uint32_t fallen_us = view->now_us - sequence->released_us;
-	unsigned gate = sequence->gates_seen;
+	uint32_t fallen_us = view->now_us - sequence->times.released_us;
+	unsigned gate = sequence->times.gates;
 
-	if ((view->io & MAGNET) == 0)
+	if ((view->io & MAGNET) == 0 && sequence->times.magnet_planned)
 		happen(sequence, SEQUENCE_FREE);
+	else if ((gate < 2 && fallen_us > sequence->plan.gate_last_us[gate]) ||
+	         fallen_us > sequence->plan.end_us || (view->io & WIRE_IO_FRAME_DOWN))
+		fail_gates(sequence); /* also where the dampers then tear the product off */
 	else if ((view->io & WIRE_IO_PRODUCT_HELD) == 0)
 		sequence_fault(sequence, WIRE_FAULT_MAGNET);
-	else if ((gate < 2 && fallen_us > sequence->plan.gate_limit_us[gate]) ||
-	         (view->io & WIRE_IO_FRAME_DOWN))
-		fail_gates(sequence);
 	else if (sequence->tick_ms - sequence->released_ms > SEQUENCE_LATCH_MS &&
 	         (view->io & WIRE_IO_LATCH_CLOSED))
 		sequence_fault(sequence, WIRE_FAULT_LATCH);
@@ -382,7 +453,7 @@ uint16_t sequence_tick_marks(const struct sequence *sequence)
 	return impact_overdue(sequence) ? WIRE_MARK_NO_IMPACT : 0;
 }
 
-static void tick_interlocks(struct sequence *sequence, uint16_t checks)
+static void tick_interlocks(struct sequence *sequence, uint32_t checks)
 {
 	bool in_motion = sequence->state != ARMED;
 
@@ -400,7 +471,7 @@ static void tick_still(struct sequence *sequence, const struct sequence_view *vi
 	if ((view->io & WIRE_IO_LATCH_CLOSED) == 0 || (view->io & FRAME_SEEN) != 0)
 		sequence->moved = true;
 	if (!sequence->moved && !sequence->triggered &&
-	    view->now_us - sequence->released_us > sequence->plan.gate_limit_us[1])
+	    view->now_us - sequence->times.released_us > sequence->plan.gate_last_us[1])
 		happen(sequence, SEQUENCE_STILL);
 }
 
@@ -418,16 +489,28 @@ static void tick_moving(struct sequence *sequence, const struct sequence_view *v
 	tick_interlocks(sequence, view->checks);
 }
 
+static void tick_keep_out(struct sequence *sequence, const struct sequence_view *view)
+{
+	if ((view->io & FRAME_AT_REST) != 0)
+		happen(sequence, SEQUENCE_DOWN);
+}
+
+static void tick_boot(struct sequence *sequence, const struct sequence_view *view, uint32_t since_ms)
+{
+	if ((view->known & FRAME_AT_REST) == FRAME_AT_REST && (view->io & FRAME_AT_REST) == 0)
+		sequence_fault(sequence, WIRE_FAULT_RESET); /* the frame is on its way */
+	else if (since_ms >= SEQUENCE_SELF_TEST_MS && (view->checks & WIRE_CHECK_CLOCKS) != 0)
+		sequence_fault(sequence, WIRE_FAULT_SELF_TEST);
+	else if (since_ms >= SEQUENCE_SELF_TEST_MS)
+		happen(sequence, SEQUENCE_TESTED);
+}
+
 static void tick_rest(struct sequence *sequence, const struct sequence_view *view)
 {
 	uint32_t since_ms = sequence->tick_ms - sequence->entered_ms;
 
-	if (sequence->state == BOOT && since_ms >= SEQUENCE_SELF_TEST_MS) {
-		if (view->clocks_good)
-			happen(sequence, SEQUENCE_TESTED);
-		else
-			sequence_fault(sequence, WIRE_FAULT_SELF_TEST);
-	}
+	if (sequence->state == BOOT)
+		tick_boot(sequence, view, since_ms);
 	if (sequence->state == ARMED)
 		tick_interlocks(sequence, view->checks);
 	if (sequence->state == ARMED &&
@@ -435,13 +518,31 @@ static void tick_rest(struct sequence *sequence, const struct sequence_view *vie
 		happen(sequence, SEQUENCE_EXPIRED);
 	if (sequence->state == UPLOADED && since_ms >= SEQUENCE_UPLOADED_MS)
 		happen(sequence, sequence->fault == WIRE_FAULT_NONE ? SEQUENCE_DONE : SEQUENCE_FAULT);
-	happen(sequence, view->checks == 0 ? SEQUENCE_GREEN : SEQUENCE_RED);
+	happen(sequence, sequence_checks(sequence, view->checks) == 0 ? SEQUENCE_GREEN : SEQUENCE_RED);
+}
+
+/* A guard lost wants to be acknowledged; after that all checks have to stay green for a while. */
+static void watch_guards(struct sequence *sequence, uint32_t checks)
+{
+	if ((checks & GUARDS) != 0)
+		sequence->acknowledged = false;
+	if (checks != 0 || !sequence->acknowledged) {
+		sequence->settled = false;
+		sequence->green_ms = sequence->tick_ms;
+	} else if (sequence->tick_ms - sequence->green_ms >
+	           sequence->parameters->value[WIRE_PARAMETER_settle_ms]) {
+		sequence->settled = true;
+	}
 }
 
 void sequence_tick(struct sequence *sequence, const struct sequence_view *view, uint32_t tick_ms)
 {
 	sequence->tick_ms = tick_ms;
-	if (sequence_moving(sequence->state))
+	sequence->io = view->io;
+	watch_guards(sequence, view->checks);
+	if (sequence->state == KEEP_OUT)
+		tick_keep_out(sequence, view);
+	else if (sequence_moving(sequence->state))
 		tick_moving(sequence, view);
 	else
 		tick_rest(sequence, view);

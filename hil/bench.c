@@ -4,6 +4,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -60,9 +61,13 @@ static bool all_done(const struct bench *bench)
 	return bench->script.phase == SCRIPT_DONE && bench_events_done(bench);
 }
 
+/* What is left when the last drop has been accepted goes on while the counters are told. */
 static void watch_end(struct bench *bench)
 {
-	if (!all_done(bench))
+	bool last = bench->script.phase == SCRIPT_RETURN &&
+	            bench->script.drops_done + 1 == bench->options->script.drops;
+
+	if (!all_done(bench) && !(last && bench_events_done(bench)))
 		bench->done_ms = -1;
 	else if (bench->done_ms < 0)
 		bench->done_ms = bench_now_ms(bench);
@@ -93,6 +98,7 @@ static void handle(struct bench *bench, const struct sensorbus_request *request,
 	if (!bench->running || bench_now_ms(bench) != before_ms)
 		each_ms(bench);
 	bench->running = true;
+	bench->kept = request->kept;
 	bench_to_firmware(bench, answer, received);
 	bench_events_answer(bench, answer);
 }
@@ -108,10 +114,13 @@ static void tell_ready(struct bench *bench)
 
 static void start_target(struct bench *bench, unsigned cause)
 {
-	const struct bench_options *options = bench->options;
+	const struct target_options options = {.command = bench->options->firmware,
+	                                       .realtime = bench->options->realtime,
+	                                       .cause = cause,
+	                                       .kept = cause == 0 ? 0 : bench->kept};
 	char message[TARGET_MESSAGE_MAX];
 
-	bench->target = target_start(options->firmware, options->realtime, cause, message);
+	bench->target = target_start(&options, message);
 	if (bench->target == NULL)
 		bench_fail(bench, BENCH_LINK, "%s", message);
 }
@@ -207,6 +216,15 @@ static void start(struct bench *bench)
 		           options->link ? options->link : "scripted operator");
 }
 
+/* The script's run repeats for its seed; a host's must not: what it recorded once would be right again. */
+static void set_up_random(struct bench *bench)
+{
+	bench->random = ~bench->options->seed;
+	if (bench->options->link != NULL &&
+	    getrandom(&bench->random, sizeof(bench->random), 0) != (ssize_t)sizeof(bench->random))
+		bench_fail(bench, BENCH_LINK, "no random number: %s", strerror(errno));
+}
+
 /* Each step only if those before it went well. */
 static void set_up(struct bench *bench)
 {
@@ -221,13 +239,15 @@ static void set_up(struct bench *bench)
 	bench->impact_s = NAN;
 	bench->tower_rate = 1 / (1 + 1e-6 * options->clock_ppm);
 	bench->watch = options->watch;
+	bench->dice = options->seed ^ 0x666F726765;
+	set_up_random(bench);
 	bench->done_ms = -1;
 	bench->control = -1;
 	bench->event_state = UINT8_MAX;
 	for (unsigned state = 0; state < WIRE_STATES; state++)
 		bench->entered_ms[state] = -1;
 	if (bench->watch != NULL)
-		observe_init(&bench->watch->observe, &options->scene);
+		observe_init(&bench->watch->observe, &options->scene, bench->tower_rate);
 	script_init(&bench->script, &options->script);
 	if (options->ready_fd >= 0) /* the firmware must not keep it open */
 		(void)fcntl(options->ready_fd, F_SETFD, FD_CLOEXEC);

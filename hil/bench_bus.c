@@ -56,7 +56,8 @@ static void watch_state(struct bench *bench, const struct frame *frame)
 	struct observe *observe = &bench->watch->observe;
 
 	observe->now_s = bench_now_s(bench);
-	observe_from_firmware(observe, frame, bench_tower_s(bench, bench->base_grid));
+	observe_from_firmware(observe, frame, bench_tower_s(bench, bench->base_grid),
+	                      bench_tower_s(bench, bench->now_grid));
 	if (observe->state >= WIRE_STATES || observe->state == bench->event_state)
 		return;
 	bench->event_state = observe->state;
@@ -90,6 +91,7 @@ void bench_from_host(struct bench *bench, const struct frame *frame)
 		return;
 	}
 	log_frame(bench, frame);
+	bench_keep(bench, frame);
 	count = busfault_pass(&bench->to_tower, frame, out);
 	for (unsigned i = 0; i < count; i++)
 		if (ring_put(&bench->queue, &out[i]) != 0)

@@ -10,9 +10,9 @@
 #include "hil/scenario_private.h"
 
 enum {
-	LINE_MAX_BYTES = 160, /* of a datagram; more is cut off and not understood */
+	LINE_MAX_BYTES = SCENARIO_EVENT_MAX, /* of a datagram; more is cut off and not understood */
 	LINES_PER_MS = 16,
-	ANSWER_MAX = 600,
+	ANSWER_MAX = 1500,
 };
 
 struct sender {

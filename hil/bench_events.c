@@ -1,15 +1,28 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "hil/bench_private.h"
+#include "hil/random.h"
 
 enum {
 	BABBLE_FRAMES = 8, /* of the foreign node, a ms */
 	BABBLE_ID = 0x010,
-	BUS_OFF_ERRORS = 32, /* that bring a controller there: 8 points each, 256 in all */
+	BUS_PASSIVE_ERRORS = 16, /* that make a controller error-passive: 8 points each, 128 in all */
+	BUS_OFF_ERRORS = 32,     /* that bring a controller there: 8 points each, 256 in all */
 };
 
 bool bench_in_span(const struct bench *bench, enum event_action action)
 {
 	return bench_now_ms(bench) < bench->until_ms[action];
+}
+
+static void begin_span(struct bench *bench, const struct event *event)
+{
+	if (event->action == EVENT_BUS_OFF)
+		bench->bus_errors = (uint16_t)(bench->bus_errors + BUS_OFF_ERRORS);
+	if (event->action == EVENT_BUS_PASSIVE)
+		bench->bus_errors = (uint16_t)(bench->bus_errors + BUS_PASSIVE_ERRORS);
+	if (event->action == EVENT_HOST_REPLAY)
+		bench_replay_start(bench);
+	bench->until_ms[event->action] = bench_now_ms(bench) + (int64_t)(1000 * event->duration_s + 0.5);
 }
 
 void bench_event(struct bench *bench, const struct event *event)
@@ -22,8 +35,17 @@ void bench_event(struct bench *bench, const struct event *event)
 		           tower_fault_name((enum tower_fault)event->number),
 		           event->action == EVENT_FAULT ? "" : " repaired", bench_now_s(bench));
 		break;
+	case EVENT_DROPOUT:
+		tower_set_dropout(bench->tower, event->duration_s);
+		break;
+	case EVENT_GLITCH:
+		tower_glitch(bench->tower, event->number, event->pulses);
+		break;
 	case EVENT_SEND:
 		bench_from_host(bench, &event->frame);
+		break;
+	case EVENT_VERB:
+		bench_verb(bench, event);
 		break;
 	case EVENT_BUS_BURST:
 		busfault_burst(&bench->to_host, event->number);
@@ -36,10 +58,7 @@ void bench_event(struct bench *bench, const struct event *event)
 		bench->hang = true;
 		break;
 	default:
-		if (event->action == EVENT_BUS_OFF)
-			bench->bus_errors = (uint16_t)(bench->bus_errors + BUS_OFF_ERRORS);
-		bench->until_ms[event->action] =
-		        bench_now_ms(bench) + (int64_t)(1000 * event->duration_s + 0.5);
+		begin_span(bench, event);
 	}
 }
 
@@ -101,18 +120,31 @@ static bool is_blocked(const struct bench *bench)
 
 bool bench_events_done(const struct bench *bench)
 {
-	return bench->events_done == bench->options->event_count;
+	bool over = bench->events_done == bench->options->event_count;
+
+	for (unsigned action = 0; action < EVENT_ACTIONS; action++)
+		over = over && !bench_in_span(bench, (enum event_action)action);
+	return over;
 }
 
 void bench_events(struct bench *bench)
 {
 	make_events(bench);
 	make_spans(bench);
+	bench_foreign(bench);
+}
+
+static uint8_t bus_state(const struct bench *bench)
+{
+	if (bench_in_span(bench, EVENT_BUS_OFF))
+		return SENSORBUS_BUS_OFF;
+	return bench_in_span(bench, EVENT_BUS_PASSIVE) ? SENSORBUS_BUS_PASSIVE : SENSORBUS_BUS_ACTIVE;
 }
 
 void bench_events_answer(struct bench *bench, struct sensorbus_answer *answer)
 {
-	answer->bus_off = bench_in_span(bench, EVENT_BUS_OFF);
+	answer->bus_state = bus_state(bench);
+	answer->random = (uint32_t)random_next(&bench->random);
 	answer->tx_blocked = is_blocked(bench);
 	answer->bus_errors = bench->bus_errors;
 	answer->hang = bench->hang;

@@ -3,7 +3,7 @@
 
 enum {
 	LIFT_AFTER_MS = 2000, /* how long the technician takes once the tower is safe ... */
-	LIFT_SOON_MS = 1000,  /* ... and in a scenario */
+	LIFT_SOON_MS = 100,   /* ... and in a scenario */
 };
 
 /* False when the request makes no sense. */
@@ -104,18 +104,17 @@ static void sample(struct bench *bench, const struct sensorbus_request *request,
 	answer->ready = request->group;
 	answer->inputs = tower_inputs(bench->tower);
 	answer->bias_high = tower_bias_high(bench->tower);
-	for (unsigned gate = 0; gate < 2; gate++) {
+	for (unsigned i = 0; i < SENSORBUS_CAPTURES; i++) {
 		uint32_t time_us;
 
-		if (!tower_capture(bench->tower, gate, &time_us))
+		if (!tower_capture(bench->tower, i, &time_us))
 			continue;
-		answer->captures |= (uint8_t)(1u << gate);
-		answer->capture_us[gate] = capture_us(bench, time_us);
+		answer->captures |= (uint8_t)(1u << i);
+		answer->capture_us[i] = capture_us(bench, time_us);
 	}
 	if (bench->watch == NULL)
 		return;
-	observe_sample(&bench->watch->observe, request->group, answer->codes, answer->inputs,
-	               tower_truth(bench->tower), time_s);
+	observe_sample(&bench->watch->observe, request->group, answer, tower_truth(bench->tower), time_s);
 	timeline_sample(bench->watch->timeline, bench_now_s(bench),
 	                (uint16_t)(answer->inputs | request->outputs), bench->watch->observe.state,
 	                request->group, answer->codes);
@@ -144,7 +143,7 @@ static void watch_impact(struct bench *bench)
 /* The technician: lifts frame and product once the tower is safe. */
 void bench_plant_attend(struct bench *bench)
 {
-	bool waiting = bench->state == WIRE_STATE_SAFE && tower_inputs(bench->tower) & WIRE_IO_FRAME_DOWN;
+	bool waiting = bench->state == WIRE_STATE_SAFE && isfinite(tower_truth(bench->tower)->frame_down_s);
 
 	if (!waiting)
 		bench->safe_ms = -1;

@@ -4,7 +4,7 @@
 /*
  * What the bench's own files share: the state of a run. bench.c is the run as a whole, bench_plant.c moves
  * the tower from request to request, bench_bus.c carries the frames, bench_events.c is what goes wrong and
- * when, bench_control.c what does by word from outside.
+ * when, bench_foreign.c other hosts than the operator, bench_control.c what happens by word from outside.
  */
 #include <math.h>
 #include <stdint.h>
@@ -21,6 +21,7 @@
 enum {
 	BENCH_GRID_PER_MS = 70,  /* both sample grids, k/7 and k/10 ms, are whole numbers of this */
 	BENCH_QUEUE_FRAMES = 64, /* on their way to the firmware; a power of two */
+	BENCH_TAPE_FRAMES = 512, /* of hosts that are kept, to be replayed */
 };
 
 struct bench {
@@ -36,6 +37,14 @@ struct bench {
 	struct busfault to_host, to_tower;
 	struct ring queue;
 	struct frame queue_storage[BENCH_QUEUE_FRAMES];
+	struct tape {
+		unsigned count;
+		struct frame frame[BENCH_TAPE_FRAMES];
+		int64_t ms[BENCH_TAPE_FRAMES];
+		unsigned next;   /* to be replayed ... */
+		int64_t late_ms; /* ... so long after it was sent */
+		bool replayed;   /* nothing more is kept */
+	} tape;
 	uint16_t bus_errors; /* error reports of the host's link since the answer before */
 
 	int64_t base_grid; /* virtual time of the firmware's latest reset, 1/70 ms */
@@ -43,6 +52,9 @@ struct bench {
 	double tower_rate; /* the tower's seconds in one of the firmware's */
 	bool running;      /* a request came */
 	uint16_t outputs;
+	uint8_t kept;    /* what the firmware keeps over a reset */
+	uint64_t random; /* for its port_random */
+	uint64_t dice;   /* of the forger */
 
 	uint8_t state, fault; /* the firmware's, from its status before the injector */
 	int64_t safe_ms;      /* since when it is safe with the frame down, negative: it is not */
@@ -136,6 +148,18 @@ void bench_event(struct bench *bench, const struct event *event);
 /* Each ms, and what of it goes with an answer. */
 void bench_events(struct bench *bench);
 void bench_events_answer(struct bench *bench, struct sensorbus_answer *answer);
+
+/* ---- bench_foreign.c ---- */
+
+/* A command of the operator, or of the second host, as whoever hears the bus can make it. */
+void bench_verb(struct bench *bench, const struct event *event);
+
+/* Keeps what a host sent. */
+void bench_keep(struct bench *bench, const struct frame *frame);
+void bench_replay_start(struct bench *bench);
+
+/* Each ms. */
+void bench_foreign(struct bench *bench);
 
 /* ---- bench_control.c: the socket of --control, which hil/README.md describes ---- */
 

@@ -2,16 +2,7 @@
 #include "hil/busfault.h"
 
 #include "common/wire.h"
-
-/* splitmix64 (Steele, Lea, Flood 2014): any seed is a good one. */
-static uint64_t random_next(uint64_t *state)
-{
-	uint64_t z = (*state += 0x9E3779B97F4A7C15u);
-
-	z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-	z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-	return z ^ (z >> 31);
-}
+#include "hil/random.h"
 
 /* Uniform in [0, 1), so that a probability of 0 never and of 1 always happens. */
 static double random_unit(uint64_t *state)

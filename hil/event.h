@@ -4,20 +4,29 @@
 /*
  * Things that happen to the tower, its bus and its firmware in a run: what, and when. Plain data.
  */
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "common/frame.h"
+#include "common/wire.h"
 
 enum event_action {
 	EVENT_FAULT,       /* of the tower: number is an enum tower_fault */
 	EVENT_REPAIR,      /* the same, taken away */
-	EVENT_SEND,        /* a frame of the host */
+	EVENT_DROPOUT,     /* the magnet's, from now on duration_s */
+	EVENT_GLITCH,      /* of gate `number`: `pulses` of them, one with each sample */
+	EVENT_SEND,        /* a frame of whoever */
+	EVENT_VERB,        /* a command: of the scripted operator, or `second` of the second host */
 	EVENT_BUS_SILENT,  /* for duration_s nothing passes, and neither end notices */
 	EVENT_BUS_BLOCKED, /* nobody acknowledges: nothing leaves the firmware, nothing reaches it */
 	EVENT_BUS_OFF,     /* the firmware's controller is bus-off */
+	EVENT_BUS_PASSIVE, /* it is error-passive */
 	EVENT_BUS_BABBLE,  /* a foreign node sends 8 frames a ms and takes every second ms for itself */
 	EVENT_BUS_BURST,   /* the next `number` live blocks are lost */
 	EVENT_HOST_SILENT, /* the host sends nothing */
+	EVENT_HOST_SECOND, /* a second host beats too */
+	EVENT_HOST_REPLAY, /* what hosts sent from the first ARM until now comes again, as far apart */
+	EVENT_HOST_FORGE,  /* two forged commands a ms */
 	EVENT_RESET,       /* the firmware is started anew, number is its --reset-cause */
 	EVENT_HANG,        /* the firmware's main loop hangs until the watchdog bites */
 	EVENT_ACTIONS
@@ -30,9 +39,12 @@ enum {
 
 struct event {
 	enum event_action action;
-	unsigned number;
+	unsigned number, pulses;
 	double duration_s;
 	struct frame frame;
+	struct wire_command
+	        command; /* host, and the argument if not `forged`, are filled in when it is sent */
+	bool second, forged;
 	int state; /* WIRE_STATE_*: seconds count from its entry; EVENT_AT_TIME: from the start */
 	double time_s;
 	int line; /* of the scenario file */

@@ -360,6 +360,7 @@ static void set_options(struct bench_options *bench, const struct scenario *scen
 	bench->script =
 	        (struct script_options){.drops = (unsigned)scenario->operator_drops,
 	                                .release_ms = (uint32_t)(1000 * scenario->operator_release_after_s),
+	                                .passive = scenario->operator_acknowledge == 0,
 	                                .patient = true,
 	                                .wrong_hash = scenario->operator_wrong_hash != 0,
 	                                .parameters = scenario->parameter,
@@ -399,6 +400,9 @@ static int judge(const struct scenario *scenario, const struct line *line, const
 	printf("%s %s %s %.3f %.2f %016" PRIx64 " %s\n%s", failures ? "FAIL" : "PASS", name,
 	       wire_state_name(watch->observe.state), watch->virtual_s, watch->wall_s, watch->observe.hash,
 	       failures ? failed : "-", report);
+	if (watch->observe.hazard.first != NULL)
+		printf("  unsafe at %.3f s: %s\n", watch->observe.hazard.first_s,
+		       watch->observe.hazard.first);
 	free(report);
 	snprintf(title, sizeof(title), "%s: %s (%s%s)", name, scenario->title, failures ? "FAIL " : "PASS",
 	         failures ? failed : "");

@@ -12,9 +12,9 @@
 #define IMPACT_SPAN_S 0.400
 #define STATUS_ALONE_S 0.050 /* so long without a live block, the status message tells the state */
 #define RELEASE_SPAN_US 2000 /* a latch that opens later than this was not asked to */
-#define BRAKE_LATE_S 0.001
 
-#define GUARDS (WIRE_IO_DOOR_CLOSED | WIRE_IO_ESTOP_CLEAR | WIRE_IO_SUPPLY_GOOD | WIRE_IO_DAMPERS_ENGAGED)
+enum { WHOLE_SET = (1u << WIRE_PARAMETERS) - 1 };
+_Static_assert(WIRE_PARAMETERS < 31, "a bit each");
 
 static void take_note(struct observe *observe, struct observe_notes *notes, uint32_t number)
 {
@@ -30,15 +30,18 @@ static void begin_blocks(struct observe *observe)
 		observe->blocks[s].last = -1;
 }
 
-void observe_init(struct observe *observe, const struct scene *scene)
+void observe_init(struct observe *observe, const struct scene *scene, double tower_rate)
 {
 	memset(observe, 0, sizeof(*observe));
+	observe->tower_rate = tower_rate;
 	observe->planned_travel_m = scene->tower_separation_m;
 	observe->state = observe->fault = UINT8_MAX;
 	observe->block_s = -1;
 	observe->hash = 0xCBF29CE484222325u;
-	observe->truth = (struct tower_truth){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
-	observe->release_us = observe->latch_us = observe->relieve_s = NAN;
+	observe->truth = (struct tower_truth){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, false};
+	observe->release_us = observe->latch_us = observe->latch_s = observe->warning_ms = NAN;
+	observe->relieve_s = observe->dropout_first_us = NAN;
+	hazard_init(&observe->hazard, scene->tower_dampers_m);
 	begin_blocks(observe);
 }
 
@@ -90,6 +93,7 @@ void observe_reset(struct observe *observe)
 	memset(observe->has_counter, 0, sizeof(observe->has_counter));
 	memset(observe->counter, 0, sizeof(observe->counter));
 	observe->sent = observe->given = 0;
+	hazard_reset(&observe->hazard);
 }
 
 static int block_sensor(const struct frame *frame)
@@ -122,15 +126,16 @@ void observe_at_host(struct observe *observe, const struct frame *frame)
 
 /* ---- what the firmware says ---- */
 
-static void note_state(struct observe *observe, uint8_t state)
+static void note_state(struct observe *observe, uint8_t state, double tower_s)
 {
+	hazard_state(&observe->hazard, state, &observe->truth, tower_s);
 	if (state == observe->state)
 		return;
 	observe->state = state;
 	take_note(observe, &observe->path, state);
 }
 
-static void see_block(struct observe *observe, unsigned sensor, const struct frame *frame)
+static void see_block(struct observe *observe, unsigned sensor, const struct frame *frame, double tower_s)
 {
 	struct wire_block block;
 
@@ -139,10 +144,12 @@ static void see_block(struct observe *observe, unsigned sensor, const struct fra
 	if (block.tick_ms < OBSERVE_TICKS)
 		observe->blocks[sensor].sent[block.tick_ms] = 1;
 	observe->block_s = observe->now_s;
-	note_state(observe, block.status & WIRE_STATUS_STATE);
+	note_state(observe, block.status & WIRE_STATUS_STATE, tower_s);
+	if (sensor == 0)
+		hazard_block(&observe->hazard, block.status & WIRE_STATUS_STATE, block.io);
 }
 
-static void see_status(struct observe *observe, const struct frame *frame)
+static void see_status(struct observe *observe, const struct frame *frame, double tower_s)
 {
 	struct wire_status status;
 
@@ -153,7 +160,7 @@ static void see_status(struct observe *observe, const struct frame *frame)
 	if (observe->was_ready)
 		observe->checks |= status.checks;
 	if (observe->block_s < 0 || observe->now_s - observe->block_s > STATUS_ALONE_S)
-		note_state(observe, status.state);
+		note_state(observe, status.state, tower_s);
 }
 
 static void see_emcy(struct observe *observe, const struct frame *frame)
@@ -173,6 +180,8 @@ static void see_reply(struct observe *observe, const struct frame *frame)
 	if (wire_unpack_reply(frame, &reply) != 0)
 		return;
 	take_note(observe, &observe->replies, reply.state);
+	if (reply.op == WIRE_OP_CLEAR && reply.result == 0)
+		hazard_acknowledged(&observe->hazard);
 	if (reply.result != 0)
 		take_note(observe, &observe->refused, (uint32_t)(int32_t)reply.result);
 }
@@ -211,13 +220,89 @@ static void see_capture_end(struct observe *observe, const struct frame *frame, 
 {
 	struct wire_capture_end end;
 
+	observe->tail_bad += wire_check_capture_end(frame) != 0;
 	if (wire_unpack_capture_end(frame, &end) != 0)
 		return;
-	observe->captures += observe->captures == 0 || end.drop_id != observe->capture.drop_id ||
-	                     end.first_tick_ms != observe->capture.first_tick_ms ||
-	                     end.crc32 != observe->capture.crc32;
+	if (observe->captures == 0 || end.drop_id != observe->capture.drop_id ||
+	    end.first_tick_ms != observe->capture.first_tick_ms || end.crc32 != observe->capture.crc32) {
+		observe->captures++;
+		observe->tail = (struct observe_tail){.has_value = 0};
+	}
 	observe->capture = end;
-	observe->capture_first_s = tick_s + 1e-3 * end.first_tick_ms;
+	observe->capture_first_s = tick_s + 1e-3 * end.first_tick_ms * observe->tower_rate;
+}
+
+/* ---- what a drop has measured of its tower ---- */
+
+static void keep_largest(double *worst, double error)
+{
+	if (fabs(error) > *worst)
+		*worst = fabs(error);
+}
+
+static void judge_measured(struct observe *observe, const struct wire_measured *measured)
+{
+	const struct tower_truth *truth = &observe->truth;
+
+	if (measured->separation_um != UINT32_MAX) {
+		observe->separated++;
+		keep_largest(&observe->separation_error_um,
+		             measured->separation_um - 1e6 * truth->separation_travel_m);
+	}
+	if (measured->dropout_us != UINT16_MAX) {
+		keep_largest(&observe->dropout_error_us,
+		             measured->dropout_us - 1e6 * (truth->separation_s - truth->magnet_off_s));
+		if (isnan(observe->dropout_first_us))
+			observe->dropout_first_us = measured->dropout_us;
+	}
+	if (measured->latch_delay_us != UINT16_MAX)
+		keep_largest(&observe->latch_delay_error_us,
+		             measured->latch_delay_us - 1e6 * (truth->latch_open_s - observe->latch_s));
+}
+
+static void end_tail(struct observe *observe)
+{
+	const struct observe_tail *tail = &observe->tail;
+
+	if (!tail->has_measured || tail->has_value != WHOLE_SET)
+		return;
+	if (wire_parameters_crc32(tail->value) == observe->capture.parameters_crc32)
+		observe->tails++;
+	else
+		observe->tail_bad++;
+}
+
+static void see_measured(struct observe *observe, const struct frame *frame)
+{
+	struct observe_tail *tail = &observe->tail;
+	struct wire_measured measured;
+
+	observe->tail_bad += wire_check_measured(frame) != 0;
+	if (wire_unpack_measured(frame, &measured) != 0 || tail->has_measured)
+		return;
+	observe->tail_bad += measured.drop_id != observe->capture.drop_id;
+	tail->measured = measured;
+	tail->has_measured = true;
+	judge_measured(observe, &measured);
+	end_tail(observe);
+}
+
+static void see_parameter(struct observe *observe, const struct frame *frame)
+{
+	struct observe_tail *tail = &observe->tail;
+	struct wire_parameter parameter;
+	unsigned i = 0;
+
+	if (wire_unpack_parameter(frame, &parameter) != 0)
+		return;
+	while (i < WIRE_PARAMETERS && wire_parameters[i].index != parameter.index)
+		i++;
+	observe->tail_bad += i == WIRE_PARAMETERS || parameter.drop_id != observe->capture.drop_id;
+	if (i == WIRE_PARAMETERS || tail->has_value >> i & 1)
+		return;
+	tail->value[i] = parameter.value;
+	tail->has_value |= 1u << i;
+	end_tail(observe);
 }
 
 static void add_hash(struct observe *observe, const void *bytes, size_t count)
@@ -228,14 +313,14 @@ static void add_hash(struct observe *observe, const void *bytes, size_t count)
 		observe->hash = (observe->hash ^ p[i]) * 0x100000001B3u;
 }
 
-static void see_message(struct observe *observe, const struct frame *frame, double tick_s)
+static void see_message(struct observe *observe, const struct frame *frame, double tick_s, double tower_s)
 {
 	int sensor = block_sensor(frame);
 
 	if (sensor >= 0)
-		see_block(observe, (unsigned)sensor, frame);
+		see_block(observe, (unsigned)sensor, frame, tower_s);
 	else if (frame->id == WIRE_ID_STATUS)
-		see_status(observe, frame);
+		see_status(observe, frame, tower_s);
 	else if (frame->id == WIRE_ID_EMCY)
 		see_emcy(observe, frame);
 	else if (frame->id == WIRE_ID_REPLY)
@@ -246,9 +331,13 @@ static void see_message(struct observe *observe, const struct frame *frame, doub
 		see_counter(observe, frame);
 	else if (frame->id == WIRE_ID_CAPTURE_END)
 		see_capture_end(observe, frame, tick_s);
+	else if (frame->id == WIRE_ID_MEASURED)
+		see_measured(observe, frame);
+	else if (frame->id == WIRE_ID_PARAMETER)
+		see_parameter(observe, frame);
 }
 
-void observe_from_firmware(struct observe *observe, const struct frame *frame, double tick_s)
+void observe_from_firmware(struct observe *observe, const struct frame *frame, double tick_s, double tower_s)
 {
 	const struct frame *message = segment_feed(&observe->segments, frame);
 	uint32_t head[3] = {(uint32_t)lrint(observe->now_s * 1e6), frame->id,
@@ -257,7 +346,7 @@ void observe_from_firmware(struct observe *observe, const struct frame *frame, d
 	add_hash(observe, head, sizeof(head));
 	add_hash(observe, frame->data, frame->length);
 	if (message != NULL)
-		see_message(observe, message, tick_s);
+		see_message(observe, message, tick_s, tower_s);
 	observe->sent++;
 }
 
@@ -275,30 +364,24 @@ void observe_to_firmware(struct observe *observe, const struct frame *frame, dou
 
 void observe_edge(struct observe *observe, unsigned bit, bool on, double edge_us, double tower_s)
 {
-	unsigned mask = 1u << bit;
+	uint16_t mask = (uint16_t)(1u << bit);
 	bool asked = edge_us - observe->release_us <= RELEASE_SPAN_US; /* false for NAN */
 
-	if (mask == WIRE_IO_MAGNET_HOLD && !on)
-		observe->unsafe += (unsigned)(isnan(observe->truth.latch_open_s) != 0);
-	if (mask == WIRE_IO_DAMPERS_RELIEVE && on)
-		observe->unsafe += (unsigned)!asked;
 	if (mask == WIRE_IO_DAMPERS_RELIEVE && !on && isnan(observe->relieve_s))
 		observe->relieve_s = tower_s;
 	if (mask == WIRE_IO_LATCH_OPEN && on) {
-		observe->unsafe += (unsigned)(!asked || (observe->inputs & GUARDS) != GUARDS);
 		observe->latch_us = edge_us - observe->release_us;
+		observe->latch_s = tower_s;
+		observe->warning_ms = 1e3 * (tower_s - observe->hazard.warning_s);
 		observe->relieve_s = NAN;
 	}
-	observe->outputs = (uint16_t)(on ? observe->outputs | mask : observe->outputs & ~mask);
+	hazard_edge(&observe->hazard, mask, on, asked, tower_s);
 }
 
-static void see_truth(struct observe *observe, const struct tower_truth *truth, double tower_s)
+static void see_truth(struct observe *observe, const struct tower_truth *truth)
 {
-	bool again = isnan(truth->latch_open_s);
-
-	if (again && !isnan(observe->truth.latch_open_s)) /* lifted: the next drop's magnet is guarded anew */
-		observe->truth.latch_open_s = NAN;
-	if (again)
+	observe->truth.frame_away = truth->frame_away;
+	if (isnan(truth->latch_open_s))
 		return;
 	if (isfinite(truth->impact_s) && truth->impact_s != observe->truth.impact_s) {
 		observe->impacts++;
@@ -306,9 +389,6 @@ static void see_truth(struct observe *observe, const struct tower_truth *truth, 
 		observe->bursts = 0;
 		observe->burst_end_s = -1;
 	}
-	/* once, at the first look that long after the frame met the dampers */
-	if (tower_s >= truth->frame_down_s + BRAKE_LATE_S && observe->outputs & WIRE_IO_DAMPERS_RELIEVE)
-		observe->unsafe++;
 	observe->truth = *truth;
 }
 
@@ -326,12 +406,12 @@ static void see_codes(struct observe *observe, unsigned group, const int16_t cod
 	observe->burst_end_s = tower_s;
 }
 
-void observe_sample(struct observe *observe, unsigned group, const int16_t codes[6], uint16_t inputs,
+void observe_sample(struct observe *observe, unsigned group, const struct sensorbus_answer *answer,
                     const struct tower_truth *truth, double tower_s)
 {
-	observe->inputs = inputs;
-	see_truth(observe, truth, tower_s);
-	see_codes(observe, group, codes, tower_s);
+	hazard_sample(&observe->hazard, answer->inputs, answer->captures, truth, tower_s);
+	see_truth(observe, truth);
+	see_codes(observe, group, answer->codes, tower_s);
 }
 
 /* ---- the numbers ---- */
@@ -348,11 +428,29 @@ static void capture_results(const struct observe *observe, double results[SCENAR
 	        1e6 * (observe->capture_first_s - observe->truth.impact_s) + capture->trigger_us;
 }
 
+static void tail_results(const struct observe *observe, double results[SCENARIO_RESULTS])
+{
+	const struct wire_measured *measured = &observe->tail.measured;
+	bool dropped = observe->tail.has_measured && measured->dropout_us != UINT16_MAX;
+
+	results[SCENARIO_tail_errors] = observe->tail_bad + (double)observe->captures - observe->tails;
+	results[SCENARIO_measured] = observe->separated;
+	results[SCENARIO_separation_error_um] = observe->separation_error_um;
+	results[SCENARIO_dropout_error_us] = observe->dropout_error_us;
+	results[SCENARIO_latch_delay_error_us] = observe->latch_delay_error_us;
+	if (dropped) {
+		results[SCENARIO_dropout_us] = measured->dropout_us;
+		results[SCENARIO_dropout_trend_us] = measured->dropout_us - observe->dropout_first_us;
+	}
+	if (observe->tail.has_measured) {
+		results[SCENARIO_dropout_used_us] = measured->dropout_used_us;
+		results[SCENARIO_acceleration_mm_s2] = measured->acceleration_mm_s2;
+	}
+}
+
 void observe_results(const struct observe *observe, double results[SCENARIO_RESULTS])
 {
 	const struct tower_truth *truth = &observe->truth;
-	bool at_rest = !wire_state_moving(observe->state);
-	bool dangerous = observe->outputs & (WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE);
 
 	results[SCENARIO_captures] = observe->captures;
 	results[SCENARIO_impacts] = observe->impacts;
@@ -368,7 +466,9 @@ void observe_results(const struct observe *observe, double results[SCENARIO_RESU
 	capture_results(observe, results);
 	results[SCENARIO_s2x_peak_g] = observe->impacts ? (double)observe->peak_x / WIRE_COUNTS_PER_G : NAN;
 	results[SCENARIO_s2_bursts] = observe->impacts ? (double)observe->bursts : NAN;
-	results[SCENARIO_unsafe] = observe->unsafe + (at_rest && dangerous) + observe->emcy_is_wrong;
+	results[SCENARIO_warning_ms] = observe->warning_ms;
+	tail_results(observe, results);
+	results[SCENARIO_unsafe] = hazard_count(&observe->hazard) + observe->emcy_is_wrong;
 	results[SCENARIO_ledger_sent] = (double)observe->sent_error;
 	results[SCENARIO_ledger_received] = (double)observe->given_error;
 	results[SCENARIO_ledger_blocks] = (double)(observe->blocks_error + blocks_error(observe));

@@ -15,8 +15,10 @@
 #include "common/frame.h"
 #include "common/scenes/scene.h"
 #include "common/segment.h"
+#include "common/sensorbus.h"
 #include "common/wire.h"
 #include "hil/busfault.h"
+#include "hil/hazard.h"
 #include "hil/scenario.h"
 #include "hil/tower.h"
 
@@ -43,13 +45,14 @@ struct observe_blocks {
 };
 
 struct observe {
+	double tower_rate;       /* the tower's seconds in one of the firmware's */
 	double planned_travel_m; /* where the product shall leave the frame */
 	double now_s;            /* virtual time */
 
 	struct observe_notes path, emcy, replies, refused, aborts;
 	uint8_t state, fault;
 	bool was_ready;
-	uint16_t checks;    /* told as not green at any time since it first was READY */
+	uint32_t checks;    /* told as not green at any time since it first was READY */
 	double block_s;     /* when the last live block told the state, negative: none yet */
 	bool emcy_is_wrong; /* a code that is not its fault's */
 
@@ -67,19 +70,33 @@ struct observe {
 	struct wire_capture_end capture;
 	unsigned captures;
 	double capture_first_s; /* tower's time of its first tick */
+	struct observe_tail {   /* what follows a capture end */
+		struct wire_measured measured;
+		bool has_measured;
+		uint32_t value[WIRE_PARAMETERS];
+		uint32_t has_value; /* a bit each */
+	} tail;
+	unsigned tails;     /* captures with all of it, the parameters those of the capture end's CRC-32 */
+	unsigned tail_bad;  /* seals that do not agree, sets that are not what the capture end says */
+	unsigned separated; /* drops whose separation was measured */
+	double separation_error_um, dropout_error_us, latch_delay_error_us; /* against the tower, the worst */
+	double dropout_first_us;                                            /* measured, NAN: none */
 
 	struct tower_truth truth; /* of the latest drop that began */
-	unsigned impacts, resets, unsafe;
+	unsigned impacts, resets;
+	struct hazard hazard;
 	double release_us; /* when the last RELEASE reached the firmware, NAN: never */
 	double latch_us;   /* from there to the latch's edge, NAN */
+	double latch_s;    /* that edge, tower's time */
+	double warning_ms; /* that the warning was on before it, NAN */
 	double relieve_s;  /* dampers not relieved any more, tower's time, NAN */
 	int peak_x;        /* counts */
 	unsigned bursts;
 	double burst_end_s;
-	uint16_t outputs, inputs;
 };
 
-void observe_init(struct observe *observe, const struct scene *scene);
+/* tower_rate: the tower's seconds in one of the firmware's. */
+void observe_init(struct observe *observe, const struct scene *scene, double tower_rate);
 
 /* The firmware started anew: its counters and ticks begin at 0. */
 void observe_reset(struct observe *observe);
@@ -88,11 +105,11 @@ void observe_reset(struct observe *observe);
 void observe_edge(struct observe *observe, unsigned bit, bool on, double edge_us, double tower_s);
 
 /* What was converted, and the tower as it is now. */
-void observe_sample(struct observe *observe, unsigned group, const int16_t codes[6], uint16_t inputs,
+void observe_sample(struct observe *observe, unsigned group, const struct sensorbus_answer *answer,
                     const struct tower_truth *truth, double tower_s);
 
-/* tick_s: tower's time of the firmware's tick 0. */
-void observe_from_firmware(struct observe *observe, const struct frame *frame, double tick_s);
+/* tick_s: tower's time of the firmware's tick 0; tower_s: now. */
+void observe_from_firmware(struct observe *observe, const struct frame *frame, double tick_s, double tower_s);
 void observe_at_host(struct observe *observe, const struct frame *frame);
 void observe_to_firmware(struct observe *observe, const struct frame *frame, double now_us);
 

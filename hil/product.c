@@ -108,14 +108,14 @@ static void rates(const struct product *p, const double s[], double rate[])
 	rate[PRODUCT_Y] = s[PRODUCT_VY];
 	rate[PRODUCT_ANGLE] = s[PRODUCT_SPIN];
 	rate[PRODUCT_VX] = (load.x_n + mount.x_n) / p->case_mass_kg;
-	rate[PRODUCT_VY] = (load.y_n + mount.y_n) / p->case_mass_kg - UNITS_G_M_S2;
+	rate[PRODUCT_VY] = (load.y_n + mount.y_n) / p->case_mass_kg - p->gravity_m_s2;
 	rate[PRODUCT_SPIN] = -load.torque_n_m / p->inertia_kg_m2;
 	rate[PRODUCT_PLATE_X] = s[PRODUCT_PLATE_VX];
 	rate[PRODUCT_PLATE_Y] = s[PRODUCT_PLATE_VY];
 	/* without a plate its place holders ride with the box */
 	rate[PRODUCT_PLATE_VX] = p->plate_mass_kg > 0 ? -mount.x_n / p->plate_mass_kg : rate[PRODUCT_VX];
 	rate[PRODUCT_PLATE_VY] =
-	        p->plate_mass_kg > 0 ? -mount.y_n / p->plate_mass_kg - UNITS_G_M_S2 : rate[PRODUCT_VY];
+	        p->plate_mass_kg > 0 ? -mount.y_n / p->plate_mass_kg - p->gravity_m_s2 : rate[PRODUCT_VY];
 }
 
 /* A corner clear of the mat forgets its last contact and is ready for the next. */
@@ -140,6 +140,7 @@ void product_init(struct product *p, const struct scene *scene, double angle_rad
 	const double strain_m = scene->mount_softening_strain * scene->mount_cube_m;
 
 	memset(p, 0, sizeof(*p));
+	p->gravity_m_s2 = scene->drop_gravity_m_s2;
 	p->case_mass_kg = scene->product_case_mass_kg;
 	p->plate_mass_kg = scene->mount_plate_mass_kg;
 	p->inertia_kg_m2 = scene->product_inertia_ratio * scene->product_case_mass_kg *
@@ -207,8 +208,8 @@ void product_step(struct product *p, double step_s)
 void product_read(const struct product *p, struct product_reading *reading)
 {
 	const double sn = sin(p->state[PRODUCT_ANGLE]), cs = cos(p->state[PRODUCT_ANGLE]);
-	const double x = p->rate[PRODUCT_PLATE_VX], y = p->rate[PRODUCT_PLATE_VY] + UNITS_G_M_S2;
-	const double box_x = p->rate[PRODUCT_VX], box_y = p->rate[PRODUCT_VY] + UNITS_G_M_S2;
+	const double x = p->rate[PRODUCT_PLATE_VX], y = p->rate[PRODUCT_PLATE_VY] + p->gravity_m_s2;
+	const double box_x = p->rate[PRODUCT_VX], box_y = p->rate[PRODUCT_VY] + p->gravity_m_s2;
 	const double spin = p->state[PRODUCT_SPIN];
 	const double body_x = x * sn + y * cs, body_y = -x * cs + y * sn;
 

@@ -48,6 +48,7 @@ enum product_state {
 #define PRODUCT_APPROACH_MIN_M_S 0.1
 
 struct product {
+	double gravity_m_s2;
 	double case_mass_kg, plate_mass_kg, inertia_kg_m2;
 	double lever_x_m, lever_y_m;
 	double stiffness25_n_m15, hysteresis, tangential_ratio, friction; /* hysteresis: D */

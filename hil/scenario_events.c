@@ -8,7 +8,6 @@
 #include "hil/tower.h"
 
 enum {
-	TOKEN = 0x5A5A,       /* the script's */
 	SEQUENCE_FROM = 0x80, /* of commands that [at] sends: the script counts from 0 */
 	SDO_WRITE = 0x23,
 };
@@ -38,21 +37,26 @@ static bool parse_frame(const char *text, struct frame *frame)
 
 static bool parse_verb(unsigned count, char **words, uint8_t sequence, struct event *event)
 {
-	struct wire_command command = {.sequence = sequence, .token = TOKEN};
-	unsigned long token = TOKEN;
+	struct wire_command command = {.sequence = sequence};
+	unsigned at = 2;
+	unsigned long argument = 0;
 
 	for (unsigned op = 1; command.op == 0 && op <= UINT8_MAX; op++)
 		if (strcasecmp(words[1], wire_op_name(op)) == 0)
 			command.op = (uint8_t)op;
-	if (command.op == 0 || count > 3 ||
-	    (count == 3 && !scenario_parse_whole(words[2], UINT16_MAX, &token)))
+	event->action = EVENT_VERB;
+	event->second = at < count && strcmp(words[at], "second") == 0;
+	at += event->second;
+	event->forged = at < count;
+	if (command.op == 0 || count > at + 1 ||
+	    (event->forged && !scenario_parse_whole(words[at], UINT32_MAX, &argument)))
 		return false;
-	command.token = (uint16_t)token;
-	wire_pack_command(&event->frame, WIRE_ID_COMMAND, &command);
+	command.argument = (uint32_t)argument;
+	event->command = command;
 	return true;
 }
 
-/* send abort | send release 0x1234 | send set NAME VALUE | send frame 000#0201 */
+/* send abort | send release second 0x1234 | send set NAME VALUE | send frame 000#0201 */
 static bool parse_send(unsigned count, char **words, uint8_t sequence, struct event *event)
 {
 	struct scenario_parameter parameter;
@@ -75,9 +79,11 @@ static bool parse_bus(unsigned count, char **words, struct event *event)
 		const char *key, *name;
 		enum event_action action;
 	} spans[] = {
-	        {"bus", "silent", EVENT_BUS_SILENT}, {"bus", "blocked", EVENT_BUS_BLOCKED},
-	        {"bus", "off", EVENT_BUS_OFF},       {"bus", "babble", EVENT_BUS_BABBLE},
-	        {"bus", "burst", EVENT_BUS_BURST},   {"host", "silent", EVENT_HOST_SILENT},
+	        {"bus", "silent", EVENT_BUS_SILENT},   {"bus", "blocked", EVENT_BUS_BLOCKED},
+	        {"bus", "off", EVENT_BUS_OFF},         {"bus", "babble", EVENT_BUS_BABBLE},
+	        {"bus", "passive", EVENT_BUS_PASSIVE}, {"bus", "burst", EVENT_BUS_BURST},
+	        {"host", "silent", EVENT_HOST_SILENT}, {"host", "second", EVENT_HOST_SECOND},
+	        {"host", "replay", EVENT_HOST_REPLAY}, {"host", "forge", EVENT_HOST_FORGE},
 	};
 	unsigned long frames;
 
@@ -97,7 +103,7 @@ static bool parse_bus(unsigned count, char **words, struct event *event)
 
 static bool parse_reset(unsigned count, char **words, struct event *event)
 {
-	static const char *const causes[] = {"power_on", "command", "watchdog", "brown_out"};
+	static const char *const causes[] = {"power_on", "command", "watchdog", "brown_out", "pin"};
 
 	event->action = EVENT_RESET;
 	for (unsigned i = 0; count == 2 && i < sizeof(causes) / sizeof(causes[0]); i++)
@@ -114,10 +120,33 @@ static bool parse_hang(unsigned count, char **words, struct event *event)
 	return count == 2 && strcmp(words[1], "main_loop") == 0;
 }
 
+static bool parse_gate(unsigned count, char **words, struct event *event)
+{
+	static const char *const gates[] = {"upper", "lower"};
+	unsigned long pulses = 1;
+
+	event->action = EVENT_GLITCH;
+	for (unsigned gate = 0; count == 3 && gate < 2; gate++)
+		if (strcmp(words[1], gates[gate]) == 0 && scenario_parse_whole(words[2], 1000, &pulses)) {
+			event->number = gate;
+			event->pulses = (unsigned)pulses;
+			return true;
+		}
+	return false;
+}
+
+static bool parse_dropout(unsigned count, char **words, struct event *event)
+{
+	event->action = EVENT_DROPOUT;
+	return count == 2 && settings_number(words[1], 0.002, 0.05, &event->duration_s);
+}
+
 const char scenario_actions[] =
-        "fault FAULT, repair FAULT, send VERB [TOKEN], send set NAME VALUE, send frame ID#DATA, "
-        "bus silent|blocked|off|babble SECONDS, bus burst N, host silent SECONDS, "
-        "reset power_on|command|watchdog|brown_out, hang main_loop";
+        "fault FAULT, repair FAULT, send VERB [second] [ARGUMENT], send set NAME VALUE, send frame ID#DATA, "
+        "bus silent|blocked|off|passive|babble SECONDS, bus burst N, host silent|second|replay|forge "
+        "SECONDS, "
+        "gate upper|lower PULSES, dropout SECONDS, reset power_on|command|watchdog|brown_out|pin, hang "
+        "main_loop";
 
 bool scenario_parse_action(unsigned count, char **words, uint8_t sequence, struct event *event)
 {
@@ -129,6 +158,10 @@ bool scenario_parse_action(unsigned count, char **words, uint8_t sequence, struc
 		return parse_reset(count, words, event);
 	if (strcmp(words[0], "hang") == 0)
 		return parse_hang(count, words, event);
+	if (strcmp(words[0], "gate") == 0)
+		return parse_gate(count, words, event);
+	if (strcmp(words[0], "dropout") == 0)
+		return parse_dropout(count, words, event);
 	return parse_bus(count, words, event);
 }
 
@@ -149,7 +182,7 @@ int scenario_read_event(struct scenario_reading *reading, const char *name, cons
 {
 	struct scenario *scenario = &reading->scenario;
 	struct event event = {.line = reading->settings.line};
-	char text[160];
+	char text[SCENARIO_EVENT_MAX];
 	char *words[SCENARIO_WORDS_MAX];
 	unsigned count, what = 0;
 

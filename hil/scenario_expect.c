@@ -93,7 +93,7 @@ static const struct list_kind {
         {"fault", offsetof(struct scenario, fault), WIRE_FAULTS, 1, 1, wire_fault_name},
         {"emcy", offsetof(struct scenario, emcy), WIRE_FAULTS, 0, SCENARIO_LIST_MAX, wire_fault_name},
         {"path", offsetof(struct scenario, path), WIRE_STATES, 1, SCENARIO_LIST_MAX, wire_state_name},
-        {"checks", offsetof(struct scenario, checks), WIRE_CHECKS, 0, 16, wire_check_name},
+        {"checks", offsetof(struct scenario, checks), WIRE_CHECKS, 0, WIRE_CHECKS, wire_check_name},
         {"marks", offsetof(struct scenario, marks), 16, 0, 16, mark_of},
         {"replies", offsetof(struct scenario, replies), WIRE_STATES, 0, SCENARIO_LIST_MAX, wire_state_name},
         {"refused", offsetof(struct scenario, refused), ERRORS, 0, SCENARIO_LIST_MAX, error_of},

@@ -8,7 +8,10 @@
 #include "common/scenes/settings.h"
 #include "hil/scenario.h"
 
-enum { SCENARIO_WORDS_MAX = 40 };
+enum {
+	SCENARIO_WORDS_MAX = 40,
+	SCENARIO_EVENT_MAX = 240, /* characters of an event: one with a frame of 64 bytes fits */
+};
 
 struct scenario_reading {
 	struct settings settings;

@@ -16,9 +16,12 @@ enum {
 	RESEND_TICKS = 64, /* ticks in a request */
 	GIVE_UP_MS = 3000, /* so long without a missing block coming */
 	NMT_OPERATIONAL = 5,
-	TOKEN = 0x5A5A,
+	NMT_BOOT_UP = 0,
 	SDO_WRITE = 0x23,
+	SDO_WRITTEN = 0x60,
+	GUARDS = WIRE_CHECK_ESTOP | WIRE_CHECK_DOOR | WIRE_CHECK_LATCH | WIRE_CHECK_PRODUCT,
 };
+_Static_assert(WIRE_PARAMETERS < 32, "has_value has a bit for each");
 
 static void enter(struct script *script, enum script_phase phase, uint32_t send_ms)
 {
@@ -33,9 +36,16 @@ static enum script_phase first_phase(const struct script *script)
 	return script->drops_done < script->options.drops ? SCRIPT_ARM : SCRIPT_DONE;
 }
 
+static void set_initial(struct script *script)
+{
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
+		script->value[i] = wire_parameters[i].initial;
+}
+
 void script_init(struct script *script, const struct script_options *options)
 {
 	*script = (struct script){.options = *options};
+	set_initial(script);
 	script->phase = first_phase(script);
 }
 
@@ -72,15 +82,70 @@ static void feed_capture(struct script *script, const struct frame *frame, uint3
 {
 	struct wire_capture_end end;
 
-	if (wire_unpack_capture_end(frame, &end) != 0 || script->phase != SCRIPT_FETCH || script->captured ||
+	if (wire_check_capture_end(frame) != 0 || wire_unpack_capture_end(frame, &end) != 0 ||
+	    script->phase != SCRIPT_FETCH || script->captured ||
 	    (end.drop_id == script->capture.drop_id && end.first_tick_ms == script->capture.first_tick_ms &&
 	     end.crc32 == script->capture.crc32)) /* after a restart the tower's numbers begin anew */
 		return;
 	script->capture = end;
 	script->captured = true;
+	script->has_measured = false;
+	script->has_value = 0;
 	script->progress_ms = now_ms;
 	script->send_ms = now_ms + SETTLE_MS;
 	script->resend_at = 0;
+}
+
+static void feed_measured(struct script *script, const struct frame *frame, uint32_t now_ms)
+{
+	struct wire_measured measured;
+
+	if (!script->captured || script->has_measured || wire_check_measured(frame) != 0 ||
+	    wire_unpack_measured(frame, &measured) != 0 || measured.drop_id != script->capture.drop_id)
+		return;
+	script->has_measured = true;
+	script->progress_ms = now_ms;
+}
+
+/* Index in wire_parameters, WIRE_PARAMETERS: none. */
+static unsigned find_parameter(uint16_t index)
+{
+	unsigned i = 0;
+
+	while (i < WIRE_PARAMETERS && wire_parameters[i].index != index)
+		i++;
+	return i;
+}
+
+/* The set a capture was made with; its CRC-32 in the capture end is compared by who observes. */
+static void feed_parameter(struct script *script, const struct frame *frame, uint32_t now_ms)
+{
+	struct wire_parameter parameter;
+	unsigned i;
+
+	if (!script->captured || wire_unpack_parameter(frame, &parameter) != 0 ||
+	    parameter.drop_id != script->capture.drop_id)
+		return;
+	i = find_parameter(parameter.index);
+	if (i == WIRE_PARAMETERS || script->has_value >> i & 1)
+		return;
+	script->has_value |= 1u << i;
+	script->progress_ms = now_ms;
+}
+
+static void feed_armed(struct script *script, const struct frame *frame)
+{
+	if (wire_unpack_armed(frame, &script->armed) == 0)
+		script->has_armed = script->armed.host == (SCRIPT_SESSION & UINT16_MAX);
+}
+
+/* A tower that starts anew has forgotten what was written. */
+static void feed_heartbeat(struct script *script, const struct frame *frame)
+{
+	struct wire_heartbeat heartbeat;
+
+	if (wire_unpack_heartbeat(frame, &heartbeat) == 0 && heartbeat.nmt_state == NMT_BOOT_UP)
+		set_initial(script);
 }
 
 static void feed_reply(struct script *script, const struct frame *frame)
@@ -98,9 +163,14 @@ static void feed_sdo(struct script *script, const struct frame *frame, uint32_t 
 {
 	struct wire_sdo sdo;
 
+	unsigned i;
+
 	if (script->phase != SCRIPT_SET || wire_unpack_sdo(frame, &sdo) != 0 ||
 	    sdo.index != script->options.parameters[script->parameters_done].index)
 		return;
+	i = find_parameter(sdo.index);
+	if (sdo.specifier == SDO_WRITTEN && i < WIRE_PARAMETERS)
+		script->value[i] = script->options.parameters[script->parameters_done].value;
 	script->parameters_done++;
 	enter(script, first_phase(script), now_ms);
 }
@@ -131,6 +201,18 @@ void script_feed(struct script *script, const struct frame *part, uint32_t now_m
 		if (wire_unpack_status(frame, &script->status) != 0)
 			return; /* of another wire: the hash in the heartbeat tells */
 		break;
+	case WIRE_ID_MEASURED:
+		feed_measured(script, frame, now_ms);
+		break;
+	case WIRE_ID_PARAMETER:
+		feed_parameter(script, frame, now_ms);
+		break;
+	case WIRE_ID_ARMED:
+		feed_armed(script, frame);
+		break;
+	case WIRE_ID_HEARTBEAT_TOWER:
+		feed_heartbeat(script, frame);
+		break;
 	case WIRE_ID_REPLY:
 		feed_reply(script, frame);
 		break;
@@ -146,7 +228,7 @@ void script_feed(struct script *script, const struct frame *part, uint32_t now_m
 
 static void fail(struct script *script, const char *what)
 {
-	char checks[80] = "";
+	char checks[160] = "";
 
 	for (unsigned i = 0, used = 0; i < WIRE_CHECKS && used < sizeof(checks) - 16; i++)
 		if (script->status.checks & 1u << i)
@@ -158,12 +240,34 @@ static void fail(struct script *script, const char *what)
 	script->phase = SCRIPT_FAILED;
 }
 
+void script_verb(const struct script *script, uint32_t session, struct wire_command *message)
+{
+	uint32_t parameters = wire_parameters_crc32(script->value);
+
+	message->host = (uint16_t)session;
+	switch (message->op) {
+	case WIRE_OP_ARM:
+		message->argument = wire_arm_key(session, parameters);
+		break;
+	case WIRE_OP_RELEASE:
+		message->argument = wire_release_key(script->armed.nonce, script->armed.drop_id, parameters);
+		break;
+	case WIRE_OP_ACCEPT:
+		message->argument = script->capture.crc32;
+		break;
+	case WIRE_OP_DISCARD:
+		message->argument = script->capture.drop_id;
+		break;
+	default:
+		message->argument = 0;
+	}
+}
+
 static unsigned command(struct script *script, uint8_t op, uint32_t now_ms, struct frame *out)
 {
-	struct wire_command message = {.op = op, .sequence = script->sequence++, .token = TOKEN};
+	struct wire_command message = {.op = op, .sequence = script->sequence++};
 
-	if (op == WIRE_OP_ACCEPT)
-		message.argument = script->capture.crc32;
+	script_verb(script, SCRIPT_SESSION, &message);
 	wire_pack_command(out, WIRE_ID_COMMAND, &message);
 	script->send_ms = now_ms + REPEAT_MS;
 	return 1;
@@ -232,14 +336,18 @@ static unsigned do_set(struct script *script, uint32_t now_ms, struct frame *out
 	return 1;
 }
 
+/* Armed without the tower's answer, which was lost: ARM once more brings the same again. */
 static unsigned do_arm(struct script *script, uint32_t now_ms, struct frame *out)
 {
-	if (script->status.state == WIRE_STATE_ARMED) {
+	bool armed = script->status.state == WIRE_STATE_ARMED;
+
+	if (armed && script->has_armed) {
 		enter(script, SCRIPT_RELEASE, now_ms + script->options.release_ms);
 		return 0;
 	}
-	if (script->status.state != WIRE_STATE_READY || !due(script->send_ms, now_ms))
+	if ((!armed && script->status.state != WIRE_STATE_READY) || !due(script->send_ms, now_ms))
 		return 0;
+	script->has_armed = false;
 	return command(script, WIRE_OP_ARM, now_ms, out);
 }
 
@@ -248,6 +356,7 @@ static unsigned do_release(struct script *script, uint32_t now_ms, struct frame 
 	unsigned state = script->status.state;
 
 	if (state == WIRE_STATE_SAFE || state == WIRE_STATE_READY) { /* disarmed */
+		script->has_armed = false;
 		enter(script, SCRIPT_ARM, now_ms);
 		return 0;
 	}
@@ -258,8 +367,23 @@ static unsigned do_release(struct script *script, uint32_t now_ms, struct frame 
 	return due(script->send_ms, now_ms) ? command(script, WIRE_OP_RELEASE, now_ms, out) : 0;
 }
 
+/* What was measured and the parameters come behind the capture end, and again with it. */
+static bool tail_missing(const struct script *script)
+{
+	return !script->has_measured || script->has_value != (UINT32_C(1) << WIRE_PARAMETERS) - 1;
+}
+
+static unsigned request_end(struct script *script, uint32_t now_ms, struct frame *out)
+{
+	script->send_ms = now_ms + REPEAT_MS;
+	wire_pack_resend(out, WIRE_ID_RESEND, &(struct wire_resend){.sensor = 1});
+	return 1;
+}
+
 static unsigned do_fetch(struct script *script, uint32_t now_ms, struct frame *out)
 {
+	unsigned state = script->status.state;
+	bool patient;
 	unsigned lacking;
 
 	if (!due(script->send_ms, now_ms))
@@ -268,20 +392,20 @@ static unsigned do_fetch(struct script *script, uint32_t now_ms, struct frame *o
 		return 0; /* the upload goes on */
 	if (!script->captured) {
 		script->send_ms = now_ms + REPEAT_MS;
-		if (script->status.state != WIRE_STATE_CAPTURED)
+		if (state != WIRE_STATE_CAPTURED && state != WIRE_STATE_KEEP_OUT)
 			return 0;
-		/* The capture end was lost. */
-		wire_pack_resend(out, WIRE_ID_RESEND, &(struct wire_resend){.sensor = 1});
-		return 1;
+		return request_end(script, now_ms, out); /* it was lost */
 	}
 	if (capture_ticks(script) > SCRIPT_TICKS) {
 		fail(script, "capture longer than the script remembers");
 		return 0;
 	}
 	lacking = count_missing(script);
-	if (lacking > 0 && !due(script->progress_ms + GIVE_UP_MS, now_ms)) {
+	patient = !due(script->progress_ms + GIVE_UP_MS, now_ms);
+	if (lacking > 0 && patient)
 		return request_missing(script, now_ms, out);
-	}
+	if (tail_missing(script) && patient)
+		return request_end(script, now_ms, out);
 	if (lacking > 0) {
 		snprintf(script->why, sizeof(script->why), "drop %u: discarded with %u blocks missing",
 		         script->drops_done + 1, lacking);
@@ -362,16 +486,39 @@ static void stopped(struct script *script, uint32_t now_ms)
 		enter(script, SCRIPT_ARM, now_ms);
 }
 
+/* The technician has looked: guards that were open are closed again. */
+static unsigned acknowledge(struct script *script, uint32_t now_ms, struct frame *out)
+{
+	struct wire_command message = {.op = WIRE_OP_CLEAR, .sequence = script->sequence};
+	uint32_t checks = script->status.checks;
+	bool waiting = script->status.state == WIRE_STATE_SAFE && checks & WIRE_CHECK_ACKNOWLEDGE &&
+	               !(checks & GUARDS);
+
+	if (!waiting || script->options.passive || !due(script->clear_ms, now_ms))
+		return 0;
+	script->clear_ms = now_ms + REPEAT_MS;
+	script->sequence++;
+	script_verb(script, SCRIPT_SESSION, &message);
+	wire_pack_command(out, WIRE_ID_COMMAND, &message);
+	return 1;
+}
+
+void script_heartbeat(struct frame *frame, uint32_t session, uint32_t hash)
+{
+	wire_pack_host_heartbeat(frame, WIRE_ID_HEARTBEAT_HOST,
+	                         &(struct wire_host_heartbeat){NMT_OPERATIONAL, session, (uint16_t)hash});
+}
+
 unsigned script_poll(struct script *script, uint32_t now_ms, struct frame out[SCRIPT_SEND_MAX])
 {
 	unsigned count = 0;
 
 	if (due(script->heartbeat_ms, now_ms)) {
 		script->heartbeat_ms = now_ms + HEARTBEAT_MS;
-		wire_pack_heartbeat(
-		        &out[count++], WIRE_ID_HEARTBEAT_HOST,
-		        &(struct wire_heartbeat){NMT_OPERATIONAL, wire_hash() ^ script->options.wrong_hash});
+		script_heartbeat(&out[count++], SCRIPT_SESSION, wire_hash() ^ script->options.wrong_hash);
 	}
+	if (script->phase == SCRIPT_ARM || script->phase == SCRIPT_DONE)
+		count += acknowledge(script, now_ms, out + count);
 	if (script->phase == SCRIPT_DONE || script->phase == SCRIPT_FAILED)
 		return count;
 	if (drop_is_off(script))

@@ -2,9 +2,11 @@
 #ifndef DT_HIL_SCRIPT_H
 #define DT_HIL_SCRIPT_H
 /*
- * The scripted operator inside the bench: heartbeats, arms, releases, asks for missing blocks, accepts
- * and waits for SAFE, as often as told. It lives in virtual time and has no randomness, so that a run
- * repeats bit for bit. It holds no samples, only which blocks came: the host proper is another program.
+ * The scripted operator inside the bench: heartbeats, acknowledges when the guards are closed again, arms,
+ * releases after the warning, asks for what is missing, accepts and waits for SAFE, as often as told. It
+ * knows the tower's parameters by their initial values and what it wrote itself. It lives in virtual time and
+ * has no randomness, so that a run repeats bit for bit. It holds no samples, only which blocks came: the host
+ * proper is another program.
  *
  * One thread, no heap. Times are virtual, in ms.
  */
@@ -17,12 +19,16 @@
 #include "hil/scenario.h"
 
 enum {
-	SCRIPT_TICKS = 2048,     /* blocks remembered of a sensor, more than the longest capture has */
-	SCRIPT_SEND_MAX = 12,    /* frames in one call */
-	SCRIPT_RELEASE_MS = 500, /* a person's pause between ARM and RELEASE */
-	SCRIPT_LIMIT_MS = 30000, /* for one drop, from SAFE to SAFE */
+	SCRIPT_TICKS = 2048,      /* blocks remembered of a sensor, more than the longest capture has */
+	SCRIPT_SEND_MAX = 12,     /* frames in one call */
+	SCRIPT_RELEASE_MS = 1100, /* from ARM to RELEASE: the warning, and a little */
+	SCRIPT_LIMIT_MS = 30000,  /* for one drop, from SAFE to SAFE */
 	SCRIPT_WHY_MAX = 200,
 };
+
+/* In the heartbeats of the operator and of the second host that the bench has. */
+#define SCRIPT_SESSION UINT32_C(0x4F504552)
+#define SCRIPT_SESSION_SECOND UINT32_C(0x4E4F4445)
 
 enum script_phase {
 	SCRIPT_SET,     /* wait for SAFE, write the parameters */
@@ -38,6 +44,7 @@ enum script_phase {
 struct script_options {
 	unsigned drops;      /* 0: heartbeats only */
 	uint32_t release_ms; /* from ARM to RELEASE */
+	bool passive;        /* acknowledges nothing */
 	bool patient;        /* a fault at rest does not end it: it waits for READY, for ever */
 	bool wrong_hash;     /* as if built from another wire.def */
 	const struct scenario_parameter *parameters; /* to write before the first drop, in this order */
@@ -49,17 +56,23 @@ struct script {
 	enum script_phase phase;
 	unsigned drops_done;
 	unsigned parameters_done;
-	unsigned incomplete;   /* drops that came back to SAFE with blocks missing */
-	uint32_t drop_ms;      /* when this drop began */
-	uint32_t heartbeat_ms; /* when the next one is due */
-	uint32_t send_ms;      /* when the phase's next command or request is due */
-	uint32_t progress_ms;  /* when a block of the capture came last ... */
-	uint32_t segment_ms;   /* ... and a segment of anything */
-	uint32_t resend_at;    /* where the next round begins: S1's blocks are counted first, then S2's */
+	unsigned incomplete;             /* drops that came back to SAFE with blocks missing */
+	uint32_t drop_ms;                /* when this drop began */
+	uint32_t heartbeat_ms;           /* when the next one is due */
+	uint32_t send_ms;                /* when the phase's next command or request is due */
+	uint32_t clear_ms;               /* when the guards may be acknowledged again */
+	uint32_t value[WIRE_PARAMETERS]; /* that it believes the tower has */
+	struct wire_armed armed;         /* the tower's last */
+	bool has_armed;                  /* it answers our ARM */
+	uint32_t progress_ms;            /* when a block of the capture came last ... */
+	uint32_t segment_ms;             /* ... and a segment of anything */
+	uint32_t resend_at; /* where the next round begins: S1's blocks are counted first, then S2's */
 	uint8_t sequence;
 	uint8_t accept_op;
-	bool captured; /* capture is this drop's */
-	bool classic;  /* it came in segments: the tower uploads by itself */
+	bool captured;      /* capture is this drop's */
+	bool has_measured;  /* its measured came, good ... */
+	uint32_t has_value; /* ... and these of its parameters, a bit each */
+	bool classic;       /* it came in segments: the tower uploads by itself */
 	struct segment_join segments;
 	struct wire_capture_end capture;
 	struct wire_status status;                 /* the tower's last */
@@ -72,6 +85,13 @@ void script_init(struct script *script, const struct script_options *options);
 
 /* A frame from the tower. */
 void script_feed(struct script *script, const struct frame *frame, uint32_t now_ms);
+
+/* Fills in host and argument of the command as that session would send it now, with what the bus has told
+ * everybody. */
+void script_verb(const struct script *script, uint32_t session, struct wire_command *command);
+
+/* The heartbeat of that session. */
+void script_heartbeat(struct frame *frame, uint32_t session, uint32_t hash);
 
 /* To be called every ms; returns how many frames go to the tower. */
 unsigned script_poll(struct script *script, uint32_t now_ms, struct frame out[SCRIPT_SEND_MAX]);

@@ -17,6 +17,8 @@
 #include <unistd.h>
 #include <wordexp.h>
 
+#include "common/link/temporary.h"
+
 enum {
 	SILENCE_MS = 5000, /* a firmware that asks for nothing hangs */
 	SLICE_MS = 100,
@@ -25,8 +27,8 @@ enum {
 };
 
 struct target {
-	char directory[64];
-	char prefix[80], request_path[96], answer_path[96];
+	struct temporary folder;
+	char prefix[104], request_path[112], answer_path[112];
 	pid_t pid;       /* 0: not running */
 	bool killed;     /* by us, after it did not end */
 	int wait_status; /* of waitpid, once it has ended */
@@ -44,12 +46,7 @@ static void close_all(struct target *target)
 		close(target->request_fd);
 	if (target->answer_fd >= 0)
 		close(target->answer_fd);
-	if (target->request_path[0])
-		unlink(target->request_path);
-	if (target->answer_path[0])
-		unlink(target->answer_path);
-	if (target->directory[0])
-		rmdir(target->directory);
+	temporary_remove(&target->folder);
 	if (target->signal_fd >= 0) {
 		close(target->signal_fd);
 		sigprocmask(SIG_SETMASK, &target->signals_before, NULL);
@@ -129,16 +126,9 @@ static int block_signals(struct target *target)
 
 static int make_bus(struct target *target)
 {
-	const char *parent = getenv("TMPDIR");
-
-	if (parent == NULL || strlen(parent) > 30)
-		parent = "/tmp";
-	snprintf(target->directory, sizeof(target->directory), "%s/droptower-bench.XXXXXX", parent);
-	if (mkdtemp(target->directory) == NULL) {
-		target->directory[0] = '\0';
+	if (temporary_make(&target->folder, "bench") != 0)
 		return -1;
-	}
-	snprintf(target->prefix, sizeof(target->prefix), "%s/bus", target->directory);
+	snprintf(target->prefix, sizeof(target->prefix), "%s/bus", target->folder.path);
 	snprintf(target->request_path, sizeof(target->request_path), "%s.request", target->prefix);
 	snprintf(target->answer_path, sizeof(target->answer_path), "%s.answer", target->prefix);
 	if (mkfifo(target->request_path, 0600) != 0 || mkfifo(target->answer_path, 0600) != 0)
@@ -207,14 +197,27 @@ static void share_processor(void)
 	(void)sched_setaffinity(0, sizeof(set), &set);
 }
 
-static int run_command(struct target *target, const char *command, bool realtime, unsigned cause,
+/* An option and its number, in text; nothing for 0. Returns the words. */
+static size_t add_number(char **argv, char *option, unsigned number, char *text, size_t size)
+{
+	if (number == 0)
+		return 0;
+	snprintf(text, size, "%u", number);
+	argv[0] = option;
+	argv[1] = text;
+	return 2;
+}
+
+static int run_command(struct target *target, const struct target_options *options,
                        char message[TARGET_MESSAGE_MAX])
 {
-	static char bus[] = "--bus", clock_paced[] = "--realtime", reset_cause[] = "--reset-cause";
-	char number[12];
+	static char bus[] = "--bus", clock_paced[] = "--realtime", reset_cause[] = "--reset-cause",
+	            kept[] = "--kept";
+	const char *command = options->command;
+	char cause_text[12], kept_text[12];
 	wordexp_t words = {.we_offs = 0};
 	char beside[PATH_MAX_BYTES];
-	char *argv[64];
+	char *argv[68];
 	size_t count = 0;
 	int error;
 
@@ -234,13 +237,10 @@ static int run_command(struct target *target, const char *command, bool realtime
 		argv[count++] = words.we_wordv[i];
 	argv[count++] = bus;
 	argv[count++] = target->prefix;
-	if (realtime)
+	if (options->realtime)
 		argv[count++] = clock_paced;
-	if (cause != 0) {
-		snprintf(number, sizeof(number), "%u", cause);
-		argv[count++] = reset_cause;
-		argv[count++] = number;
-	}
+	count += add_number(argv + count, reset_cause, options->cause, cause_text, sizeof(cause_text));
+	count += add_number(argv + count, kept, options->kept, kept_text, sizeof(kept_text));
 	argv[count] = NULL;
 	error = spawn(target, argv);
 	if (error != 0)
@@ -251,8 +251,7 @@ static int run_command(struct target *target, const char *command, bool realtime
 	return error == 0 ? 0 : -1;
 }
 
-struct target *target_start(const char *command, bool realtime, unsigned cause,
-                            char message[TARGET_MESSAGE_MAX])
+struct target *target_start(const struct target_options *options, char message[TARGET_MESSAGE_MAX])
 {
 	struct target *target = calloc(1, sizeof(*target));
 
@@ -263,13 +262,14 @@ struct target *target_start(const char *command, bool realtime, unsigned cause,
 	target->request_fd = target->answer_fd = target->signal_fd = -1;
 	if (block_signals(target) < 0 || make_bus(target) != 0) {
 		snprintf(message, TARGET_MESSAGE_MAX, "cannot make the sensor bus in %s: %s",
-		         target->directory[0] ? target->directory : "a temporary directory", strerror(errno));
+		         target->folder.path[0] ? target->folder.path : "a temporary directory",
+		         strerror(errno));
 		close_all(target);
 		return NULL;
 	}
-	if (!realtime)
+	if (!options->realtime)
 		share_processor();
-	if (run_command(target, command, realtime, cause, message) != 0) {
+	if (run_command(target, options, message) != 0) {
 		close_all(target);
 		return NULL;
 	}

@@ -19,11 +19,17 @@ enum { TARGET_MESSAGE_MAX = 512 };
 
 struct target;
 
-/* Runs `COMMAND --bus PREFIX [--realtime] [--reset-cause CAUSE]`, the last for a cause that is not 0; command
- * is split into words as a shell would, without running any other; NULL is droptower-firmware next to this
- * program. NULL on error. */
-struct target *target_start(const char *command, bool realtime, unsigned cause,
-                            char message[TARGET_MESSAGE_MAX]);
+/* How it starts. cause and kept are those of common/sensorbus.h and firmware's --help, 0 after power-on. */
+struct target_options {
+	const char *command; /* split into words as a shell would, without running any other; NULL:
+	                        droptower-firmware next to this program */
+	bool realtime;
+	unsigned cause, kept;
+};
+
+/* Runs `COMMAND --bus PREFIX [--realtime] [--reset-cause CAUSE] [--kept BYTE]`, the last two where they are
+ * not 0. NULL on error. */
+struct target *target_start(const struct target_options *options, char message[TARGET_MESSAGE_MAX]);
 
 /* Waits for the next request. 1 with it and its frames, 0 when a signal asks to stop, DT_E_TIMEOUT after
  * 5 s without one, DT_E_CLOSED when the firmware is gone, DT_E_FORMAT for bytes that are no request. */

@@ -40,6 +40,7 @@ static const struct {
         {WIRE_IO_MAGNET_HOLD, "magnet holds"},
         {WIRE_IO_DAMPERS_RELIEVE, "dampers relieved"},
         {WIRE_IO_CAMERA, "camera"},
+        {WIRE_IO_WARNING, "warning"},
         {WIRE_IO_LATCH_CLOSED, "latch closed"},
         {WIRE_IO_PRODUCT_HELD, "product held"},
         {WIRE_IO_DAMPERS_ENGAGED, "dampers in"},
@@ -201,17 +202,18 @@ static void put_column(const struct observe *observe, const char *trace, double 
 {
 	fprintf(out, "set lmargin at screen %g\nset rmargin at screen %g\nset xrange [%.6f:%.6f]\n", left,
 	        right, from_s, to_s);
-	fputs("set format x ''\nset xlabel ''\nset ylabel ''\nset yrange [-0.7:10.7]\nset ytics (", out);
+	fputs("set format x ''\nset xlabel ''\nset ylabel ''\nset ytics (", out);
 	for (unsigned i = 0; i < WIRE_STATES; i++)
 		fprintf(out, "%s'%s' %u", i ? ", " : "", wire_state_name(i), i);
-	fputs(")\nset tmargin at screen 0.92\nset bmargin at screen 0.67\n", out);
+	fprintf(out, ")\nset yrange [-0.7:%u.7]", WIRE_STATES - 1);
+	fputs("\nset tmargin at screen 0.92\nset bmargin at screen 0.67\n", out);
 	put_emergencies(observe, from_s, to_s, out);
 	fputs("plot $levels using 1:2 with steps lw 2 lc rgb '#205090'\nunset label\n", out);
 	fprintf(out, "set yrange [0.3:%u.7]\nset ytics (", LANES);
 	for (unsigned i = 0; i < LANES; i++)
 		fprintf(out, "%s'%s' %u", i ? ", " : "", lanes[i].name, LANES - i);
 	fputs(")\nset tmargin at screen 0.65\nset bmargin at screen 0.30\nplot for [lane=3:", out);
-	fprintf(out, "%u] $levels using 1:lane with steps lw 1.5 lc rgb (lane < 7 ? 0xb05010 : 0x307030)\n",
+	fprintf(out, "%u] $levels using 1:lane with steps lw 1.5 lc rgb (lane < 8 ? 0xb05010 : 0x307030)\n",
 	        LANES + 2);
 	fputs("set ylabel 'S2 X, Y (g)'\nset yrange [*:*]\nset ytics auto\nset format x '%g'\n"
 	      "set xlabel 'virtual time (s)'\nset tmargin at screen 0.28\nset bmargin at screen 0.08\n",

@@ -22,8 +22,16 @@ static const char *const fault_names[TOWER_FAULTS] = {
         [TOWER_DAMPERS_OUT] = "dampers_out",
         [TOWER_GATE_UPPER_DEAD] = "gate_upper_dead",
         [TOWER_GATE_LOWER_DEAD] = "gate_lower_dead",
+        [TOWER_GATE_UPPER_WIRE] = "gate_upper_wire",
+        [TOWER_GATE_LOWER_WIRE] = "gate_lower_wire",
+        [TOWER_FRAME_DOWN_WIRE] = "frame_down_wire",
+        [TOWER_FRAME_READS_UP] = "frame_reads_up",
+        [TOWER_LATCH_READS_CLOSED] = "latch_reads_closed",
+        [TOWER_LATCH_READS_OPEN] = "latch_reads_open",
+        [TOWER_FRAME_JAMMED] = "frame_jammed",
         [TOWER_LATCH_STUCK] = "latch_stuck",
         [TOWER_MAGNET_WEAK] = "magnet_weak",
+        [TOWER_MAGNET_STUCK] = "magnet_stuck",
         [TOWER_CABLE_S1] = "cable_s1",
         [TOWER_CABLE_S2] = "cable_s2",
         [TOWER_SHORT_S1] = "short_s1",
@@ -38,9 +46,21 @@ static void magnet_switch(struct tower *t, bool on)
 		t->place = PLACE_MAGNET;
 	if (t->place != PLACE_MAGNET)
 		return;
-	t->magnet_drops_s = on ? INFINITY : t->now_s + t->scene.tower_magnet_dropout_s;
+	t->magnet_drops_s =
+	        on || t->fault[TOWER_MAGNET_STUCK] ? INFINITY : t->now_s + t->scene.tower_magnet_dropout_s;
 	t->truth.magnet_off_s = on ? NAN : t->now_s;
 	tower_motion_renew(t);
+}
+
+/* The latch's coil follows its output as long as the contacts in series with it are closed. */
+static void latch_switch(struct tower *t)
+{
+	const bool on = output_on(t, WIRE_IO_LATCH_OPEN);
+
+	if (on == t->latch_energised)
+		return;
+	t->latch_energised = on;
+	t->latch_opens_s = on ? t->now_s + t->scene.tower_latch_delay_s : INFINITY;
 }
 
 void tower_output(struct tower *t, unsigned bit, bool on, double time_s)
@@ -48,11 +68,10 @@ void tower_output(struct tower *t, unsigned bit, bool on, double time_s)
 	const unsigned mask = bit < SENSORBUS_OUTPUTS ? 1u << bit : 0;
 
 	tower_advance(t, time_s);
-	if (mask == 0 || output_on(t, mask) == on)
+	if (mask == 0 || ((t->outputs & mask) != 0) == on)
 		return;
 	t->outputs ^= mask;
-	if (mask == WIRE_IO_LATCH_OPEN)
-		t->latch_opens_s = on ? t->now_s + t->scene.tower_latch_delay_s : INFINITY;
+	latch_switch(t);
 	if (mask == WIRE_IO_MAGNET_HOLD)
 		magnet_switch(t, on);
 	if (mask == WIRE_IO_DAMPERS_RELIEVE)
@@ -70,28 +89,44 @@ void tower_sample(struct tower *t, unsigned group, int16_t codes[CHANNELS])
 	}
 }
 
-static bool gate_broken(const struct tower *t, enum mark mark, enum tower_fault dead)
+static bool gate_broken(const struct tower *t, enum mark mark, enum tower_fault dead, enum tower_fault wire)
 {
 	const double below_m = tower_motion_distance(&t->frame, t->now_s) - tower_mark_travel(t, mark);
 
-	return !t->fault[dead] && below_m >= 0 && below_m < FLAG_HEIGHT_M;
+	return t->fault[wire] || (!t->fault[dead] && below_m >= 0 && below_m < FLAG_HEIGHT_M);
+}
+
+static bool latch_reads_closed(const struct tower *t)
+{
+	return t->fault[TOWER_LATCH_READS_CLOSED] ||
+	       (t->frame_state == FRAME_LATCHED && !t->fault[TOWER_LATCH_READS_OPEN]);
+}
+
+static bool frame_reads_down(const struct tower *t)
+{
+	return t->fault[TOWER_FRAME_DOWN_WIRE] ||
+	       (t->passed > MARK_DAMPERS && !t->fault[TOWER_FRAME_READS_UP]);
 }
 
 uint16_t tower_inputs(const struct tower *t)
 {
 	const bool *fault = t->fault;
-	const bool held = t->place == PLACE_MAGNET && output_on(t, WIRE_IO_MAGNET_HOLD);
+	const bool held = t->place == PLACE_PIN || t->place == PLACE_MAGNET;
 	unsigned inputs = 0;
 
-	inputs |= t->frame_state == FRAME_LATCHED ? WIRE_IO_LATCH_CLOSED : 0;
+	inputs |= latch_reads_closed(t) ? WIRE_IO_LATCH_CLOSED : 0;
 	inputs |= held ? WIRE_IO_PRODUCT_HELD : 0;
 	inputs |= fault[TOWER_DAMPERS_OUT] ? 0 : WIRE_IO_DAMPERS_ENGAGED;
 	inputs |= fault[TOWER_DOOR_OPEN] ? 0 : WIRE_IO_DOOR_CLOSED;
 	inputs |= fault[TOWER_ESTOP] ? 0 : WIRE_IO_ESTOP_CLEAR;
 	inputs |= fault[TOWER_SUPPLY_LOW] ? 0 : WIRE_IO_SUPPLY_GOOD;
-	inputs |= gate_broken(t, MARK_GATE_UPPER, TOWER_GATE_UPPER_DEAD) ? WIRE_IO_GATE_UPPER : 0;
-	inputs |= gate_broken(t, MARK_GATE_LOWER, TOWER_GATE_LOWER_DEAD) ? WIRE_IO_GATE_LOWER : 0;
-	inputs |= t->passed > MARK_DAMPERS ? WIRE_IO_FRAME_DOWN : 0;
+	inputs |= gate_broken(t, MARK_GATE_UPPER, TOWER_GATE_UPPER_DEAD, TOWER_GATE_UPPER_WIRE)
+	                  ? WIRE_IO_GATE_UPPER
+	                  : 0;
+	inputs |= gate_broken(t, MARK_GATE_LOWER, TOWER_GATE_LOWER_DEAD, TOWER_GATE_LOWER_WIRE)
+	                  ? WIRE_IO_GATE_LOWER
+	                  : 0;
+	inputs |= frame_reads_down(t) ? WIRE_IO_FRAME_DOWN : 0;
 	inputs |= tower_sensor_cut_off(t, 0) ? 0 : WIRE_IO_IEPE_S1;
 	inputs |= tower_sensor_cut_off(t, 1) ? 0 : WIRE_IO_IEPE_S2;
 	return (uint16_t)inputs;
@@ -102,13 +137,36 @@ uint8_t tower_bias_high(const struct tower *t)
 	return (uint8_t)(t->fault[TOWER_CABLE_S1] | t->fault[TOWER_CABLE_S2] << 1);
 }
 
-bool tower_capture(struct tower *t, unsigned gate, uint32_t *time_us)
+void tower_stamp(struct tower *t, unsigned which)
 {
-	if (gate > 1 || !t->captured[gate])
+	t->captured[which] = true;
+	t->capture_us[which] = (uint32_t)(uint64_t)floor(t->now_s * 1e6);
+}
+
+bool tower_capture(struct tower *t, unsigned which, uint32_t *time_us)
+{
+	if (which >= SENSORBUS_CAPTURES)
 		return false;
-	t->captured[gate] = false;
-	*time_us = t->capture_us[gate];
+	if (which < KEEPER && !t->captured[which] && t->glitches[which] > 0) {
+		t->glitches[which]--;
+		tower_stamp(t, which);
+	}
+	if (!t->captured[which])
+		return false;
+	t->captured[which] = false;
+	*time_us = t->capture_us[which];
 	return true;
+}
+
+void tower_glitch(struct tower *t, unsigned gate, unsigned pulses)
+{
+	if (gate < KEEPER)
+		t->glitches[gate] += pulses;
+}
+
+void tower_set_dropout(struct tower *t, double dropout_s)
+{
+	t->scene.tower_magnet_dropout_s = dropout_s;
 }
 
 const struct tower_truth *tower_truth(const struct tower *t)
@@ -121,8 +179,16 @@ void tower_fault(struct tower *t, enum tower_fault fault, bool on)
 	if (fault >= TOWER_FAULTS || t->fault[fault] == on)
 		return;
 	t->fault[fault] = on;
+	latch_switch(t);
 	if (fault == TOWER_LATCH_STUCK && !on && output_on(t, WIRE_IO_LATCH_OPEN))
 		t->latch_opens_s = t->now_s;
+	if (on && (fault == TOWER_GATE_UPPER_WIRE || fault == TOWER_GATE_LOWER_WIRE))
+		tower_stamp(t, fault - TOWER_GATE_UPPER_WIRE); /* the line's edge */
+	if (fault == TOWER_MAGNET_STUCK && t->place == PLACE_MAGNET && !output_on(t, WIRE_IO_MAGNET_HOLD))
+		t->magnet_drops_s = on ? INFINITY : t->now_s + t->scene.tower_magnet_dropout_s;
+	if (fault == TOWER_FRAME_JAMMED && !on && t->frame_state == FRAME_STOPPED &&
+	    t->passed <= MARK_DAMPERS)
+		t->frame_state = FRAME_MOVING;
 	tower_sensors_set_up(t);
 	tower_motion_renew(t);
 	tower_sensors_feel(t, 0);
@@ -159,10 +225,11 @@ void tower_lift(struct tower *t)
 	t->frame = (struct motion){t->now_s, 0, 0, 0};
 	t->latch_opens_s = output_on(t, WIRE_IO_LATCH_OPEN) ? t->now_s : INFINITY;
 	t->passed = 0;
-	t->captured[0] = t->captured[1] = false;
+	for (unsigned i = 0; i < SENSORBUS_CAPTURES; i++)
+		t->captured[i] = false;
 	t->place = output_on(t, WIRE_IO_MAGNET_HOLD) ? PLACE_MAGNET : PLACE_PIN;
 	t->magnet_drops_s = INFINITY;
-	t->truth = (struct tower_truth){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+	t->truth = (struct tower_truth){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, false};
 	scatter_draw(t);
 	product_init(&t->product, &t->scene, UNITS_RAD(t->truth.angle_deg));
 	product_carry(&t->product, 0);

@@ -47,6 +47,7 @@ struct tower_truth {
 	double angle_deg; /* of this drop, from the start */
 	double separation_travel_m;
 	double frame_speed_at_separation_m_s;
+	bool frame_away; /* now: neither in its latch nor met by the dampers */
 };
 
 enum tower_fault {
@@ -56,9 +57,17 @@ enum tower_fault {
 	TOWER_DAMPERS_OUT,     /* out of the rails: the frame meets the stop behind them */
 	TOWER_GATE_UPPER_DEAD, /* never sees its beam broken */
 	TOWER_GATE_LOWER_DEAD,
-	TOWER_LATCH_STUCK, /* does not open */
-	TOWER_MAGNET_WEAK, /* holds at rest, loses the product as soon as the frame moves */
-	TOWER_CABLE_S1,    /* open: bias too high, no acceleration, no noise */
+	TOWER_GATE_UPPER_WIRE, /* broken: reads as a broken beam, for ever */
+	TOWER_GATE_LOWER_WIRE,
+	TOWER_FRAME_DOWN_WIRE, /* broken: reads as a frame that is down */
+	TOWER_FRAME_READS_UP,  /* its switch never sees it down */
+	TOWER_LATCH_READS_CLOSED,
+	TOWER_LATCH_READS_OPEN,
+	TOWER_FRAME_JAMMED, /* on the rails: brakes, and stays where it then hangs until it is freed */
+	TOWER_LATCH_STUCK,  /* does not open */
+	TOWER_MAGNET_WEAK,  /* holds at rest, loses the product as soon as the frame moves */
+	TOWER_MAGNET_STUCK, /* does not let go when it is switched off */
+	TOWER_CABLE_S1,     /* open: bias too high, no acceleration, no noise */
 	TOWER_CABLE_S2,
 	TOWER_SHORT_S1, /* of the cable: bias too low, and the same */
 	TOWER_SHORT_S2,
@@ -69,7 +78,9 @@ enum tower_fault {
 struct tower *tower_create(const struct scene *scene, const struct tower_options *options);
 void tower_destroy(struct tower *tower);
 
-/* An edge of output `bit` (0 to 3 of the io word) at time_s; the tower goes on to that time. */
+/* An edge of output `bit` (0 to 4 of the io word) at time_s; the tower goes on to that time. Door and
+ * emergency stop lie in series with the coils of latch and relief: while one is open neither is energised,
+ * whatever the output. */
 void tower_output(struct tower *tower, unsigned bit, bool on, double time_s);
 
 /* Goes on to exactly time_s. */
@@ -85,9 +96,15 @@ uint16_t tower_inputs(const struct tower *tower);
 /* Bit 0 S1, 1 S2: its bias is above its window now. */
 uint8_t tower_bias_high(const struct tower *tower);
 
-/* True once after gate 0 (upper) or 1 (lower) saw its beam broken, with the time in whole us, rounded
- * down as a timer does, modulo 2^32. */
-bool tower_capture(struct tower *tower, unsigned gate, uint32_t *time_us);
+/* True once after gate 0 (upper) or 1 (lower) saw its beam broken, or the keeper current (2) fell because the
+ * product left, with the time in whole us, rounded down as a timer does, modulo 2^32. */
+bool tower_capture(struct tower *tower, unsigned which, uint32_t *time_us);
+
+/* The gate's line pulses without a beam being broken: so many captures, each when it is asked for next. */
+void tower_glitch(struct tower *tower, unsigned gate, unsigned pulses);
+
+/* Of the magnet, from its next switching off on. */
+void tower_set_dropout(struct tower *tower, double dropout_s);
 
 /* Valid as long as the tower; changes as it goes on. */
 const struct tower_truth *tower_truth(const struct tower *tower);

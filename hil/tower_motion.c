@@ -7,6 +7,7 @@
 #define BRAKE_SHARE 0.8     /* of the stroke, for a frame that fell freely down to the dampers */
 #define RELIEVED_SHARE 0.25 /* of the braking that relieved dampers still give */
 #define MAGNET_WEIGHTS 5.0  /* the magnet pulls this many times the product's weight */
+#define JAM_WEIGHTS 3.0     /* a frame that jams is slowed down with so many g: the product stays on */
 
 /* ---- uniform motion ---- */
 
@@ -98,15 +99,18 @@ static double frame_acceleration(const struct tower *t)
 {
 	const double product_kg =
 	        product_on_frame(t) ? t->scene.product_case_mass_kg + t->scene.mount_plate_mass_kg : 0;
-	double a =
-	        UNITS_G_M_S2 - t->scene.tower_frame_friction_n / (t->scene.tower_frame_mass_kg + product_kg);
+	double a = t->scene.drop_gravity_m_s2 -
+	           t->scene.tower_frame_friction_n / (t->scene.tower_frame_mass_kg + product_kg);
 
 	if (t->frame_state != FRAME_MOVING)
 		return 0;
 	if (t->passed > MARK_DAMPERS && !t->fault[TOWER_DAMPERS_OUT]) {
-		a = -UNITS_G_M_S2 * t->scene.tower_dampers_m / (BRAKE_SHARE * t->scene.tower_damper_stroke_m);
+		a = -t->scene.drop_gravity_m_s2 * t->scene.tower_dampers_m /
+		    (BRAKE_SHARE * t->scene.tower_damper_stroke_m);
 		if (output_on(t, WIRE_IO_DAMPERS_RELIEVE))
 			a *= RELIEVED_SHARE;
+	} else if (t->fault[TOWER_FRAME_JAMMED]) {
+		a = -JAM_WEIGHTS * UNITS_G_M_S2;
 	}
 	return t->frame.speed_m_s > 0 ? a : fmax(a, 0); /* friction stops a frame but does not lift it */
 }
@@ -118,18 +122,20 @@ static bool product_carried(const struct tower *t)
 		return true;
 	if (t->fault[TOWER_MAGNET_WEAK] && t->frame_state == FRAME_MOVING)
 		return false;
-	return UNITS_G_M_S2 - frame_acceleration(t) <= MAGNET_WEIGHTS * UNITS_G_M_S2;
+	return t->scene.drop_gravity_m_s2 - frame_acceleration(t) <=
+	       MAGNET_WEIGHTS * t->scene.drop_gravity_m_s2;
 }
 
 static void product_leave(struct tower *t)
 {
 	t->place = PLACE_AIR;
+	tower_stamp(t, KEEPER);
 	t->magnet_drops_s = INFINITY;
 	t->fall.since_s = t->now_s;
 	t->fall.distance_m = tower_motion_distance(&t->frame, t->now_s);
 	t->fall.speed_m_s = motion_speed(&t->frame, t->now_s);
-	t->fall.acceleration_m_s2 = UNITS_G_M_S2;
-	product_carry(&t->product, UNITS_G_M_S2);
+	t->fall.acceleration_m_s2 = t->scene.drop_gravity_m_s2;
+	product_carry(&t->product, t->scene.drop_gravity_m_s2);
 	t->truth.separation_s = t->now_s;
 	t->truth.separation_travel_m = t->fall.distance_m;
 	t->truth.frame_speed_at_separation_m_s = t->fall.speed_m_s;
@@ -203,15 +209,14 @@ static void latch_opens(struct tower *t)
 		return;
 	t->frame_state = FRAME_MOVING;
 	t->truth.latch_open_s = t->now_s;
+	t->truth.frame_away = true;
 	tower_motion_renew(t);
 }
 
 static void gate_sees(struct tower *t, unsigned gate)
 {
-	if (t->fault[gate == 0 ? TOWER_GATE_UPPER_DEAD : TOWER_GATE_LOWER_DEAD])
-		return;
-	t->captured[gate] = true;
-	t->capture_us[gate] = (uint32_t)(uint64_t)floor(t->now_s * 1e6);
+	if (!t->fault[TOWER_GATE_UPPER_DEAD + gate] && !t->fault[TOWER_GATE_UPPER_WIRE + gate])
+		tower_stamp(t, gate);
 }
 
 static void frame_passes(struct tower *t)
@@ -227,6 +232,7 @@ static void frame_passes(struct tower *t)
 		break;
 	case MARK_DAMPERS:
 		t->truth.frame_down_s = t->now_s;
+		t->truth.frame_away = false;
 		tower_motion_renew(t);
 		break;
 	case MARK_END: /* the hard stop: nothing but the pin holds on */

@@ -37,12 +37,14 @@ struct tower {
 	unsigned outputs;
 	bool fault[TOWER_FAULTS];
 	double latch_opens_s, magnet_drops_s; /* INFINITY: not under way */
+	bool latch_energised;                 /* its coil */
 
 	enum frame_state frame_state;
 	struct motion frame;
 	unsigned passed; /* marks */
-	bool captured[2];
-	uint32_t capture_us[2];
+	bool captured[SENSORBUS_CAPTURES];
+	uint32_t capture_us[SENSORBUS_CAPTURES];
+	unsigned glitches[2]; /* of the gates, to come */
 
 	enum place place;
 	struct motion fall; /* of the lowest corner, in PLACE_AIR */
@@ -53,10 +55,19 @@ struct tower {
 	struct tower_truth truth;
 };
 
+/* What the output drives: the coils of latch and relief have the contacts of door and emergency stop in
+ * series with them. */
 static inline bool output_on(const struct tower *t, unsigned mask)
 {
-	return (t->outputs & mask) != 0;
+	const bool open = t->fault[TOWER_DOOR_OPEN] || t->fault[TOWER_ESTOP];
+	const unsigned guarded = WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE;
+
+	return (t->outputs & mask) != 0 && !(open && mask & guarded);
 }
+
+enum { KEEPER = 2 }; /* the capture behind those of the gates */
+
+void tower_stamp(struct tower *t, unsigned which);
 
 double tower_motion_distance(const struct motion *m, double time_s);
 

@@ -99,7 +99,7 @@ static void judge_bits(struct verdict *verdict, const char *name, unsigned bits,
 		return;
 	for (unsigned i = 0; i < list->count; i++)
 		wanted |= 1u << list->item[i];
-	for (unsigned bit = 0; bit < 16; bit++) {
+	for (unsigned bit = 0; bit < 32; bit++) {
 		if (bits >> bit & 1)
 			add_item(measured, bit, name_of);
 		if (wanted >> bit & 1)

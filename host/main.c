@@ -21,6 +21,7 @@ static const struct {
         {"replay", command_replay, "a logged drop onto CAN or LCM, in its own time"},
         {"convert", command_convert, "candump, LCM, CSV, UFF58 and HDF5 into each other; the wire as DBC"},
         {"series", command_series, "series of drops in an archive: means, decisions, tables"},
+        {"verify", command_verify, "whether a file, a drop, an archive or a report is what left the tower"},
         {"report", command_report, "a series for whoever ordered it: a page, on paper, as CSV"},
         {"chart", command_chart, "what the estimates cost and where they fail, in simulated drops"},
         {"ctl", command_ctl, "the operator's verbs: status, arm, release, abort, clear, set"},

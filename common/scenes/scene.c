@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "common/scenes/scene.h"
+#include "common/plain.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -60,6 +61,10 @@ static int read_text(struct reading *reading, const char *name, const char *valu
 		                     name);
 	if (value[0] == '\0' || strlen(value) >= room)
 		return settings_fail(settings, DT_E_FORMAT, "%.60s is empty or too long", name);
+	if (!plain_is_line(value, strlen(value)))
+		return settings_fail(
+		        settings, DT_E_FORMAT,
+		        "%.60s has a control character or is no UTF-8, expected one line of text", name);
 	memcpy(to, value, strlen(value) + 1);
 	if (to == reading->scene.name)
 		reading->name_line = settings->line;

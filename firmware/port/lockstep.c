@@ -8,7 +8,8 @@
 
 enum {
 	TICK_US = 1000,
-	RECEIVED = 32, /* twice what an answer brings */
+	RECEIVED = 32, /* what an answer brings at most */
+	KEEPER = 2,    /* the capture behind those of the gates */
 };
 
 /* The sample instants of a millisecond. Those of X from 1 on are a fraction of a us after floor_us. */
@@ -43,11 +44,13 @@ static struct machine {
 	uint8_t off_planned;                 /* outputs that port_off_at will switch ... */
 	uint32_t off_us[SENSORBUS_OUTPUTS];  /* ... and when */
 	bool first_request, reset_wanted, bus_classic, hung;
-	bool bus_off, tx_blocked;
+	enum port_bus bus;
+	bool tx_blocked;
 	uint32_t bus_errors, frames_lost;
 	struct sensorbus_answer answer;
-	uint8_t captures; /* gates that control has not seen yet ... */
-	uint32_t capture_us[2];
+	uint8_t captures; /* that control has not seen yet ... */
+	uint32_t capture_us[SENSORBUS_CAPTURES];
+	uint8_t kept, kept_before; /* port_keep, now and before the reset */
 	unsigned sent_count;
 	size_t request_bytes; /* in request[], its frames included */
 	/* As the frames are sent, so they wait: each is written once. */
@@ -57,7 +60,7 @@ static struct machine {
 
 /* app_poll takes fewer frames than an answer may bring: the others wait here for the next. */
 static struct frame received[RECEIVED];
-static bool link_off; /* by a link of the port's own, which a reset leaves as it is */
+static enum port_bus link_bus; /* by a link of the port's own, which a reset leaves as it is */
 
 /* ---- what the core calls ---- */
 
@@ -69,6 +72,31 @@ uint32_t port_time_us(void)
 uint16_t port_io(void)
 {
 	return machine.inputs | machine.outputs;
+}
+
+void port_keep(uint8_t byte)
+{
+	machine.kept = byte;
+}
+
+uint8_t port_kept(void)
+{
+	return machine.kept_before;
+}
+
+uint8_t lockstep_kept(void)
+{
+	return machine.kept;
+}
+
+uint32_t lockstep_random(void)
+{
+	return machine.answer.random;
+}
+
+bool port_brown_out_set(void)
+{
+	return true; /* a simulated supply has no level to set */
 }
 
 uint16_t port_bias_high(void)
@@ -140,7 +168,7 @@ int port_can_setup(bool classic, uint32_t data_kbit_s)
 
 bool lockstep_can_open(void)
 {
-	return !machine.bus_off && !machine.tx_blocked;
+	return machine.bus != PORT_BUS_OFF && !machine.tx_blocked;
 }
 
 static int take_frame(const struct frame *frame)
@@ -166,15 +194,15 @@ int lockstep_can_receive(struct frame *frame)
 	return ring_get(&machine.received, frame) == 0;
 }
 
-void lockstep_can_link(uint32_t errors, bool off)
+void lockstep_can_link(uint32_t errors, enum port_bus state)
 {
 	machine.bus_errors += errors;
-	link_off = off;
+	link_bus = state;
 }
 
-uint32_t port_can_errors(bool *bus_off)
+uint32_t port_can_errors(enum port_bus *state)
 {
-	*bus_off = machine.bus_off;
+	*state = machine.bus;
 	return machine.bus_errors + machine.frames_lost;
 }
 
@@ -197,9 +225,9 @@ bool lockstep_hung(void)
 
 static unsigned at;
 
-unsigned lockstep_group(unsigned instant)
+unsigned lockstep_instant_us(unsigned instant)
 {
-	return instants[instant].group;
+	return instants[instant].floor_us;
 }
 
 /* Makes the planned edges whose time has come by up_to_us. */
@@ -231,6 +259,7 @@ static int send_request(const struct instant *instant)
 	        .edges = machine.edges,
 	        .frames = (uint8_t)machine.sent_count,
 	        .reset = machine.first_request,
+	        .kept = machine.kept,
 	};
 	int result;
 
@@ -269,6 +298,23 @@ static int read_frames(unsigned count)
 	return result;
 }
 
+static enum port_bus bus_of(uint8_t state)
+{
+	switch (state) {
+	case SENSORBUS_BUS_ACTIVE:
+		return PORT_BUS_ACTIVE;
+	case SENSORBUS_BUS_PASSIVE:
+		return PORT_BUS_PASSIVE;
+	default:
+		return PORT_BUS_OFF;
+	}
+}
+
+static enum port_bus worse(enum port_bus a, enum port_bus b)
+{
+	return a > b ? a : b;
+}
+
 static int read_answer(void)
 {
 	uint8_t bytes[SENSORBUS_ANSWER_BYTES];
@@ -278,16 +324,16 @@ static int read_answer(void)
 	if (result != 0)
 		return result;
 	sensorbus_get_answer(bytes, answer);
-	machine.inputs = answer->inputs & (uint16_t)~WIRE_IO_OUTPUTS & (uint16_t)~WIRE_IO_OVERRUN;
+	machine.inputs = answer->inputs & (uint16_t)~WIRE_IO_OUTPUTS;
 	machine.bias_high = answer->bias_high;
 	machine.hung |= answer->hang != 0;
-	for (unsigned gate = 0; gate < 2; gate++)
-		if (answer->captures & 1u << gate) {
-			machine.captures |= (uint8_t)(1u << gate);
-			machine.capture_us[gate] = answer->capture_us[gate];
+	for (unsigned i = 0; i < SENSORBUS_CAPTURES; i++)
+		if (answer->captures & 1u << i) {
+			machine.captures |= (uint8_t)(1u << i);
+			machine.capture_us[i] = answer->capture_us[i];
 		}
 	machine.bus_errors += answer->bus_errors;
-	machine.bus_off = answer->bus_off != 0 || link_off;
+	machine.bus = worse(bus_of(answer->bus_state), link_bus);
 	machine.tx_blocked = answer->tx_blocked != 0;
 	result = read_frames(answer->frames);
 	return result == 0 && answer->stop ? LOCKSTEP_GONE : result;
@@ -319,14 +365,14 @@ bool lockstep_deliver(void)
 	return at == 0 || machine.captures != 0;
 }
 
-/* True once after the gate was captured. */
-static bool take_capture(unsigned gate, uint32_t *time_us)
+/* True once after it was captured. */
+static bool take_capture(unsigned i, uint32_t *time_us)
 {
 	uint32_t before = lockstep_hold();
-	bool captured = machine.captures & 1u << gate;
+	bool captured = machine.captures & 1u << i;
 
-	machine.captures &= (uint8_t) ~(1u << gate);
-	*time_us = machine.capture_us[gate];
+	machine.captures &= (uint8_t) ~(1u << i);
+	*time_us = machine.capture_us[i];
 	lockstep_release(before);
 	return captured;
 }
@@ -335,13 +381,15 @@ void lockstep_control(void)
 {
 	uint32_t time_us;
 
-	for (unsigned gate = 0; gate < 2; gate++)
+	for (unsigned gate = 0; gate < KEEPER; gate++)
 		if (take_capture(gate, &time_us))
 			app_on_gate(gate, time_us);
+	if (take_capture(KEEPER, &time_us))
+		app_on_keeper(time_us);
 	app_on_tick();
 }
 
-void lockstep_boot(enum port_reset cause, bool bus_classic)
+void lockstep_boot(enum port_reset cause, uint8_t kept, bool bus_classic)
 {
 	memset(&machine, 0, sizeof(machine));
 	machine.outputs = WIRE_IO_MAGNET_HOLD; /* as the drivers hold it in reset */
@@ -349,5 +397,6 @@ void lockstep_boot(enum port_reset cause, bool bus_classic)
 	machine.request_bytes = SENSORBUS_REQUEST_BYTES;
 	machine.first_request = true;
 	machine.bus_classic = bus_classic;
+	machine.kept = machine.kept_before = kept;
 	app_init(cause);
 }

@@ -4,7 +4,7 @@
 /*
  * The firmware core in lockstep with a simulated tower (common/sensorbus.h): what the ports posix and qemu
  * have in common. lockstep.c also defines the functions of port.h that deal with outputs, time, the state of
- * the bus and port_reset.
+ * the bus, what is kept over a reset, and port_reset.
  *
  * Time is virtual: at each of the 16 sample instants of a millisecond one request and its answer; all that
  * the core then does, it does at that instant, rounded up to the next whole us. An output edge that is
@@ -24,11 +24,11 @@ enum {
 	LOCKSTEP_WATCHDOG_MS = 50,
 };
 
-/* Which samples the instant takes: SENSORBUS_X, SENSORBUS_YZ, and both where a tick begins. */
-unsigned lockstep_group(unsigned instant);
+/* When the instant's samples are due, us after the tick, rounded down. */
+unsigned lockstep_instant_us(unsigned instant);
 
-/* After a reset, interrupts off: a new machine, and app_init. */
-void lockstep_boot(enum port_reset cause, bool bus_classic);
+/* After a reset, interrupts off: a new machine, and app_init. kept: what port_kept gives. */
+void lockstep_boot(enum port_reset cause, uint8_t kept, bool bus_classic);
 
 /* Request and answer; 0, LOCKSTEP_GONE or DT_E_*. Then, if 0, the samples go to the core; true asks for the
  * control interrupt, which brings it what else came. */
@@ -36,8 +36,12 @@ DT_MUST_USE int lockstep_exchange(unsigned instant);
 DT_MUST_USE bool lockstep_deliver(void);
 void lockstep_control(void);
 
-/* The core has asked for a restart. */
+/* The core has asked for a restart; what it keeps over one now. */
 bool lockstep_reset_wanted(void);
+uint8_t lockstep_kept(void);
+
+/* The other end's number of this instant, for port_random. */
+uint32_t lockstep_random(void);
 
 /* The bench wants to see the watchdog bite: app_poll is not to be called any more. */
 bool lockstep_hung(void);
@@ -48,9 +52,9 @@ DT_MUST_USE int lockstep_can_send(const struct frame *frame);
 DT_MUST_USE int lockstep_can_receive(struct frame *frame);
 
 /* For a port with a CAN link of its own. By the latest answer the bus takes frames; and what the link says:
- * errors since the call before, off the bus from the next answer on. */
+ * errors since the call before, its state from the next answer on. */
 bool lockstep_can_open(void);
-void lockstep_can_link(uint32_t errors, bool off);
+void lockstep_can_link(uint32_t errors, enum port_bus state);
 
 /* From the port, the two pipes: all bytes; 0, LOCKSTEP_GONE or DT_E_*. */
 DT_MUST_USE int lockstep_write(const void *bytes, size_t count);

@@ -39,8 +39,8 @@ static double number(const cJSON *object, const char *name)
 /* What stands in the full result only. */
 static int take_result(struct reading *reading, struct study_series *series, const char *name)
 {
-	char *text = archive_json(reading->archive, name, NULL);
-	cJSON *json = text != NULL ? cJSON_Parse(text) : NULL;
+	char *text = NULL;
+	cJSON *json = archive_json(reading->archive, name, NULL, &text) == 0 ? cJSON_Parse(text) : NULL;
 	const cJSON *resultants = cJSON_GetObjectItemCaseSensitive(json, "resultants");
 
 	free(text);

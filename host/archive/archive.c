@@ -12,6 +12,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "common/plain.h"
 #include "host/archive/durable.h"
 #include "host/archive/private.h"
 
@@ -71,15 +72,23 @@ int archive_check_text(struct archive *archive, const char *what, const char *te
 {
 	size_t length = strlen(text);
 
-	for (size_t i = 0; i < length; i++)
-		if (iscntrl((unsigned char)text[i]))
-			return archive_refuse(archive, DT_E_ARGUMENT,
-			                      "the %s has a control character, expected one line of text",
-			                      what);
+	if (!plain_is_line(text, length))
+		return archive_refuse(
+		        archive, DT_E_ARGUMENT,
+		        "the %s has a control character or is no UTF-8, expected one line of text", what);
 	if (length > ARCHIVE_TEXT_MAX)
 		return archive_refuse(archive, DT_E_ARGUMENT, "the %s is longer than %d bytes", what,
 		                      ARCHIVE_TEXT_MAX);
 	return 0;
+}
+
+int archive_check_operator(struct archive *archive, const char *name)
+{
+	if (name[strspn(name, " ")] == '\0')
+		return archive_refuse(
+		        archive, DT_E_ARGUMENT,
+		        "nobody is known to decide: expected the operator's name (--operator NAME)");
+	return archive_check_text(archive, "operator's name", name);
 }
 
 /* ---- opening ---- */
@@ -253,6 +262,7 @@ void archive_close(struct archive *archive)
 	sqlite3_close(archive->index);
 	if (archive->lock >= 0)
 		close(archive->lock);
+	free(archive->mark);
 	free(archive->folder);
 	free(archive);
 }

@@ -49,7 +49,7 @@ struct archive_series {
 	unsigned planned;
 	const char *created; /* UTC, ISO 8601 */
 	/* of its drops */
-	unsigned recorded, accepted, rejected, partial;
+	unsigned recorded, accepted, rejected, partial, faulty;
 	const char *last; /* time of the last drop; "" when there is none */
 };
 
@@ -101,9 +101,22 @@ DT_MUST_USE int archive_resume(struct archive *archive, const char *drop,
 
 /* ---- results, decisions ---- */
 
-/* The series of SERIES/NUMBER, and its log's place in the archive's folder. DT_E_STATE: not recorded. */
-DT_MUST_USE int archive_log(struct archive *archive, const char *drop, char series[ARCHIVE_NAME_MAX + 1],
-                            char raw[ARCHIVE_NAME_MAX + 64]);
+/* The log of a drop, open and proven: the one way to read it. What file holds are the bytes that were
+ * verified, whatever becomes of the archive's. */
+struct archive_log {
+	char series[ARCHIVE_NAME_MAX + 1];
+	unsigned number;
+	char raw[ARCHIVE_NAME_MAX + 64]; /* its place in the archive's folder */
+	char file[32];                   /* to read it by, until it is closed */
+	int copy;
+	char fault[ARCHIVE_MESSAGE_MAX]; /* one line on a result that is not what was recorded; "" */
+};
+
+/* Verifies log, sidecar and results of SERIES/NUMBER and marks the drop in the index. DT_E_STATE: not
+ * recorded. DT_E_CORRUPT: log or sidecar is missing or not what was recorded. Results can be made again:
+ * what is wrong with them stands in fault. */
+DT_MUST_USE int archive_open_log(struct archive *archive, const char *drop, struct archive_log *log);
+void archive_close_log(struct archive_log *log);
 
 /* json: as `analyze --json` gives it. Kept in the index and beside the log; the result of the same version is
  * replaced, others stay. Drops are named SERIES/NUMBER. */
@@ -112,7 +125,9 @@ DT_MUST_USE int archive_result(struct archive *archive, const char *drop, const 
 
 enum archive_decision { ARCHIVE_OPEN, ARCHIVE_ACCEPTED, ARCHIVE_REJECTED };
 
-/* text: the reason; may be "" for ACCEPTED only. Logged with its time. DT_E_STATE: not recorded. */
+/* text: the reason; may be "" for ACCEPTED only. Logged with its time, and so is what is wrong with the
+ * drop's files. DT_E_STATE: not recorded. DT_E_CORRUPT: cannot be ACCEPTED, since a file is missing or not
+ * what was recorded. */
 DT_MUST_USE int archive_decide(struct archive *archive, const char *drop, enum archive_decision decision,
                                const char *operator_name, const char *text);
 DT_MUST_USE int archive_note(struct archive *archive, const char *drop, const char *operator_name,
@@ -154,11 +169,13 @@ const char *archive_value_unit(enum archive_value value); /* "g" */
 struct archive_drop {
 	struct archive_series series; /* without the counts */
 	unsigned number;
-	const char *state;    /* "recording" "interrupted" "recorded" "missing" */
+	const char *state;    /* "recording" "interrupted" "recorded"; of a file: "altered" "missing" */
 	const char *decision; /* "open" "accepted" "rejected" */
 	const char *reason, *operator_name, *note;
 	const char *raw, *sha256, *time;
 	int64_t bytes;
+	bool sealed;                       /* its sidecar is in the chain */
+	const char *fault;                 /* one line on the file that is missing or altered; "" */
 	bool simulated;                    /* known to be from a simulated tower; false: not known */
 	const char *version;               /* of the result; NULL: there is none */
 	double value[ARCHIVE_VALUE_COUNT]; /* NAN: none */
@@ -214,26 +231,73 @@ DT_MUST_USE int archive_each_calibration(struct archive *archive,
                                                      const struct archive_calibration *calibration),
                                          void *context);
 
-/* The JSON of a drop's result, to be freed; version NULL: the newest. NULL with a message if there is none.
- */
-char *archive_json(struct archive *archive, const char *drop, const char *version);
+/* The JSON of a drop's result, to be freed; version NULL: the newest. DT_E_EMPTY: there is none. */
+DT_MUST_USE int archive_json(struct archive *archive, const char *drop, const char *version, char **json);
 
 /* Where a log with these bytes is: 1 and "SERIES/NUMBER" in drop, 0 when there is none, or DT_E_*. */
 DT_MUST_USE int archive_find(struct archive *archive, const char *file, char drop[ARCHIVE_NAME_MAX + 16]);
 
-/* A number that is another one once somebody else, not this archive, has changed what there is. */
+/* Captures, by what tells one from every other (record/log_capture.h), in whatever file they came. The index
+ * keeps the keys of those it was told of; after a rebuild they are asked for again. archive_find_capture as
+ * archive_find. archive_ask_captures calls key_of for the log of each recorded drop whose key is not known;
+ * what it returns 0 for is kept. */
+enum { ARCHIVE_KEY_MAX = 80 };
+DT_MUST_USE int archive_find_capture(struct archive *archive, const char *key,
+                                     char drop[ARCHIVE_NAME_MAX + 16]);
+DT_MUST_USE int archive_know_capture(struct archive *archive, int64_t drop, const char *key);
+DT_MUST_USE int archive_ask_captures(struct archive *archive,
+                                     int (*key_of)(const char *log, char key[ARCHIVE_KEY_MAX]));
+
+/* A number that is another one once somebody else, not this archive, has changed what there is, or a drop has
+ * been found altered, missing or whole again. */
 DT_MUST_USE int archive_changes(struct archive *archive, int64_t *number);
 
 /* ---- care ---- */
 
-/* Calls wrong for each raw file that is gone or not what was recorded, and marks those that are gone. Returns
- * how many there were, or DT_E_*. */
-DT_MUST_USE int archive_verify(struct archive *archive, void (*wrong)(void *context, const char *text),
-                               void *context);
+/* Calls wrong with one line for each file that is missing or not what was recorded, and marks the drops in
+ * the index as far as it can be written. series NULL: all of it, the chain included; number 0: all drops of
+ * the series. wrong may be NULL. Returns how many lines, or DT_E_*. */
+DT_MUST_USE int archive_verify(struct archive *archive, const char *series, unsigned number,
+                               void (*wrong)(void *context, const char *text), void *context);
 
-/* Makes the index again from the raw files; what is there of it stays beside it, under another name. wrong
- * is called for each file that could not be used. Needs no open archive, and that nobody else writes. */
-DT_MUST_USE int archive_rebuild(const char *folder, void (*wrong)(void *context, const char *text),
-                                void *context, char message[ARCHIVE_MESSAGE_MAX]);
+/* The chain's last entry, which stands for all that the archive holds, and how many recorded drops it does
+ * not know. */
+struct archive_seal {
+	int64_t entry; /* 0: there is no chain yet */
+	char head[65];
+	int64_t drops, not_sealed;
+};
+DT_MUST_USE int archive_seal(struct archive *archive, struct archive_seal *seal);
+
+/* Whether the chain has this entry with this head: 1 or 0, or DT_E_*. */
+DT_MUST_USE int archive_reaches(struct archive *archive, int64_t entry, const char *head);
+
+/* Whether a drop's files are missing or altered, so that it counts nowhere. */
+bool archive_is_faulty(const struct archive_drop *drop);
+
+/* Makes the index again from the raw files, and verifies them; what is there of it stays beside it, under
+ * another name. wrong is called for each file that could not be used or is not what was recorded. Needs no
+ * open archive, and that nobody else writes. DT_E_STATE: it would know fewer drops than before; fewer: it
+ * may. */
+DT_MUST_USE int archive_rebuild(const char *folder, bool fewer,
+                                void (*wrong)(void *context, const char *text), void *context,
+                                char message[ARCHIVE_MESSAGE_MAX]);
+
+/* ---- the tower over a series ---- */
+
+enum archive_trend_of {
+	ARCHIVE_TREND_DROPOUT,
+	ARCHIVE_TREND_SEPARATION,
+	ARCHIVE_TREND_ACCELERATION,
+	ARCHIVE_TRENDS
+};
+
+/* A straight line through what the drops measured: at the first and at the last of them. NAN of no drop. */
+struct archive_trend {
+	unsigned drops;  /* that measured it */
+	double from, to; /* s, m, m/s2 */
+};
+DT_MUST_USE int archive_trends(struct archive *archive, const char *series,
+                               struct archive_trend trend[ARCHIVE_TRENDS]);
 
 #endif

@@ -3,7 +3,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <nettle/sha2.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -75,7 +74,7 @@ int durable_folders(const char *path)
 	return result;
 }
 
-static int write_all(int fd, const char *bytes, size_t size)
+static int put_all(int fd, const char *bytes, size_t size)
 {
 	while (size > 0) {
 		ssize_t n = write(fd, bytes, size);
@@ -87,52 +86,99 @@ static int write_all(int fd, const char *bytes, size_t size)
 		bytes += n;
 		size -= (size_t)n;
 	}
-	return fsync(fd) == 0 ? 0 : DT_E_SYSTEM;
+	return 0;
+}
+
+static int write_all(int fd, const char *bytes, size_t size)
+{
+	int result = put_all(fd, bytes, size);
+
+	return result == 0 && fsync(fd) != 0 ? DT_E_SYSTEM : result;
+}
+
+static char *part_of(const char *path)
+{
+	char *part;
+
+	return asprintf(&part, "%s.part", path) < 0 ? NULL : part;
+}
+
+int durable_stage(const char *path, const void *bytes, size_t size)
+{
+	char *part = part_of(path);
+	int fd, result;
+
+	if (part == NULL)
+		return DT_E_MEMORY;
+	if (size == 0) { /* nothing of ours is empty: what is there stays */
+		free(part);
+		errno = ENODATA;
+		return DT_E_SYSTEM;
+	}
+	fd = open(part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+	result = fd < 0 ? DT_E_SYSTEM : shut(fd, write_all(fd, bytes, size));
+	if (result != 0 && fd >= 0) {
+		int before = errno;
+
+		unlink(part);
+		errno = before;
+	}
+	free(part);
+	return result;
+}
+
+int durable_publish(const char *path)
+{
+	char *part = part_of(path);
+	int result = part == NULL ? DT_E_MEMORY : rename(part, path) == 0 ? 0 : DT_E_SYSTEM;
+
+	free(part);
+	return result != 0 ? result : durable_sync_folder(path);
 }
 
 int durable_write(const char *path, const void *bytes, size_t size)
 {
-	char *beside;
-	int fd, result;
+	int result = durable_stage(path, bytes, size);
 
-	if (asprintf(&beside, "%s.part", path) < 0)
-		return DT_E_MEMORY;
-	fd = open(beside, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
-	result = fd < 0 ? DT_E_SYSTEM : shut(fd, write_all(fd, bytes, size));
-	if (result == 0 && rename(beside, path) != 0)
-		result = DT_E_SYSTEM;
-	if (result != 0 && fd >= 0) {
-		int before = errno;
-
-		unlink(beside);
-		errno = before;
-	}
-	free(beside);
-	return result != 0 ? result : durable_sync_folder(path);
+	return result != 0 ? result : durable_publish(path);
 }
 
-int durable_hash(const char *path, char hash[DURABLE_HASH_CHARS], int64_t *bytes)
+int durable_append(const char *path, int64_t at, const void *bytes, size_t size)
+{
+	int fd = open(path, O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666), result;
+
+	if (fd < 0)
+		return DT_E_SYSTEM;
+	result = ftruncate(fd, at) == 0 && lseek(fd, at, SEEK_SET) == at ? write_all(fd, bytes, size)
+	                                                                 : DT_E_SYSTEM;
+	if (result != 0 && ftruncate(fd, at) != 0)
+		result = DT_E_SYSTEM; /* half a line stays: the next one takes its place */
+	result = shut(fd, result);
+	return result == 0 && at == 0 ? durable_sync_folder(path) : result;
+}
+
+int durable_hash(const char *path, char hash[DIGEST_CHARS], int64_t *bytes, int copy)
 {
 	struct sha256_ctx context;
-	uint8_t block[32768], digest[SHA256_DIGEST_SIZE];
-	int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
+	uint8_t block[32768];
+	int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY), result = 0;
 	int64_t total = 0;
-	ssize_t n;
+	ssize_t n = 0;
 
 	if (fd < 0)
 		return DT_E_SYSTEM;
 	sha256_init(&context);
-	while ((n = read(fd, block, sizeof(block))) > 0 || (n < 0 && errno == EINTR)) {
+	while (result == 0 && ((n = read(fd, block, sizeof(block))) > 0 || (n < 0 && errno == EINTR))) {
 		if (n < 0)
 			continue;
 		sha256_update(&context, (size_t)n, block);
 		total += n;
+		if (copy >= 0)
+			result = put_all(copy, (const char *)block, (size_t)n);
 	}
-	if (shut(fd, n == 0 ? 0 : DT_E_SYSTEM) != 0)
+	if (shut(fd, result == 0 && n == 0 ? 0 : DT_E_SYSTEM) != 0)
 		return DT_E_SYSTEM;
-	sha256_digest(&context, sizeof(digest), digest);
-	for (size_t i = 0; i < sizeof(digest); i++)
-		snprintf(hash + 2 * i, 3, "%02x", digest[i]);
+	digest_end(&context, hash);
 	*bytes = total;
 	return 0;
 }

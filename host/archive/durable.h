@@ -9,14 +9,19 @@
 #include <stdint.h>
 
 #include "common/error.h"
-
-enum { DURABLE_HASH_CHARS = 65 };
+#include "host/record/digest.h"
 
 /* Makes the folders of path, up to its last slash. */
 DT_MUST_USE int durable_folders(const char *path);
 
-/* Replaces path by these bytes: the old ones or the new ones are there at any moment. */
+/* Replaces path by these bytes, of which there must be some: the old ones or the new ones are there at any
+ * moment. In two steps: the new ones are on the disk as PATH.part, then they take their place. */
 DT_MUST_USE int durable_write(const char *path, const void *bytes, size_t size);
+DT_MUST_USE int durable_stage(const char *path, const void *bytes, size_t size);
+DT_MUST_USE int durable_publish(const char *path);
+
+/* Writes bytes into path from byte `at` on, and nothing is behind them; path is made when it is not there. */
+DT_MUST_USE int durable_append(const char *path, int64_t at, const void *bytes, size_t size);
 
 /* Somebody else wrote path: file and folder to the disk. */
 DT_MUST_USE int durable_sync(const char *path);
@@ -24,8 +29,8 @@ DT_MUST_USE int durable_sync(const char *path);
 /* The folder that holds path to the disk. */
 DT_MUST_USE int durable_sync_folder(const char *path);
 
-/* SHA-256 (FIPS 180-4) in hexadecimal digits, and the size. */
-DT_MUST_USE int durable_hash(const char *path, char hash[DURABLE_HASH_CHARS], int64_t *bytes);
+/* SHA-256 and size. copy: a descriptor that gets the same bytes, or -1. */
+DT_MUST_USE int durable_hash(const char *path, char hash[DIGEST_CHARS], int64_t *bytes, int copy);
 
 /* The whole file with a NUL behind, to be freed; NULL with errno set. size may be NULL. */
 char *durable_read(const char *path, size_t *size);

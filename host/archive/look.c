@@ -189,7 +189,7 @@ int archive_each_series(struct archive *archive, const struct archive_filter *fi
 
 	add(&q,
 	    "SELECT " SERIES_COLUMNS ", s.scene, SUM(d.state <> 'recording'), SUM(d.decision = 'accepted'),"
-	    " SUM(d.decision = 'rejected'), SUM(d.state = 'recording'), MAX(d.time)"
+	    " SUM(d.decision = 'rejected'), SUM(d.state = 'recording'), SUM(d.proof <> ''), MAX(d.time)"
 	    " FROM series s JOIN campaigns c ON c.id = s.campaign_id LEFT JOIN drops d ON d.series_id = s.id",
 	    NULL);
 	add_conditions(&q, filter);
@@ -217,7 +217,8 @@ int archive_each_series(struct archive *archive, const struct archive_filter *fi
 		series.accepted = (unsigned)sqlite3_column_int(s, SERIES_COLUMN_COUNT + 2);
 		series.rejected = (unsigned)sqlite3_column_int(s, SERIES_COLUMN_COUNT + 3);
 		series.partial = (unsigned)sqlite3_column_int(s, SERIES_COLUMN_COUNT + 4);
-		series.last = sql_text(s, SERIES_COLUMN_COUNT + 5);
+		series.faulty = (unsigned)sqlite3_column_int(s, SERIES_COLUMN_COUNT + 5);
+		series.last = sql_text(s, SERIES_COLUMN_COUNT + 6);
 		result = each(context, &series);
 		if (result != 0)
 			break;
@@ -250,20 +251,23 @@ static double number_or_nan(sqlite3_stmt *s, int column)
 }
 
 #define VALUE_COLUMNS(name, text, unit) ", r." text "_" unit ", r." text "_sigma_" unit
-#define DROP_COLUMNS                                                                      \
-	SERIES_COLUMNS                                                                    \
-	", d.number, d.state, d.decision, d.reason, d.operator, d.note, d.raw, d.sha256," \
-	" d.time, d.bytes, d.simulated, v.name, r.not_ok, r.flags" ARCHIVE_VALUES(VALUE_COLUMNS)
+#define DROP_COLUMNS                                                                                         \
+	SERIES_COLUMNS                                                                                       \
+	", d.number, CASE d.proof WHEN '' THEN d.state ELSE d.proof END, d.decision, d.reason, d.operator, " \
+	"d.note, d.raw, d.sha256,"                                                                           \
+	" d.time, d.bytes, d.simulated, v.name, r.not_ok, r.flags, d.entry, d.fault, d.id" ARCHIVE_VALUES(   \
+	        VALUE_COLUMNS)
 
 /* The same columns, of which means need only these: half the time for ten thousand drops. */
 #define NUMBER_COLUMNS(name, text, unit) ", r." text "_" unit ", NULL"
-#define DROP_NUMBERS                                                                                  \
-	SERIES_COLUMNS ", d.number, NULL, d.decision, NULL, NULL, NULL, NULL, substr(d.sha256, 1, 1)" \
-	               ", NULL, NULL, NULL, NULL, r.not_ok, NULL" ARCHIVE_VALUES(NUMBER_COLUMNS)
+#define DROP_NUMBERS                                                                      \
+	SERIES_COLUMNS                                                                    \
+	", d.number, d.proof, d.decision, NULL, NULL, NULL, NULL, substr(d.sha256, 1, 1)" \
+	", NULL, NULL, NULL, NULL, r.not_ok, NULL, NULL, NULL, d.id" ARCHIVE_VALUES(NUMBER_COLUMNS)
 
 static void drop_of(const struct archive *archive, sqlite3_stmt *s, struct archive_drop *drop)
 {
-	enum { N = SERIES_COLUMN_COUNT, VALUES = N + 14 };
+	enum { N = SERIES_COLUMN_COUNT, VALUES = N + 17 };
 
 	*drop = (struct archive_drop){
 	        .series = series_of(s),
@@ -281,11 +285,18 @@ static void drop_of(const struct archive *archive, sqlite3_stmt *s, struct archi
 	        .version = (const char *)sqlite3_column_text(s, N + 11),
 	        .not_ok = (unsigned)sqlite3_column_int(s, N + 12),
 	        .flags = sql_text(s, N + 13),
+	        .sealed = sqlite3_column_int64(s, N + 14) != 0,
+	        .fault = sql_text(s, N + 15),
 	};
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
 		drop->value[i] = number_or_nan(s, VALUES + 2 * i);
 		drop->sigma[i] = number_or_nan(s, VALUES + 2 * i + 1);
 	}
+	for (size_t i = 0; i < archive->marks; i++)
+		if (archive->mark[i].drop == sqlite3_column_int64(s, N + 16)) {
+			drop->state = archive->mark[i].missing ? "missing" : "altered";
+			drop->fault = archive->mark[i].fault;
+		}
 	if (strcmp(drop->state, "recording") == 0 && !is_being_recorded(archive, drop->raw))
 		drop->state = "interrupted";
 }
@@ -399,11 +410,10 @@ int archive_each_calibration(struct archive *archive,
 	return result;
 }
 
-char *archive_json(struct archive *archive, const char *drop, const char *version)
+int archive_json(struct archive *archive, const char *drop, const char *version, char **json)
 {
 	struct archive_place place;
 	sqlite3_stmt *s;
-	char *json = NULL;
 	int result = archive_locate(archive, drop, &place);
 
 	if (result == 0)
@@ -414,50 +424,36 @@ char *archive_json(struct archive *archive, const char *drop, const char *versio
 		                   " ORDER BY r.id DESC LIMIT 1",
 		                   "is", place.drop, version);
 	if (result != 0)
-		return NULL;
-	result = sql_step(archive, s);
-	if (result > 0)
-		json = strdup(sql_text(s, 0));
-	sqlite3_finalize(s);
-	if (json == NULL && result >= 0)
-		archive_refuse(archive, DT_E_EMPTY, "%.100s: no result%s%.60s", drop,
-		               version != NULL ? " by version " : "", version != NULL ? version : "");
-	return json;
-}
-
-int archive_log(struct archive *archive, const char *drop, char series[ARCHIVE_NAME_MAX + 1],
-                char raw[ARCHIVE_NAME_MAX + 64])
-{
-	struct archive_place place;
-	int result = archive_locate(archive, drop, &place);
-
-	if (result == 0 && !place.recorded)
-		result = archive_refuse(archive, DT_E_STATE, "%s was never completely recorded", drop);
-	if (result != 0)
 		return result;
-	strcpy(series, place.name);
-	strcpy(raw, place.raw);
-	return 0;
+	result = sql_step(archive, s);
+	if (result > 0) {
+		*json = strdup(sql_text(s, 0));
+		result = *json != NULL ? 0
+		                       : archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+	} else if (result == 0) {
+		result =
+		        archive_refuse(archive, DT_E_EMPTY, "%.100s: no result%s%.60s", drop,
+		                       version != NULL ? " by version " : "", version != NULL ? version : "");
+	}
+	sqlite3_finalize(s);
+	return result;
 }
 
 int archive_changes(struct archive *archive, int64_t *number)
 {
-	return sql_number(archive, number, "PRAGMA data_version", "");
+	int result = sql_number(archive, number, "PRAGMA data_version", "");
+
+	if (result == 0)
+		*number += archive->marked;
+	return result;
 }
 
-int archive_find(struct archive *archive, const char *file, char drop[ARCHIVE_NAME_MAX + 16])
+int archive_first_drop(struct archive *archive, const char *query, const char *text,
+                       char drop[ARCHIVE_NAME_MAX + 16])
 {
-	char hash[DURABLE_HASH_CHARS];
 	sqlite3_stmt *s;
-	int64_t bytes;
-	int result;
+	int result = sql_query(archive, &s, query, "s", text);
 
-	if (durable_hash(file, hash, &bytes) != 0)
-		return archive_refuse(archive, DT_E_SYSTEM, "%.500s: cannot be read", file);
-	result = sql_query(archive, &s,
-	                   "SELECT s.name || '/' || d.number FROM drops d JOIN series s ON s.id = d.series_id"
-	                   " WHERE d.sha256 = ? LIMIT 1",
-	                   "s", hash);
 	if (result != 0)
 		return result;
 	result = sql_step(archive, s);
@@ -465,4 +461,18 @@ int archive_find(struct archive *archive, const char *file, char drop[ARCHIVE_NA
 		snprintf(drop, ARCHIVE_NAME_MAX + 16, "%s", sql_text(s, 0));
 	sqlite3_finalize(s);
 	return result;
+}
+
+int archive_find(struct archive *archive, const char *file, char drop[ARCHIVE_NAME_MAX + 16])
+{
+	char hash[DIGEST_CHARS];
+	int64_t bytes;
+
+	if (durable_hash(file, hash, &bytes, -1) != 0)
+		return archive_refuse(archive, DT_E_SYSTEM, "%.500s: cannot be read", file);
+	return archive_first_drop(
+	        archive,
+	        "SELECT s.name || '/' || d.number FROM drops d JOIN series s ON s.id = d.series_id"
+	        " WHERE d.sha256 = ? LIMIT 1",
+	        hash, drop);
 }

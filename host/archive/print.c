@@ -116,6 +116,7 @@ static int series_json(void *context, const struct archive_series *series)
 	put_number(&p->builder, item, "accepted", series->accepted);
 	put_number(&p->builder, item, "rejected", series->rejected);
 	put_number(&p->builder, item, "partial", series->partial);
+	put_number(&p->builder, item, "faulty", series->faulty);
 	put_text(&p->builder, item, "last", series->last);
 	return 0;
 }
@@ -132,8 +133,8 @@ static int series_csv(void *context, const struct archive_series *series)
 	csv_text(p->out, series->scene_name);
 	csv_number(p->out, series->angle_deg);
 	csv_number(p->out, series->height_m);
-	fprintf(p->out, "%u,%u,%u,%u,%u,%s,%s\n", series->planned, series->recorded, series->accepted,
-	        series->rejected, series->partial, series->created, series->last);
+	fprintf(p->out, "%u,%u,%u,%u,%u,%s,%s,%u\n", series->planned, series->recorded, series->accepted,
+	        series->rejected, series->partial, series->created, series->last, series->faulty);
 	return 0;
 }
 
@@ -147,9 +148,12 @@ static int series_text(void *context, const struct archive_series *series)
 		fprintf(p->out, "%-20s %-11s %-16s %5s %7s %8s %8s %8s %7s  %s\n", "series", "campaign",
 		        "scene", "deg", "planned", "recorded", "accepted", "rejected", "partial",
 		        "last drop");
-	fprintf(p->out, "%-20s %-11s %-16s %5g %7u %8u %8u %8u %7u  %.10s\n", series->name, series->campaign,
+	fprintf(p->out, "%-20s %-11s %-16s %5g %7u %8u %8u %8u %7u  %.10s", series->name, series->campaign,
 	        series->scene_name, series->angle_deg, series->planned, series->recorded, series->accepted,
 	        series->rejected, series->partial, series->last);
+	if (series->faulty > 0)
+		fprintf(p->out, "  %u altered or missing", series->faulty);
+	fputc('\n', p->out);
 	return 0;
 }
 
@@ -163,7 +167,7 @@ int print_series(struct archive *archive, const struct archive_filter *filter, e
 
 	if (format == PRINT_CSV) {
 		fputs("series,campaign,scene,angle_deg,height_m,planned,recorded,accepted,rejected,partial,"
-		      "created,last\n",
+		      "created,last,faulty\n",
 		      out);
 		result = archive_each_series(archive, &asked, series_csv, &p);
 		return result != 0 ? result : print_done(out);

@@ -16,7 +16,8 @@ enum print_format { PRINT_TEXT, PRINT_JSON, PRINT_CSV };
 DT_MUST_USE int print_series(struct archive *archive, const struct archive_filter *filter,
                              enum print_format format, FILE *out);
 
-/* One line a drop, with filter->series also the series, its mean, standard deviation and count. */
+/* One line a drop, with filter->series also the series, its mean, standard deviation and count, and the head
+ * of the chain; then the files of its drops are verified first. Of others what was found last is told. */
 DT_MUST_USE int print_drops(struct archive *archive, const struct archive_filter *filter, bool undecided,
                             enum print_format format, FILE *out);
 

@@ -61,6 +61,7 @@ static int drop_json(void *context, const struct archive_drop *drop)
 	item = cJSON_CreateObject();
 	if (archive_counts(drop, p->undecided))
 		archive_cell_add(&p->total, drop);
+	p->faulty += archive_is_faulty(drop);
 	put_text(b, item, "series", drop->series.name);
 	put_number(b, item, "number", drop->number);
 	put_text(b, item, "campaign", drop->series.campaign);
@@ -69,6 +70,8 @@ static int drop_json(void *context, const struct archive_drop *drop)
 	put_number(b, item, "height_m", drop->series.height_m);
 	put_text(b, item, "time", drop->time);
 	put_text(b, item, "state", drop->state);
+	put_text(b, item, "fault", drop->fault);
+	put_item(b, item, "sealed", cJSON_CreateBool(drop->sealed));
 	put_text(b, item, "decision", drop->decision);
 	put_text(b, item, "reason", drop->reason);
 	put_text(b, item, "operator", drop->operator_name);
@@ -104,6 +107,22 @@ static int series_of_drops(void *context, const struct archive_series *series)
 	return put_part(&p->builder, object, p->out);
 }
 
+/* What stands for all that the archive holds. */
+static int put_seal(struct print *p)
+{
+	cJSON *object = cJSON_CreateObject();
+	struct archive_seal seal;
+	int result = archive_seal(p->archive, &seal);
+
+	if (result == 0) {
+		put_number(&p->builder, object, "entry", (double)seal.entry);
+		put_text(&p->builder, object, "head", seal.head);
+		return put_part(&p->builder, object, p->out);
+	}
+	cJSON_Delete(object);
+	return result;
+}
+
 static int put_total(struct print *p)
 {
 	cJSON *means = cJSON_CreateObject();
@@ -134,6 +153,9 @@ static int drops_json(struct print *p, const struct archive_filter *filter)
 	fprintf(p->out, "],\"more\":%s,\"means\":", p->more ? "true" : "false");
 	if (result == 0)
 		result = put_total(p);
+	fputs(",\"seal\":", p->out);
+	if (result == 0)
+		result = put_seal(p);
 	fputs("}\n", p->out);
 	return result;
 }
@@ -166,7 +188,9 @@ static int drop_csv(void *context, const struct archive_drop *drop)
 		csv_number(p->out, drop->value[i]);
 		csv_number(p->out, drop->sigma[i]);
 	}
-	fprintf(p->out, "%s,%s\n", drop->raw, drop->sha256);
+	fprintf(p->out, "%s,%s,", drop->sealed ? "yes" : "", drop->raw);
+	csv_text(p->out, drop->fault);
+	fprintf(p->out, "%s\n", drop->sha256);
 	return 0;
 }
 
@@ -184,7 +208,7 @@ static int drops_csv(struct print *p, const struct archive_filter *filter)
 		print_key(key, (enum archive_value)i, "sigma_");
 		fprintf(p->out, "%s,", key);
 	}
-	fputs("raw,sha256\n", p->out);
+	fputs("sealed,raw,fault,sha256\n", p->out);
 	return archive_each_drop(p->archive, filter, drop_csv, p);
 }
 
@@ -224,6 +248,7 @@ static int drop_text(void *context, const struct archive_drop *drop)
 		return 0;
 	if (archive_counts(drop, p->undecided))
 		archive_cell_add(&p->total, drop);
+	p->faulty += archive_is_faulty(drop);
 	if (p->lines++ == 0) {
 		fprintf(p->out, "%-20s %-16s %-11s", "drop", "time (UTC)", "decision");
 		for (int i = 0; i < COLUMNS; i++)
@@ -231,7 +256,8 @@ static int drop_text(void *context, const struct archive_drop *drop)
 		fputc('\n', p->out);
 	}
 	snprintf(name, sizeof(name), "%s/%u", drop->series.name, drop->number);
-	fprintf(p->out, "%-20s %-16.16s %-11s", name, drop->time, partial ? drop->state : drop->decision);
+	fprintf(p->out, "%-20s %-16.16s %-11s", name, drop->time,
+	        partial || archive_is_faulty(drop) ? drop->state : drop->decision);
 	for (int i = 0; i < COLUMNS; i++) {
 		bool not_ok = (drop->not_ok >> columns[i].value & 1u) != 0;
 
@@ -239,8 +265,10 @@ static int drop_text(void *context, const struct archive_drop *drop)
 		         not_ok ? '*' : ' ');
 		p->marked |= not_ok && !isnan(drop->value[columns[i].value]);
 	}
-	if (strcmp(drop->state, "missing") == 0)
-		fputs(" raw log missing", p->out);
+	if (drop->fault[0] != '\0')
+		fprintf(p->out, " %s", drop->fault);
+	if (!drop->sealed && !partial)
+		fputs(" not sealed", p->out);
 	if (drop->simulated)
 		fputs(" simulated tower", p->out);
 	fprintf(p->out, "%s%s%s%s%s%s\n", drop->flags[0] != '\0' ? " " : "", drop->flags,
@@ -265,6 +293,17 @@ static void total_text(const struct print *p)
 	for (int i = 0; i < COLUMNS; i++)
 		fprintf(out, "%8u ", p->total.value[columns[i].value].n);
 	fputc('\n', out);
+}
+
+static int seal_text(const struct print *p)
+{
+	struct archive_seal seal;
+	int result = archive_seal(p->archive, &seal);
+
+	if (result == 0 && seal.entry > 0)
+		fprintf(p->out, "chain of the archive: entry %lld, head %s\n", (long long)seal.entry,
+		        seal.head);
+	return result;
 }
 
 static int head_text(void *context, const struct archive_series *series)
@@ -293,11 +332,13 @@ static int drops_text(struct print *p, const struct archive_filter *filter)
 		total_text(p);
 	else if (filter->series != NULL)
 		fputs("\nnone accepted yet: no mean\n", p->out);
+	if (p->faulty > 0)
+		fprintf(p->out, "%u altered or missing, and in no mean\n", p->faulty);
 	if (p->marked)
 		fputs("* look at its status: 'droptower analyze' on the log says what is the matter\n",
 		      p->out);
 	print_more(p);
-	return 0;
+	return filter->series != NULL ? seal_text(p) : 0;
 }
 
 int print_drops(struct archive *archive, const struct archive_filter *filter, bool undecided,
@@ -305,9 +346,13 @@ int print_drops(struct archive *archive, const struct archive_filter *filter, bo
 {
 	struct print p = {.out = out, .archive = archive, .undecided = undecided};
 	struct archive_filter asked = print_begin(&p, filter);
-	int result = format == PRINT_JSON  ? drops_json(&p, &asked)
-	             : format == PRINT_CSV ? drops_csv(&p, &asked)
-	                                   : drops_text(&p, &asked);
+	int result = 0;
 
+	if (filter->series != NULL)
+		result = archive_verify(archive, filter->series, filter->number, NULL, NULL);
+	if (result >= 0)
+		result = format == PRINT_JSON  ? drops_json(&p, &asked)
+		         : format == PRINT_CSV ? drops_csv(&p, &asked)
+		                               : drops_text(&p, &asked);
 	return result != 0 ? result : print_done(out);
 }

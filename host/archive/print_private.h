@@ -17,6 +17,7 @@ struct print {
 	size_t lines, limit;       /* limit 0: none */
 	bool more;                 /* than limit */
 	bool marked;               /* a value has a star */
+	unsigned faulty;           /* drops whose files are altered or missing */
 	struct archive_cell total; /* of the drops that count */
 };
 

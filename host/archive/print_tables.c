@@ -64,6 +64,7 @@ static void put_place(struct builder *b, cJSON *item, const struct archive_cell 
 	put_number(b, item, "angle_deg", cell->angle_deg);
 	put_number(b, item, "height_m", cell->height_m);
 	put_number(b, item, "drops", cell->drops);
+	put_number(b, item, "faulty", cell->faulty);
 }
 
 static void put_sensor(struct builder *b, cJSON *array, const struct archive_cell *cell, int sensor,
@@ -121,7 +122,8 @@ static void sensor_csv(FILE *out, const struct archive_cell *cell, int sensor,
 		csv_number(out, reference != NULL ? print_ratio(mean_of(cell, sensor, axis),
 		                                                mean_of(reference, sensor, axis))
 		                                  : (double)NAN);
-	fprintf(out, "%s\n", reference != NULL ? reference->scene_name : "");
+	csv_text(out, reference != NULL ? reference->scene_name : "");
+	fprintf(out, "%u\n", cell->faulty);
 }
 
 static int tables_csv(const struct archive_table *table, const char *reference, FILE *out)
@@ -130,7 +132,7 @@ static int tables_csv(const struct archive_table *table, const char *reference, 
 	for (int axis = X; axis < AXES; axis++)
 		fprintf(out, "%s_mean_g,%s_sd_g,%s_n,", axis_keys[axis], axis_keys[axis], axis_keys[axis]);
 	fputs("r_of_means_g,s1_over_s2_x,s1_over_s2_y,s1_over_s2_r,over_reference_x,over_reference_y,"
-	      "over_reference_r,reference\n",
+	      "over_reference_r,reference,faulty\n",
 	      out);
 	for (size_t i = 0; i < table->count; i++)
 		for (int sensor = 0; sensor < 2; sensor++)
@@ -189,6 +191,9 @@ static void means_text(const struct archive_table *table, FILE *out)
 			        "S1 X", "S1 Y", "S1 XY", "S1 Z", "S2 X", "S2 Y", "S2 XY", "S2 Z", "lag ms",
 			        "plate Hz", "damping");
 		cell_text(out, cell);
+		if (cell->faulty > 0)
+			fprintf(out, "%5s  %u accepted, but altered or missing, and in no mean\n", "",
+			        cell->faulty);
 	}
 }
 

@@ -15,6 +15,15 @@ struct archive {
 	sqlite3 *index;
 	int lock; /* shared by writers, exclusive to who rebuilds; -1: reading */
 	char message[ARCHIVE_MESSAGE_MAX];
+	struct archive_mark *mark; /* of drops, where the index could not take them */
+	int64_t marked;            /* marks that changed since it was opened, in the index or here */
+	size_t marks;
+};
+
+struct archive_mark {
+	int64_t drop;
+	bool missing;
+	char fault[ARCHIVE_MESSAGE_MAX];
 };
 
 /* Writes the message and returns code. */
@@ -44,6 +53,11 @@ DT_MUST_USE int sql_number(struct archive *archive, int64_t *number, const char 
 /* Never NULL. */
 const char *sql_text(sqlite3_stmt *statement, int column);
 
+/* The first drop that a query for SERIES/NUMBER by one text finds: 1 with it, 0 when there is none, or
+ * DT_E_*. */
+DT_MUST_USE int archive_first_drop(struct archive *archive, const char *query, const char *text,
+                                   char drop[ARCHIVE_NAME_MAX + 16]);
+
 /* A damaged or unreachable index, in words. */
 int sql_refuse(struct archive *archive);
 
@@ -64,6 +78,8 @@ enum { ARCHIVE_TIME_CHARS = 24 };
 void archive_time(char text[ARCHIVE_TIME_CHARS], int64_t time_s);
 DT_MUST_USE int archive_check_name(struct archive *archive, const char *what, const char *name);
 DT_MUST_USE int archive_check_names(struct archive *archive, const char *series, const char *campaign);
+/* A text that is not blank. */
+DT_MUST_USE int archive_check_operator(struct archive *archive, const char *name);
 DT_MUST_USE int archive_check_text(struct archive *archive, const char *what, const char *text);
 
 /* Whether a name ends as a log's does. */
@@ -85,22 +101,18 @@ DT_MUST_USE int archive_each_numbers(struct archive *archive, const struct archi
                                      int (*each)(void *context, const struct archive_drop *drop),
                                      void *context);
 
-/* ---- sidecars: the scene as it was given, then what the index knows ---- */
+/* ---- rows; the sidecars stand in sidecar.h ---- */
 
 #define SIDECAR_SECTION "[archive]"
-
-/* Writes FOLDER/raw/.../NNNN.ini of a drop, or .../SERIES.ini, from the index; within a transaction. */
-DT_MUST_USE int sidecar_write_drop(struct archive *archive, int64_t drop);
-DT_MUST_USE int sidecar_write_series(struct archive *archive, int64_t series);
-
-/* Puts what file (in the folder) says into the index. 1: all but a result that could not be used, message
- * says why. */
-DT_MUST_USE int sidecar_read(struct archive *archive, const char *file);
 
 /* Puts a series, and its campaign when that is new, into the index alone. */
 DT_MUST_USE int series_insert(struct archive *archive, const char *name, const char *campaign,
                               const char *text, const struct scene *scene, int64_t planned,
                               const char *created, int64_t *row);
+
+/* Something that was decided, noted or found of a drop, into the index alone. */
+DT_MUST_USE int event_insert(struct archive *archive, int64_t drop, const char *what,
+                             const char *operator_name, const char *text);
 
 /* Puts a result into the index alone. DT_E_FORMAT: json is none of ours. */
 DT_MUST_USE int result_insert(struct archive *archive, int64_t drop, const char *when, const char *version,

@@ -7,69 +7,29 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "host/archive/durable.h"
-#include "host/archive/private.h"
+#include "host/archive/proof.h"
 
 #define REBUILT "index.sqlite.rebuilt"
 
-/* ---- verify ---- */
-
-/* What is wrong with the file of a row of raw, bytes, sha256; "" when nothing is. Whether it is gone. */
-static bool examine(const struct archive *archive, sqlite3_stmt *s, char text[ARCHIVE_MESSAGE_MAX])
-{
-	char path[ARCHIVE_PATH_MAX], hash[DURABLE_HASH_CHARS];
-	const char *raw = sql_text(s, 1);
-	int64_t bytes = 0;
-
-	text[0] = '\0';
-	snprintf(path, sizeof(path), "%s/%s", archive->folder, raw);
-	if (durable_hash(path, hash, &bytes) != 0) {
-		snprintf(text, ARCHIVE_MESSAGE_MAX, "%.400s: %s", raw, strerror(errno));
-		return errno == ENOENT;
-	}
-	if (strcmp(hash, sql_text(s, 3)) != 0)
-		snprintf(text, ARCHIVE_MESSAGE_MAX,
-		         "%.400s: %lld bytes that are not the %lld recorded (SHA-256 does not agree)", raw,
-		         (long long)bytes, (long long)sqlite3_column_int64(s, 2));
-	return false;
-}
-
-int archive_verify(struct archive *archive, void (*wrong)(void *context, const char *text), void *context)
-{
-	char text[ARCHIVE_MESSAGE_MAX];
-	sqlite3_stmt *s;
-	int count = 0, result = sql_query(archive, &s,
-	                                  "SELECT id, raw, bytes, sha256, state FROM drops"
-	                                  " WHERE state <> 'recording' ORDER BY raw",
-	                                  "");
-
-	if (result != 0)
-		return result;
-	while ((result = sql_step(archive, s)) > 0) {
-		const char *state = examine(archive, s, text) ? "missing" : "recorded";
-
-		if (text[0] != '\0') {
-			wrong(context, text);
-			count++;
-		}
-		if (strcmp(state, sql_text(s, 4)) == 0)
-			continue;
-		result = sql_run(archive, "UPDATE drops SET state = ? WHERE id = ?", "si", state,
-		                 sqlite3_column_int64(s, 0));
-		if (result != 0)
-			break;
-	}
-	sqlite3_finalize(s);
-	return result != 0 ? result : count;
-}
-
-/* ---- rebuild ---- */
-
 struct rebuild {
 	struct archive archive;
+	struct proof proof;
+	bool fewer;     /* drops than before will do */
+	int64_t before; /* drops known until now */
 	void (*wrong)(void *context, const char *text);
 	void *context;
 };
+
+/* What the chain has of a sidecar. */
+static int note_entry(struct rebuild *rebuild, const char *file, int64_t drop)
+{
+	const struct chain_entry *entry = chain_find(&rebuild->proof.chain, file);
+
+	if (drop == 0 || entry == NULL)
+		return 0;
+	return sql_run(&rebuild->archive, "UPDATE drops SET entry = ? WHERE id = ?", "ii", entry->number,
+	               drop);
+}
 
 /* One sidecar; what is wrong with it is told and left out. */
 static int take(struct rebuild *rebuild, const char *file)
@@ -77,16 +37,19 @@ static int take(struct rebuild *rebuild, const char *file)
 	struct archive *archive = &rebuild->archive;
 	char text[ARCHIVE_MESSAGE_MAX + 256];
 	int taken, result = sql_script(archive, "SAVEPOINT one");
+	int64_t drop;
 
 	if (result != 0)
 		return result;
-	taken = sidecar_read(archive, file);
+	taken = sidecar_read(archive, file, &drop);
 	if (taken != 0) {
 		snprintf(text, sizeof(text), "%.200s: %s", file, archive->message);
 		rebuild->wrong(rebuild->context, text);
 	}
 	if (taken < 0)
 		result = sql_script(archive, "ROLLBACK TO one");
+	else
+		result = note_entry(rebuild, file, drop);
 	return result != 0 ? result : sql_script(archive, "RELEASE one");
 }
 
@@ -118,26 +81,118 @@ static void look_for_sidecar(struct rebuild *rebuild, const FTSENT *entry)
 	rebuild->wrong(rebuild->context, text);
 }
 
+/* A linked folder or file is taken as what it leads to, but not what is linked in there again. */
+static bool follow(struct rebuild *rebuild, FTS *walk, FTSENT *entry)
+{
+	char text[ARCHIVE_MESSAGE_MAX];
+
+	if (entry->fts_info == FTS_SL && !entry->fts_parent->fts_number) {
+		entry->fts_number = 1;
+		return fts_set(walk, entry, FTS_FOLLOW) == 0;
+	}
+	snprintf(text, sizeof(text), "%.500s: %s", entry->fts_path,
+	         entry->fts_info == FTS_SL ? "a link within a link, which is not followed"
+	                                   : "a link to nowhere");
+	rebuild->wrong(rebuild->context, text);
+	return true;
+}
+
+static int take_entry(struct rebuild *rebuild, FTS *walk, FTSENT *entry)
+{
+	size_t front = strlen(rebuild->archive.folder) + 1;
+	char text[ARCHIVE_MESSAGE_MAX];
+
+	switch (entry->fts_info) {
+	case FTS_SL:
+	case FTS_SLNONE:
+		return follow(rebuild, walk, entry) ? 0 : DT_E_SYSTEM;
+	case FTS_D:
+		entry->fts_number |= entry->fts_parent->fts_number;
+		return 0;
+	case FTS_F:
+		if (ends_in(entry->fts_name, ".ini"))
+			return take(rebuild, entry->fts_path + front);
+		look_for_sidecar(rebuild, entry);
+		return 0;
+	case FTS_DNR:
+	case FTS_ERR:
+	case FTS_NS:
+		snprintf(text, sizeof(text), "%.500s: %s", entry->fts_path, strerror(entry->fts_errno));
+		rebuild->wrong(rebuild->context, text);
+		return 0;
+	default:
+		return 0;
+	}
+}
+
 static int take_all(struct rebuild *rebuild)
 {
 	char raw[ARCHIVE_PATH_MAX], *roots[] = {raw, NULL};
-	size_t front = strlen(rebuild->archive.folder) + 1;
 	FTS *walk;
 	FTSENT *entry;
 	int result = 0;
 
 	snprintf(raw, sizeof(raw), "%s/raw", rebuild->archive.folder);
-	walk = fts_open(roots, FTS_PHYSICAL | FTS_NOCHDIR, by_name);
+	walk = fts_open(roots, FTS_PHYSICAL | FTS_COMFOLLOW | FTS_NOCHDIR, by_name);
 	if (walk == NULL)
 		return archive_refuse(&rebuild->archive, DT_E_SYSTEM, "%.400s: %s", raw, strerror(errno));
-	while (result == 0 && (entry = fts_read(walk)) != NULL) {
-		if (entry->fts_info == FTS_F && ends_in(entry->fts_name, ".ini"))
-			result = take(rebuild, entry->fts_path + front);
-		else if (entry->fts_info == FTS_F)
-			look_for_sidecar(rebuild, entry);
-	}
+	while (result == 0 && (entry = fts_read(walk)) != NULL)
+		result = take_entry(rebuild, walk, entry);
 	fts_close(walk);
 	return result;
+}
+
+/* ---- no drop is lost on the way ---- */
+
+/* Sidecars of drops that the chain has and that were not taken away. */
+static int64_t drops_of_chain(const struct chain *chain)
+{
+	int64_t count = 0;
+
+	for (size_t i = 0; i < chain->count; i++) {
+		const struct chain_entry *entry = &chain->entry[i];
+
+		count += sidecar_is_of_drop(entry->path) && strcmp(entry->hash, CHAIN_REMOVED) != 0 &&
+		         entry == chain_find(chain, entry->path);
+	}
+	return count;
+}
+
+/* Drops of the index that is there; 0 when it cannot be believed. */
+static int64_t drops_of_index(const char *folder)
+{
+	char path[ARCHIVE_PATH_MAX];
+	sqlite3 *old = NULL;
+	sqlite3_stmt *s = NULL;
+	int64_t count = 0;
+	bool whole = false;
+
+	snprintf(path, sizeof(path), "%s/index.sqlite", folder);
+	if (sqlite3_open_v2(path, &old, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, NULL) == SQLITE_OK &&
+	    sqlite3_prepare_v2(old, "PRAGMA quick_check(1)", -1, &s, NULL) == SQLITE_OK)
+		whole = sqlite3_step(s) == SQLITE_ROW && strcmp(sql_text(s, 0), "ok") == 0;
+	sqlite3_finalize(s);
+	if (whole && sqlite3_prepare_v2(old, "SELECT COUNT(*) FROM drops", -1, &s, NULL) == SQLITE_OK) {
+		if (sqlite3_step(s) == SQLITE_ROW)
+			count = sqlite3_column_int64(s, 0);
+		sqlite3_finalize(s);
+	}
+	sqlite3_close(old);
+	return count;
+}
+
+static int hold_count(struct rebuild *rebuild)
+{
+	struct archive *archive = &rebuild->archive;
+	int64_t now = 0;
+	int result = sql_number(archive, &now, "SELECT COUNT(*) FROM drops", "");
+
+	if (result != 0 || now >= rebuild->before || rebuild->fewer)
+		return result;
+	return archive_refuse(archive, DT_E_STATE,
+	                      "%.300s: %lld drops in the raw files, expected the %lld known until now: is "
+	                      "'raw' mounted? --fewer makes the index of what is there",
+	                      archive->folder, (long long)now, (long long)rebuild->before);
 }
 
 static void path_of(const struct archive *archive, char path[ARCHIVE_PATH_MAX], const char *name,
@@ -174,15 +229,46 @@ static void remove_rebuilt(const struct archive *archive)
 	}
 }
 
+/* Within one transaction. */
+static int fill_index(struct rebuild *rebuild)
+{
+	struct archive *archive = &rebuild->archive;
+	const struct chain *chain = &rebuild->proof.chain;
+	int result = take_all(rebuild);
+
+	if (result == 0)
+		result = proof_of_all(&rebuild->proof, NULL, 0);
+	if (result == 0)
+		result = proof_of_rest(&rebuild->proof, false);
+	if (result == 0 && chain->broken != 0)
+		proof_fault(&rebuild->proof, PROOF_CHAIN, false, CHAIN_FILE ": broken at entry %lld",
+		            (long long)chain->broken);
+	if (result == 0 && chain->count > 0)
+		result = chain_note(archive, chain->entry[chain->count - 1].number,
+		                    chain->entry[chain->count - 1].head);
+	return result != 0 ? result : hold_count(rebuild);
+}
+
 static int fill(struct rebuild *rebuild)
 {
 	struct archive *archive = &rebuild->archive;
-	int result = index_open(archive, REBUILT, ARCHIVE_CREATE);
+	int result = proof_open(archive, &rebuild->proof);
+	int64_t of_index;
 
+	if (result != 0)
+		return result;
+	rebuild->proof.wrong = rebuild->wrong;
+	rebuild->proof.context = rebuild->context;
+	of_index = drops_of_index(archive->folder);
+	rebuild->before = drops_of_chain(&rebuild->proof.chain);
+	if (of_index > rebuild->before)
+		rebuild->before = of_index;
+	result = index_open(archive, REBUILT, ARCHIVE_CREATE);
 	if (result == 0)
 		result = archive_start(archive);
 	if (result == 0)
-		result = archive_end(archive, take_all(rebuild));
+		result = archive_end(archive, fill_index(rebuild));
+	proof_close(&rebuild->proof);
 	if (sqlite3_close(archive->index) != SQLITE_OK && result == 0) /* the log goes into the file */
 		result = archive_refuse(archive, DT_E_SYSTEM, "%.400s: the new index cannot be closed",
 		                        archive->folder);
@@ -216,10 +302,11 @@ static int rebuild_in(struct rebuild *rebuild)
 	return result;
 }
 
-int archive_rebuild(const char *folder, void (*wrong)(void *context, const char *text), void *context,
-                    char message[ARCHIVE_MESSAGE_MAX])
+int archive_rebuild(const char *folder, bool fewer, void (*wrong)(void *context, const char *text),
+                    void *context, char message[ARCHIVE_MESSAGE_MAX])
 {
-	struct rebuild rebuild = {.archive = {.lock = -1}, .wrong = wrong, .context = context};
+	struct rebuild rebuild = {
+	        .archive = {.lock = -1}, .fewer = fewer, .wrong = wrong, .context = context};
 	size_t length = strlen(folder);
 	int result;
 

@@ -14,8 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "host/archive/durable.h"
-#include "host/archive/private.h"
+#include "host/archive/proof.h"
 
 enum { SCENE_MAX_BYTES = 65536, NUMBER_MAX = 1000000 };
 
@@ -206,6 +205,24 @@ static int insert_drop(struct archive *archive, const char *operator_name, const
 	return result != 0 ? result : sidecar_write_drop(archive, r->drop);
 }
 
+/* The chain says that the sidecar goes. */
+static int enter_removal(struct archive *archive, const char *raw)
+{
+	char file[ARCHIVE_NAME_MAX + 64];
+	struct chain_place place;
+	int result = chain_next(archive, &place);
+
+	sidecar_name(raw, file);
+	return result != 0 ? result : chain_enter(archive, &place, file, 0, CHAIN_REMOVED);
+}
+
+static int remove_drop(struct archive *archive, const struct archive_recording *r)
+{
+	int result = sql_run(archive, "DELETE FROM drops WHERE id = ?", "i", r->drop);
+
+	return result != 0 ? result : enter_removal(archive, r->raw);
+}
+
 static void remove_files(const struct archive *archive, const char *raw)
 {
 	char path[ARCHIVE_PATH_MAX];
@@ -216,6 +233,18 @@ static void remove_files(const struct archive *archive, const char *raw)
 	unlink(path);
 }
 
+/* Files of a drop that did not come to be, as far as it goes; what went wrong before stays told. */
+static void take_back(struct archive *archive, const char *raw)
+{
+	char message[ARCHIVE_MESSAGE_MAX];
+
+	memcpy(message, archive->message, sizeof(message));
+	if (archive_start(archive) != 0 || archive_end(archive, enter_removal(archive, raw)) != 0)
+		archive->message[0] = '\0'; /* 'verify' names it as missing */
+	remove_files(archive, raw);
+	memcpy(archive->message, message, sizeof(message));
+}
+
 int archive_begin(struct archive *archive, const char *series, const char *operator_name, const char *ending,
                   bool simulated, struct archive_recording *recording)
 {
@@ -223,7 +252,7 @@ int archive_begin(struct archive *archive, const char *series, const char *opera
 	int result = archive_check_name(archive, "series", series);
 
 	if (result == 0)
-		result = archive_check_text(archive, "operator's name", operator_name);
+		result = archive_check_operator(archive, operator_name);
 	if (result != 0)
 		return result;
 	strcpy(r.series, series);
@@ -236,7 +265,7 @@ int archive_begin(struct archive *archive, const char *series, const char *opera
 		return 0;
 	}
 	if (r.lock >= 0) {
-		remove_files(archive, r.raw);
+		take_back(archive, r.raw);
 		archive_abandon(&r);
 	}
 	return result;
@@ -250,7 +279,7 @@ void archive_abandon(struct archive_recording *recording)
 
 void archive_discard(struct archive *archive, struct archive_recording *recording)
 {
-	if (sql_run(archive, "DELETE FROM drops WHERE id = ?", "i", recording->drop) == 0)
+	if (archive_start(archive) == 0 && archive_end(archive, remove_drop(archive, recording)) == 0)
 		remove_files(archive, recording->raw);
 	archive_abandon(recording);
 }
@@ -282,17 +311,6 @@ int archive_resume(struct archive *archive, const char *drop, struct archive_rec
 	                      place.recorded ? "recorded" : "being recorded");
 }
 
-static int add_event(struct archive *archive, int64_t drop, const char *what, const char *operator_name,
-                     const char *text)
-{
-	char now[ARCHIVE_TIME_CHARS];
-
-	archive_time(now, time(NULL));
-	return sql_run(archive,
-	               "INSERT INTO events (drop_id, time, what, operator, text) VALUES (?, ?, ?, ?, ?)",
-	               "issss", drop, now, what, operator_name, text);
-}
-
 static int acknowledge(struct archive *archive, const struct archive_recording *r, const char *when,
                        const char *note, const char *hash, int64_t bytes)
 {
@@ -307,13 +325,13 @@ static int acknowledge(struct archive *archive, const struct archive_recording *
 int archive_finish(struct archive *archive, struct archive_recording *recording, int64_t time_s,
                    const char *note)
 {
-	char hash[DURABLE_HASH_CHARS], when[ARCHIVE_TIME_CHARS];
+	char hash[DIGEST_CHARS], when[ARCHIVE_TIME_CHARS];
 	int64_t bytes;
 	int result = archive_check_text(archive, "note", note);
 
 	archive_time(when, time_s);
 	if (result == 0 &&
-	    (durable_sync(recording->log) != 0 || durable_hash(recording->log, hash, &bytes) != 0))
+	    (durable_sync(recording->log) != 0 || durable_hash(recording->log, hash, &bytes, -1) != 0))
 		result = refuse_file(archive, recording->log);
 	if (result == 0)
 		result = archive_start(archive);
@@ -326,15 +344,21 @@ int archive_finish(struct archive *archive, struct archive_recording *recording,
 
 /* ---- decisions, notes, calibrations ---- */
 
-static int start_change(struct archive *archive, const char *drop, const char *operator_name,
-                        const char *text, struct archive_place *place)
+/* What is asked for comes before the drop's files, which are read from end to end. */
+static int look_first(struct archive *archive, const char *drop, const char *operator_name, const char *text,
+                      char fault[ARCHIVE_MESSAGE_MAX])
 {
 	int result = archive_check_text(archive, "text", text);
 
 	if (result == 0)
-		result = archive_check_text(archive, "operator's name", operator_name);
-	if (result == 0)
-		result = archive_start(archive);
+		result = archive_check_operator(archive, operator_name);
+	return result == 0 ? proof_look(archive, drop, fault) : result;
+}
+
+static int start_change(struct archive *archive, const char *drop, struct archive_place *place)
+{
+	int result = archive_start(archive);
+
 	if (result != 0)
 		return result;
 	result = archive_locate(archive, drop, place);
@@ -352,51 +376,66 @@ int archive_decide(struct archive *archive, const char *drop, enum archive_decis
                    const char *operator_name, const char *text)
 {
 	static const char *const names[] = {"open", "accepted", "rejected"};
+	char fault[ARCHIVE_MESSAGE_MAX];
 	struct archive_place place;
 	int result;
 
 	if (decision != ARCHIVE_ACCEPTED && strspn(text, " ") == strlen(text))
 		return archive_refuse(archive, DT_E_ARGUMENT, "%s: expected a reason", drop);
-	result = start_change(archive, drop, operator_name, text, &place);
+	result = look_first(archive, drop, operator_name, text, fault);
+	if (result != 0)
+		return result;
+	if (fault[0] != '\0' && decision == ARCHIVE_ACCEPTED)
+		return archive_refuse(archive, DT_E_CORRUPT, "%s cannot be accepted: %.500s", drop, fault);
+	result = start_change(archive, drop, &place);
 	if (result != 0)
 		return result;
 	if (!place.recorded)
 		result = archive_refuse(archive, DT_E_STATE,
 		                        "%s was never completely recorded: it counts nowhere", drop);
 	if (result == 0)
+		result = proof_log(archive, place.drop, fault);
+	if (result == 0)
 		result = sql_run(archive, "UPDATE drops SET decision = ?, reason = ? WHERE id = ?", "ssi",
 		                 names[decision], text, place.drop);
 	if (result == 0)
-		result = add_event(archive, place.drop, names[decision], operator_name, text);
+		result = event_insert(archive, place.drop, names[decision], operator_name, text);
 	return end_change(archive, &place, result);
 }
 
 int archive_note(struct archive *archive, const char *drop, const char *operator_name, const char *text)
 {
+	char fault[ARCHIVE_MESSAGE_MAX];
 	struct archive_place place;
-	int result = start_change(archive, drop, operator_name, text, &place);
+	int result = look_first(archive, drop, operator_name, text, fault);
 
+	if (result == 0)
+		result = start_change(archive, drop, &place);
 	if (result != 0)
 		return result;
-	result = sql_run(archive, "UPDATE drops SET note = ? WHERE id = ?", "si", text, place.drop);
+	result = proof_log(archive, place.drop, fault);
 	if (result == 0)
-		result = add_event(archive, place.drop, "note", operator_name, text);
+		result = sql_run(archive, "UPDATE drops SET note = ? WHERE id = ?", "si", text, place.drop);
+	if (result == 0)
+		result = event_insert(archive, place.drop, "note", operator_name, text);
 	return end_change(archive, &place, result);
 }
 
 static int write_calibration(struct archive *archive, const char *sensor, double gain, const char *date,
                              const char *note)
 {
-	char path[ARCHIVE_PATH_MAX], text[ARCHIVE_TEXT_MAX + 400];
+	char file[ARCHIVE_NAME_MAX + 64], text[ARCHIVE_TEXT_MAX + 600];
+	struct chain_place place;
+	int result = chain_next(archive, &place);
 
-	snprintf(path, sizeof(path), "%s/raw/%.4s/calibration-%s-%s.ini", archive->folder, date, sensor,
-	         date);
+	if (result != 0)
+		return result;
+	snprintf(file, sizeof(file), "raw/%.4s/calibration-%s-%s.ini", date, sensor, date);
 	snprintf(text, sizeof(text),
-	         SIDECAR_SECTION "\nformat = 1\ncalibration = %s\ngain = %.17g\ndate = %s\nnote = %s\n",
-	         sensor, gain, date, note);
-	if (durable_folders(path) != 0 || durable_write(path, text, strlen(text)) != 0)
-		return refuse_file(archive, path);
-	return 0;
+	         SIDECAR_SECTION "\nformat = 1\ncalibration = %s\ngain = %.17g\ndate = %s\nnote = %s\n"
+	                         "entry = %lld\nprevious = %s\n",
+	         sensor, gain, date, note, (long long)place.number, place.head);
+	return sidecar_put(archive, file, text, strlen(text), &place);
 }
 
 int archive_calibrate(struct archive *archive, const char *sensor, double gain, const char *date,

@@ -10,8 +10,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "host/archive/durable.h"
-#include "host/archive/private.h"
+#include "host/archive/proof.h"
 
 const char *archive_value_name(enum archive_value value)
 {
@@ -220,27 +219,41 @@ int result_insert(struct archive *archive, int64_t drop, const char *when, const
 
 static int write_json(struct archive *archive, const char *raw, const char *version, const char *json)
 {
-	char path[ARCHIVE_PATH_MAX + ARCHIVE_NAME_MAX];
-	int stem = (int)(strrchr(raw, '.') - raw);
+	char path[ARCHIVE_PATH_MAX];
 
-	snprintf(path, sizeof(path), "%s/%.*s.%.60s.json", archive->folder, stem, raw, version);
+	sidecar_json_path(archive, raw, version, path);
 	if (durable_write(path, json, strlen(json)) == 0)
 		return 0;
 	return archive_refuse(archive, DT_E_SYSTEM, "%.500s: %s", path, strerror(errno));
 }
 
-int archive_result(struct archive *archive, const char *drop, const char *version, const char *json)
+int event_insert(struct archive *archive, int64_t drop, const char *what, const char *operator_name,
+                 const char *text)
 {
 	char now[ARCHIVE_TIME_CHARS];
-	struct archive_place place;
-	int result = archive_start(archive);
 
+	archive_time(now, time(NULL));
+	return sql_run(archive,
+	               "INSERT INTO events (drop_id, time, what, operator, text) VALUES (?, ?, ?, ?, ?)",
+	               "issss", drop, now, what, operator_name, text);
+}
+
+int archive_result(struct archive *archive, const char *drop, const char *version, const char *json)
+{
+	char now[ARCHIVE_TIME_CHARS], fault[ARCHIVE_MESSAGE_MAX];
+	struct archive_place place;
+	int result = proof_look(archive, drop, fault);
+
+	if (result == 0)
+		result = archive_start(archive);
 	if (result != 0)
 		return result;
 	archive_time(now, time(NULL));
 	result = archive_locate(archive, drop, &place);
 	if (result == 0)
 		result = result_insert(archive, place.drop, now, version, json);
+	if (result == 0)
+		result = proof_log(archive, place.drop, fault);
 	if (result == 0)
 		result = write_json(archive, place.raw, version, json);
 	if (result == 0)

@@ -54,7 +54,24 @@ static const char second[] =
 static const char third[] = "ALTER TABLE drops ADD COLUMN simulated INTEGER NOT NULL DEFAULT 0"
                             " CHECK (simulated IN (0, 1));";
 
-static const char *const steps[] = {first, second, third};
+/* Captures by what tells them apart: found again from the logs, so that no sidecar has them. */
+static const char fourth[] =
+        "CREATE TABLE captures (drop_id INTEGER PRIMARY KEY REFERENCES drops(id) ON DELETE CASCADE,"
+        " key TEXT NOT NULL);"
+        "CREATE INDEX captures_by_key ON captures(key);";
+
+/* Whether its files are what was recorded; the entry of its sidecar in the chain, 0: none. */
+static const char fifth[] =
+        "ALTER TABLE drops ADD COLUMN entry INTEGER NOT NULL DEFAULT 0;"
+        "ALTER TABLE drops ADD COLUMN proof TEXT NOT NULL DEFAULT ''"
+        " CHECK (proof IN ('', 'altered', 'missing'));"
+        "ALTER TABLE drops ADD COLUMN fault TEXT NOT NULL DEFAULT '';"
+        "UPDATE drops SET proof = 'missing', fault = raw || ': missing', state = 'recorded'"
+        " WHERE state = 'missing' AND length(sha256) = 64;"
+        "CREATE TABLE chain (id INTEGER PRIMARY KEY CHECK (id = 1), entries INTEGER NOT NULL,"
+        " head TEXT NOT NULL);";
+
+static const char *const steps[] = {first, second, third, fourth, fifth};
 enum { STEPS = sizeof(steps) / sizeof(steps[0]) };
 
 static int version_of(struct archive *archive, int64_t *version)

@@ -1,18 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Sidecars written from the index. sidecar_read.c reads them.
+ */
 #include <errno.h>
-#include <math.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include "host/archive/durable.h"
-#include "host/archive/private.h"
-
-#define MARK "\n; ---- what the archive knows of it ----\n" SIDECAR_SECTION "\n"
-
-/* ---- writing ---- */
+#include "host/archive/chain.h"
+#include "host/archive/sidecar.h"
+#include "host/record/text.h"
 
 #define SERIES_COLUMNS "s.scene, s.name, c.name, s.angle_deg, s.height_m, s.planned, s.created"
 #define SERIES_TABLES " FROM series s JOIN campaigns c ON c.id = s.campaign_id "
@@ -20,8 +16,8 @@ enum { SERIES_COLUMN_COUNT = 7 };
 
 static void put_series(FILE *out, sqlite3_stmt *s)
 {
-	fprintf(out, "%s" MARK "format = 1\nseries = %s\ncampaign = %s\n", sql_text(s, 0), sql_text(s, 1),
-	        sql_text(s, 2));
+	fprintf(out, "%s" SIDECAR_MARK "format = 1\nseries = %s\ncampaign = %s\n", sql_text(s, 0),
+	        sql_text(s, 1), sql_text(s, 2));
 	fprintf(out, "angle_deg = %.15g\nheight_m = %.15g\nplanned = %d\ncreated = %s\n",
 	        sqlite3_column_double(s, 3), sqlite3_column_double(s, 4), sqlite3_column_int(s, 5),
 	        sql_text(s, 6));
@@ -52,12 +48,34 @@ static int put_rows(struct archive *archive, FILE *out, const char *key, const c
 	return result;
 }
 
+/* "result = TIME<tab>VERSION<tab>BYTES<tab>SHA-256" for each; the hash is of what the index has, which is
+ * what the file beside the log should be. */
+static int put_results(struct archive *archive, FILE *out, int64_t drop)
+{
+	char hash[DIGEST_CHARS];
+	sqlite3_stmt *s;
+	int result = sql_query(
+	        archive, &s,
+	        "SELECT r.time, v.name, t.json FROM results r JOIN versions v ON v.id = r.version_id"
+	        " JOIN texts t ON t.result_id = r.id WHERE r.drop_id = ? ORDER BY r.id",
+	        "i", drop);
+
+	if (result != 0)
+		return result;
+	while ((result = sql_step(archive, s)) > 0) {
+		const char *json = sql_text(s, 2);
+
+		digest_of(json, strlen(json), hash);
+		fprintf(out, "result = %s\t%s\t%zu\t%s\n", sql_text(s, 0), sql_text(s, 1), strlen(json),
+		        hash);
+	}
+	sqlite3_finalize(s);
+	return result;
+}
+
 static int put_history(struct archive *archive, FILE *out, int64_t drop)
 {
-	int result = put_rows(archive, out, "result = ",
-	                      "SELECT r.time, v.name FROM results r JOIN versions v ON v.id = r.version_id"
-	                      " WHERE r.drop_id = ? ORDER BY r.id",
-	                      drop);
+	int result = put_results(archive, out, drop);
 
 	return result != 0 ? result
 	                   : put_rows(archive, out, "event = ",
@@ -66,28 +84,64 @@ static int put_history(struct archive *archive, FILE *out, int64_t drop)
 	                              drop);
 }
 
+static int refuse_file(struct archive *archive, const char *path)
+{
+	return archive_refuse(archive, DT_E_SYSTEM, "%.500s: %s", path, strerror(errno));
+}
+
+/* On the disk beside its place, then in the chain, then in its place: whatever moment the power fails, the
+ * chain's last entry of a path is the hash of the file or of what stands beside it. */
+int sidecar_put(struct archive *archive, const char *file, const char *text, size_t size,
+                const struct chain_place *place)
+{
+	char path[ARCHIVE_PATH_MAX], hash[DIGEST_CHARS];
+	int result;
+
+	snprintf(path, sizeof(path), "%s/%.200s", archive->folder, file);
+	if (durable_folders(path) != 0 || durable_stage(path, text, size) != 0)
+		return refuse_file(archive, path);
+	digest_of(text, size, hash);
+	result = chain_enter(archive, place, file, (int64_t)size, hash);
+	if (result == 0 && durable_publish(path) != 0)
+		result = refuse_file(archive, path);
+	return result;
+}
+
+void sidecar_name(const char *raw, char file[ARCHIVE_NAME_MAX + 64])
+{
+	const char *dot = strrchr(raw, '.');
+
+	snprintf(file, ARCHIVE_NAME_MAX + 64, "%.*s.ini", dot != NULL ? (int)(dot - raw) : (int)strlen(raw),
+	         raw);
+}
+
 /* The row is there; writes what to says, "raw/..." with any ending. */
 static int write_out(struct archive *archive, sqlite3_stmt *s, const char *to, int64_t drop)
 {
-	char path[ARCHIVE_PATH_MAX], *text = NULL;
-	size_t size = 0;
-	FILE *out = open_memstream(&text, &size);
-	int result = 0;
+	char file[ARCHIVE_NAME_MAX + 64];
+	struct chain_place place;
+	struct text text;
+	int result = chain_next(archive, &place);
 
-	if (out == NULL)
+	if (result != 0)
+		return result;
+	if (text_open(&text) != 0)
 		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
-	put_series(out, s);
+	put_series(text.out, s);
 	if (drop != 0) {
-		put_drop(out, s);
-		result = put_history(archive, out, drop);
+		put_drop(text.out, s);
+		result = put_history(archive, text.out, drop);
 	}
-	if (fclose(out) != 0 && result == 0)
-		result = archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
-	snprintf(path, sizeof(path), "%s/%s", archive->folder, to);
-	strcpy(strrchr(path, '.'), ".ini");
-	if (result == 0 && (durable_folders(path) != 0 || durable_write(path, text, size) != 0))
-		result = archive_refuse(archive, DT_E_SYSTEM, "%.500s: %s", path, strerror(errno));
-	free(text);
+	fprintf(text.out, "entry = %lld\nprevious = %s\n", (long long)place.number, place.head);
+	if (text_close(&text, result) != 0)
+		return result != 0 ? result
+		                   : archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+	sidecar_name(to, file);
+	result = sidecar_put(archive, file, text.bytes, text.size, &place);
+	free(text.bytes);
+	if (result == 0 && drop != 0)
+		result =
+		        sql_run(archive, "UPDATE drops SET entry = ? WHERE id = ?", "ii", place.number, drop);
 	return result;
 }
 
@@ -127,214 +181,5 @@ int sidecar_write_series(struct archive *archive, int64_t series)
 		result = write_out(archive, s, to, 0);
 	}
 	sqlite3_finalize(s);
-	return result;
-}
-
-/* ---- reading ---- */
-
-struct sidecar {
-	const char *file, *scene;
-	char *line, *end; /* lines of the archive's section, each with a NUL behind */
-};
-
-/* The value of the first line from *at on that has this key, "" when there is none; *at moves behind it. */
-static const char *next_value(const struct sidecar *sidecar, const char *key, const char **at)
-{
-	size_t length = strlen(key);
-
-	while (*at < sidecar->end) {
-		const char *line = *at;
-
-		*at += strlen(line) + 1;
-		if (strncmp(line, key, length) == 0 && strncmp(line + length, " =", 2) == 0)
-			return line + length + 2 + (line[length + 2] == ' ');
-	}
-	return "";
-}
-
-static const char *value(const struct sidecar *sidecar, const char *key)
-{
-	const char *at = sidecar->line;
-
-	return next_value(sidecar, key, &at);
-}
-
-static double number(const struct sidecar *sidecar, const char *key)
-{
-	const char *text = value(sidecar, key);
-	char *end;
-	double read = strtod(text, &end);
-
-	return end == text || *end != '\0' ? (double)NAN : read;
-}
-
-/* Splits text in place. */
-static int split(struct archive *archive, struct sidecar *sidecar, char *text)
-{
-	char *mark = strstr(text, MARK), *section = strstr(text, SIDECAR_SECTION);
-
-	if (section == NULL)
-		return archive_refuse(archive, DT_E_FORMAT, "%.400s: no section " SIDECAR_SECTION,
-		                      sidecar->file);
-	sidecar->scene = "";
-	if (mark != NULL) {
-		*mark = '\0';
-		sidecar->scene = text;
-	}
-	sidecar->line = section + strlen(SIDECAR_SECTION);
-	sidecar->end = sidecar->line + strlen(sidecar->line);
-	for (char *c = sidecar->line; c < sidecar->end; c++)
-		if (*c == '\n')
-			*c = '\0';
-	if (number(sidecar, "format") == 1)
-		return 0;
-	return archive_refuse(archive, DT_E_FORMAT, "%.400s: format = %.20s, expected 1", sidecar->file,
-	                      value(sidecar, "format"));
-}
-
-/* The series' row, made when this is the first that tells of it. */
-static int take_series(struct archive *archive, const struct sidecar *sidecar, int64_t *series)
-{
-	const char *name = value(sidecar, "series"), *campaign = value(sidecar, "campaign");
-	struct scene scene;
-	int result = archive_check_names(archive, name, campaign);
-
-	if (result != 0)
-		return result;
-	result = sql_number(archive, series, "SELECT id FROM series WHERE name = ?", "s", name);
-	if (result != DT_E_EMPTY)
-		return result;
-	result = scene_of_text(archive, name, sidecar->scene, number(sidecar, "angle_deg"), &scene);
-	if (result == 0)
-		result = series_insert(archive, name, campaign, sidecar->scene, &scene,
-		                       strtol(value(sidecar, "planned"), NULL, 10), value(sidecar, "created"),
-		                       series);
-	return result;
-}
-
-static int take_events(struct archive *archive, const struct sidecar *sidecar, int64_t drop)
-{
-	const char *at = sidecar->line, *text;
-	int result = 0;
-
-	while (result == 0 && *(text = next_value(sidecar, "event", &at)) != '\0') {
-		char *copy = strdup(text), *rest = copy;
-		const char *part[4] = {"", "", "", ""};
-
-		for (int i = 0; i < 4 && rest != NULL; i++)
-			part[i] = i < 3 ? strsep(&rest, "\t") : rest;
-		result = sql_run(archive,
-		                 "INSERT INTO events (drop_id, time, what, operator, text)"
-		                 " VALUES (?, ?, ?, ?, ?)",
-		                 "issss", drop, part[0], part[1], part[2], part[3]);
-		free(copy);
-	}
-	return result;
-}
-
-/* FOLDER/raw/.../NNNN.VERSION.json */
-static int take_result(struct archive *archive, const struct sidecar *sidecar, int64_t drop, const char *when,
-                       const char *version)
-{
-	char path[ARCHIVE_PATH_MAX + ARCHIVE_NAME_MAX], *json;
-	int stem = (int)(strrchr(sidecar->file, '.') - sidecar->file), result;
-
-	snprintf(path, sizeof(path), "%s/%.*s.%.60s.json", archive->folder, stem, sidecar->file, version);
-	json = durable_read(path, NULL);
-	if (json == NULL)
-		return archive_refuse(archive, DT_E_SYSTEM, "%.500s: %s", path, strerror(errno));
-	result = result_insert(archive, drop, when, version, json);
-	free(json);
-	return result;
-}
-
-/* 1 when one of them could not be used. */
-static int take_results(struct archive *archive, const struct sidecar *sidecar, int64_t drop)
-{
-	const char *at = sidecar->line, *text;
-	bool lost = false;
-	int result = 0;
-
-	while (result == 0 && *(text = next_value(sidecar, "result", &at)) != '\0') {
-		const char *tab = strchr(text, '\t');
-		char when[ARCHIVE_TIME_CHARS] = "";
-
-		if (tab != NULL)
-			snprintf(when, sizeof(when), "%.*s", (int)(tab - text), text);
-		result = take_result(archive, sidecar, drop, when, tab != NULL ? tab + 1 : text);
-		if (result == DT_E_SYSTEM || result == DT_E_FORMAT) {
-			lost = true;
-			result = 0;
-		}
-	}
-	return result != 0 ? result : lost;
-}
-
-static bool log_is_there(const struct archive *archive, const char *raw)
-{
-	char path[ARCHIVE_PATH_MAX];
-
-	snprintf(path, sizeof(path), "%s/%.100s", archive->folder, raw);
-	return access(path, F_OK) == 0;
-}
-
-/* Its columns are checked by the table itself. */
-static int take_drop(struct archive *archive, const struct sidecar *sidecar, int64_t *drop)
-{
-	const char *state = value(sidecar, "state"), *raw = value(sidecar, "raw");
-	bool recorded = strcmp(state, "recorded") == 0;
-	int64_t series;
-	int result = take_series(archive, sidecar, &series);
-
-	if (result != 0)
-		return result;
-	if (strncmp(raw, sidecar->file, (size_t)(strrchr(sidecar->file, '.') - sidecar->file)) != 0)
-		return archive_refuse(archive, DT_E_FORMAT,
-		                      "%.300s: raw = %.100s, expected the log beside it", sidecar->file, raw);
-	if (recorded && !log_is_there(archive, raw))
-		state = "missing";
-	result = sql_run(archive,
-	                 "INSERT INTO drops (series_id, number, state, decision, reason, operator, note, raw,"
-	                 " bytes, sha256, time, simulated) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-	                 "iissssssissi", series, (int64_t)strtol(value(sidecar, "drop"), NULL, 10), state,
-	                 value(sidecar, "decision"), value(sidecar, "reason"), value(sidecar, "operator"),
-	                 value(sidecar, "note"), raw, (int64_t)strtoll(value(sidecar, "bytes"), NULL, 10),
-	                 value(sidecar, "sha256"), value(sidecar, "time"),
-	                 (int64_t)(strcmp(value(sidecar, "simulated"), "1") == 0));
-	*drop = sqlite3_last_insert_rowid(archive->index);
-	return result != 0 ? result : take_events(archive, sidecar, *drop);
-}
-
-static int take(struct archive *archive, const struct sidecar *sidecar)
-{
-	int64_t row;
-	int result;
-
-	if (value(sidecar, "calibration")[0] != '\0')
-		return sql_run(archive,
-		               "INSERT OR REPLACE INTO calibrations (sensor, gain, date, note)"
-		               " VALUES (?, ?, ?, ?)",
-		               "sdss", value(sidecar, "calibration"), number(sidecar, "gain"),
-		               value(sidecar, "date"), value(sidecar, "note"));
-	if (value(sidecar, "drop")[0] == '\0')
-		return take_series(archive, sidecar, &row);
-	result = take_drop(archive, sidecar, &row);
-	return result != 0 ? result : take_results(archive, sidecar, row);
-}
-
-int sidecar_read(struct archive *archive, const char *file)
-{
-	struct sidecar sidecar = {.file = file};
-	char path[ARCHIVE_PATH_MAX], *text;
-	int result;
-
-	snprintf(path, sizeof(path), "%s/%.200s", archive->folder, file);
-	text = durable_read(path, NULL);
-	if (text == NULL)
-		return archive_refuse(archive, DT_E_SYSTEM, "%.500s: %s", path, strerror(errno));
-	result = split(archive, &sidecar, text);
-	if (result == 0)
-		result = take(archive, &sidecar);
-	free(text);
 	return result;
 }

@@ -23,7 +23,7 @@ static void mean_add(struct archive_mean *m, double value, bool not_ok)
 
 void archive_cell_add(struct archive_cell *cell, const struct archive_drop *drop)
 {
-	if (cell->drops++ == 0) {
+	if (cell->campaign[0] == '\0') {
 		snprintf(cell->campaign, sizeof(cell->campaign), "%s", drop->series.campaign);
 		snprintf(cell->scene_name, sizeof(cell->scene_name), "%s", drop->series.scene_name);
 		cell->angle_deg = drop->series.angle_deg;
@@ -32,12 +32,24 @@ void archive_cell_add(struct archive_cell *cell, const struct archive_drop *drop
 		for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
 			cell->value[i].mean = cell->value[i].sd = NAN;
 	}
+	if (archive_is_faulty(drop)) {
+		cell->faulty++;
+		return;
+	}
+	cell->drops++;
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
 		mean_add(&cell->value[i], drop->value[i], (drop->not_ok >> i & 1u) != 0);
 }
 
+bool archive_is_faulty(const struct archive_drop *drop)
+{
+	return strcmp(drop->state, "altered") == 0 || strcmp(drop->state, "missing") == 0;
+}
+
 bool archive_counts(const struct archive_drop *drop, bool undecided)
 {
+	if (archive_is_faulty(drop))
+		return false;
 	return strcmp(drop->decision, "accepted") == 0 ||
 	       (undecided && strcmp(drop->decision, "open") == 0 && drop->sha256[0] != '\0');
 }
@@ -65,7 +77,8 @@ static int add_drop(void *context, const struct archive_drop *drop)
 	struct growing *g = context;
 	struct archive_table *t = &g->table;
 
-	if (!archive_counts(drop, g->undecided))
+	if (!archive_counts(drop, g->undecided) &&
+	    !(archive_is_faulty(drop) && strcmp(drop->decision, "accepted") == 0))
 		return 0;
 	if (t->count == 0 || !belongs(&t->cell[t->count - 1], &drop->series)) {
 		if (t->count == g->room) {

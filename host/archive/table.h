@@ -19,6 +19,7 @@ struct archive_cell {
 	char scene_name[64];
 	double angle_deg, height_m, plate_mass_kg;
 	unsigned drops;
+	unsigned faulty; /* accepted, and left out since their files are altered or missing */
 	struct archive_mean value[ARCHIVE_VALUE_COUNT];
 };
 
@@ -27,10 +28,11 @@ struct archive_table {
 	size_t count;
 };
 
-/* Adds a drop; a cell is begun zeroed. (Welford 1962) */
+/* Adds a drop, or notes that it is faulty; a cell is begun zeroed. (Welford 1962) */
 void archive_cell_add(struct archive_cell *cell, const struct archive_drop *drop);
 
-/* Whether a drop counts: accepted, or with undecided, also recorded and not yet decided. */
+/* Whether a drop counts: accepted, or with undecided, also recorded and not yet decided; and its files are
+ * what was recorded. */
 bool archive_counts(const struct archive_drop *drop, bool undecided);
 
 /* Of the drops that pass and count. To be freed by archive_table_free after 0. */

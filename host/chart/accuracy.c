@@ -30,19 +30,18 @@ struct panel {
 
 static int write_csv(const struct chart_options *options, const struct panel *p, char *message)
 {
-	struct file_text text;
+	struct text text;
 	int status = file_begin(&text, message);
 
 	if (status)
 		return status;
-	fprintf(text.stream, "# %s, SI units; seed %lu\n", quantity_text(p->quantity)->title, options->seed);
-	fputs("method,of,family_told,noise_g,drops,values,gross,bias,rmse,bound,ratio,cost_us\n",
-	      text.stream);
+	fprintf(text.out, "# %s, SI units; seed %lu\n", quantity_text(p->quantity)->title, options->seed);
+	fputs("method,of,family_told,noise_g,drops,values,gross,bias,rmse,bound,ratio,cost_us\n", text.out);
 	for (size_t m = 0; m < p->methods; m++)
 		for (size_t i = 0; i < NOISES && p->method[m].quantity == p->quantity; i++) {
 			const struct campaign_tally *t = &p->campaign->cells[i].tally[m];
 
-			fprintf(text.stream, "\"%s\",%s,%d,%g,%u,%u,%u,%.9g,%.9g,%.9g,%.6g,%.4g\n",
+			fprintf(text.out, "\"%s\",%s,%d,%g,%u,%u,%u,%.9g,%.9g,%.9g,%.6g,%.4g\n",
 			        p->method[m].name, p->method[m].ours ? "droptower" : "others",
 			        p->method[m].told, noises[i], p->campaign->drops, t->values, t->gross,
 			        campaign_bias(t), campaign_rms(t), t->bound, campaign_ratio(t), t->cost_us);
@@ -202,9 +201,9 @@ static void draw_legend(FILE *out, const struct panel *p)
 static int draw(const struct chart_options *options, struct panel *p, char *message)
 {
 	const struct quantity_text *text = quantity_text(p->quantity);
-	struct file_text script;
+	struct text script;
 	int status = file_begin(&script, message);
-	FILE *out = script.stream;
+	FILE *out = script.out;
 
 	if (status)
 		return status;

@@ -8,7 +8,7 @@
 #include <gsl/gsl_linalg.h>
 #include <gsl/gsl_math.h>
 
-#define G_M_S2 9.81
+#include "common/units.h"
 
 /* A signal's parameters, in the order of struct synthetic_axis from peak_g on. */
 enum { PEAK, ONSET, CONTACT, GAIN, DELAY, HZ, DAMPING, SECOND_GAIN, SECOND_DELAY, SECOND_HZ, SECOND_DAMPING };
@@ -180,7 +180,7 @@ static double lag_of_x(const struct synthetic_signal signal[2])
 static int add_pulses(struct synthetic *synthetic, struct bound *sum)
 {
 	double summit = synthetic_pulse_summit(synthetic->scene.family);
-	double area = synthetic_pulse_area(synthetic->scene.family) * G_M_S2;
+	double area = synthetic_pulse_area(synthetic->scene.family) * UNITS_G_M_S2;
 
 	for (int axis = 0; axis < 2; axis++) {
 		const struct synthetic_axis *a = &synthetic->signal[axis].axis;

@@ -1,63 +1,39 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/chart/file.h"
 
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
+#include "host/record/whole.h"
 #include "host/report/picture.h"
 
 enum { PATH = 4096 };
 
-int file_begin(struct file_text *text, char *message)
+int file_begin(struct text *text, char *message)
 {
-	*text = (struct file_text){0};
-	text->stream = open_memstream(&text->bytes, &text->length);
-	if (text->stream)
-		return 0;
-	snprintf(message, CHART_MESSAGE_MAX, "%s", error_text(DT_E_MEMORY));
-	return DT_E_MEMORY;
+	int result = text_open(text);
+
+	if (result != 0)
+		snprintf(message, CHART_MESSAGE_MAX, "%s", error_text(result));
+	return result;
 }
 
-void file_drop(struct file_text *text)
+void file_drop(struct text *text)
 {
-	if (text->stream)
-		fclose(text->stream);
+	if (text->out && text_close(text, 0) != 0)
+		return;
 	free(text->bytes);
-	*text = (struct file_text){0};
+	*text = (struct text){0};
 }
 
-/* What was written so far is in bytes, length. */
-static int finish(struct file_text *text, char *message)
+/* What was written so far is in bytes, size. */
+static int finish(struct text *text, char *message)
 {
-	int failed = fclose(text->stream);
+	int result = text_close(text, 0);
 
-	text->stream = NULL;
-	if (!failed)
-		return 0;
-	snprintf(message, CHART_MESSAGE_MAX, "%s", error_text(DT_E_MEMORY));
-	return DT_E_MEMORY;
-}
-
-static int put(const char *bytes, size_t length, const char *path)
-{
-	char beside[PATH + 8];
-	FILE *file;
-	int failed;
-
-	snprintf(beside, sizeof(beside), "%s.part", path);
-	file = fopen(beside, "w");
-	if (!file)
-		return -1;
-	failed = fwrite(bytes, 1, length, file) != length;
-	failed |= fclose(file) != 0;
-	if (!failed && rename(beside, path) == 0)
-		return 0;
-	failed = errno;
-	unlink(beside);
-	errno = failed;
-	return -1;
+	if (result != 0)
+		snprintf(message, CHART_MESSAGE_MAX, "%s", error_text(result));
+	return result;
 }
 
 static int put_named(const char *bytes, size_t length, const char *folder, const char *kind, const char *name,
@@ -65,30 +41,27 @@ static int put_named(const char *bytes, size_t length, const char *folder, const
 {
 	char path[PATH];
 
-	if ((size_t)snprintf(path, sizeof(path), "%s/%s-%s.%s", folder, kind, name, extension) >=
-	    sizeof(path))
-		errno = ENAMETOOLONG;
-	else if (put(bytes, length, path) == 0)
-		return 0;
-	snprintf(message, CHART_MESSAGE_MAX, "%.300s: %s", path, strerror(errno));
+	if ((size_t)snprintf(path, sizeof(path), "%s/%s-%s.%s", folder, kind, name, extension) < sizeof(path))
+		return whole_write(path, bytes, length, message, CHART_MESSAGE_MAX);
+	snprintf(message, CHART_MESSAGE_MAX, "%.300s: the name is too long", folder);
 	return DT_E_SYSTEM;
 }
 
-int file_write(struct file_text *text, const char *folder, const char *kind, const char *name,
+int file_write(struct text *text, const char *folder, const char *kind, const char *name,
                const char *extension, char *message)
 {
 	int status = finish(text, message);
 
-	return status ? status : put_named(text->bytes, text->length, folder, kind, name, extension, message);
+	return status ? status : put_named(text->bytes, text->size, folder, kind, name, extension, message);
 }
 
-int file_draw(struct file_text *script, const char *folder, const char *kind, const char *name, char *message)
+int file_draw(struct text *script, const char *folder, const char *kind, const char *name, char *message)
 {
 	char *svg = NULL;
 	int status = finish(script, message);
 
 	if (!status)
-		status = picture_draw(script->bytes, script->length, &svg, message, CHART_MESSAGE_MAX);
+		status = picture_draw(script->bytes, script->size, &svg, message, CHART_MESSAGE_MAX);
 	if (!status)
 		status = put_named(svg, strlen(svg), folder, kind, name, "svg", message);
 	free(svg);

@@ -5,21 +5,16 @@
  * The files of a chart. A file is whole or not there: text is made in memory, written beside, renamed.
  */
 #include "host/chart/chart.h"
+#include "host/record/text.h"
 
-/* Text made by fprintf to *stream; free with file_drop. */
-struct file_text {
-	FILE *stream;
-	char *bytes;
-	size_t length;
-};
-
-DT_MUST_USE int file_begin(struct file_text *text, char *message);
-void file_drop(struct file_text *text);
+/* A text is freed with file_drop. */
+DT_MUST_USE int file_begin(struct text *text, char *message);
+void file_drop(struct text *text);
 
 /* folder/kind-name.extension. The first takes the text as it is, the second has gnuplot draw it. */
-DT_MUST_USE int file_write(struct file_text *text, const char *folder, const char *kind, const char *name,
+DT_MUST_USE int file_write(struct text *text, const char *folder, const char *kind, const char *name,
                            const char *extension, char *message);
-DT_MUST_USE int file_draw(struct file_text *script, const char *folder, const char *kind, const char *name,
+DT_MUST_USE int file_draw(struct text *script, const char *folder, const char *kind, const char *name,
                           char *message);
 
 #endif

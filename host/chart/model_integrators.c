@@ -147,7 +147,7 @@ static double error_of(const struct run *run)
 static int problem_of(bool planar, struct problem *p)
 {
 	const struct scene s = study_scene(STUDY_2A, 25);
-	double speed = sqrt(2 * UNITS_G_M_S2 * s.drop_height_m), lever_y = s.product_width_m / 2;
+	double speed = sqrt(2 * s.drop_gravity_m_s2 * s.drop_height_m), lever_y = s.product_width_m / 2;
 	double lever_x = lever_y / tan(UNITS_RAD(s.product_balance_angle_deg));
 	double mount_c = 2 * s.mount_damping_ratio * sqrt(s.mount_stiffness_n_m * s.mount_plate_mass_kg);
 	double inertia = s.product_case_mass_kg *
@@ -164,6 +164,7 @@ static int problem_of(bool planar, struct problem *p)
 	                            s.product_case_mass_kg,
 	                            s.mount_plate_mass_kg,
 	                            inertia,
+	                            s.drop_gravity_m_s2,
 	                            speed,
 	                            UNITS_RAD(s.drop_angle_deg),
 	                            lever_x,
@@ -174,6 +175,7 @@ static int problem_of(bool planar, struct problem *p)
 	                            mount_c};
 	p->coupled = (struct coupled){.case_mass_kg = s.product_case_mass_kg,
 	                              .plate_mass_kg = s.mount_plate_mass_kg,
+	                              .gravity_m_s2 = s.drop_gravity_m_s2,
 	                              .speed_m_s = speed,
 	                              .stiffness_n_m15 = k,
 	                              .law = law,
@@ -184,6 +186,7 @@ static int problem_of(bool planar, struct problem *p)
 	                            .plate_mass_kg = s.mount_plate_mass_kg,
 	                            .inertia_kg_m2 = inertia,
 	                            .angle_rad = UNITS_RAD(s.drop_angle_deg),
+	                            .gravity_m_s2 = s.drop_gravity_m_s2,
 	                            .speed_m_s = speed,
 	                            .lever_x_m = lever_x,
 	                            .lever_y_m = lever_y,

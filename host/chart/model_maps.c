@@ -100,7 +100,8 @@ struct maps_corners maps_corners(double angle_deg)
 	struct motion m = {.planar = true,
 	                   .box_kg = s.product_case_mass_kg,
 	                   .inertia_kg_m2 = s.product_case_mass_kg * (length * length + width * width) / 12,
-	                   .speed_m_s = sqrt(2 * UNITS_G_M_S2 * s.drop_height_m),
+	                   .gravity_m_s2 = s.drop_gravity_m_s2,
+	                   .speed_m_s = sqrt(2 * s.drop_gravity_m_s2 * s.drop_height_m),
 	                   .angle_rad = UNITS_RAD(angle_deg),
 	                   .lever_x_m = length / 2,
 	                   .lever_y_m = width / 2};

@@ -5,7 +5,6 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>
 
-#include "common/units.h"
 #include "host/chart/model_numerics.h"
 
 enum { HEIGHT, RISE, PLATE_HEIGHT, PLATE_RISE, COUPLED_STATES };
@@ -79,8 +78,8 @@ static double over_plate(const struct motion *m, double force)
 void motion_rates(const struct motion *m, const double y[], double rate[])
 {
 	const struct forces f = forces_of(m, y);
-	double up = (f.normal + f.mount_up) / m->box_kg - UNITS_G_M_S2;
-	double plate_up = over_plate(m, f.mount_up) - UNITS_G_M_S2;
+	double up = (f.normal + f.mount_up) / m->box_kg - m->gravity_m_s2;
+	double plate_up = over_plate(m, f.mount_up) - m->gravity_m_s2;
 
 	if (!m->planar) {
 		rate[HEIGHT] = y[RISE];

@@ -43,7 +43,7 @@ enum { MOTION_STATES_MAX = 10 };
 struct motion {
 	bool planar;
 	double box_kg, plate_kg, inertia_kg_m2; /* plate_kg 0: no plate, its states stay as they are */
-	double speed_m_s, angle_rad, lever_x_m, lever_y_m;
+	double gravity_m_s2, speed_m_s, angle_rad, lever_x_m, lever_y_m;
 	double stiffness_n_m15, damping; /* k and D of the contact */
 	double mount_n_m, mount_damping_n_s_m;
 };

@@ -78,18 +78,18 @@ static void table_of_series(FILE *out, const struct plot_panel *p)
 
 static int write_table(const struct plot *plot, const char *folder, const char *kind, char *message)
 {
-	struct file_text text;
+	struct text text;
 	int status = file_begin(&text, message);
 
 	if (status)
 		return status;
-	fprintf(text.stream, "# %s%s%s\n", plot->title, plot->value ? "; value: " : "",
+	fprintf(text.out, "# %s%s%s\n", plot->title, plot->value ? "; value: " : "",
 	        plot->value ? plot->value : "");
-	fputs("panel,series,x_is,x,y_is,y,value,fails\n", text.stream);
+	fputs("panel,series,x_is,x,y_is,y,value,fails\n", text.out);
 	for (size_t i = 0; i < plot->panels; i++) {
 		if (plot->panel[i].cell)
-			table_of_map(text.stream, &plot->panel[i]);
-		table_of_series(text.stream, &plot->panel[i]);
+			table_of_map(text.out, &plot->panel[i]);
+		table_of_series(text.out, &plot->panel[i]);
 	}
 	status = file_write(&text, folder, kind, plot->name, "csv", message);
 	file_drop(&text);
@@ -328,14 +328,14 @@ static void draw_heads(FILE *out, const struct plot *plot, double height)
 int plot_write(const struct plot *plot, const char *folder, const char *kind, char *message)
 {
 	double height = TOP + PLOT + BOTTOM + (plot->value ? LEGEND : 0);
-	struct file_text script;
+	struct text script;
 	int status = write_table(plot, folder, kind, message);
 
 	if (!status)
 		status = file_begin(&script, message);
 	if (status)
 		return status;
-	fprintf(script.stream,
+	fprintf(script.out,
 	        "set terminal svg size %d,%.0f dynamic noenhanced font 'sans-serif,13' background '#ffffff'\n"
 	        "set multiplot\nset style textbox opaque noborder margins 2,1\nset tics front\n",
 	        WIDTH, height);
@@ -343,14 +343,14 @@ int plot_write(const struct plot *plot, const char *folder, const char *kind, ch
 	fputs("set lmargin at screen 0\nset rmargin at screen 1\nset tmargin at screen 1\nset bmargin at "
 	      "screen 0\n"
 	      "unset border\nunset tics\nunset key\nset xrange [0:1]\nset yrange [0:1]\n",
-	      script.stream);
-	draw_heads(script.stream, plot, height);
+	      script.out);
+	draw_heads(script.out, plot, height);
 	fputs("plot NaN notitle\nunset object\nset border\nset tics front\nset grid back lc rgb '#dddddd' lw "
 	      "1\n",
-	      script.stream);
+	      script.out);
 	for (size_t i = 0; i < plot->panels; i++)
-		draw_panel(script.stream, plot, i, height);
-	fputs("unset multiplot\n", script.stream);
+		draw_panel(script.out, plot, i, height);
+	fputs("unset multiplot\n", script.out);
 	status = file_draw(&script, folder, kind, plot->name, message);
 	file_drop(&script);
 	return status;

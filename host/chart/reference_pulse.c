@@ -3,9 +3,9 @@
 
 #include <gsl/gsl_math.h>
 
+#include "common/units.h"
 #include "host/chart/reference.h"
 
-#define G_M_S2 9.81
 #define LAG_MAX_S 6e-3
 
 static size_t largest(const struct reference_series *s)
@@ -93,12 +93,12 @@ static double sum_around(const struct reference_series *s, double reach_s)
 	for (size_t k = 0; k < s->count; k++)
 		if (fabs((double)k - at) <= reach)
 			sum += s->y[k];
-	return sum * G_M_S2 / s->rate_hz;
+	return sum * UNITS_G_M_S2 / s->rate_hz;
 }
 
 double reference_area_width(const struct reference_series *s)
 {
-	return M_PI_2 * sum_around(s, 0.75 * ten_percent(s)) / G_M_S2 / s->y[largest(s)];
+	return M_PI_2 * sum_around(s, 0.75 * ten_percent(s)) / UNITS_G_M_S2 / s->y[largest(s)];
 }
 
 double reference_velocity(const struct reference_series *s, double contact_s)

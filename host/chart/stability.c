@@ -136,17 +136,17 @@ static bool fails(const struct map *map, const struct campaign_tally *t)
 
 static int write_csv(const struct chart_options *options, const struct map *map, char *message)
 {
-	struct file_text text;
+	struct text text;
 	int status = file_begin(&text, message);
 
 	if (status)
 		return status;
-	fprintf(text.stream, "# %s, SI units; seed %lu; fails: ratio above %g, or gross in more than %g %%\n",
+	fprintf(text.out, "# %s, SI units; seed %lu; fails: ratio above %g, or gross in more than %g %%\n",
 	        quantity_text(map->quantity)->title, options->seed, quantity_text(map->quantity)->fails,
 	        100 * GROSS_MOST);
 	fputs("method,of,family_told,sweep,value,unit,drops,values,gross,doubted,bias,rmse,bound,ratio,"
 	      "fails\n",
-	      text.stream);
+	      text.out);
 	for (size_t m = 0; m < map->methods; m++) {
 		const struct campaign_cell *cell = map->campaign->cells;
 
@@ -155,7 +155,7 @@ static int write_csv(const struct chart_options *options, const struct map *map,
 				const struct campaign_tally *t = &cell->tally[m];
 				char value[32];
 
-				fprintf(text.stream,
+				fprintf(text.out,
 				        "\"%s\",%s,%d,%s,%s,\"%s\",%u,%u,%u,%u,%.9g,%.9g,%.9g,%.6g,%d\n",
 				        map->method[m].name, map->method[m].ours ? "droptower" : "others",
 				        map->method[m].told, sweeps[s].name, value_text(&sweeps[s], i, value),
@@ -339,9 +339,9 @@ static int draw(const struct chart_options *options, const struct map *map, char
 {
 	const struct quantity_text *text = quantity_text(map->quantity);
 	double columns = column(SWEEPS), rows = 0, width, height;
-	struct file_text script;
+	struct text script;
 	int status = file_begin(&script, message);
-	FILE *out = script.stream;
+	FILE *out = script.out;
 
 	if (status)
 		return status;

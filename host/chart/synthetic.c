@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/chart/synthetic.h"
+#include "host/record/drop.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -8,9 +9,10 @@
 #include <gsl/gsl_math.h>
 #include <gsl/gsl_randist.h>
 
+#include "common/units.h"
+
 #define LOST_S 8e-3
 #define PEAK_LOST_MOST 8.0 /* more, and nothing is left of the pulse */
-#define G_M_S2 9.81
 
 struct synthetic_scene synthetic_scene(void)
 {
@@ -236,7 +238,7 @@ struct synthetic_truth synthetic_truth(const struct synthetic *synthetic)
 	        .damped_hz = x->damped_hz,
 	        .damping = x->damping,
 	        .contact_s = x->contact_s,
-	        .velocity_m_s = synthetic_pulse_area(family) * x->contact_s * x->peak_g * G_M_S2};
+	        .velocity_m_s = synthetic_pulse_area(family) * x->contact_s * x->peak_g * UNITS_G_M_S2};
 }
 
 /* ---- a drop
@@ -300,6 +302,7 @@ int synthetic_open(struct synthetic *synthetic, const struct synthetic_scene *sc
 		failed = !record_add_channel(&synthetic->record, names[i],
 		                             rate_of(synthetic, (enum synthetic_channel)i),
 		                             count_of(synthetic, (enum synthetic_channel)i));
+	drop_set_axes(&synthetic->record);
 	if (!failed)
 		return 0;
 	synthetic_close(synthetic);

@@ -5,15 +5,21 @@
 
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
+#include "host/command/list.h"
 #include "host/estimate/cfc.h"
+#include "host/record/log_capture.h"
 #include "host/record/read.h"
 
 static const char help[] =
         "usage: droptower analyze FILE... [OPTIONS]\n"
         "\n"
         "Analyses logged drops (candump text, LCM event log, our CSV), UFF58, HDF5 and LabVIEW .lvm files,\n"
-        "and any delimited text. The format is found from the content.\n"
+        "and any delimited text. The format is found from the content. A log of several drops gives one\n"
+        "result for each.\n"
         "\n"
+        "  --list           what drops a log holds, without analysing them; of a large log an index is kept\n"
+        "                   as FILE.index\n"
+        "  --drop N         only the N-th drop of the log, counted from 1 (one FILE only)\n"
         "  --columns SPEC   for foreign text: one name:unit per column, '-' before the unit flips the sign,\n"
         "                   a lone '-' skips, e.g. \"time:ms,fixture:g,board:-g,-\"; units s ms us, g m/s2;\n"
         "                   without a time column say name:unit@RATE_HZ\n"
@@ -22,7 +28,7 @@ static const char help[] =
         "  --lowpass HZ     zero-phase low-pass before everything else\n"
         "  --cfc CLASS      channel frequency class 60, 180, 600 or 1000 (SAE J211, ISO 6487), zero-phase\n"
         "  --iepe S         undo the sensor supply's high-pass of this time constant (0: leave it);\n"
-        "                   without it, the scene's where channels are named S1X to S2Z\n"
+        "                   without it, the scene's where channels are the tower's\n"
         "  --family NAME    the contact pulse is a half-sine, haversine or sine-power (auto)\n"
         "  --tolerance PCT  standard uncertainty asked for, of the value (0.5); what it takes is done\n"
         "  --events         list shocks, largest first, and free falls in the table too\n"
@@ -32,8 +38,8 @@ static const char help[] =
         "  --band CSV       hold a pulse against time_s,lower_g,upper_g; time 0 is where it leaves 10 %\n"
         "  --band-at-peak   time 0 of the band is the pulse's peak\n"
         "  --channel NAME   the band's channel; without it, the one with the largest peak\n"
-        "  --json           one JSON object per file on standard output\n"
-        "  --html PAGE      write a page (one FILE only)\n"
+        "  --json           one JSON object per drop on standard output\n"
+        "  --html PAGE      write a page (one FILE of one drop, or --drop N)\n"
         "  --strict         a flagged record or channel is a failure (exit 3)\n";
 
 enum {
@@ -53,7 +59,9 @@ enum {
 	OPTION_CHANNEL,
 	OPTION_JSON,
 	OPTION_HTML,
-	OPTION_STRICT
+	OPTION_STRICT,
+	OPTION_LIST,
+	OPTION_DROP
 };
 
 static const struct option long_options[] = {
@@ -74,6 +82,8 @@ static const struct option long_options[] = {
         {"json", no_argument, NULL, OPTION_JSON},
         {"html", required_argument, NULL, OPTION_HTML},
         {"strict", no_argument, NULL, OPTION_STRICT},
+        {"list", no_argument, NULL, OPTION_LIST},
+        {"drop", required_argument, NULL, OPTION_DROP},
         {"help", no_argument, NULL, 'h'},
         {0},
 };
@@ -81,6 +91,8 @@ static const struct option long_options[] = {
 struct arguments {
 	const char *columns, *scene_file, *band_file;
 	double angle_deg;
+	unsigned drop; /* of the log; 0: all */
+	bool list;
 	struct evaluate_options evaluate;
 	int help;
 };
@@ -96,7 +108,7 @@ static int parse_class(struct arguments *arguments, const char *text)
 	return command_usage("analyze", "--cfc is '%s', expected 60, 180, 600 or 1000", text);
 }
 
-/* What concerns filters, shocks and bands. */
+/* What concerns filters, shocks and bands, and which drops. */
 static int parse_shock(struct arguments *arguments, int option, const char *unknown)
 {
 	struct evaluate_options *evaluate = &arguments->evaluate;
@@ -120,6 +132,11 @@ static int parse_shock(struct arguments *arguments, int option, const char *unkn
 	case OPTION_CHANNEL:
 		evaluate->band.channel = optarg;
 		return COMMAND_DONE;
+	case OPTION_LIST:
+		arguments->list = true;
+		return COMMAND_DONE;
+	case OPTION_DROP:
+		return command_drop("analyze", optarg, &arguments->drop);
 	default:
 		return command_option("analyze", unknown);
 	}
@@ -180,13 +197,13 @@ static int parse(struct arguments *arguments, int argc, char **argv)
 	return code;
 }
 
-static int analyze_file(const char *file, const struct arguments *arguments)
+static int analyze_one(const char *file, const struct arguments *arguments)
 {
 	char message[READ_MESSAGE_MAX];
 	struct record record;
 	int code;
 
-	if (read_record(&record, file, arguments->columns, message) != 0) {
+	if (read_nth(&record, file, arguments->columns, arguments->drop, message) != 0) {
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}
@@ -195,12 +212,61 @@ static int analyze_file(const char *file, const struct arguments *arguments)
 	return code;
 }
 
+struct analysing {
+	const char *file;
+	const struct arguments *arguments;
+	unsigned count;
+	int code;
+};
+
+static int analyze_drop(void *context, const struct log_capture *capture, struct record *record)
+{
+	struct analysing *analysing = context;
+	const struct evaluate_options *options = &analysing->arguments->evaluate;
+	int code = COMMAND_INPUT;
+
+	if (record == NULL) {
+		command_error("%s: drop %u of the log: no block of it", analysing->file, capture->number);
+	} else {
+		if (analysing->count++ > 0 && !options->json)
+			putchar('\n');
+		code = evaluate(record, options);
+		record_free(record);
+	}
+	if (code != COMMAND_DONE)
+		analysing->code = code; /* the others are still analysed */
+	return 0;
+}
+
+static int analyze_each(const char *file, const struct arguments *arguments)
+{
+	struct analysing analysing = {.file = file, .arguments = arguments, .code = COMMAND_DONE};
+	char message[READ_MESSAGE_MAX];
+
+	if (read_each(file, arguments->columns, analyze_drop, &analysing, message) == 0)
+		return analysing.code;
+	command_error("%s", message);
+	return COMMAND_INPUT;
+}
+
+static int analyze_file(const char *file, const struct arguments *arguments)
+{
+	if (arguments->list)
+		return list_drops(file, arguments->evaluate.json);
+	return arguments->drop != 0 || arguments->evaluate.html != NULL ? analyze_one(file, arguments)
+	                                                                : analyze_each(file, arguments);
+}
+
 static int check(const struct arguments *arguments, int argc, char **argv)
 {
 	if (optind == argc)
 		return command_usage("analyze", "no FILE given");
 	if (arguments->evaluate.html != NULL && optind + 1 != argc)
 		return command_usage("analyze", "--html takes one FILE, %d are given", argc - optind);
+	if (arguments->drop != 0 && optind + 1 != argc)
+		return command_usage("analyze", "--drop takes one FILE, %d are given", argc - optind);
+	if (arguments->list && (arguments->drop != 0 || arguments->evaluate.html != NULL))
+		return command_usage("analyze", "--list goes without --drop and --html");
 	if (!isnan(arguments->angle_deg) && arguments->scene_file == NULL)
 		return command_usage("analyze", "--angle needs a --scene to lay it over");
 	if (arguments->band_file == NULL &&

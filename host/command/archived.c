@@ -30,7 +30,7 @@ const char *archived_operator(const char *given)
 
 	if (given != NULL)
 		return given;
-	if (user != NULL)
+	if (user != NULL && user[0] != '\0')
 		return user;
 	login = getpwuid(geteuid());
 	return login != NULL ? login->pw_name : "";
@@ -66,50 +66,91 @@ int archived_scene_file(struct archive *archive, const char *series, char file[A
 	return COMMAND_DONE;
 }
 
-/* The result does not depend on where the archive stands. */
-static char *analyse(struct archive *archive, const struct scene *scene, const char *raw,
-                     char message[ARCHIVE_MESSAGE_MAX])
+/* A reader that refuses names the copy it was given: the log is meant. */
+static void name_log(const struct archive_log *log, const char *said, char message[ARCHIVE_MESSAGE_MAX])
 {
-	char path[ARCHIVE_PATH_MAX], *json;
-	struct record record;
+	size_t length = strlen(log->file);
 
-	snprintf(path, sizeof(path), "%s/%.100s", archive_folder(archive), raw);
-	if (read_record(&record, path, NULL, message) != 0)
-		return NULL;
-	snprintf(record.file, sizeof(record.file), "%.200s", raw);
-	json = evaluate_json(&record, scene);
-	record_free(&record);
-	if (json == NULL)
-		snprintf(message, ARCHIVE_MESSAGE_MAX, "%.500s: cannot be analysed; kept without a result",
-		         path);
-	return json;
+	if (strncmp(said, log->file, length) == 0)
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%s%.500s", log->raw, said + length);
+	else
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%.600s", said);
 }
 
-int archived_result(struct archive *archive, const char *series, unsigned number, const char *raw,
-                    char message[ARCHIVE_MESSAGE_MAX])
+int archived_read(struct archive *archive, const char *drop, struct record *record,
+                  char fault[ARCHIVE_MESSAGE_MAX], char message[ARCHIVE_MESSAGE_MAX])
+{
+	char said[READ_MESSAGE_MAX];
+	struct archive_log log;
+	int result = archive_open_log(archive, drop, &log);
+
+	if (result != 0) {
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%s", archive_message(archive));
+		return result;
+	}
+	if (fault != NULL) {
+		memcpy(fault, log.fault, sizeof(log.fault));
+	} else if (log.fault[0] != '\0') {
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%.100s: %.500s", drop, log.fault);
+		archive_close_log(&log);
+		return DT_E_CORRUPT;
+	}
+	result = read_record(record, log.file, NULL, said);
+	if (result == 0)
+		snprintf(record->file, sizeof(record->file), "%s", log.raw);
+	else
+		name_log(&log, said, message);
+	archive_close_log(&log);
+	return result;
+}
+
+/* The result does not depend on where the archive stands. */
+static int analyse(struct archive *archive, const char *drop, const struct scene *scene,
+                   char fault[ARCHIVE_MESSAGE_MAX], char **json, char message[ARCHIVE_MESSAGE_MAX])
+{
+	struct record record;
+	int result = archived_read(archive, drop, &record, fault, message);
+
+	if (result != 0)
+		return result;
+	*json = evaluate_json(&record, scene);
+	if (*json == NULL)
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%.500s: cannot be analysed; kept without a result",
+		         record.file);
+	record_free(&record);
+	return *json != NULL ? 0 : DT_E_FORMAT;
+}
+
+int archived_result(struct archive *archive, const char *series, unsigned number,
+                    char fault[ARCHIVE_MESSAGE_MAX], char message[ARCHIVE_MESSAGE_MAX])
 {
 	char drop[ARCHIVE_NAME_MAX + 16], *json;
 	struct scene scene;
 	int result = archive_scene(archive, series, &scene);
 
-	if (result == 0) {
-		json = analyse(archive, &scene, raw, message);
-		if (json == NULL)
-			return DT_E_FORMAT;
-		snprintf(drop, sizeof(drop), "%s/%u", series, number);
-		result = archive_result(archive, drop, DT_VERSION, json);
-		free(json);
-	}
+	fault[0] = '\0';
+	snprintf(message, ARCHIVE_MESSAGE_MAX, "%s", archive_message(archive));
+	if (result != 0)
+		return result;
+	snprintf(drop, sizeof(drop), "%.60s/%u", series, number);
+	result = analyse(archive, drop, &scene, fault, &json, message);
+	if (result != 0)
+		return result;
+	result = archive_result(archive, drop, DT_VERSION, json);
 	if (result != 0)
 		snprintf(message, ARCHIVE_MESSAGE_MAX, "%s", archive_message(archive));
+	free(json);
 	return result;
 }
 
-int archived_analyse(struct archive *archive, const char *series, unsigned number, const char *raw)
+int archived_analyse(struct archive *archive, const char *series, unsigned number)
 {
-	char message[ARCHIVE_MESSAGE_MAX];
+	char message[ARCHIVE_MESSAGE_MAX], fault[ARCHIVE_MESSAGE_MAX];
+	int result = archived_result(archive, series, number, fault, message);
 
-	if (archived_result(archive, series, number, raw, message) == 0)
+	if (fault[0] != '\0')
+		command_error("%s; analysed again from the log, which is what was recorded", fault);
+	if (result == 0)
 		return COMMAND_DONE;
 	command_error("%s", message);
 	return COMMAND_INPUT;

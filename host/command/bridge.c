@@ -7,43 +7,67 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/wire_table.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
+#include "host/command/journal.h"
 #include "host/command/notify.h"
+#include "host/command/mac.h"
 #include "host/command/publish.h"
 #include "host/command/session.h"
 #include "host/command/tower_setup.h"
 
 static const char help[] =
-        "usage: droptower bridge --link URL [--lcm URL] [--scene FILE [--angle DEG]]\n"
+        "usage: droptower bridge --link URL [--lcm URL] [--commands KEYFILE] [--scene FILE [--angle DEG]]\n"
         "\n"
-        "CAN to LCM and commands back: publishes DT_BLOCK, DT_STATE, DT_DROP and DT_RESULT, takes "
-        "DT_COMMAND. Keeps\n"
-        "the host's heartbeat going, collects every drop until its CRC-32 agrees, accepts and analyses it.\n"
+        "CAN to LCM: publishes DT_BLOCK, DT_STATE, DT_DROP and DT_RESULT, keeps the host's heartbeat going,\n"
+        "collects every drop until its CRC-32 agrees, accepts and analyses it. Takes ABORT from anybody on "
+        "this\n"
+        "machine, and other commands only with --commands.\n"
         "\n"
-        "  --link URL     unix:PATH, can:IF or slcan:DEV\n"
-        "  --lcm URL      default " PUBLISH_URL "\n"
-        "  --scene FILE   sets the tower's parameters and adds the model to the results\n"
-        "  --angle DEG    contact angle, instead of the scene's\n";
+        "  --link URL          unix:PATH, can:IF or slcan:DEV\n"
+        "  --lcm URL           default " PUBLISH_URL ";\n"
+        "                      with ttl=1 or more it sends to, and takes from, other machines\n"
+        "  --commands KEYFILE  takes DT_COMMAND from whoever has this key, and signs what it publishes: a "
+        "file\n"
+        "                      of at least 32 bytes, mode 0600 (head -c 32 /dev/urandom)\n"
+        "  --scene FILE        sets the tower's parameters and adds the model to the results\n"
+        "  --angle DEG         contact angle, instead of the scene's\n";
+
+enum {
+	SAY_EVERY_MS = 1000,
+	ABORT_EVERY_MS = 100, /* those that prove nothing */
+};
 
 struct bridge {
-	const char *link, *lcm, *scene_file;
+	const char *link, *lcm, *scene_file, *key_file;
 	double angle_deg;
 	bool help;
 	struct scene scene;
 	struct session *session;
 	struct publisher *publisher;
 	int publish_error;
-	bool commanded; /* a DT_COMMAND waits */
+	struct mac_key key;
+	struct mac_taker taker;
+	bool commanded; /* a command that was taken waits */
 	droptower_command command;
+	bool abort_asked, abort_proven;
+	droptower_command abort;      /* the proven one */
+	int64_t aborted_ms, noted_ms; /* the last ABORT; the last without proof in the journal */
+	enum mac_refusal refusal;     /* the last */
+	unsigned unsaid;              /* refusals */
+	int64_t said_ms;
 };
 
 static int parse(struct bridge *bridge, int argc, char **argv)
 {
-	static const struct option options[] = {
-	        {"link", required_argument, NULL, 'l'},  {"lcm", required_argument, NULL, 'L'},
-	        {"scene", required_argument, NULL, 's'}, {"angle", required_argument, NULL, 'a'},
-	        {"help", no_argument, NULL, 'h'},        {0}};
+	static const struct option options[] = {{"link", required_argument, NULL, 'l'},
+	                                        {"lcm", required_argument, NULL, 'L'},
+	                                        {"scene", required_argument, NULL, 's'},
+	                                        {"angle", required_argument, NULL, 'a'},
+	                                        {"help", no_argument, NULL, 'h'},
+	                                        {"commands", required_argument, NULL, 'k'},
+	                                        {0}};
 	int option, code = COMMAND_DONE;
 
 	opterr = 0;
@@ -54,6 +78,9 @@ static int parse(struct bridge *bridge, int argc, char **argv)
 			break;
 		case 'L':
 			bridge->lcm = optarg;
+			break;
+		case 'k':
+			bridge->key_file = optarg;
 			break;
 		case 's':
 			bridge->scene_file = optarg;
@@ -77,48 +104,189 @@ static int parse(struct bridge *bridge, int argc, char **argv)
 	return code;
 }
 
+/* ---- what is told ---- */
+
+static int32_t ms_until(int64_t at_ms)
+{
+	int64_t left_ms = at_ms - session_now_ms();
+
+	return left_ms < 0 ? 0 : left_ms > INT32_MAX ? INT32_MAX : (int32_t)left_ms;
+}
+
+/* What DT_STATE says of commands, as it is now. */
+static void tell(struct bridge *bridge)
+{
+	const struct session_view *view = session_view(bridge->session);
+	droptower_state *state = &bridge->publisher->state;
+
+	state->session = view->session;
+	state->refused = 0;
+	for (unsigned i = MAC_TAKEN + 1; i < MAC_REFUSALS; i++)
+		state->refused += (int64_t)bridge->taker.refused[i];
+	state->refusal = (int16_t)bridge->refusal;
+	state->armed = view->armed;
+	state->nonce = view->armed ? view->nonce : 0;
+	state->armed_drop_id = view->armed ? view->armed_drop_id : 0;
+	state->release_in_ms = view->armed ? ms_until(view->release_from_ms) : 0;
+	state->disarmed_in_ms = view->armed ? ms_until(view->armed_until_ms) : 0;
+}
+
 static void on_frame(void *user, const struct frame *frame)
 {
 	struct bridge *bridge = user;
-	int result = publisher_frame(bridge->publisher, frame);
+	int result;
 
+	if (bridge->session != NULL && frame->id == WIRE_ID_STATUS)
+		tell(bridge);
+	result = publisher_frame(bridge->publisher, frame);
 	if (result != 0)
 		bridge->publish_error = result;
 }
 
-static bool abort_waits(const struct bridge *bridge)
+/* What is refused, at most once a second: a flood fills neither terminal nor disk. */
+static void say_refused(struct bridge *bridge)
 {
-	return bridge->commanded && bridge->command.op == WIRE_OP_ABORT;
+	int64_t now_ms = session_now_ms();
+	char text[128];
+
+	if (bridge->unsaid == 0 || (bridge->said_ms != 0 && now_ms - bridge->said_ms < SAY_EVERY_MS))
+		return;
+	snprintf(text, sizeof(text), "%u without proof, the last %s", bridge->unsaid,
+	         mac_text(bridge->refusal));
+	command_error("bridge: DT_COMMAND: %s", text);
+	journal_write(&(struct journal_line){.program = "bridge",
+	                                     .who = "unknown",
+	                                     .session = session_view(bridge->session)->session,
+	                                     .verb = "DT_COMMAND",
+	                                     .refusal = text});
+	bridge->unsaid = 0;
+	bridge->said_ms = now_ms;
 }
 
-static void on_command(const lcm_recv_buf_t *buffer, const char *channel, const droptower_command *command,
-                       void *user)
+static void keep_record(const struct bridge *bridge, const droptower_command *command, int result)
+{
+	char who[sizeof(command->sender) + 1];
+
+	snprintf(who, sizeof(who), "%.*s", (int)sizeof(command->sender), (const char *)command->sender);
+	journal_write(&(struct journal_line){.program = "bridge",
+	                                     .who = who,
+	                                     .session = session_view(bridge->session)->session,
+	                                     .verb = wire_op_name((unsigned)command->op),
+	                                     .refusal = result != 0 ? error_text(result) : NULL});
+}
+
+/* ---- commands ---- */
+
+static void take(struct bridge *bridge, const droptower_command *command)
+{
+	if (command->op == WIRE_OP_ABORT) {
+		bridge->abort_asked = true;
+		bridge->abort_proven = true;
+		bridge->abort = *command;
+		bridge->commanded = false; /* what waits is not carried out any more */
+	} else if (!bridge->abort_asked) {
+		bridge->commanded = true;
+		bridge->command = *command;
+	}
+}
+
+static void on_command(const lcm_recv_buf_t *buffer, const char *channel, void *user)
 {
 	struct bridge *bridge = user;
+	droptower_command command;
+	enum mac_refusal refusal;
 
-	(void)buffer;
 	(void)channel;
-	if (abort_waits(bridge))
-		return; /* nothing that comes behind an ABORT is carried out before it */
-	bridge->commanded = true;
-	bridge->command = *command;
+	refusal = mac_judge(&bridge->taker, buffer->data, buffer->data_size, session_utime(), &command);
+	if (refusal == MAC_TAKEN && bridge->commanded && command.op != WIRE_OP_ABORT) {
+		refusal = MAC_BUSY;
+		bridge->taker.refused[MAC_BUSY]++;
+	}
+	if (refusal == MAC_TAKEN) {
+		take(bridge, &command);
+		return;
+	}
+	bridge->refusal = refusal;
+	bridge->unsaid++;
+	if (refusal != MAC_FORM && command.op == WIRE_OP_ABORT) { /* ABORT never asks */
+		bridge->abort_asked = true;
+		bridge->commanded = false;
+	}
 }
 
-/* Carries out the command that came in; its outcome goes with the next state. */
-static int obey(struct bridge *bridge)
+static int answer(struct bridge *bridge, int64_t counter, int result)
 {
+	bridge->publisher->state.counter = counter;
+	bridge->publisher->state.result = (int16_t)result;
+	tell(bridge);
+	return publisher_state(bridge->publisher);
+}
+
+/* One that proves nothing waits its turn: at rest it changes nothing, in motion it brakes what is braked. */
+static int obey_abort(struct bridge *bridge)
+{
+	int64_t now_ms = session_now_ms();
+	bool proven = bridge->abort_proven;
 	int result;
 
+	if (!proven && bridge->aborted_ms != 0 && now_ms - bridge->aborted_ms < ABORT_EVERY_MS)
+		return 0;
+	bridge->abort_asked = false;
+	bridge->abort_proven = false;
+	bridge->aborted_ms = now_ms;
+	result = session_command(bridge->session, WIRE_OP_ABORT);
+	if (result == 0)
+		bridge->publisher->state.aborted_utime = session_utime();
+	if (proven) {
+		keep_record(bridge, &bridge->abort, result);
+		return answer(bridge, bridge->abort.counter, result);
+	}
+	if (bridge->noted_ms == 0 || now_ms - bridge->noted_ms >= SAY_EVERY_MS) {
+		keep_record(bridge, &(droptower_command){.op = WIRE_OP_ABORT, .sender = "unknown"}, result);
+		bridge->noted_ms = now_ms;
+	}
+	say_refused(bridge);
+	tell(bridge);
+	return publisher_state(bridge->publisher);
+}
+
+static int carry_out(struct bridge *bridge, const droptower_command *command)
+{
+	const struct session_view *view = session_view(bridge->session);
+
+	switch (command->op) {
+	case WIRE_OP_RELEASE: /* of this ARM, whatever has been armed since it was sent */
+		if (!view->armed || command->nonce != view->nonce || command->argument != view->armed_drop_id)
+			return DT_E_TOKEN;
+		return session_command(bridge->session, WIRE_OP_RELEASE);
+	case WIRE_OP_ARM:
+	case WIRE_OP_CLEAR:
+		return session_command(bridge->session, (enum wire_op)command->op);
+	default:
+		return DT_E_ARGUMENT;
+	}
+}
+
+/* Carries out what came in; its outcome goes with the next state. */
+static int obey(struct bridge *bridge)
+{
+	droptower_command command;
+	int result;
+
+	if (bridge->abort_asked)
+		return obey_abort(bridge);
+	say_refused(bridge);
 	if (!bridge->commanded)
 		return 0;
+	command = bridge->command;
 	bridge->commanded = false;
-	if (bridge->command.op < WIRE_OP_ARM || bridge->command.op > WIRE_OP_CLEAR ||
-	    bridge->command.token < 0 || bridge->command.token > UINT16_MAX)
-		result = DT_E_ARGUMENT;
-	else
-		result = session_command(bridge->session, (enum wire_op)bridge->command.op,
-		                         (uint16_t)bridge->command.token);
-	return publisher_answer(bridge->publisher, bridge->command.utime, result);
+	result = carry_out(bridge, &command);
+	if (result == DT_E_PARAMETERS)
+		command_error(
+		        "bridge: somebody has changed the tower's parameters since they were read: look "
+		        "at them with 'droptower ctl get', then start the bridge again");
+	keep_record(bridge, &command, result);
+	return answer(bridge, command.counter, result);
 }
 
 /* While a command waits for its reply an ABORT must not wait for it. */
@@ -128,8 +296,10 @@ static bool cancelled(void *user)
 
 	while (lcm_handle_timeout(bridge->publisher->lcm, 0) > 0)
 		continue;
-	return abort_waits(bridge);
+	return bridge->abort_asked;
 }
+
+/* ---- drops ---- */
 
 static int hand_on_drop(struct bridge *bridge)
 {
@@ -187,8 +357,12 @@ static int bridge_session(struct bridge *bridge)
 		command_error("%s", message);
 		return COMMAND_LINK;
 	}
-	droptower_command_subscribe(bridge->publisher->lcm, PUBLISH_COMMAND, on_command, bridge);
-	if (bridge->scene_file != NULL) {
+	bridge->taker.session = session_view(bridge->session)->session;
+	if (publisher_listen(bridge->publisher, PUBLISH_COMMAND, on_command, bridge) != 0) {
+		command_error("%s: LCM does not receive, or cannot be kept to this machine", bridge->lcm);
+		code = COMMAND_LINK;
+	}
+	if (code == COMMAND_DONE && bridge->scene_file != NULL) {
 		code = tower_setup_hear(bridge->session, message);
 		if (code == COMMAND_DONE)
 			code = tower_setup_write(bridge->session, &bridge->scene, message);
@@ -201,11 +375,26 @@ static int bridge_session(struct bridge *bridge)
 	return code;
 }
 
+static int read_key(struct bridge *bridge)
+{
+	char message[MAC_MESSAGE_MAX];
+
+	if (mac_read_key(bridge->key_file, &bridge->key, message) != 0) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	bridge->taker.key = &bridge->key;
+	return COMMAND_DONE;
+}
+
 int command_bridge(int argc, char **argv)
 {
-	struct bridge bridge = {.lcm = PUBLISH_URL, .angle_deg = NAN};
+	static struct bridge bridge; /* a key of 4 KiB is no stack's business */
 	char message[PUBLISH_MESSAGE_MAX];
-	int code = parse(&bridge, argc, argv);
+	int code;
+
+	bridge = (struct bridge){.lcm = PUBLISH_URL, .angle_deg = NAN};
+	code = parse(&bridge, argc, argv);
 
 	if (code == COMMAND_DONE && bridge.help) {
 		fputs(help, stdout);
@@ -213,6 +402,8 @@ int command_bridge(int argc, char **argv)
 	}
 	if (code == COMMAND_DONE && bridge.scene_file != NULL)
 		code = evaluate_read_scene(&bridge.scene, bridge.scene_file, bridge.angle_deg);
+	if (code == COMMAND_DONE && bridge.key_file != NULL)
+		code = read_key(&bridge);
 	if (code != COMMAND_DONE)
 		return code;
 	command_catch_signals();
@@ -221,6 +412,7 @@ int command_bridge(int argc, char **argv)
 		command_error("%s", message);
 		return COMMAND_LINK;
 	}
+	bridge.publisher->key = bridge.taker.key;
 	code = bridge_session(&bridge);
 	publisher_close(bridge.publisher);
 	return code;

@@ -4,6 +4,7 @@
 #include <getopt.h>
 #include <signal.h>
 #include <stdarg.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -126,4 +127,15 @@ int command_angle(const char *name, const char *text, double *angle_deg)
 int command_height(const char *name, const char *text, double *height_m)
 {
 	return of_the_drop(name, "height", "height_m", text, height_m);
+}
+
+int command_drop(const char *name, const char *text, unsigned *number)
+{
+	double value;
+
+	if (!command_is_number(text, 1, 1e9, &value) || value > floor(value))
+		return command_usage(name, "--drop is '%s', expected the number of a drop in its log, from 1",
+		                     text);
+	*number = (unsigned)value;
+	return COMMAND_DONE;
 }

@@ -26,6 +26,7 @@ int command_chart(int argc, char **argv);
 int command_model(int argc, char **argv);
 int command_series(int argc, char **argv);
 int command_report(int argc, char **argv);
+int command_verify(int argc, char **argv);
 int command_serve(int argc, char **argv);
 
 /* What `droptower --version` prints: this program, its wire, and the libraries that run with it. */
@@ -60,6 +61,9 @@ bool command_is_number(const char *text, double min, double max, double *value);
 /* The same of --option; 0 on success, else says why and returns COMMAND_USAGE. */
 int command_number(const char *name, const char *option, const char *text, double min, double max,
                    double *value);
+
+/* --drop: the number of a drop in its log, from 1. */
+int command_drop(const char *name, const char *text, unsigned *number);
 
 /* --angle and --height, within what a scene may have. */
 int command_angle(const char *name, const char *text, double *angle_deg);

@@ -2,16 +2,18 @@
 #include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "host/command/command.h"
+#include "host/record/log_capture.h"
 #include "host/record/dbc.h"
 #include "host/record/read.h"
 #include "host/record/whole.h"
 #include "host/record/write.h"
 
 static const char help[] =
-        "usage: droptower convert IN OUT [--columns SPEC]\n"
+        "usage: droptower convert IN OUT [--drop N | --each] [--columns SPEC]\n"
         "       droptower convert --dbc OUT\n"
         "\n"
         "Writes a logged drop in another format, chosen by OUT's ending: .log candump text, .lcm LCM event "
@@ -20,8 +22,12 @@ static const char help[] =
         "content.\n"
         "Foreign recordings become CSV, universal files or HDF5; foreign text needs --columns.\n"
         "\n"
+        "  --drop N        the N-th drop of a log of several, counted from 1 ('analyze --list' shows them)\n"
+        "  --each          every drop of IN into a file of its own: OUT.csv becomes OUT-0001.csv ...\n"
         "  --columns SPEC  for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\"\n"
         "  --dbc OUT       the wire as a DBC file for other CAN tools; - is standard output\n";
+
+enum { CONVERT_TOLD = 1 }; /* what was wrong was printed */
 
 static int write_dbc(const char *file)
 {
@@ -45,11 +51,11 @@ static int write_dbc(const char *file)
 	return COMMAND_INPUT;
 }
 
-static int convert(const char *in, const char *out, const char *columns)
+static int convert(const char *in, const char *out, const char *columns, unsigned number)
 {
 	char message[READ_MESSAGE_MAX];
 	struct record record;
-	int result = read_record(&record, in, columns, message);
+	int result = read_nth(&record, in, columns, number, message);
 
 	if (result == 0) {
 		result = write_record(&record, out, message);
@@ -61,32 +67,101 @@ static int convert(const char *in, const char *out, const char *columns)
 	return COMMAND_INPUT;
 }
 
+struct converting {
+	const char *in, *out;
+	unsigned number;
+	int code;
+};
+
+/* OUT with the drop's number in front of its ending; false without memory. */
+static bool name_of(const struct converting *converting, char **name)
+{
+	const char *out = converting->out, *slash = strrchr(out, '/'), *dot = strrchr(out, '.');
+	size_t stem = dot != NULL && (slash == NULL || dot > slash) ? (size_t)(dot - out) : strlen(out);
+
+	return asprintf(name, "%.*s-%04u%s", (int)stem, out, converting->number, out + stem) >= 0;
+}
+
+static int convert_drop(void *context, const struct log_capture *capture, struct record *record)
+{
+	struct converting *converting = context;
+	char message[READ_MESSAGE_MAX], *name = NULL;
+	int result = 0;
+
+	converting->number++;
+	if (record == NULL) {
+		command_error("%s: drop %u of the log: no block of it", converting->in, capture->number);
+		converting->code = COMMAND_INPUT;
+		return 0;
+	}
+	if (!name_of(converting, &name)) {
+		result = DT_E_MEMORY;
+		command_error("%s: %s", converting->out, error_text(result));
+	} else if (command_is_input("convert", name, converting->in)) {
+		result = DT_E_ARGUMENT;
+	} else {
+		result = write_record(record, name, message);
+		if (result != 0)
+			command_error("%s", message);
+		else
+			printf("%s\n", name);
+	}
+	free(name);
+	record_free(record);
+	converting->code = result != 0 ? COMMAND_INPUT : converting->code;
+	return result != 0 ? CONVERT_TOLD : 0;
+}
+
+static int convert_each(const char *in, const char *out, const char *columns)
+{
+	struct converting converting = {.in = in, .out = out, .code = COMMAND_DONE};
+	char message[READ_MESSAGE_MAX];
+	int result = read_each(in, columns, convert_drop, &converting, message);
+
+	if (result == 0 || result == CONVERT_TOLD)
+		return converting.code;
+	command_error("%s", message);
+	return COMMAND_INPUT;
+}
+
 int command_convert(int argc, char **argv)
 {
-	static const struct option options[] = {{"columns", required_argument, NULL, 'c'},
-	                                        {"dbc", required_argument, NULL, 'd'},
-	                                        {"help", no_argument, NULL, 'h'},
-	                                        {0}};
+	static const struct option options[] = {
+	        {"columns", required_argument, NULL, 'c'}, {"dbc", required_argument, NULL, 'd'},
+	        {"drop", required_argument, NULL, 'n'},    {"each", no_argument, NULL, 'e'},
+	        {"help", no_argument, NULL, 'h'},          {0}};
 	const char *columns = NULL, *dbc = NULL;
-	int option;
+	unsigned number = 0;
+	bool each = false;
+	int option, code = COMMAND_DONE;
 
 	opterr = 0;
-	while ((option = getopt_long(argc, argv, "h", options, NULL)) != -1) {
+	while (code == COMMAND_DONE && (option = getopt_long(argc, argv, "h", options, NULL)) != -1) {
 		if (option == 'c')
 			columns = optarg;
 		else if (option == 'd')
 			dbc = optarg;
+		else if (option == 'n')
+			code = command_drop("convert", optarg, &number);
+		else if (option == 'e')
+			each = true;
 		else if (option == 'h') {
 			fputs(help, stdout);
 			return COMMAND_DONE;
 		} else
 			return command_option("convert", argv[optind - 1]);
 	}
+	if (code != COMMAND_DONE)
+		return code;
 	if (dbc != NULL)
 		return optind == argc ? write_dbc(dbc) : command_usage("convert", "--dbc takes no IN");
 	if (optind + 2 != argc)
 		return command_usage("convert", "expected IN OUT, %d given", argc - optind);
+	if (each && number != 0)
+		return command_usage("convert", "--drop and --each exclude each other");
+	if (each)
+		return convert_each(argv[optind], argv[optind + 1], columns);
 	if (command_is_input("convert", argv[optind + 1], argv[optind]))
 		return COMMAND_USAGE;
-	return convert(argv[optind], argv[optind + 1], columns);
+	return convert(argv[optind], argv[optind + 1], columns, number);
 }

@@ -7,26 +7,32 @@
 
 #include "common/wire_table.h"
 #include "host/command/command.h"
-#include "host/command/session.h"
+#include "host/command/release.h"
+#include "host/command/tower_setup.h"
 
 static const char help[] =
-        "usage: droptower ctl [--link URL] status|arm|release TOKEN|abort|clear|set NAME VALUE|get "
-        "[NAME]\n"
+        "usage: droptower ctl [--link URL] [--unattended] [--key FILE] status|arm|abort|clear|set NAME "
+        "VALUE|get [NAME]\n"
         "\n"
         "  status         state, checks, faults and every counter\n"
-        "  arm            prints the token that release needs within 10 s\n"
-        "  release TOKEN  opens the latch: the product falls\n"
+        "  arm            stays as the host that arms: asks for a key to arm, when horn and lamp have warned "
+        "for\n"
+        "                 another to release, and follows the fall; any other key disarms. The drop stays "
+        "in\n"
+        "                 the tower for 'droptower bridge' beside, or the next 'droptower run'\n"
         "  abort          never asks, never refused\n"
-        "  clear          out of a fault whose cause is gone\n"
+        "  clear          acknowledges that a guard was open; out of a fault whose cause is gone\n"
         "  set NAME VALUE a parameter, until the tower starts again: bus_mode (0 CAN FD, 1 classic CAN), "
         "data_kbit_s,\n"
         "                 trigger_counts, ...; a name that is none lists them\n"
         "  get [NAME]     what a parameter is, without NAME every one\n"
         "\n"
-        "The tower arms only while a host keeps its heartbeat going: run 'droptower bridge' beside.\n"
-        "--link is unix:PATH, can:IF, slcan:DEV or udpm://...; default $DROPTOWER_LINK, else can:can0.\n";
+        "  --link URL     unix:PATH, can:IF, slcan:DEV or udpm://...; default $DROPTOWER_LINK, else "
+        "can:can0\n"
+        "  --unattended   arm without asking; on a terminal a typed word confirms it\n"
+        "  --key FILE     with udpm://...: the key that the bridge takes commands with\n";
 
-enum { STATUS_WAIT_MS = 1500, COUNTERS_WAIT_MS = 5000 };
+enum { STATUS_WAIT_MS = 1500, COUNTERS_WAIT_MS = 5000, FALL_MS = 20000 };
 
 static void print_status(const struct session_view *view)
 {
@@ -35,6 +41,8 @@ static void print_status(const struct session_view *view)
 	       view->fault != 0 ? wire_fault_text(view->fault) : "",
 	       view->state == WIRE_STATE_FAULT_HELD ? "; 'droptower ctl clear' when its cause is gone" : "",
 	       view->drop_id);
+	if (view->two_towers)
+		printf("bus      two towers on it: their clocks disagree, expected one\n");
 	if (view->checks == 0)
 		printf("checks   all green\n");
 	for (unsigned i = 0; i < WIRE_CHECKS; i++)
@@ -81,35 +89,73 @@ static int refused(const char *verb, int result, const struct session_view *view
 	                                                                              : COMMAND_REFUSED;
 }
 
-static int act(struct session *session, const char *verb, uint16_t token)
+/* abort, clear */
+static int act(struct session *session, const char *verb)
 {
-	static const struct {
-		const char *verb;
-		enum wire_op op;
-	} verbs[] = {{"arm", WIRE_OP_ARM},
-	             {"release", WIRE_OP_RELEASE},
-	             {"abort", WIRE_OP_ABORT},
-	             {"clear", WIRE_OP_CLEAR}};
-	const struct session_view *view = session_view(session);
+	bool abort = strcmp(verb, "abort") == 0;
+	int result = session_command(session, abort ? WIRE_OP_ABORT : WIRE_OP_CLEAR);
 
-	if (strcmp(verb, "arm") == 0)
-		token = session_token();
-	for (size_t i = 0; i < sizeof(verbs) / sizeof(verbs[0]); i++) {
-		int result;
-
-		if (strcmp(verb, verbs[i].verb) != 0)
-			continue;
-		result = session_command(session, verbs[i].op, token);
-		if (result != 0) {
-			if (result != DT_E_TIMEOUT)
-				(void)wait_for_status(session, false);
-			return refused(verb, result, view);
-		}
-		if (strcmp(verb, "arm") == 0)
-			printf("%u\n", token);
+	if (result == 0)
 		return COMMAND_DONE;
+	if (result != DT_E_TIMEOUT)
+		(void)wait_for_status(session, false);
+	return refused(verb, result, session_view(session));
+}
+
+/* ---- arm ---- */
+
+static void say(void *user, const char *line)
+{
+	(void)user;
+	fprintf(stderr, "%s\n", line);
+}
+
+/* Until it has come to rest; Ctrl-C brakes it. */
+static int follow_fall(struct session *session)
+{
+	const struct session_view *view = session_view(session);
+	int64_t start_ms = session_now_ms();
+	uint32_t told = 1u << WIRE_STATE_ARMED;
+	bool aborted = false;
+	int result = 0;
+
+	while (result == 0 && session_now_ms() - start_ms < FALL_MS) {
+		result = session_poll(session, 50);
+		if ((told >> view->state & 1u) == 0)
+			fprintf(stderr, "%-9s %s\n", wire_state_name(view->state),
+			        wire_state_text(view->state));
+		told |= 1u << view->state;
+		if (!wire_state_moving(view->state) && view->state != WIRE_STATE_ARMED)
+			return aborted || view->state == WIRE_STATE_FAULT_HELD ? COMMAND_REFUSED
+			                                                       : COMMAND_DONE;
+		if (result == 0 && command_interrupted() && !aborted)
+			result = session_command(session, WIRE_OP_ABORT);
+		aborted |= command_interrupted() != 0;
 	}
-	return COMMAND_USAGE;
+	return command_link_failed("following the fall", result != 0 ? result : DT_E_TIMEOUT);
+}
+
+static int arm(struct session *session, bool unattended)
+{
+	struct release release = {.session = session, .unattended = unattended, .say = say};
+	const struct session_view *view = session_view(session);
+	char message[SESSION_MESSAGE_MAX];
+	int code = tower_setup_hear(session, message);
+	int result = code == COMMAND_DONE ? session_read_parameters(session) : 0;
+
+	if (code != COMMAND_DONE) {
+		command_error("%s", message);
+		return code;
+	}
+	if (result == 0)
+		fprintf(stderr, "tower     separation at %u mm, dampers at %u mm, drop-out %.1f ms\n",
+		        view->parameters[WIRE_PARAMETER_separation_um] / 1000,
+		        view->parameters[WIRE_PARAMETER_dampers_um] / 1000,
+		        view->parameters[WIRE_PARAMETER_dropout_us] / 1000.0);
+	else if (result != DT_E_UNKNOWN) /* over LCM the bridge knows them */
+		return command_link_failed("reading the tower's parameters", result);
+	code = release_ask(&release);
+	return code == COMMAND_DONE ? follow_fall(session) : code;
 }
 
 static int not_over_lcm(const char *verb)
@@ -160,22 +206,11 @@ static int get(struct session *session, unsigned first, unsigned last)
 
 struct order {
 	const char *verb;
-	uint16_t token;                    /* of release */
+	bool unattended;                   /* of arm */
 	enum wire_parameter_number number; /* of set and get */
 	bool all;                          /* of get */
 	uint32_t value;
 };
-
-static int parse_token(const char *text, uint16_t *token)
-{
-	char *end;
-	unsigned long value = strtoul(text, &end, 10);
-
-	if (text[0] < '0' || text[0] > '9' || *end != '\0' || value < 1 || value > UINT16_MAX)
-		return command_usage("ctl", "token '%s', expected the number that arm printed", text);
-	*token = (uint16_t)value;
-	return COMMAND_DONE;
-}
 
 static int parse_parameter(const char *verb, const char *name, enum wire_parameter_number *number)
 {
@@ -224,12 +259,7 @@ static int parse_order(char **words, int count, struct order *order)
 	order->verb = words[0];
 	for (size_t i = 0; i < sizeof(plain) / sizeof(plain[0]); i++)
 		known |= strcmp(words[0], plain[i]) == 0;
-	if (strcmp(words[0], "release") == 0) {
-		if (count < 2)
-			return command_usage("ctl", "release needs the token that arm printed");
-		code = parse_token(words[1], &order->token);
-		taken = 2;
-	} else if (strcmp(words[0], "set") == 0) {
+	if (strcmp(words[0], "set") == 0) {
 		code = parse_set(words + 1, count - 1, order);
 		taken = 3;
 	} else if (strcmp(words[0], "get") == 0) {
@@ -237,8 +267,7 @@ static int parse_order(char **words, int count, struct order *order)
 		code = order->all ? COMMAND_DONE : parse_parameter("get", words[1], &order->number);
 		taken = 2;
 	} else if (!known) {
-		return command_usage("ctl",
-		                     "no verb '%s', expected status, arm, release, abort, clear, set or get",
+		return command_usage("ctl", "no verb '%s', expected status, arm, abort, clear, set or get",
 		                     words[0]);
 	}
 	if (code == COMMAND_DONE && count > taken)
@@ -257,8 +286,10 @@ static int carry_out(struct session *session, const char *url, const struct orde
 	if (strcmp(order->verb, "get") == 0)
 		return get(session, order->all ? 0 : order->number,
 		           order->all ? WIRE_PARAMETERS - 1 : order->number);
+	if (strcmp(order->verb, "arm") == 0)
+		return arm(session, order->unattended);
 	if (strcmp(order->verb, "status") != 0)
-		return act(session, order->verb, order->token);
+		return act(session, order->verb);
 	result = wait_for_status(session, true);
 	if (result != 0) {
 		command_error("%s: no tower heard: %s", url, error_text(result));
@@ -268,9 +299,10 @@ static int carry_out(struct session *session, const char *url, const struct orde
 	return COMMAND_DONE;
 }
 
-static int with_session(const char *url, const struct order *order)
+static int with_session(const char *url, const char *key, const struct order *order)
 {
-	struct session_options options = {.passive = true};
+	struct session_options options = {
+	        .passive = strcmp(order->verb, "arm") != 0, .key = key, .program = "ctl"};
 	char message[SESSION_MESSAGE_MAX];
 	struct session *session = session_open(url, &options, message);
 	int code;
@@ -279,6 +311,7 @@ static int with_session(const char *url, const struct order *order)
 		command_error("%s", message);
 		return COMMAND_LINK;
 	}
+	session_hold(session, true); /* whoever collects does it beside us */
 	code = carry_out(session, url, order);
 	session_close(session);
 	return code;
@@ -286,9 +319,12 @@ static int with_session(const char *url, const struct order *order)
 
 int command_ctl(int argc, char **argv)
 {
-	static const struct option options[] = {
-	        {"link", required_argument, NULL, 'l'}, {"help", no_argument, NULL, 'h'}, {0}};
-	const char *url = getenv("DROPTOWER_LINK");
+	static const struct option options[] = {{"link", required_argument, NULL, 'l'},
+	                                        {"unattended", no_argument, NULL, 'u'},
+	                                        {"key", required_argument, NULL, 'k'},
+	                                        {"help", no_argument, NULL, 'h'},
+	                                        {0}};
+	const char *url = getenv("DROPTOWER_LINK"), *key = NULL;
 	struct order order = {0};
 	int option, code;
 
@@ -298,13 +334,22 @@ int command_ctl(int argc, char **argv)
 			fputs(help, stdout);
 			return COMMAND_DONE;
 		}
-		if (option != 'l')
+		if (option == 'l')
+			url = optarg;
+		else if (option == 'u')
+			order.unattended = true;
+		else if (option == 'k')
+			key = optarg;
+		else
 			return command_option("ctl", argv[optind - 1]);
-		url = optarg;
 	}
 	code = parse_order(argv + optind, argc - optind, &order);
 	if (code != COMMAND_DONE)
 		return code;
+	if (order.unattended && strcmp(order.verb, "arm") != 0)
+		return command_usage("ctl", "--unattended goes with arm");
 	command_catch_signals();
-	return with_session(url != NULL ? url : "can:can0", &order);
+	if (strcmp(order.verb, "arm") == 0)
+		code = release_consent("ctl", order.unattended);
+	return code == COMMAND_DONE ? with_session(url != NULL ? url : "can:can0", key, &order) : code;
 }

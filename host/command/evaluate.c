@@ -14,6 +14,7 @@
 #include "host/estimate/cfc.h"
 #include "host/estimate/filter.h"
 #include "host/record/drop.h"
+#include "host/record/text.h"
 #include "host/record/whole.h"
 #include "host/report/report.h"
 #include "host/shock/free_fall.h"
@@ -69,8 +70,10 @@ static struct estimate_options estimate_options_of(const struct record *record,
 	if (isnan(estimate.iepe_time_constant_s))
 		estimate.iepe_time_constant_s =
 		        scene && drop_has_channel(record) ? scene->sensor_iepe_time_constant_s : 0;
-	if (scene)
-		estimate.impact_speed_m_s = sqrt(2 * UNITS_G_M_S2 * scene->drop_height_m);
+	if (scene) {
+		estimate.gravity_m_s2 = scene->drop_gravity_m_s2;
+		estimate.impact_speed_m_s = sqrt(2 * scene->drop_gravity_m_s2 * scene->drop_height_m);
+	}
 	return estimate;
 }
 
@@ -82,7 +85,9 @@ static int find_shocks(struct evaluated *e, const struct evaluate_options *optio
 	int result = events_find(report->record, &options->events, &e->events);
 
 	if (result == 0)
-		result = free_fall_find(report->record, &e->falls);
+		result = free_fall_find(report->record,
+		                        options->scene ? options->scene->drop_gravity_m_s2 : UNITS_G_M_S2,
+		                        &e->falls);
 	if (result != 0)
 		return result;
 	report->events = &e->events;
@@ -151,6 +156,7 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 	                            .scene = scene,
 	                            .version = DT_VERSION,
 	                            .simulated = options->simulated,
+	                            .unattended = options->unattended,
 	                            .tolerance_asked = options->tolerance > 0};
 	result = find_shocks(e, options, &estimate);
 	if (result != 0) {
@@ -204,23 +210,16 @@ char *evaluate_json(const struct record *record, const struct scene *scene)
 {
 	struct evaluate_options options = {.scene = scene, .iepe_time_constant_s = NAN};
 	struct evaluated e;
-	char *json = NULL;
-	size_t size = 0;
-	FILE *out;
+	struct text json;
+	int result;
 
 	if (evaluate_open(&e, record, &options) != 0)
 		return NULL;
-	out = open_memstream(&json, &size);
-	if (out != NULL) {
-		int result = report_json(&e.report, out);
-
-		if (fclose(out) != 0 || result != 0) {
-			free(json);
-			json = NULL;
-		}
-	}
+	result = text_open(&json);
+	if (result == 0)
+		result = text_close(&json, report_json(&e.report, json.out));
 	evaluate_close(&e);
-	return json;
+	return result == 0 ? json.bytes : NULL;
 }
 
 int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg)

@@ -27,6 +27,7 @@ struct evaluate_options {
 	const char *json_file;        /* JSON beside it; NULL: none */
 	bool strict;                  /* a flag is a failure */
 	bool simulated;               /* the page says so */
+	bool unattended;              /* JSON says so */
 };
 
 /* A record with all that is found of it. */

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "common/wire.h"
+#include "host/command/loopback.h"
 #include "host/command/session.h"
 #include "host/record/lcm_codec.h"
 
@@ -19,8 +20,10 @@ struct publisher *publisher_open(const char *url, char message[PUBLISH_MESSAGE_M
 {
 	struct publisher *publisher = calloc(1, sizeof(*publisher));
 
-	if (publisher != NULL)
-		publisher->lcm = lcm_create(strcmp(url, "udpm://") == 0 ? PUBLISH_URL : url);
+	if (publisher != NULL) {
+		publisher->url = strcmp(url, "udpm://") == 0 ? PUBLISH_URL : url;
+		publisher->lcm = lcm_create(publisher->url);
+	}
 	if (publisher == NULL || publisher->lcm == NULL) {
 		free(publisher);
 		snprintf(message, PUBLISH_MESSAGE_MAX,
@@ -40,23 +43,77 @@ void publisher_close(struct publisher *publisher)
 	free(publisher);
 }
 
+/* LCM opens its socket with the first subscription. What came before it was confined is thrown away. */
+static int confine(struct publisher *publisher)
+{
+	publisher->listening = true;
+	if (!loopback_only(publisher->url))
+		return 0;
+	if (loopback_confine(publisher->url) != 0)
+		return DT_E_LINK;
+	while (lcm_handle_timeout(publisher->lcm, 0) > 0)
+		continue;
+	return 0;
+}
+
+static void ignore(const lcm_recv_buf_t *buffer, const char *channel, void *user)
+{
+	(void)buffer;
+	(void)channel;
+	(void)user;
+}
+
+int publisher_listen(struct publisher *publisher, const char *channel, lcm_msg_handler_t handler, void *user)
+{
+	lcm_subscription_t *subscription;
+
+	if (!publisher->listening) {
+		subscription = lcm_subscribe(publisher->lcm, "DT_.*", ignore, NULL);
+		if (subscription == NULL || confine(publisher) != 0)
+			return DT_E_LINK;
+		lcm_unsubscribe(publisher->lcm, subscription);
+	}
+	subscription = lcm_subscribe(publisher->lcm, channel, handler, user);
+	return subscription != NULL && lcm_subscription_set_queue_capacity(subscription, 0) == 0 ? 0
+	                                                                                         : DT_E_LINK;
+}
+
 static int sent(int lcm_result)
 {
 	return lcm_result == 0 ? 0 : DT_E_LINK;
 }
 
-static int publish_state(struct publisher *publisher, const struct frame *frame)
+static int publish_signed(struct publisher *publisher, const char *channel, uint8_t *bytes, int size)
 {
-	droptower_state state = {.command_utime = publisher->command_utime,
-	                         .command_result = publisher->command_result};
+	if (size < MAC_BYTES)
+		return DT_E_MEMORY;
+	if (publisher->key != NULL)
+		mac_seal(publisher->key, channel, bytes, (size_t)size);
+	return sent(lcm_publish(publisher->lcm, channel, bytes, (unsigned)size));
+}
 
-	if (lcm_codec_state(frame, &state) != 0) {
+int publisher_state(struct publisher *publisher)
+{
+	uint8_t bytes[512];
+	int64_t now_us = session_utime();
+
+	if (!publisher->status_seen)
+		return 0;
+	publisher->utime = now_us > publisher->utime ? now_us : publisher->utime + 1;
+	publisher->state.utime = publisher->utime;
+	publisher->states++;
+	return publish_signed(publisher, PUBLISH_STATE, bytes,
+	                      droptower_state_encode(bytes, 0, sizeof(bytes), &publisher->state));
+}
+
+static int publish_status(struct publisher *publisher, const struct frame *frame)
+{
+	if (lcm_codec_state(frame, &publisher->state) != 0) {
 		publisher->refused++;
 		return 0;
 	}
-	publisher->status = *frame;
-	publisher->states++;
-	return sent(droptower_state_publish(publisher->lcm, PUBLISH_STATE, &state));
+	publisher->status_seen = true;
+	return publisher_state(publisher);
 }
 
 static int publish_block(struct publisher *publisher, const struct frame *frame)
@@ -68,6 +125,7 @@ static int publish_block(struct publisher *publisher, const struct frame *frame)
 		return 0;
 	}
 	publisher->blocks++;
+	publisher->state.drop_id = block.drop_id;
 	return sent(droptower_block_publish(publisher->lcm, LCM_CODEC_BLOCK, &block));
 }
 
@@ -75,7 +133,7 @@ int publisher_frame(struct publisher *publisher, const struct frame *frame)
 {
 	switch (frame->id) {
 	case WIRE_ID_STATUS:
-		return publish_state(publisher, frame);
+		return publish_status(publisher, frame);
 	case WIRE_ID_BLOCK_S1:
 	case WIRE_ID_BLOCK_S2:
 	case WIRE_ID_RESENT_S1:
@@ -86,22 +144,23 @@ int publisher_frame(struct publisher *publisher, const struct frame *frame)
 	}
 }
 
-int publisher_answer(struct publisher *publisher, int64_t command_utime, int result)
-{
-	publisher->command_utime = command_utime;
-	publisher->command_result = (int16_t)result;
-	return publish_state(publisher, &publisher->status);
-}
-
 int publisher_drop(struct publisher *publisher, const struct record *record)
 {
 	droptower_drop drop;
-	int result = lcm_codec_drop(record, session_utime(), &drop);
+	uint8_t *bytes;
+	int size, result = lcm_codec_drop(record, session_utime(), &drop);
 
 	if (result != 0)
 		return result;
 	publisher->drops++;
-	result = sent(droptower_drop_publish(publisher->lcm, LCM_CODEC_DROP, &drop));
+	size = droptower_drop_encoded_size(&drop);
+	bytes = malloc((size_t)size);
+	if (bytes == NULL)
+		result = DT_E_MEMORY;
+	else
+		result = publish_signed(publisher, LCM_CODEC_DROP, bytes,
+		                        droptower_drop_encode(bytes, 0, size, &drop));
+	free(bytes);
 	lcm_codec_free_drop(&drop);
 	return result;
 }

@@ -4,13 +4,19 @@
 /*
  * What the host publishes on LCM: DT_BLOCK, DT_STATE, DT_DROP, DT_RESULT; and DT_COMMAND, which it takes.
  * One thread. The bridge, the replay and a session over LCM use it.
+ *
+ * With a key DT_STATE and DT_DROP carry a MAC (mac.h). What is received is only what this machine sent,
+ * unless the URL says otherwise (loopback.h).
  */
 #include <stdbool.h>
 #include <stddef.h>
 
 #include <lcm/lcm.h>
 
+#include <droptower_state.h>
+
 #include "common/frame.h"
+#include "host/command/mac.h"
 #include "host/record/record.h"
 
 #define PUBLISH_STATE "DT_STATE"
@@ -24,9 +30,12 @@ enum { PUBLISH_MESSAGE_MAX = 256 };
 
 struct publisher {
 	lcm_t *lcm;
-	int64_t command_utime; /* of the last command answered; goes with every state */
-	int16_t command_result;
-	struct frame status; /* the last one, to be published again with a command's result */
+	const char *url; /* the caller's */
+	bool listening;
+	const struct mac_key *key; /* signs; NULL: nothing is signed */
+	droptower_state state;     /* the last one; the bridge keeps what it says of commands */
+	bool status_seen;
+	int64_t utime;                           /* of the last state; grows */
 	uint64_t blocks, states, drops, refused; /* refused: frames that are none of the wire's */
 };
 
@@ -45,8 +54,13 @@ DT_MUST_USE int publisher_frame(struct publisher *publisher, const struct frame 
 DT_MUST_USE int publisher_drop(struct publisher *publisher, const struct record *record);
 DT_MUST_USE int publisher_result(struct publisher *publisher, unsigned drop_id, const char *json);
 
-/* Publishes the last state again with what became of a command. */
-DT_MUST_USE int publisher_answer(struct publisher *publisher, int64_t command_utime, int result);
+/* Publishes the last state again with what is now said of commands. */
+DT_MUST_USE int publisher_state(struct publisher *publisher);
+
+/* The bytes of a message, as they are and unchecked, to a handler: none is lost to a full queue. 0 or
+ * DT_E_LINK: LCM refuses, or its socket cannot be kept to this machine. */
+DT_MUST_USE int publisher_listen(struct publisher *publisher, const char *channel, lcm_msg_handler_t handler,
+                                 void *user);
 
 /* Bytes as they are. */
 DT_MUST_USE int publisher_raw(struct publisher *publisher, const char *channel, const void *bytes,

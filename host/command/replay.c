@@ -8,18 +8,24 @@
 #include <time.h>
 
 #include "common/link/link.h"
+#include "common/wire.h"
+#include "common/wire_table.h"
 #include "host/command/command.h"
 #include "host/command/publish.h"
+#include "host/command/session.h"
 #include "host/record/lcm_log.h"
 
 static const char help[] =
-        "usage: droptower replay FILE [--speed X|max] [--to URL]\n"
+        "usage: droptower replay FILE [--speed X|max] [--to URL] [--as-host]\n"
         "\n"
         "Sends a logged drop again, in its own time. candump text goes to a CAN link (unix:PATH, can:IF,\n"
         "slcan:DEV, log:FILE) or, as the bridge would, to LCM (udpm://...); an LCM event log goes to LCM.\n"
         "\n"
         "  --speed X    X times as fast (default 1), or max: as fast as FILE can be read\n"
         "  --to URL     where to (default log:-, candump text on standard output)\n"
+        "  --as-host    also what only a host may send: commands, parameters, its heartbeat, DT_COMMAND. "
+        "They\n"
+        "               are left out otherwise, but into a log; where a tower is heard they are refused\n"
         "\n"
         "Into a log: at a given speed the frames carry the time they were sent, at max their own.\n";
 
@@ -33,10 +39,18 @@ struct pace {
 	struct timespec start;
 };
 
+enum {
+	LISTEN_MS = 1000, /* a tower says ten times a second that it is there, and so does a bridge */
+	ROOM_MS = 2000,   /* a link that takes nothing for so long is stuck */
+};
+
 struct replay {
 	const char *file, *to;
 	struct pace pace;
+	bool as_host;
 	uint64_t sent, skipped;
+	uint64_t withheld;                  /* what only a host may send */
+	uint64_t states_sent, states_heard; /* over LCM we hear ourselves */
 };
 
 /* Waits until the moment that belongs to a log time. A time before the one before it is sent at once. */
@@ -64,34 +78,108 @@ static void keep_pace(struct pace *pace, int64_t time_us)
 		continue;
 }
 
+/* ---- what only a host may send ---- */
+
+static bool is_hosts(const struct frame *frame)
+{
+	const struct wire_message *message;
+
+	if ((frame->flags & (FRAME_EXTENDED | FRAME_ERROR)) != 0)
+		return false;
+	message = wire_message_of(frame->id);
+	return message != NULL && strcmp(message->sender, "host") == 0;
+}
+
+static bool is_towers(const struct frame *frame)
+{
+	return (frame->flags & (FRAME_EXTENDED | FRAME_ERROR)) == 0 &&
+	       (frame->id == WIRE_ID_HEARTBEAT_TOWER || frame->id == WIRE_ID_STATUS);
+}
+
+static int refuse(const struct replay *replay)
+{
+	command_error("%s: a tower is heard there; --as-host is for a bus without one", replay->to);
+	return COMMAND_REFUSED;
+}
+
+/* Whether a tower is heard within so long; what else comes is let go. */
+static int listen_on_link(const struct replay *replay, struct link *to, int64_t listen_ms)
+{
+	int64_t until_ms = session_now_ms() + listen_ms;
+
+	do {
+		struct frame frame;
+		int left_ms = (int)(until_ms - session_now_ms());
+		int result = link_receive(to, &frame, left_ms > 0 ? left_ms : 0);
+
+		if (result < 0)
+			return command_link_failed(replay->to, result);
+		if (result > 0 && is_towers(&frame))
+			return refuse(replay);
+		if (result == 0 && left_ms <= 0)
+			return COMMAND_DONE;
+	} while (!command_interrupted());
+	return COMMAND_DONE;
+}
+
+static bool is_live(const struct replay *replay)
+{
+	return replay->as_host && strncmp(replay->to, "log:", 4) != 0;
+}
+
+/* ---- frames ---- */
+
 static int send_to_link(struct replay *replay, struct link *to, struct frame *frame)
 {
+	const struct timespec turn = {.tv_nsec = 1000000};
+	int result;
+
 	if (replay->pace.speed > 0.0)
 		frame->time_us = 0; /* now */
-	return link_send(to, frame);
+	for (int turns = 0; (result = link_send(to, frame)) == DT_E_FULL && turns < ROOM_MS; turns++)
+		nanosleep(&turn, NULL); /* the peers have to take what is on its way */
+	return result;
+}
+
+/* To link or publisher. A COMMAND_* code. */
+static int send_frame(struct replay *replay, struct frame *frame, struct link *to,
+                      struct publisher *publisher)
+{
+	int code = COMMAND_DONE, result;
+
+	keep_pace(&replay->pace, frame->time_us);
+	if (to != NULL && is_live(replay))
+		code = listen_on_link(replay, to, 0);
+	if (code != COMMAND_DONE)
+		return code;
+	result = to != NULL ? send_to_link(replay, to, frame) : publisher_frame(publisher, frame);
+	if (result != 0)
+		return command_link_failed(replay->to, result);
+	replay->sent++;
+	return COMMAND_DONE;
 }
 
 static int replay_frames(struct replay *replay, struct link *from, struct link *to,
                          struct publisher *publisher)
 {
+	bool copies = strncmp(replay->to, "log:", 4) == 0;
+	int code = to != NULL && is_live(replay) ? listen_on_link(replay, to, LISTEN_MS) : COMMAND_DONE;
 	struct frame frame;
-	int result;
+	int result = 1;
 
-	while ((result = link_receive(from, &frame, 0)) == 1 && !command_interrupted()) {
-		if ((frame.flags & FRAME_ERROR) != 0) {
+	while (code == COMMAND_DONE && !command_interrupted() &&
+	       (result = link_receive(from, &frame, 0)) == 1) {
+		if ((frame.flags & FRAME_ERROR) != 0)
 			replay->skipped++; /* a report of the bus, not a frame anybody sent */
-			continue;
-		}
-		keep_pace(&replay->pace, frame.time_us);
-		result = to != NULL ? send_to_link(replay, to, &frame) : publisher_frame(publisher, &frame);
-		if (result != 0)
-			return command_link_failed(replay->to, result);
-		replay->sent++;
+		else if (is_hosts(&frame) && !copies && !replay->as_host)
+			replay->withheld++;
+		else
+			code = send_frame(replay, &frame, to, publisher);
 	}
 	replay->skipped += link_counters(from)->malformed;
-	if (result != DT_E_CLOSED && result != 1)
+	if (code == COMMAND_DONE && result != DT_E_CLOSED && result != 1)
 		return command_link_failed(replay->file, result);
-	return COMMAND_DONE;
+	return code;
 }
 
 static int replay_candump(struct replay *replay)
@@ -126,25 +214,76 @@ static int replay_candump(struct replay *replay)
 	return code;
 }
 
-static int replay_events(struct replay *replay, const struct source *source, struct publisher *publisher)
+/* ---- LCM events ---- */
+
+static void on_state(const lcm_recv_buf_t *buffer, const char *channel, void *user)
 {
-	struct lcm_log_walk walk = {0};
-	struct lcm_log_event event;
+	struct replay *replay = user;
 
-	while (!command_interrupted() && lcm_log_next(source, &walk, &event)) {
-		int result;
+	(void)buffer;
+	(void)channel;
+	replay->states_heard++;
+}
 
-		keep_pace(&replay->pace, event.time_us);
-		result = publisher_raw(publisher, event.channel, event.data, event.size);
-		if (result != 0)
-			return command_link_failed(replay->to, result);
-		replay->sent++;
-	}
-	replay->skipped += walk.skipped;
+/* More states than our own come from a bridge, and it has a tower. */
+static int listen_on_lcm(struct replay *replay, struct publisher *publisher, int64_t listen_ms)
+{
+	int64_t until_ms = session_now_ms() + listen_ms;
+
+	do {
+		int64_t left_ms = until_ms - session_now_ms();
+
+		if (lcm_handle_timeout(publisher->lcm, left_ms > 0 ? (int)left_ms : 0) < 0)
+			return command_link_failed(replay->to, DT_E_LINK);
+		if (replay->states_heard > replay->states_sent)
+			return refuse(replay);
+	} while (session_now_ms() < until_ms && !command_interrupted());
 	return COMMAND_DONE;
 }
 
-static int replay_lcm(struct replay *replay, const struct source *source)
+static int send_event(struct replay *replay, const struct lcm_log_event *event, struct publisher *publisher)
+{
+	int code = COMMAND_DONE, result;
+
+	keep_pace(&replay->pace, event->time_us);
+	if (replay->as_host)
+		code = listen_on_lcm(replay, publisher, 0);
+	if (code != COMMAND_DONE)
+		return code;
+	result = publisher_raw(publisher, event->channel, event->data, event->size);
+	if (result != 0)
+		return command_link_failed(replay->to, result);
+	replay->states_sent += strcmp(event->channel, PUBLISH_STATE) == 0;
+	replay->sent++;
+	return COMMAND_DONE;
+}
+
+static int replay_events(struct replay *replay, struct log_file *log, struct publisher *publisher)
+{
+	struct lcm_log_walk walk = {0};
+	struct lcm_log_event event;
+	int code = COMMAND_DONE;
+
+	if (replay->as_host) {
+		code = publisher_listen(publisher, PUBLISH_STATE, on_state, replay) == 0
+		               ? listen_on_lcm(replay, publisher, LISTEN_MS)
+		               : command_link_failed(replay->to, DT_E_LINK);
+	}
+	while (code == COMMAND_DONE && !command_interrupted() && lcm_log_next(log, &walk, &event)) {
+		if (event.cut)
+			continue;       /* counted as skipped */
+		if (event.data == NULL) /* beyond what LCM sends */
+			replay->skipped++;
+		else if (strcmp(event.channel, PUBLISH_COMMAND) == 0 && !replay->as_host)
+			replay->withheld++;
+		else
+			code = send_event(replay, &event, publisher);
+	}
+	replay->skipped += walk.skipped;
+	return code;
+}
+
+static int replay_lcm(struct replay *replay, struct log_file *log)
 {
 	char message[PUBLISH_MESSAGE_MAX];
 	struct publisher *publisher;
@@ -158,7 +297,7 @@ static int replay_lcm(struct replay *replay, const struct source *source)
 		command_error("%s", message);
 		return COMMAND_LINK;
 	}
-	code = replay_events(replay, source, publisher);
+	code = replay_events(replay, log, publisher);
 	publisher_close(publisher);
 	return code;
 }
@@ -166,16 +305,20 @@ static int replay_lcm(struct replay *replay, const struct source *source)
 static int replay_file(struct replay *replay)
 {
 	char message[READ_MESSAGE_MAX];
-	struct source source;
+	struct log_file log;
 	int code;
 
-	if (source_load(&source, replay->file, "a recording", message) != 0) {
+	if (log_file_open(&log, replay->file, "a recording", message) != 0) {
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}
-	code = lcm_log_is(&source) ? replay_lcm(replay, &source) : replay_candump(replay);
-	source_free(&source);
-	if (code == COMMAND_DONE && replay->sent == 0 && !command_interrupted()) {
+	code = lcm_log_is(&log) ? replay_lcm(replay, &log) : replay_candump(replay);
+	if (code == COMMAND_DONE && log_file_error(&log, message) != 0) {
+		command_error("%s", message);
+		code = COMMAND_INPUT;
+	}
+	log_file_close(&log);
+	if (code == COMMAND_DONE && replay->sent + replay->withheld == 0 && !command_interrupted()) {
 		command_error("%s: no frame, expected candump text or an LCM event log", replay->file);
 		code = COMMAND_INPUT;
 	}
@@ -199,6 +342,7 @@ int command_replay(int argc, char **argv)
 {
 	static const struct option options[] = {{"speed", required_argument, NULL, 's'},
 	                                        {"to", required_argument, NULL, 't'},
+	                                        {"as-host", no_argument, NULL, 'a'},
 	                                        {"help", no_argument, NULL, 'h'},
 	                                        {0}};
 	struct replay replay = {.to = "log:-", .pace = {.speed = 1.0}};
@@ -210,6 +354,8 @@ int command_replay(int argc, char **argv)
 			code = parse_speed(optarg, &replay.pace.speed);
 		else if (option == 't')
 			replay.to = optarg;
+		else if (option == 'a')
+			replay.as_host = true;
 		else if (option == 'h') {
 			fputs(help, stdout);
 			return COMMAND_DONE;
@@ -228,5 +374,8 @@ int command_replay(int argc, char **argv)
 	if (code == COMMAND_DONE && replay.skipped > 0)
 		command_error("%s: %" PRIu64 " sent, %" PRIu64 " skipped that are no frame to send",
 		              replay.file, replay.sent, replay.skipped);
+	if (code == COMMAND_DONE && replay.withheld > 0)
+		command_error("%s: %" PRIu64 " sent, %" PRIu64 " left out that only a host may send",
+		              replay.file, replay.sent, replay.withheld);
 	return code;
 }

@@ -1,12 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <droptower_version.h>
 #include <getopt.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "host/archive/print.h"
 #include "host/command/archived.h"
 #include "host/command/command.h"
+#include "host/record/seal.h"
+#include "host/record/text.h"
 #include "host/record/whole.h"
 #include "host/report/pdf.h"
 #include "host/report/series.h"
@@ -21,9 +25,10 @@ static const char help[] =
         "  --pdf FILE       the same on paper; needs chromium, chromium-browser or google-chrome\n"
         "  --csv FILE       the table for spreadsheets, as series show --csv\n"
         "  --archive DIR    the archive's folder; without it $DROPTOWER_ARCHIVE, else ./archive\n"
-        "  --undecided      drops that are not decided count, too\n";
+        "  --undecided      drops that are not decided count, too\n"
+        "  --partial        even when a trace cannot be drawn or a file is not what was recorded\n";
 
-enum { OPTION_ARCHIVE = 256, OPTION_HTML, OPTION_PDF, OPTION_CSV, OPTION_UNDECIDED };
+enum { OPTION_ARCHIVE = 256, OPTION_HTML, OPTION_PDF, OPTION_CSV, OPTION_UNDECIDED, OPTION_PARTIAL };
 
 static const struct option long_options[] = {
         {"archive", required_argument, NULL, OPTION_ARCHIVE},
@@ -31,13 +36,14 @@ static const struct option long_options[] = {
         {"pdf", required_argument, NULL, OPTION_PDF},
         {"csv", required_argument, NULL, OPTION_CSV},
         {"undecided", no_argument, NULL, OPTION_UNDECIDED},
+        {"partial", no_argument, NULL, OPTION_PARTIAL},
         {"help", no_argument, NULL, 'h'},
         {0},
 };
 
 struct arguments {
 	const char *archive, *html, *pdf, *csv;
-	bool undecided, help;
+	bool undecided, partial, help;
 };
 
 static int parse(struct arguments *a, int argc, char **argv)
@@ -61,6 +67,9 @@ static int parse(struct arguments *a, int argc, char **argv)
 			break;
 		case OPTION_UNDECIDED:
 			a->undecided = true;
+			break;
+		case OPTION_PARTIAL:
+			a->partial = true;
 			break;
 		case 'h':
 			a->help = true;
@@ -98,56 +107,113 @@ static int write_csv(const struct series_report *request, const char *file)
 	return result == 0 ? COMMAND_DONE : failed(message);
 }
 
-static int write_pdf(const char *page, size_t length, const char *file)
+/* The page's evidence as comments of the PDF, before the word that says where its table is, which does not
+ * move. */
+static int put_evidence(const char *page, const char *pdf, size_t length, FILE *out)
 {
-	char message[ARCHIVE_MESSAGE_MAX], *pdf = NULL;
-	size_t pdf_length = 0;
-	int result =
-	        pdf_print(page, length, command_interrupted, &pdf, &pdf_length, message, sizeof(message));
+	static const char word[] = "startxref";
+	const char *line = strstr(page, SERIES_EVIDENCE), *at = pdf + length, *end;
+
+	while (at > pdf &&
+	       (pdf + length - at < (ptrdiff_t)strlen(word) || memcmp(at, word, strlen(word)) != 0))
+		at--;
+	if (at == pdf || line == NULL)
+		return DT_E_FORMAT;
+	fwrite(pdf, 1, (size_t)(at - pdf), out);
+	fputs("%droptower evidence\n", out);
+	for (line += strlen(SERIES_EVIDENCE); (end = strchr(line, '\n')) != NULL && *line != '-';
+	     line = end + 1)
+		if (strncmp(line, SEAL_WORD, strlen(SEAL_WORD)) != 0)
+			fprintf(out, "%%%.*s\n", (int)(end - line), line);
+	fputs("%" SEAL_BLANK "\n", out);
+	fwrite(at, 1, length - (size_t)(at - pdf), out);
+	return 0;
+}
+
+static int write_pdf(const struct text *page, const char *file)
+{
+	char message[ARCHIVE_MESSAGE_MAX] = "no PDF: the browser's is none that a comment fits into",
+	     *pdf = NULL;
+	struct text sealed = {.bytes = NULL};
+	size_t length = 0;
+	int result = pdf_print(page->bytes, page->size, command_interrupted, &pdf, &length, message,
+	                       sizeof(message));
 
 	if (result == 0)
-		result = whole_write(file, pdf, pdf_length, message, sizeof(message));
+		result = text_open(&sealed);
+	if (result == 0)
+		result = text_close(&sealed, put_evidence(page->bytes, pdf, length, sealed.out));
+	if (result == 0)
+		result = seal_fill(sealed.bytes, sealed.size);
+	if (result == 0)
+		result = whole_write(file, sealed.bytes, sealed.size, message, sizeof(message));
+	free(sealed.bytes);
 	free(pdf);
 	return result == 0 ? COMMAND_DONE : failed(message);
 }
 
-/* The page is made once for both. */
-static int write_page(const struct series_report *request, const struct arguments *a)
+static void tell(void *context, const char *text)
 {
-	char message[ARCHIVE_MESSAGE_MAX], *page = NULL;
-	size_t length = 0;
-	FILE *out = open_memstream(&page, &length);
-	int result, code = COMMAND_DONE;
+	(void)context;
+	command_error("%s", text);
+}
 
-	if (out == NULL)
-		return failed(error_text(DT_E_MEMORY));
-	result = series_report_html(request, out, message, sizeof(message));
-	if (fclose(out) != 0 && result == 0) {
-		snprintf(message, sizeof(message), "%s", error_text(DT_E_MEMORY));
-		result = DT_E_MEMORY;
-	}
-	if (result == 0 && a->html != NULL)
-		result = whole_write(a->html, page, length, message, sizeof(message));
-	if (result != 0)
-		code = failed(message);
-	else if (a->pdf != NULL)
-		code = write_pdf(page, length, a->pdf);
-	free(page);
-	return code;
+/* Whether its drops are what was recorded, when nobody wants a page. */
+static int look(const struct series_report *request)
+{
+	int lacks = archive_verify(request->archive, request->series, 0, tell, NULL);
+
+	if (lacks < 0)
+		return archived_failed(request->archive);
+	if (lacks == 0 || request->partial)
+		return COMMAND_DONE;
+	command_error("%s: files are not what was recorded; --partial writes the table all the same",
+	              request->series);
+	return COMMAND_INPUT;
+}
+
+/* The page is made once for both. */
+static int make(const struct series_report *request, struct text *page)
+{
+	char message[ARCHIVE_MESSAGE_MAX] = "";
+	int result = text_open(page);
+
+	if (result == 0)
+		result = text_close(page, series_report_html(request, page->out, message, sizeof(message)));
+	if (result == 0)
+		result = seal_fill(page->bytes, page->size);
+	return result == 0 ? COMMAND_DONE : failed(message[0] != '\0' ? message : error_text(result));
+}
+
+static int write_page(const struct arguments *a, const struct text *page)
+{
+	char message[ARCHIVE_MESSAGE_MAX];
+
+	if (a->html != NULL && whole_write(a->html, page->bytes, page->size, message, sizeof(message)) != 0)
+		return failed(message);
+	return a->pdf != NULL ? write_pdf(page, a->pdf) : COMMAND_DONE;
 }
 
 static int write_all(struct archive *archive, const char *series, const struct arguments *a)
 {
-	struct series_report request = {archive, series, a->undecided, DT_VERSION};
+	struct series_report request = {.archive = archive,
+	                                .series = series,
+	                                .undecided = a->undecided,
+	                                .version = DT_VERSION,
+	                                .partial = a->partial,
+	                                .lacking = tell};
 	struct scene scene;
-	int code = COMMAND_DONE;
+	struct text page = {.bytes = NULL};
+	int code;
 
 	if (archive_scene(archive, series, &scene) != 0)
 		return archived_failed(archive);
-	if (a->csv != NULL)
+	code = a->html != NULL || a->pdf != NULL ? make(&request, &page) : look(&request);
+	if (code == COMMAND_DONE && a->csv != NULL)
 		code = write_csv(&request, a->csv);
-	if (code == COMMAND_DONE && (a->html != NULL || a->pdf != NULL))
-		code = write_page(&request, a);
+	if (code == COMMAND_DONE)
+		code = write_page(a, &page);
+	free(page.bytes);
 	return code;
 }
 

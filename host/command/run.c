@@ -12,19 +12,25 @@
 
 #include "host/command/beside.h"
 #include "host/command/command.h"
+#include "host/command/release.h"
 #include "host/command/run_private.h"
 #include "host/command/simulated.h"
 
 static const char help[] =
         "usage: droptower run [OPTIONS]\n"
         "\n"
-        "One drop: waits until every check is green, then arms and releases AT ONCE (the last check that\n"
-        "turns green, say the door that closes, is the release), follows the fall, fetches every sample,\n"
-        "analyses and reports. Writes drop-NNNN.log (candump text), .csv, .json and .html into --out.\n"
-        "Ctrl-C aborts: at rest nothing is released, in motion the frame is braked and the record kept.\n"
+        "One drop: says what will fall, waits until every check is green, asks for a key to arm and, when\n"
+        "horn and lamp have warned, for another to release; follows the fall, fetches every sample, "
+        "analyses\n"
+        "and reports. Writes drop-NNNN.log (candump text), .csv, .json and .html into --out.\n"
+        "Any other key and Ctrl-C abort: at rest nothing is released, in motion the frame is braked and the\n"
+        "record kept. A simulated tower of our own asks nothing.\n"
         "\n"
         "  --link URL     unix:PATH, can:IF, slcan:DEV, or udpm://... for a running 'droptower bridge';\n"
         "                 it needs --scene or --series; without it a simulated tower is started\n"
+        "  --unattended   with --link: drops without asking; on a terminal a typed word confirms it. It is\n"
+        "                 noted with the drop\n"
+        "  --key FILE     with udpm://...: the key that the bridge takes commands with\n"
         "  --scene FILE   what is dropped: a file, or one of those that come along by its name (for a\n"
         "                 simulated tower geometry-2A without it)\n"
         "  --angle DEG    contact angle, instead of the scene's\n"
@@ -49,6 +55,8 @@ enum {
 	OPTION_JSON,
 	OPTION_STRICT,
 	OPTION_BENCH,
+	OPTION_UNATTENDED,
+	OPTION_KEY,
 };
 
 static const struct option long_options[] = {
@@ -62,6 +70,8 @@ static const struct option long_options[] = {
         {"json", no_argument, NULL, OPTION_JSON},
         {"strict", no_argument, NULL, OPTION_STRICT},
         {"bench", required_argument, NULL, OPTION_BENCH},
+        {"unattended", no_argument, NULL, OPTION_UNATTENDED},
+        {"key", required_argument, NULL, OPTION_KEY},
         {"help", no_argument, NULL, 'h'},
         {0},
 };
@@ -140,6 +150,12 @@ static int parse(struct run *run, int argc, char **argv)
 				                     RUN_BENCH_WORDS_MAX);
 			run->bench_words[run->bench_word_count++] = optarg;
 			break;
+		case OPTION_UNATTENDED:
+			run->unattended = true;
+			break;
+		case OPTION_KEY:
+			run->key = optarg;
+			break;
 		case 'h':
 			run->help = true;
 			return COMMAND_DONE;
@@ -151,6 +167,8 @@ static int parse(struct run *run, int argc, char **argv)
 		code = command_usage("run", "'%s' is too much", argv[optind]);
 	if (code == COMMAND_DONE && run->link != NULL && run->bench_word_count > 0)
 		code = command_usage("run", "--bench is for the simulated tower, --link for another one");
+	if (code == COMMAND_DONE && run->link == NULL && (run->unattended || run->key != NULL))
+		code = command_usage("run", "--unattended and --key go with --link");
 	if (code == COMMAND_DONE)
 		code = check_archive(run);
 	return code == COMMAND_DONE ? choose_scene(run) : code;
@@ -224,9 +242,12 @@ int command_run(int argc, char **argv)
 		fputs(help, stdout);
 		return COMMAND_DONE;
 	}
-	run.start_ms = session_now_ms();
 	command_catch_signals();
-	code = run_keep_begin(&run);
+	if (run.link != NULL)
+		code = release_consent("run", run.unattended);
+	run.start_ms = session_now_ms();
+	if (code == COMMAND_DONE)
+		code = run_keep_begin(&run);
 	if (code == COMMAND_DONE)
 		code = run_drop(&run);
 	run_keep_end(&run);

@@ -3,86 +3,54 @@
  * One drop, from the first check to the last sample.
  */
 #include <inttypes.h>
+#include <stdio.h>
 
 #include "common/wire_table.h"
 #include "host/command/command.h"
+#include "host/command/release.h"
 #include "host/command/run_private.h"
 #include "host/command/tower_setup.h"
 
 enum {
-	READY_MS = 60000, /* a person may have to close a door */
-	DROP_MS = 20000,  /* fall, capture and upload take about one second */
+	DROP_STATUSES = 20 * SESSION_STATUSES_HZ, /* fall, capture and upload take about one second */
+	STILL_MS = 1000,                          /* ten statuses */
+	LEAVE_MS = 2000,                          /* a drop that was accepted leaves the tower at once */
 };
 
 /* ---- to the release ---- */
 
-static void tell_checks(const struct run *run, uint16_t checks)
+static void say(void *user, const char *line)
 {
-	for (unsigned i = 0; i < WIRE_CHECKS; i++)
-		if ((checks >> i & 1u) != 0)
-			run_progress(run, "check     %-10s %s", wire_check_name(i), wire_check_text(i));
+	run_progress(user, "%s", line);
 }
 
-static int wait_until_ready(struct run *run)
+/* What will fall, for who is asked. */
+static void tell_plan(const struct run *run)
 {
-	const struct session_view *view = session_view(run->session);
-	int64_t start_ms = session_now_ms();
-	uint16_t told = 0;
+	const struct scene *scene = &run->scene;
+	char place[ARCHIVE_NAME_MAX + 32];
 
-	while (view->state != WIRE_STATE_READY) {
-		int result = session_poll(run->session, 50);
-
-		if (result != 0)
-			return command_link_failed("waiting for the checks", result);
-		if (command_interrupted())
-			return command_stopped();
-		if (view->state == WIRE_STATE_FAULT_HELD) {
-			command_error(
-			        "the tower holds a fault: %s; 'droptower ctl clear' when its cause is gone",
-			        wire_fault_text(view->fault));
-			return COMMAND_REFUSED;
-		}
-		if (view->checks != told && session_now_ms() - start_ms > 1000) {
-			told = view->checks;
-			tell_checks(run, told);
-		}
-		if (session_now_ms() - start_ms > READY_MS) {
-			command_error("checks not green within %d s", READY_MS / 1000);
-			return COMMAND_REFUSED;
-		}
-	}
-	run_progress(run, "ready     all checks green");
-	return COMMAND_DONE;
+	if (run->series != NULL)
+		snprintf(place, sizeof(place), "drop %u of series %s", run->recording.number, run->series);
+	else
+		snprintf(place, sizeof(place), "drop of no series");
+	run_progress(run, "falls     %s, %.3g kg, from %.3f m at %.4g deg, %s", scene->name,
+	             scene->product_case_mass_kg + scene->mount_plate_mass_kg, scene->drop_height_m,
+	             scene->drop_angle_deg, place);
 }
 
-static bool unanswered(int result)
+static int let_fall(struct run *run)
 {
-	return result == DT_E_TIMEOUT || result == DT_E_CLOSED || result == DT_E_LINK;
-}
+	struct release release = {.session = run->session,
+	                          .unattended = run->unattended || run->link == NULL,
+	                          .say = say,
+	                          .user = run};
+	int code;
 
-static int arm_and_release(struct run *run)
-{
-	uint16_t token = session_token();
-	int result;
-
-	result = session_command(run->session, WIRE_OP_ARM, token);
-	if (command_interrupted()) {
-		result = session_command(run->session, WIRE_OP_ABORT, 0);
-		return result == 0 ? command_stopped() : command_link_failed("abort", result);
-	}
-	if (result == 0) {
-		run_progress(run, "armed");
-		result = session_command(run->session, WIRE_OP_RELEASE, token);
-		run->released = result == 0 || unanswered(result); /* it may have worked */
-	}
-	/* an interrupted release may have worked: what follows aborts it and looks */
-	if (result == 0 || command_interrupted()) {
-		run_progress(run, "released");
-		return COMMAND_DONE;
-	}
-	command_error("the tower refuses: %s", error_text(result));
-	tell_checks(run, session_view(run->session)->checks);
-	return unanswered(result) ? COMMAND_LINK : COMMAND_REFUSED;
+	tell_plan(run);
+	code = release_ask(&release);
+	run->released = release.released;
+	return code;
 }
 
 static void tell_state(const struct run *run, unsigned state, uint32_t *told)
@@ -103,16 +71,46 @@ static void tell_fault(const struct run *run, unsigned fault, unsigned *told)
 	*told = fault;
 }
 
+/* A log that can take no more: the drop is fetched without it, and stays in the tower for the next run. */
+static int poll_and_keep(struct run *run)
+{
+	int result = session_poll(run->session, 50);
+
+	if (result != DT_E_SYSTEM || run->log_failed)
+		return result;
+	run->log_failed = true;
+	session_log(run->session, NULL);
+	session_keep(run->session);
+	run_progress(run, "log       cannot be written: %s", run->log);
+	return 0;
+}
+
+/* After Ctrl-C: as long as something comes of the drop it is worth waiting for. */
+struct patience {
+	uint64_t heard;
+	int64_t since_ms;
+};
+
+static bool stands_still(struct patience *patience, const struct session_view *view)
+{
+	uint64_t heard = view->blocks + view->statuses;
+
+	if (heard != patience->heard)
+		*patience = (struct patience){.heard = heard, .since_ms = session_now_ms()};
+	return session_now_ms() - patience->since_ms > STILL_MS;
+}
+
 /* Follows the drop until it is collected. */
 static int follow_to_end(struct run *run, struct record *record)
 {
 	const struct session_view *view = session_view(run->session);
-	int64_t start_ms = session_now_ms();
+	uint64_t from_statuses = view->statuses;
 	uint32_t told = 1u << WIRE_STATE_ARMED;
 	unsigned told_fault = WIRE_FAULT_NONE;
+	struct patience patience = {.since_ms = session_now_ms()};
 
 	for (;;) {
-		int result = session_poll(run->session, 50);
+		int result = poll_and_keep(run);
 		int taken = result == 0 ? session_take_drop(run->session, record) : result;
 
 		if (result == 0)
@@ -132,14 +130,19 @@ static int follow_to_end(struct run *run, struct record *record)
 		if (command_interrupted() && !run->aborted) {
 			run->aborted = true;
 			run_progress(run, "abort");
-			result = session_command(run->session, WIRE_OP_ABORT, 0);
+			result = session_command(run->session, WIRE_OP_ABORT);
 			if (result != 0)
 				return command_link_failed("abort", result);
 		}
-		if (session_now_ms() - start_ms > DROP_MS) {
-			command_error("no capture within %d s of the release; state %s, fault %s",
-			              DROP_MS / 1000, wire_state_name(view->state),
-			              wire_fault_name(view->fault));
+		if (run->aborted && stands_still(&patience, view)) {
+			command_error("aborted, and nothing more comes of the drop; the tower may hold it");
+			return COMMAND_REFUSED;
+		}
+		if (session_is_over(run->session, from_statuses + DROP_STATUSES)) {
+			command_error("no capture within %d s of the release; state %s, fault %s%s",
+			              DROP_STATUSES / SESSION_STATUSES_HZ, wire_state_name(view->state),
+			              wire_fault_name(view->fault),
+			              view->two_towers ? "; two towers on this bus, expected one" : "");
 			return COMMAND_LINK;
 		}
 	}
@@ -168,11 +171,23 @@ static int release_and_follow(struct run *run, struct record *record)
 	if (code != COMMAND_DONE)
 		command_error("%s", message);
 	if (code == COMMAND_DONE)
-		code = wait_until_ready(run);
+		code = run_keep_room(run);
 	if (code == COMMAND_DONE)
-		code = arm_and_release(run);
-	run->released |= code == COMMAND_DONE;
+		code = let_fall(run);
 	return code == COMMAND_DONE ? follow_to_end(run, record) : code;
+}
+
+/* Until the tower has let go of what was accepted; a frame that did not come down keeps it. */
+static void see_it_leave(struct run *run)
+{
+	const struct session_view *view = session_view(run->session);
+	int64_t start_ms = session_now_ms();
+
+	while (!run->log_failed && session_drops(view->state) && session_poll(run->session, 50) == 0 &&
+	       !command_interrupted() && session_now_ms() - start_ms < LEAVE_MS)
+		continue;
+	if (view->state == WIRE_STATE_KEEP_OUT)
+		command_error("%s", wire_state_text(view->state));
 }
 
 /* A host that died leaves its drop in the tower, which neither arms before it is fetched nor may have it
@@ -196,13 +211,18 @@ static int drop(struct run *run, struct record *record)
 	if (code == COMMAND_DONE)
 		run_progress(run, "collected %" PRIu64 " blocks, %" PRIu64 " asked for again",
 		             record->counters.blocks, session_view(run->session)->asked);
+	if (code == COMMAND_DONE)
+		see_it_leave(run);
 	tell_losses(run);
 	return code;
 }
 
 int run_follow(struct run *run, const char *url, struct record *record)
 {
-	struct session_options options = {0};
+	struct session_options options = {
+	        .key = run->key,
+	        .program = run->link != NULL ? "run" : NULL, /* a simulated tower is nobody's business */
+	        .operator_name = run->operator_name};
 	char log[ARCHIVE_PATH_MAX + 8], message[SESSION_MESSAGE_MAX];
 	int code = COMMAND_LINK;
 
@@ -218,9 +238,6 @@ int run_follow(struct run *run, const char *url, struct record *record)
 	else
 		command_error("%s", message);
 	session_close(run->session);
-	if (link_close(options.log) != 0) {
-		command_error("%s: could not be written", run->log);
-		code = COMMAND_INPUT;
-	}
+	run->log_failed |= link_close(options.log) != 0;
 	return code;
 }

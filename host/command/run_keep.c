@@ -12,6 +12,7 @@
 
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
+#include "host/command/room.h"
 #include "host/command/run_private.h"
 #include "host/record/write.h"
 
@@ -77,7 +78,26 @@ int run_keep_begin(struct run *run)
 	return run->series != NULL ? begin_in_archive(run) : begin_in_folder(run);
 }
 
+int run_keep_room(const struct run *run)
+{
+	double bytes = room_bytes(run->series != NULL ? run->archive_folder : run->out);
+
+	if (!(bytes < ROOM_RESERVE_BYTES))
+		return COMMAND_DONE;
+	command_error("%.0f MB left on the disk, expected %.0f MB for a drop", bytes / 1e6,
+	              ROOM_RESERVE_BYTES / 1e6);
+	return COMMAND_INPUT;
+}
+
 /* ---- after it ---- */
+
+/* The drop is in memory, and shown; what could not be kept of it is told. */
+static int tell_lost(const struct run *run)
+{
+	command_error("%s: could not be written; the tower holds the drop, the next run fetches it",
+	              run->log);
+	return COMMAND_INPUT;
+}
 
 /* A drop that is not what it seems ends with a word and a code of its own. */
 static int tell_oddity(const struct run *run, const struct record *record, int code)
@@ -107,17 +127,20 @@ static int report_archived(struct run *run, struct record *record)
 	struct evaluate_options options = {
 	        .scene = &run->scene, .iepe_time_constant_s = NAN, .json = run->json, .strict = run->strict};
 	const struct archive_recording *r = &run->recording;
-	const char *note = run->aborted   ? "aborted in motion"
-	                   : run->earlier ? "was still in the tower from an earlier run"
-	                                  : "";
+	const char *note = run->aborted      ? "aborted in motion"
+	                   : run->earlier    ? "was still in the tower from an earlier run"
+	                   : run->unattended ? "released unattended"
+	                                     : "";
 	struct archive_filter mine = archive_filter_none();
 	FILE *out = run->json ? stderr : stdout;
 	int code, shown;
 
-	if (archive_finish(run->archive, &run->recording, 0, note) != 0)
-		return archived_failed(run->archive);
+	if (run->log_failed || archive_finish(run->archive, &run->recording, 0, note) != 0) {
+		(void)evaluate(record, &options);
+		return run->log_failed ? tell_lost(run) : archived_failed(run->archive);
+	}
 	run_progress(run, "recorded  %s/%u", r->series, r->number);
-	code = archived_analyse(run->archive, r->series, r->number, r->raw);
+	code = archived_analyse(run->archive, r->series, r->number);
 	snprintf(record->file, sizeof(record->file), "%s", r->raw);
 	shown = evaluate(record, &options);
 	mine.series = r->series;
@@ -138,14 +161,19 @@ static int report_files(struct run *run, struct record *record)
 	                                   .html = html,
 	                                   .json_file = json,
 	                                   .strict = run->strict,
-	                                   .simulated = run->link == NULL};
+	                                   .simulated = run->link == NULL,
+	                                   .unattended = run->unattended};
 	int code;
 
 	snprintf(csv, sizeof(csv), "%s.csv", run->stem);
 	snprintf(json, sizeof(json), "%s.json", run->stem);
 	snprintf(html, sizeof(html), "%s.html", run->stem);
 	snprintf(record->file, sizeof(record->file), "%.4000s.log", run->stem);
-	if (write_record(record, csv, message) != 0) {
+	if (run->log_failed || write_record(record, csv, message) != 0) {
+		options.html = options.json_file = NULL;
+		(void)evaluate(record, &options);
+		if (run->log_failed)
+			return tell_lost(run);
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}

@@ -21,16 +21,18 @@ struct run {
 	const char *link, *scene_file, *out;
 	const char *archive_folder, *series, *operator_name;
 	double angle_deg;
-	bool json, strict, help;
+	const char *key; /* for commands over LCM */
+	bool json, strict, help, unattended;
 	const char *bench_words[RUN_BENCH_WORDS_MAX + 8];
 	int bench_word_count;
 	/* while it runs */
 	struct scene scene;
 	struct session *session;
 	int64_t start_ms;
-	bool aborted;  /* by the operator, after the release */
-	bool earlier;  /* the drop is one that the tower still held */
-	bool released; /* what comes now is, or may be, a drop, whatever becomes of it */
+	bool aborted;    /* by the operator, after the release */
+	bool earlier;    /* the drop is one that the tower still held */
+	bool log_failed; /* the disk took no more of it; the drop stays in the tower */
+	bool released;   /* what comes now is, or may be, a drop, whatever becomes of it */
 	char scene_path[PATH_MAX];
 	char stem[4096]; /* OUT/drop-NNNN */
 	char log[ARCHIVE_PATH_MAX];
@@ -44,6 +46,9 @@ void run_progress(const struct run *run, const char *format, ...) __attribute__(
 
 /* Reads the scene, and makes an empty log: the next of --out, or the next of the series. */
 int run_keep_begin(struct run *run);
+
+/* COMMAND_INPUT when there is no room for a drop on the disk. */
+int run_keep_room(const struct run *run);
 
 /* Drops on the tower at url, every frame into the log. The log is on disk when it returns. */
 int run_follow(struct run *run, const char *url, struct record *record);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * `droptower series`: its options, and which verb runs. The verbs stand in series_look.c and series_change.c.
+ * `droptower series`: its options, and which verb runs. The verbs stand in series_look.c, series_change.c and
+ * series_add.c.
  */
 #include <getopt.h>
 #include <math.h>
@@ -20,7 +21,9 @@ static const char help[] =
         "  list                    series with their counts (what it does without a verb)\n"
         "  drops                   drops of all series\n"
         "  new NAME --scene FILE   a series of --drops N at --angle DEG from --height M, in --campaign NAME\n"
-        "  add SERIES LOG...       takes logs in and analyses them\n"
+        "  add SERIES LOG...       takes every drop of the logs in and analyses it; leaves out what is "
+        "there\n"
+        "                          already in whatever file, refuses what disagrees with the series\n"
         "  show SERIES             its drops; mean, SD and count of the accepted ones\n"
         "  accept DROP|SERIES...   a drop, or all drops of a series that are not decided\n"
         "  reject DROP...          keeps it and counts it nowhere; --reason TEXT\n"
@@ -29,14 +32,14 @@ static const char help[] =
         "  result DROP             the analysis in full, as JSON; --version V for an older one\n"
         "  tables [CAMPAIGN]       means, SDs and ratios by scene and angle\n"
         "  reanalyse SERIES...     by this version; the results of others stay\n"
-        "  verify                  every raw file against its SHA-256\n"
         "  calibrate [SENSOR GAIN] notes a calibration of --date DAY (--note TEXT), or lists them\n"
         "\n"
         "  --archive DIR    the archive's folder; without it $DROPTOWER_ARCHIVE, else ./archive\n"
         "  --rebuild        make its index again from the raw files (no verb)\n"
+        "  --fewer          for --rebuild: even if it then knows fewer drops than before\n"
         "  --campaign NAME  those of a campaign; for new: which it belongs to (default)\n"
         "  --scene NAME     those of a scene; for new: the scene's file, or one that comes along\n"
-        "  --angle DEG      those at an angle; for new: instead of the scene's\n"
+        "  --angle DEG      those at an angle; for new: instead of the scene's; for add: of these logs\n"
         "  --height M       for new: instead of the scene's\n"
         "  --date DAY       drops of a day, month or year (UTC), or FROM..TO: 2026-11, "
         "2026-11-02..2026-11-05\n"
@@ -58,6 +61,7 @@ static const char help[] =
 enum {
 	OPTION_ARCHIVE = 256,
 	OPTION_REBUILD,
+	OPTION_FEWER,
 	OPTION_CAMPAIGN,
 	OPTION_SCENE,
 	OPTION_ANGLE,
@@ -80,6 +84,7 @@ enum {
 static const struct option long_options[] = {
         {"archive", required_argument, NULL, OPTION_ARCHIVE},
         {"rebuild", no_argument, NULL, OPTION_REBUILD},
+        {"fewer", no_argument, NULL, OPTION_FEWER},
         {"campaign", required_argument, NULL, OPTION_CAMPAIGN},
         {"scene", required_argument, NULL, OPTION_SCENE},
         {"angle", required_argument, NULL, OPTION_ANGLE},
@@ -162,6 +167,9 @@ static int parse_one(struct series_arguments *a, int option, const char *unknown
 	case OPTION_REBUILD:
 		a->rebuild = true;
 		return COMMAND_DONE;
+	case OPTION_FEWER:
+		a->fewer = true;
+		return COMMAND_DONE;
 	case OPTION_UNDECIDED:
 		a->undecided = true;
 		return COMMAND_DONE;
@@ -198,6 +206,8 @@ static int parse(struct series_arguments *a, int argc, char **argv)
 		code = parse_one(a, option, argv[optind - 1]);
 	if (code == COMMAND_DONE && a->json && a->csv != NULL)
 		code = command_usage("series", "--json and --csv exclude each other");
+	if (code == COMMAND_DONE && a->fewer && !a->rebuild)
+		code = command_usage("series", "--fewer goes with --rebuild");
 	if (code == COMMAND_DONE && a->limit > 0 && a->csv != NULL)
 		code = command_usage("series",
 		                     "--limit goes without --csv, which cannot say that there are more");
@@ -227,7 +237,6 @@ static const struct verb {
         {"result", ARCHIVE_READ, 1, 1, series_verb_result, "DROP"},
         {"tables", ARCHIVE_READ, 0, 1, series_verb_tables, "at most a CAMPAIGN"},
         {"reanalyse", ARCHIVE_WRITE, 1, 1 << 20, series_verb_reanalyse, "SERIES..."},
-        {"verify", ARCHIVE_WRITE, 0, 0, series_verb_verify, "nothing behind it"},
         {"calibrate", ARCHIVE_WRITE, 0, 2, series_verb_calibrate, "SENSOR GAIN, or nothing"},
 };
 enum { VERBS = sizeof(verbs) / sizeof(verbs[0]) };

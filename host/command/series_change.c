@@ -1,23 +1,18 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * The verbs of `droptower series` that change an archive: series, logs, decisions, notes, results.
+ * The verbs of `droptower series` that change an archive: series, decisions, notes, results. Logs are added
+ * by series_add.c.
  */
-#include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "host/command/archived.h"
 #include "host/command/beside.h"
 #include "host/command/command.h"
 #include "host/command/series_private.h"
-#include "host/record/drop.h"
-#include "host/record/read.h"
 
-/* ---- new series and logs ---- */
+/* ---- a new series ---- */
 
 int series_verb_new(struct archive *archive, struct series_arguments *a)
 {
@@ -31,107 +26,12 @@ int series_verb_new(struct archive *archive, struct series_arguments *a)
 	return COMMAND_DONE;
 }
 
-static int copy_bytes(int from, int to)
-{
-	char block[65536];
-	ssize_t n, done;
-
-	while ((n = read(from, block, sizeof(block))) > 0)
-		for (ssize_t at = 0; at < n; at += done) {
-			done = write(to, block + at, (size_t)(n - at));
-			if (done < 0)
-				return -1;
-		}
-	return n == 0 ? 0 : -1;
-}
-
-/* file to the log of r, and when file was last written. */
-static int copy_log(const char *file, const struct archive_recording *r, int64_t *time_s)
-{
-	int from = open(file, O_RDONLY | O_CLOEXEC), to = open(r->log, O_WRONLY | O_CLOEXEC), result = -1;
-	struct stat status;
-
-	if (from >= 0 && to >= 0 && fstat(from, &status) == 0) {
-		*time_s = status.st_mtime;
-		result = copy_bytes(from, to);
-	}
-	if (result != 0)
-		command_error("%s to %s: %s", file, r->log, strerror(errno));
-	if (from >= 0)
-		close(from);
-	if (to >= 0 && close(to) != 0 && result == 0) {
-		command_error("%s: %s", r->log, strerror(errno));
-		result = -1;
-	}
-	return result;
-}
-
-/* A log is looked at before anything is made of it. */
-static int is_new_log(struct archive *archive, const char *file, const char **ending)
-{
-	char message[READ_MESSAGE_MAX], drop[ARCHIVE_NAME_MAX + 16];
-	struct record record;
-	bool ours;
-	int found;
-
-	if (read_record(&record, file, NULL, message) != 0) {
-		command_error("%s", message);
-		return COMMAND_INPUT;
-	}
-	*ending = archive_ending(record.format);
-	ours = drop_has_channel(&record);
-	record_free(&record);
-	if (!ours) {
-		command_error("%s: no channel S1X to S2Z, expected a drop of the tower", file);
-		return COMMAND_INPUT;
-	}
-	found = archive_find(archive, file, drop);
-	if (found < 0)
-		return archived_failed(archive);
-	if (found == 0)
-		return COMMAND_DONE;
-	command_error("%s: is there already as %s, expected a log that is not", file, drop);
-	return COMMAND_INPUT;
-}
-
-static int add_log(struct archive *archive, const struct series_arguments *a, const char *file)
-{
-	struct archive_recording r;
-	const char *ending = NULL;
-	int64_t time_s = 0;
-	int code = is_new_log(archive, file, &ending);
-
-	if (code != COMMAND_DONE)
-		return code;
-	if (archive_begin(archive, a->word[0], a->operator_name, ending, a->simulated, &r) != 0)
-		return archived_failed(archive);
-	if (copy_log(file, &r, &time_s) != 0) {
-		archive_discard(archive, &r);
-		return COMMAND_INPUT;
-	}
-	if (archive_finish(archive, &r, time_s, a->note != NULL ? a->note : "") != 0)
-		return archived_failed(archive);
-	printf("%s/%u  %s\n", r.series, r.number, file);
-	fflush(stdout);
-	return archived_analyse(archive, r.series, r.number, r.raw);
-}
-
-int series_verb_add(struct archive *archive, struct series_arguments *a)
-{
-	int code = series_must_be(archive, a->word[0]);
-
-	for (int i = 1; i < a->count && code == COMMAND_DONE; i++)
-		code = add_log(archive, a, a->word[i]);
-	return code;
-}
-
 /* ---- the drops that a verb works on ---- */
 
 /* The drops that a verb works on: looked up first, since what it does changes the list. */
 struct chosen {
 	struct {
 		char name[ARCHIVE_NAME_MAX + 16], series[ARCHIVE_NAME_MAX + 1];
-		char raw[ARCHIVE_NAME_MAX + 64];
 		unsigned number;
 	} * drop;
 	size_t count, room;
@@ -142,8 +42,7 @@ static int choose_one(void *context, const struct archive_drop *drop)
 {
 	struct chosen *c = context;
 
-	if (strcmp(drop->state, "recorded") != 0 ||
-	    (c->undecided_only && strcmp(drop->decision, "open") != 0) ||
+	if (drop->sha256[0] == '\0' || (c->undecided_only && strcmp(drop->decision, "open") != 0) ||
 	    (c->without_result_only && drop->version != NULL))
 		return 0;
 	if (c->count == c->room) {
@@ -157,7 +56,6 @@ static int choose_one(void *context, const struct archive_drop *drop)
 	}
 	snprintf(c->drop[c->count].name, sizeof(c->drop->name), "%.60s/%u", drop->series.name, drop->number);
 	snprintf(c->drop[c->count].series, sizeof(c->drop->series), "%s", drop->series.name);
-	snprintf(c->drop[c->count].raw, sizeof(c->drop->raw), "%s", drop->raw);
 	c->drop[c->count++].number = drop->number;
 	return 0;
 }
@@ -179,8 +77,7 @@ static int analyse_chosen(struct archive *archive, struct chosen *chosen)
 	int code = COMMAND_DONE;
 
 	for (size_t i = 0; i < chosen->count && !command_interrupted(); i++) {
-		int one = archived_analyse(archive, chosen->drop[i].series, chosen->drop[i].number,
-		                           chosen->drop[i].raw);
+		int one = archived_analyse(archive, chosen->drop[i].series, chosen->drop[i].number);
 
 		if (one != COMMAND_DONE)
 			code = one;
@@ -306,7 +203,7 @@ int series_rebuild(const struct series_arguments *a)
 	struct archive *archive;
 	int wrong = 0, code;
 
-	if (archive_rebuild(a->archive, series_tell_wrong, &wrong, message) != 0 ||
+	if (archive_rebuild(a->archive, a->fewer, series_tell_wrong, &wrong, message) != 0 ||
 	    (archive = archive_open(a->archive, ARCHIVE_WRITE, message)) == NULL) {
 		command_error("%s", message);
 		return COMMAND_INPUT;

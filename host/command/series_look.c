@@ -89,12 +89,40 @@ int series_verb_drops(struct archive *archive, struct series_arguments *a)
 	return print(&(struct job){archive, a, print_all});
 }
 
+/* How the tower has changed over the series; nothing when its drops say nothing. */
+static int print_trends(struct archive *archive, const char *series)
+{
+	static const struct {
+		const char *name, *unit;
+		double scale;
+		int decimals;
+	} words[ARCHIVE_TRENDS] = {
+	        [ARCHIVE_TREND_DROPOUT] = {"magnet drop-out", "ms", 1e3, 2},
+	        [ARCHIVE_TREND_SEPARATION] = {"separation", "mm", 1e3, 1},
+	        [ARCHIVE_TREND_ACCELERATION] = {"frame", "m/s2", 1.0, 3},
+	};
+	struct archive_trend trend[ARCHIVE_TRENDS];
+
+	if (archive_trends(archive, series, trend) != 0)
+		return archived_failed(archive);
+	for (int i = 0; i < ARCHIVE_TRENDS; i++)
+		if (trend[i].drops > 1)
+			printf("tower    %s %.*f -> %.*f %s over %u drops\n", words[i].name,
+			       words[i].decimals, trend[i].from * words[i].scale, words[i].decimals,
+			       trend[i].to * words[i].scale, words[i].unit, trend[i].drops);
+	return COMMAND_DONE;
+}
+
 int series_verb_show(struct archive *archive, struct series_arguments *a)
 {
 	int code = series_must_be(archive, a->word[0]);
 
 	a->filter.series = a->word[0];
-	return code != COMMAND_DONE ? code : print(&(struct job){archive, a, print_all});
+	if (code == COMMAND_DONE)
+		code = print(&(struct job){archive, a, print_all});
+	if (code == COMMAND_DONE && a->csv == NULL && !a->json)
+		code = print_trends(archive, a->word[0]);
+	return code;
 }
 
 static int count_one(void *context, const struct archive_series *series)
@@ -138,10 +166,10 @@ int series_verb_calibrations(struct archive *archive, struct series_arguments *a
 
 int series_verb_result(struct archive *archive, struct series_arguments *a)
 {
-	char *json = archive_json(archive, a->word[0], a->filter.version);
+	char *json;
 	bool failed;
 
-	if (json == NULL)
+	if (archive_json(archive, a->word[0], a->filter.version, &json) != 0)
 		return archived_failed(archive);
 	failed = fputs(json, stdout) < 0 || fflush(stdout) != 0;
 	free(json);
@@ -156,16 +184,4 @@ void series_tell_wrong(void *context, const char *text)
 
 	(*count)++;
 	command_error("%s", text);
-}
-
-int series_verb_verify(struct archive *archive, struct series_arguments *a)
-{
-	int told = 0, count = archive_verify(archive, series_tell_wrong, &told);
-
-	(void)a;
-	if (count < 0)
-		return archived_failed(archive);
-	if (count == 0)
-		puts("every raw file is what was recorded");
-	return count == 0 ? COMMAND_DONE : COMMAND_INPUT;
 }

@@ -11,7 +11,7 @@
 
 struct series_arguments {
 	const char *archive, *csv, *reason, *note, *operator_name, *reference, *scene, *date;
-	bool json, rebuild, undecided, simulated, help;
+	bool json, rebuild, fewer, undecided, simulated, help;
 	double drops, height_m, limit;
 	struct archive_filter filter;
 	struct archive_dates dates;
@@ -25,7 +25,6 @@ int series_verb_drops(struct archive *archive, struct series_arguments *argument
 int series_verb_show(struct archive *archive, struct series_arguments *arguments);
 int series_verb_tables(struct archive *archive, struct series_arguments *arguments);
 int series_verb_result(struct archive *archive, struct series_arguments *arguments);
-int series_verb_verify(struct archive *archive, struct series_arguments *arguments);
 int series_verb_calibrations(struct archive *archive, struct series_arguments *arguments);
 
 int series_verb_new(struct archive *archive, struct series_arguments *arguments);

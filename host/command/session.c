@@ -9,7 +9,20 @@
 
 #include "common/wire_table.h"
 #include "host/command/command.h"
+#include "host/command/journal.h"
 #include "host/command/session_private.h"
+
+enum { SILENT_MS = 20000 };
+
+/* Never 0. */
+static int draw_number(uint32_t *number)
+{
+	*number = 0;
+	while (*number == 0)
+		if (getrandom(number, sizeof(*number), 0) != sizeof(*number))
+			return DT_E_SYSTEM;
+	return 0;
+}
 
 struct session *session_open(const char *url, const struct session_options *options,
                              char message[SESSION_MESSAGE_MAX])
@@ -21,6 +34,11 @@ struct session *session_open(const char *url, const struct session_options *opti
 		return NULL;
 	}
 	session->options = *options;
+	if (draw_number(&session->view.session) != 0) {
+		snprintf(message, SESSION_MESSAGE_MAX, "no random number for the session");
+		free(session);
+		return NULL;
+	}
 	session->how = strncmp(url, "udpm:", 5) == 0 ? &session_lcm : &session_can;
 	if (session->how->open(session, url, message) != 0) {
 		free(session);
@@ -47,6 +65,11 @@ void session_hold(struct session *session, bool hold)
 	session->hold = hold;
 }
 
+void session_keep(struct session *session)
+{
+	session->keep = true;
+}
+
 int session_poll(struct session *session, int timeout_ms)
 {
 	return session->how->poll(session, timeout_ms);
@@ -57,9 +80,18 @@ const struct session_view *session_view(const struct session *session)
 	return &session->view;
 }
 
-int session_command(struct session *session, enum wire_op op, uint16_t token)
+int session_command(struct session *session, enum wire_op op)
 {
-	return session->how->command(session, op, token);
+	int result = session->how->command(session, op);
+	const struct session_options *options = &session->options;
+
+	if (options->program != NULL)
+		journal_write(&(struct journal_line){.program = options->program,
+		                                     .who = options->operator_name,
+		                                     .session = session->view.session,
+		                                     .verb = wire_op_name(op),
+		                                     .refusal = result != 0 ? error_text(result) : NULL});
+	return result;
 }
 
 bool session_cancelled(struct session *session)
@@ -69,9 +101,29 @@ bool session_cancelled(struct session *session)
 	return command_interrupted() || (options->cancelled != NULL && options->cancelled(options->user));
 }
 
+int session_read_parameters(struct session *session)
+{
+	struct session_view *view = &session->view;
+	uint32_t value[WIRE_PARAMETERS];
+
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++) {
+		int result = session_get_parameter(session, (enum wire_parameter_number)i, &value[i]);
+
+		if (result != 0)
+			return result;
+	}
+	memcpy(view->parameters, value, sizeof(value));
+	view->parameters_known = true;
+	return 0;
+}
+
 int session_set_parameter(struct session *session, enum wire_parameter_number number, uint32_t value)
 {
-	return session->how->set_parameter(session, number, value);
+	int result = session->how->set_parameter(session, number, value);
+
+	if (result == 0)
+		session->view.parameters[number] = value;
+	return result;
 }
 
 int session_get_parameter(struct session *session, enum wire_parameter_number number, uint32_t *value)
@@ -84,16 +136,6 @@ int session_take_drop(struct session *session, struct record *record)
 	return session->how->take_drop(session, record);
 }
 
-uint16_t session_token(void)
-{
-	uint16_t token = 0;
-
-	while (token == 0)
-		if (getrandom(&token, sizeof(token), 0) != sizeof(token))
-			token = (uint16_t)(session_utime() | 1);
-	return token;
-}
-
 bool session_drops(unsigned state)
 {
 	return wire_state_moving(state) || state == WIRE_STATE_CAPTURED;
@@ -102,6 +144,13 @@ bool session_drops(unsigned state)
 bool session_at_rest(unsigned state)
 {
 	return !session_drops(state) && state != WIRE_STATE_ARMED && state != WIRE_STATE_UPLOADED;
+}
+
+bool session_is_over(const struct session *session, uint64_t statuses)
+{
+	const struct session_view *view = &session->view;
+
+	return view->statuses >= statuses || session_now_ms() - view->status_ms > SILENT_MS;
 }
 
 int64_t session_now_ms(void)

@@ -13,7 +13,7 @@ struct session_way {
 	int (*open)(struct session *session, const char *url, char message[SESSION_MESSAGE_MAX]);
 	void (*close)(struct session *session);
 	int (*poll)(struct session *session, int timeout_ms);
-	int (*command)(struct session *session, enum wire_op op, uint16_t token);
+	int (*command)(struct session *session, enum wire_op op);
 	int (*set_parameter)(struct session *session, enum wire_parameter_number number, uint32_t value);
 	int (*get_parameter)(struct session *session, enum wire_parameter_number number, uint32_t *value);
 	int (*take_drop)(struct session *session, struct record *record);
@@ -24,7 +24,7 @@ struct session {
 	void *way;
 	struct session_options options;
 	struct session_view view;
-	bool hold;
+	bool hold, keep;
 };
 
 /* Nobody wants what is under way any longer: Ctrl-C or an ABORT came. ABORT itself is always wanted. */

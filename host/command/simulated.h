@@ -9,11 +9,13 @@
 #include <stdint.h>
 #include <sys/types.h>
 
+#include "common/link/temporary.h"
+
 struct simulated {
 	pid_t pid;
-	char directory[64];
-	char url[96];     /* of its bus */
-	char control[80]; /* its control socket */
+	struct temporary folder;
+	char url[112];     /* of its bus */
+	char control[112]; /* its control socket */
 };
 
 /* arguments: what to hand to the bench besides --link, --control and --ready-fd, NULL-terminated, at most 32.
@@ -24,7 +26,7 @@ int simulated_start(struct simulated *tower, const char *const *arguments, char 
 /* It has not ended by itself. */
 bool simulated_alive(struct simulated *tower);
 
-/* Ends it and removes its directory. */
+/* Ends it, by force when it takes longer than 5 s, and removes its folder. */
 void simulated_stop(struct simulated *tower);
 
 #endif

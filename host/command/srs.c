@@ -18,6 +18,7 @@ static const char help[] =
         "FILE and --columns are those of 'droptower analyze'; a sensor's high-pass is not undone.\n"
         "\n"
         "  --columns SPEC    for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\"\n"
+        "  --drop N          the N-th drop of a log of several, counted from 1\n"
         "  --q Q             quality factor (10)\n"
         "  --damping RATIO   damping ratio instead, 0 to below 1\n"
         "  --per-octave N    frequencies in an octave (12)\n"
@@ -38,6 +39,7 @@ static const char help[] =
 
 enum {
 	OPTION_COLUMNS = 256,
+	OPTION_DROP,
 	OPTION_Q,
 	OPTION_DAMPING,
 	OPTION_PER_OCTAVE,
@@ -57,6 +59,7 @@ enum {
 
 static const struct option long_options[] = {
         {"columns", required_argument, NULL, OPTION_COLUMNS},
+        {"drop", required_argument, NULL, OPTION_DROP},
         {"q", required_argument, NULL, OPTION_Q},
         {"damping", required_argument, NULL, OPTION_DAMPING},
         {"per-octave", required_argument, NULL, OPTION_PER_OCTAVE},
@@ -78,6 +81,7 @@ static const struct option long_options[] = {
 
 struct arguments {
 	const char *columns, *limit_file, *csv, *svg;
+	unsigned drop; /* of a log of several; 0: the only one */
 	double q;
 	struct spectrum_options spectrum;
 	bool json, strict, help;
@@ -141,6 +145,8 @@ static int parse_one(struct arguments *arguments, int option, const char *unknow
 	case OPTION_COLUMNS:
 		arguments->columns = optarg;
 		return COMMAND_DONE;
+	case OPTION_DROP:
+		return command_drop("srs", optarg, &arguments->drop);
 	case OPTION_Q:
 	case OPTION_DAMPING:
 	case OPTION_PER_OCTAVE:
@@ -334,7 +340,7 @@ int command_srs(int argc, char **argv)
 	}
 	if (arguments.limit_file)
 		arguments.spectrum.limit = &limit;
-	if (read_record(&record, argv[optind], arguments.columns, message) == 0) {
+	if (read_nth(&record, argv[optind], arguments.columns, arguments.drop, message) == 0) {
 		code = spectrum_of(&record, &arguments);
 		record_free(&record);
 	} else {

@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "common/wire_table.h"
 #include "host/command/command.h"
@@ -45,13 +46,22 @@ int tower_setup_hear(struct session *session, char message[SESSION_MESSAGE_MAX])
 	return COMMAND_REFUSED;
 }
 
-struct setting {
-	enum wire_parameter_number number;
-	double value;
-};
+void tower_setup_settings(const struct scene *scene, struct tower_setting settings[TOWER_SETTINGS])
+{
+	const struct tower_setting all[TOWER_SETTINGS] = {
+	        {WIRE_PARAMETER_gate_upper_um, scene->tower_gate_upper_m * 1e6},
+	        {WIRE_PARAMETER_gate_lower_um, scene->tower_gate_lower_m * 1e6},
+	        {WIRE_PARAMETER_separation_um, scene->tower_separation_m * 1e6},
+	        {WIRE_PARAMETER_dampers_um, scene->tower_dampers_m * 1e6},
+	        {WIRE_PARAMETER_dropout_us, scene->tower_magnet_dropout_s * 1e6},
+	        {WIRE_PARAMETER_range_counts, scene->sensor_range_g * WIRE_COUNTS_PER_G},
+	};
+
+	memcpy(settings, all, sizeof(all));
+}
 
 /* The first that the tower could not have whatever the others are; NULL: none. */
-static const struct setting *out_of_range(const struct setting *settings, size_t count)
+static const struct tower_setting *out_of_range(const struct tower_setting *settings, size_t count)
 {
 	for (size_t i = 0; i < count; i++) {
 		const struct wire_parameter_info *parameter = &wire_parameters[settings[i].number];
@@ -65,7 +75,7 @@ static const struct setting *out_of_range(const struct setting *settings, size_t
 
 /* Writes what the tower takes. What does not agree with the others that it still has is moved to the front:
  * count is how many those are. Another refusal ends it, with that setting at the front. */
-static int write_round(struct session *session, struct setting *settings, size_t *count)
+static int write_round(struct session *session, struct tower_setting *settings, size_t *count)
 {
 	size_t left = 0;
 
@@ -85,7 +95,7 @@ static int write_round(struct session *session, struct setting *settings, size_t
 }
 
 /* In rounds, until all are written or a round has moved nothing. */
-static int write_all(struct session *session, struct setting *settings, size_t count)
+static int write_all(struct session *session, struct tower_setting *settings, size_t count)
 {
 	size_t before = count + 1;
 	int result = 0;
@@ -97,7 +107,7 @@ static int write_all(struct session *session, struct setting *settings, size_t c
 	return result == 0 && count > 0 ? DT_E_RANGE : result;
 }
 
-static int refused(const struct setting *setting, int result, char message[SESSION_MESSAGE_MAX])
+static int refused(const struct tower_setting *setting, int result, char message[SESSION_MESSAGE_MAX])
 {
 	const struct wire_parameter_info *parameter = &wire_parameters[setting->number];
 
@@ -116,24 +126,67 @@ static int refused(const struct setting *setting, int result, char message[SESSI
 	return result == DT_E_STATE || result == DT_E_RANGE ? COMMAND_REFUSED : COMMAND_LINK;
 }
 
+/* The set that ARM will name; what was written is in it, or another writes as well. */
+static int read_back(struct session *session, const struct tower_setting *settings, size_t count,
+                     char message[SESSION_MESSAGE_MAX])
+{
+	const struct session_view *view = session_view(session);
+	int result = session_read_parameters(session);
+
+	if (result != 0 && command_interrupted())
+		return stopped(message);
+	if (result != 0) {
+		snprintf(message, SESSION_MESSAGE_MAX, "the tower's parameters cannot be read: %s",
+		         error_text(result));
+		return COMMAND_LINK;
+	}
+	for (size_t i = 0; i < count; i++) {
+		uint32_t value = view->parameters[settings[i].number];
+
+		if (value == (uint32_t)llround(settings[i].value))
+			continue;
+		snprintf(message, SESSION_MESSAGE_MAX, "the tower has %s = %u just after %.0f was written",
+		         wire_parameters[settings[i].number].name, value, settings[i].value);
+		return COMMAND_REFUSED;
+	}
+	return COMMAND_DONE;
+}
+
 int tower_setup_write(struct session *session, const struct scene *scene, char message[SESSION_MESSAGE_MAX])
 {
-	struct setting settings[] = {
-	        {WIRE_PARAMETER_gate_upper_um, scene->tower_gate_upper_m * 1e6},
-	        {WIRE_PARAMETER_gate_lower_um, scene->tower_gate_lower_m * 1e6},
-	        {WIRE_PARAMETER_separation_um, scene->tower_separation_m * 1e6},
-	        {WIRE_PARAMETER_dampers_um, scene->tower_dampers_m * 1e6},
-	        {WIRE_PARAMETER_dropout_us, scene->tower_magnet_dropout_s * 1e6},
-	        {WIRE_PARAMETER_range_counts, scene->sensor_range_g * WIRE_COUNTS_PER_G},
-	};
-	size_t count = sizeof(settings) / sizeof(settings[0]);
-	const struct setting *beyond = out_of_range(settings, count);
+	struct tower_setting wanted[TOWER_SETTINGS],
+	        settings[TOWER_SETTINGS]; /* these in the order in which they are left */
+	const struct tower_setting *beyond;
+	size_t count = TOWER_SETTINGS;
 	int result;
 
+	tower_setup_settings(scene, wanted);
+	beyond = out_of_range(wanted, count);
 	if (beyond != NULL)
 		return refused(beyond, DT_E_RANGE, message);
+	memcpy(settings, wanted, sizeof(settings));
 	result = write_all(session, settings, count);
-	if (result == 0 || result == DT_E_UNKNOWN) /* over LCM: the bridge has set them */
+	if (result == DT_E_UNKNOWN) /* over LCM: the bridge has set them */
 		return COMMAND_DONE;
+	if (result == 0)
+		return read_back(session, wanted, count, message);
 	return command_interrupted() ? stopped(message) : refused(&settings[0], result, message);
+}
+
+bool tower_setup_difference(struct session *session, char message[SESSION_MESSAGE_MAX])
+{
+	const struct session_view *view = session_view(session);
+
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++) {
+		uint32_t value;
+
+		if (session_get_parameter(session, (enum wire_parameter_number)i, &value) != 0)
+			return false;
+		if (value == view->parameters[i])
+			continue;
+		snprintf(message, SESSION_MESSAGE_MAX, "the tower has %s = %u, expected %u %s",
+		         wire_parameters[i].name, value, view->parameters[i], wire_parameters[i].unit);
+		return true;
+	}
+	return false;
 }

@@ -6,7 +6,18 @@
  * scene.
  */
 #include "common/scenes/scene.h"
+#include "common/wire.h"
 #include "host/command/session.h"
+
+enum { TOWER_SETTINGS = 6 };
+
+struct tower_setting {
+	enum wire_parameter_number number;
+	double value; /* of the wire, not rounded */
+};
+
+/* The parameters that a scene gives a tower. */
+void tower_setup_settings(const struct scene *scene, struct tower_setting settings[TOWER_SETTINGS]);
 
 /* Waits until the tower is heard, speaks our wire and has done its self-test. Returns a COMMAND_* code; other
  * than COMMAND_DONE with one line in message. */
@@ -14,7 +25,11 @@ int tower_setup_hear(struct session *session, char message[SESSION_MESSAGE_MAX])
 
 /* Writes the parameters, in an order in which the tower takes them: it refuses a place that is not in order
  * with the others that it has. What no tower can have is refused before anything is written. Over LCM nothing
- * is written. Returns as above. */
+ * is written. Then the tower's whole set is read: it is the one that ARM will name. Returns as above. */
 int tower_setup_write(struct session *session, const struct scene *scene, char message[SESSION_MESSAGE_MAX]);
+
+/* After DT_E_PARAMETERS: the first parameter that is not what the session believes, in words. False when the
+ * tower does not tell, or there is none. */
+bool tower_setup_difference(struct session *session, char message[SESSION_MESSAGE_MAX]);
 
 #endif

@@ -164,3 +164,38 @@ bool guard_take(struct guard_rate *rate, int64_t now_ms)
 	rate->left -= 1.0;
 	return true;
 }
+
+void guard_rates_init(struct guard_rates *rates, double burst, double per_s)
+{
+	*rates = (struct guard_rates){.unnamed = {.burst = burst, .per_s = per_s}};
+	for (unsigned i = 0; i < GUARD_CONSOLES; i++)
+		rates->console[i].rate = rates->unnamed;
+}
+
+bool guard_take_of(struct guard_rates *rates, const char *console, int64_t now_ms)
+{
+	struct guard_console *place = &rates->console[0];
+
+	if (console[0] == '\0')
+		return guard_take(&rates->unnamed, now_ms);
+	for (unsigned i = 0; i < GUARD_CONSOLES; i++) {
+		struct guard_console *other = &rates->console[i];
+
+		if (strcmp(other->name, console) == 0)
+			return guard_take(&other->rate, now_ms);
+		if (other->rate.then_ms < place->rate.then_ms)
+			place = other;
+	}
+	snprintf(place->name, sizeof(place->name), "%s", console);
+	return guard_take(&place->rate, now_ms);
+}
+
+bool guard_json_has_nul(const char *text)
+{
+	while ((text = strchr(text, '\\')) != NULL && text[1] != '\0') {
+		if (strncmp(text + 1, "u0000", 5) == 0)
+			return true;
+		text += 2;
+	}
+	return false;
+}

@@ -40,4 +40,25 @@ struct guard_rate {
 /* Takes one; false when there is none left. */
 bool guard_take(struct guard_rate *rate, int64_t now_ms);
 
+/* A rate for each console that asks, and one for all that do not say who they are. A console that is new
+ * takes the place of the one that was quiet the longest, with what that had left: names made up do not get
+ * more. */
+enum { GUARD_CONSOLES = 16, GUARD_CONSOLE_MAX = 64 };
+struct guard_rates {
+	struct guard_console {
+		char name[GUARD_CONSOLE_MAX + 1];
+		struct guard_rate rate;
+	} console[GUARD_CONSOLES];
+	struct guard_rate unnamed;
+};
+void guard_rates_init(struct guard_rates *rates, double burst, double per_s);
+
+/* As guard_take; console: valid, or "". */
+bool guard_take_of(struct guard_rates *rates, const char *console, int64_t now_ms);
+
+/* ---- what a request may look like ---- */
+
+/* A JSON text has the escape of NUL in it, which would end a text within. */
+bool guard_json_has_nul(const char *text);
+
 #endif

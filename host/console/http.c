@@ -52,8 +52,9 @@ static struct MHD_Daemon *start_daemon(struct http *http, const struct sockaddr_
 	                        MHD_OPTION_CONNECTION_LIMIT, (unsigned)HTTP_CONNECTIONS,
 	                        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_S,
 	                        MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)MEMORY_PER_CONNECTION,
-	                        MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_NOTIFY_COMPLETED, http_completed,
-	                        NULL, MHD_OPTION_NOTIFY_CONNECTION, http_visit, http, MHD_OPTION_END);
+	                        MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_URI_LOG_CALLBACK, http_target,
+	                        http, MHD_OPTION_NOTIFY_COMPLETED, http_completed, NULL,
+	                        MHD_OPTION_NOTIFY_CONNECTION, http_visit, http, MHD_OPTION_END);
 }
 
 struct http *http_start(struct console *console, const struct http_options *options,
@@ -73,7 +74,8 @@ struct http *http_start(struct console *console, const struct http_options *opti
 	http->part_count = options->part_count;
 	http->token = options->token;
 	/* a technician and a page that fetches five drops at once are far below the first */
-	http->asked = (struct guard_rate){.burst = 400, .per_s = 200};
+	guard_rates_init(&http->asked, 400, 200);
+	http->held = (struct guard_rate){.burst = 400, .per_s = 200};
 	http->wrong = (struct guard_rate){.burst = 20, .per_s = 5};
 	pthread_mutex_init(&http->visits_lock, NULL);
 	pthread_mutex_init(&http->jobs_lock, NULL);

@@ -29,14 +29,21 @@ struct http {
 	const char *token;
 	struct hold hold;
 	struct streams *streams;
-	struct guard_rate asked, wrong; /* requests with the token, and without */
-	pthread_mutex_t jobs_lock;      /* of closing and jobs */
+	struct guard_rates asked;  /* requests with the token, of each console */
+	struct guard_rate held;    /* of the console that holds the arm, whatever others ask for */
+	struct guard_rate wrong;   /* without the token */
+	pthread_mutex_t jobs_lock; /* of closing and jobs */
 	bool closing;
 	unsigned jobs;               /* given away and not yet done */
 	pthread_mutex_t visits_lock; /* of what follows */
 	struct visit *oldest, *newest;
 	unsigned visits;
 };
+
+/* A request's target, before libmicrohttpd takes it apart, which needs memory for each argument and without
+ * it never answers: too long a one is refused here. MHD_OPTION_URI_LOG_CALLBACK; what it returns is the
+ * context of http_request. */
+void *http_target(void *user, const char *target, struct MHD_Connection *connection);
 
 /* A piece of a request comes; MHD_AccessHandlerCallback. */
 enum MHD_Result http_request(void *user, struct MHD_Connection *connection, const char *url,

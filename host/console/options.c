@@ -145,6 +145,9 @@ int options_read(struct options *options, int argc, char **argv)
 		code = find_scenes(options);
 	options->work.archive = archived_folder(options->work.archive);
 	options->work.operator_name = archived_operator(options->work.operator_name);
+	if (code == COMMAND_DONE &&
+	    options->work.operator_name[strspn(options->work.operator_name, " ")] == '\0')
+		code = command_usage("serve", "who drops is not known, expected --operator NAME");
 	options->work.scenes = options->scenes;
 	options->tower.scene = options->scenes[0];
 	options->tower.bench_words = options->bench_words;

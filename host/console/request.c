@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/socket.h>
 
+#include "common/plain.h"
 #include "host/console/http_private.h"
 #include "host/console/route.h"
 
@@ -15,6 +16,8 @@ enum {
 	BODY_MAX = 16 * 1024,
 	SWALLOW_MAX = 1024 * 1024, /* of a body that is too large, so that its sender hears why */
 	TEXT_MAX = 128,
+	TARGET_MAX = 4096,  /* of a request, in bytes */
+	ARGUMENTS_MAX = 64, /* in it */
 };
 
 /* A request, from its first line to its answer. */
@@ -205,7 +208,9 @@ static bool parse_body(struct request *request)
 
 	if (post) {
 		request->body[request->announced] = '\0';
-		request->tree = strlen(request->body) == request->announced
+		request->tree = plain_is_utf8(request->body, request->announced) &&
+		                                !guard_json_has_nul(request->body) &&
+		                                strlen(request->body) == request->announced
 		                        ? cJSON_ParseWithOpts(request->body, NULL, true)
 		                        : NULL;
 	}
@@ -247,7 +252,8 @@ static enum MHD_Result begin(struct request *request)
 	if (request->announced > BODY_MAX)
 		request->announced = 0;
 	if (!parse_body(request))
-		return refuse(request->connection, 400, "expected a JSON object", NULL, NULL);
+		return refuse(request->connection, 400, "expected a JSON object in UTF-8, without NUL", NULL,
+		              NULL);
 	if (request->route->needs_hold && !hold_mine(&http->hold, request->console, session_now_ms()))
 		return refuse(request->connection, 423, "this console does not hold the arm", NULL, NULL);
 	if (request->route->kind == ROUTE_STREAM)
@@ -269,11 +275,61 @@ static void take_body(struct request *request, const char *bytes, size_t size)
 
 /* ---- who asks ---- */
 
-static bool too_large(struct MHD_Connection *connection)
+static bool longer_than(struct MHD_Connection *connection, unsigned long long most)
 {
 	const char *length = header(connection, MHD_HTTP_HEADER_CONTENT_LENGTH);
 
-	return length != NULL && strtoull(length, NULL, 10) > SWALLOW_MAX;
+	return length != NULL && strtoull(length, NULL, 10) > most;
+}
+
+static enum MHD_Result count_length(void *user, enum MHD_ValueKind kind, const char *name, const char *value)
+{
+	(void)kind;
+	(void)value;
+	*(unsigned *)user += strcasecmp(name, MHD_HTTP_HEADER_CONTENT_LENGTH) == 0;
+	return MHD_YES;
+}
+
+/* Two lengths: what follows the body is then not what it seems (RFC 9112, 6.3). */
+static bool has_two_lengths(struct MHD_Connection *connection)
+{
+	unsigned count = 0;
+
+	MHD_get_connection_values(connection, MHD_HEADER_KIND, count_length, &count);
+	return count > 1;
+}
+
+/* The holder's renewals and verbs do not stand behind what other consoles ask for. */
+static bool within_rate(struct http *http, const char *console)
+{
+	int64_t now_ms = session_now_ms();
+
+	if (console == NULL || !guard_console_valid(console))
+		console = "";
+	if (hold_mine(&http->hold, console, now_ms))
+		return guard_take(&http->held, now_ms);
+	return guard_take_of(&http->asked, console, now_ms);
+}
+
+static void forget_job(struct job *job)
+{
+	free(job->answer);
+	free(job);
+}
+
+/* An ABORT with a body that is long, or of a length nobody knows, does not wait for it. */
+static enum MHD_Result abort_at_once(struct http *http, struct MHD_Connection *connection,
+                                     const struct route *route)
+{
+	struct job *job = calloc(1, sizeof(*job));
+
+	if (job == NULL)
+		return refuse(connection, 503, error_text(DT_E_MEMORY), NULL, NULL);
+	job->console = http->console;
+	job->done = forget_job;
+	job->run = route->run;
+	job->run(job);
+	return refuse(connection, 202, "aborting; the body was not waited for", NULL, NULL);
 }
 
 static enum MHD_Result check_token(struct http *http, struct MHD_Connection *connection, bool *passed)
@@ -333,11 +389,17 @@ static enum MHD_Result open_request(struct http *http, struct MHD_Connection *co
 		              allowed(path));
 	if (route == NULL)
 		return refuse(connection, 404, "no such request, or no such name", NULL, NULL);
-	if (!route->always && !guard_take(&http->asked, session_now_ms()))
+	if (has_two_lengths(connection))
+		return refuse(connection, 400, "expected one Content-Length", MHD_HTTP_HEADER_CONNECTION,
+		              "close");
+	if (!route->always && !within_rate(http, console))
 		return refuse(connection, 429, "too many requests", MHD_HTTP_HEADER_RETRY_AFTER, "1");
 	if (console != NULL && !guard_console_valid(console) && !route->always)
 		return refuse(connection, 400, "X-Console: expected 16 to 64 letters and digits", NULL, NULL);
-	if (too_large(connection))
+	if (route->always && (longer_than(connection, BODY_MAX) ||
+	                      header(connection, MHD_HTTP_HEADER_TRANSFER_ENCODING) != NULL))
+		return abort_at_once(http, connection, route);
+	if (longer_than(connection, SWALLOW_MAX))
 		return refuse(connection, 413, "expected at most 16 KiB", NULL, NULL);
 	*context = new_request(http, connection, route, rest, console);
 	return *context != NULL ? MHD_YES : MHD_NO;
@@ -370,6 +432,27 @@ static enum MHD_Result look_at(struct http *http, struct MHD_Connection *connect
 	return passed ? open_request(http, connection, method, url + 5, context) : result;
 }
 
+/* What stands for the request then: whatever else of it is here is not done. */
+static char target_refused;
+
+void *http_target(void *user, const char *target, struct MHD_Connection *connection)
+{
+	static const char refused[] =
+	        "HTTP/1.1 414 URI Too Long\r\nConnection: close\r\nContent-Length: 0\r\n\r\n";
+	const union MHD_ConnectionInfo *info =
+	        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+	unsigned arguments = 1;
+
+	(void)user;
+	for (const char *at = target; (at = strchr(at, '&')) != NULL; at++)
+		arguments++;
+	if (info == NULL || (strlen(target) <= TARGET_MAX && arguments <= ARGUMENTS_MAX))
+		return NULL;
+	(void)send(info->connect_fd, refused, sizeof(refused) - 1, MSG_DONTWAIT | MSG_NOSIGNAL);
+	(void)shutdown(info->connect_fd, SHUT_RDWR);
+	return &target_refused;
+}
+
 enum MHD_Result http_request(void *user, struct MHD_Connection *connection, const char *url,
                              const char *method, const char *version, const char *upload, size_t *upload_size,
                              void **context)
@@ -377,6 +460,8 @@ enum MHD_Result http_request(void *user, struct MHD_Connection *connection, cons
 	struct request *request = *context;
 
 	(void)version;
+	if (*context == &target_refused)
+		return MHD_NO;
 	if (request == NULL)
 		return look_at(user, connection, method, url, context);
 	if (request->asked)
@@ -396,7 +481,7 @@ void http_completed(void *user, struct MHD_Connection *connection, void **contex
 	(void)user;
 	(void)connection;
 	(void)code;
-	if (request == NULL)
+	if (request == NULL || *context == &target_refused)
 		return;
 	cJSON_Delete(request->tree);
 	free(request->job.answer);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/command/room.h"
 #include "host/console/state.h"
 
 #include <droptower_version.h>
@@ -64,6 +65,7 @@ static void add_tower(cJSON *root, const struct state *state)
 	const struct tower_view *view = &state->tower;
 	const struct session_view *session = &view->session;
 	int64_t armed_ms = view->armed_until_ms - session_now_ms();
+	int64_t warning_ms = session->release_from_ms - session_now_ms();
 	cJSON *tower = cJSON_AddObjectToObject(root, "tower");
 
 	cJSON_AddStringToObject(tower, "url", view->url);
@@ -78,6 +80,7 @@ static void add_tower(cJSON *root, const struct state *state)
 	cJSON_AddStringToObject(tower, "phase", tower_phase_name(view->phase));
 	cJSON_AddStringToObject(tower, "drop", view->drop);
 	add_number(tower, "armed_s", armed_ms > 0 ? (double)armed_ms / 1000.0 : 0.0);
+	add_number(tower, "warning_s", armed_ms > 0 && warning_ms > 0 ? (double)warning_ms / 1000.0 : 0.0);
 	add_number(tower, "heartbeat_age_s", state->live.heartbeat_age_s);
 	add_number(tower, "drop_id", session->drop_id);
 }
@@ -151,6 +154,7 @@ static void add_series(cJSON *root, const struct state *state)
 	add_number(object, "accepted", series->accepted);
 	add_number(object, "rejected", series->rejected);
 	add_number(object, "partial", series->partial);
+	add_number(object, "faulty", series->faulty);
 }
 
 static void add_archive(cJSON *root, const struct work_view *work)
@@ -160,7 +164,7 @@ static void add_archive(cJSON *root, const struct work_view *work)
 
 	add_number(disk, "free_bytes", work->disk_free_bytes);
 	add_number(disk, "drops_left",
-	           fmax(0, floor((work->disk_free_bytes - WORK_RESERVE_BYTES) / drop_bytes)));
+	           fmax(0, floor((work->disk_free_bytes - ROOM_RESERVE_BYTES) / drop_bytes)));
 	cJSON_AddStringToObject(disk, "trouble", work->trouble);
 	add_number(archive, "revision", (double)work->revision);
 	if (work->result[0] != '\0')

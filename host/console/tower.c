@@ -48,7 +48,11 @@ static void on_frame(void *user, const struct frame *frame)
 static void open_link(struct tower *tower)
 {
 	struct session_options options = {
-	        .log = tower->log, .on_frame = on_frame, .cancelled = cancelled, .user = tower};
+	        .program = tower->own ? NULL : "page", /* a simulated tower is nobody's business */
+	        .log = tower->log,
+	        .on_frame = on_frame,
+	        .cancelled = cancelled,
+	        .user = tower};
 
 	tower->open_due_ms = session_now_ms() + OPEN_AGAIN_MS;
 	if (tower->own && tower_bench_start(tower) != 0)
@@ -123,6 +127,8 @@ static const char *find_trouble(const struct tower *tower)
 		return "no tower is heard";
 	if (view->hash_known && !view->hash_agrees)
 		return error_text(DT_E_HASH);
+	if (view->two_towers)
+		return "two towers on this bus: their clocks disagree, expected one";
 	if (view->state == WIRE_STATE_CAPTURED && tower->series[0] == '\0')
 		return "the tower holds a drop: select the series that it belongs to";
 	if (tower->setup_due)

@@ -8,7 +8,7 @@
  *
  * A drop, step by step:
  *     arm       work makes the next drop of the series in the archive, tower opens its log and sends ARM
- *     release   with the token that arm gave
+ *     release   with the token that arm gave, the tower's nonce, when its warning is over
  *     ...       every frame goes into the log
  *     collected the log is closed; work syncs it, notes it as recorded, analyses it
  * Armed and disarmed again without a release leaves no drop. A drop that the tower still holds from before is
@@ -85,9 +85,9 @@ void tower_look(struct tower *tower, struct tower_view *view);
  * cannot be: 409 with the tower's own reason when it refuses, 504 when it does not answer, 503 when there
  * is no tower.
  *
- *   arm      {}              answers {"token": N, "expires_s": 10}
- *   release  {"token": N}    answers {}
- *   clear    {}
+ *   arm      {}              answers {"token": N, "warning_s": 1, "expires_s": 10}
+ *   release  {"token": N}    answers {}; 425 before the warning is over: still armed
+ *   clear    {}              also acknowledges that guards were open
  *   select   {"series": S}   at rest only: the scene's parameters are written to the tower, and a simulated
  *                            tower of our own is started anew with that scene
  *   simulate {"line": "fault estop"}   404 without a control socket

@@ -47,7 +47,7 @@ int tower_bench_start(struct tower *tower)
 
 void tower_bench_stop(struct tower *tower)
 {
-	if (tower->simulated.directory[0] != '\0')
+	if (tower->simulated.folder.path[0] != '\0')
 		simulated_stop(&tower->simulated);
 	tower->simulated = (struct simulated){0};
 	if (tower->control >= 0)

@@ -103,8 +103,7 @@ bool tower_drop_begin(struct tower *tower, struct tower_drop *drop)
 void tower_drop_armed(struct tower *tower)
 {
 	enter(tower, TOWER_ARMED);
-	tower->armed_until_ms =
-	        tower->phase_ms + (int64_t)wire_parameters[WIRE_PARAMETER_arm_timeout_ms].initial;
+	tower->armed_until_ms = session_view(tower->session)->armed_until_ms;
 }
 
 void tower_drop_released(struct tower *tower)
@@ -249,7 +248,9 @@ static void follow_idle(struct tower *tower, unsigned state)
 
 	if (session_at_rest(state))
 		tower->origin = "was not released from the console";
-	if (!settled(tower, session_drops(state) && tower->series[0] != '\0'))
+	/* one that we have may stay in the tower, until its frame is down */
+	if (!settled(tower, session_drops(state) && !session_view(tower->session)->collected &&
+	                            tower->series[0] != '\0'))
 		return;
 	drop = without_recording(tower);
 	if (drop == NULL)
@@ -270,7 +271,8 @@ static void follow_drop(struct tower *tower, const struct session_view *view)
 {
 	if (view->fault != WIRE_FAULT_NONE)
 		tower->fault = view->fault;
-	if (tower->phase == TOWER_MOVING && view->state == WIRE_STATE_CAPTURED)
+	if (tower->phase == TOWER_MOVING &&
+	    (view->state == WIRE_STATE_CAPTURED || view->state == WIRE_STATE_KEEP_OUT))
 		enter(tower, TOWER_COLLECTING);
 	if (settled(tower, session_at_rest(view->state)))
 		give_up(tower, "nothing was captured: %s",

@@ -5,11 +5,12 @@
 #include <stdio.h>
 
 #include "common/wire_table.h"
+#include "host/command/tower_setup.h"
 #include "host/console/tower_private.h"
 
-static void refuse_checks(struct job *job, uint16_t checks)
+static void refuse_checks(struct job *job, uint32_t checks)
 {
-	char text[1000] = "";
+	char text[1600] = "";
 	size_t length = 0;
 
 	for (unsigned i = 0; i < WIRE_CHECKS && length < sizeof(text); i++)
@@ -35,6 +36,17 @@ bool tower_is_void(struct tower *tower, unsigned aborted)
 	return atomic_load(&tower->aborts) != aborted;
 }
 
+/* Another has written them since; they are set again, and ARM is asked for again by a person. */
+static void refuse_parameters(struct job *job)
+{
+	struct tower *tower = job->console->tower;
+	char difference[SESSION_MESSAGE_MAX] = "it no longer tells which";
+
+	(void)tower_setup_difference(tower->session, difference);
+	job_refuse(job, 409, "%s: %s; they are set again", error_text(DT_E_PARAMETERS), difference);
+	tower->setup_due = true;
+}
+
 void tower_refuse_result(struct job *job, int result)
 {
 	struct tower *tower = job->console->tower;
@@ -45,6 +57,10 @@ void tower_refuse_result(struct job *job, int result)
 		job_refuse(job, 504, "the tower does not answer");
 	else if (result == DT_E_CLOSED || result == DT_E_LINK || result == DT_E_SYSTEM)
 		job_refuse(job, 503, "%s", error_text(result));
+	else if (result == DT_E_PARAMETERS)
+		refuse_parameters(job);
+	else if (result == DT_E_EARLY)
+		job_refuse(job, 425, "%s", error_text(result));
 	else if (result == DT_E_STATE || result == DT_E_CHECKS)
 		refuse_state(job, session_view(tower->session));
 	else

@@ -42,14 +42,16 @@ static bool hand_on(struct job *job, struct job_queue *queue, void (*run)(struct
 
 /* ---- arm ---- */
 
-static void answer_token(struct job *job, uint16_t token)
+/* The token is the nonce of this ARM. */
+static void answer_token(struct job *job, const struct session_view *view)
 {
 	cJSON *tree = cJSON_CreateObject();
+	int64_t now_ms = session_now_ms();
 
 	if (tree != NULL) {
-		cJSON_AddNumberToObject(tree, "token", token);
-		cJSON_AddNumberToObject(tree, "expires_s",
-		                        wire_parameters[WIRE_PARAMETER_arm_timeout_ms].initial / 1000.0);
+		cJSON_AddNumberToObject(tree, "token", view->nonce);
+		cJSON_AddNumberToObject(tree, "warning_s", (double)(view->release_from_ms - now_ms) / 1000.0);
+		cJSON_AddNumberToObject(tree, "expires_s", (double)(view->armed_until_ms - now_ms) / 1000.0);
 	}
 	job_answer_json(job, tree);
 }
@@ -57,7 +59,7 @@ static void answer_token(struct job *job, uint16_t token)
 static void arm(struct job *job, struct tower_drop *drop)
 {
 	struct tower *tower = job->console->tower;
-	uint16_t token = session_token();
+	const struct session_view *view = session_view(tower->session);
 	int result;
 
 	if (!tower_drop_begin(tower, drop)) {
@@ -65,7 +67,7 @@ static void arm(struct job *job, struct tower_drop *drop)
 		return;
 	}
 	tower_publish(tower);
-	result = session_command(tower->session, WIRE_OP_ARM, token);
+	result = session_command(tower->session, WIRE_OP_ARM);
 	if (result == 0)
 		tower_drop_armed(tower);
 	else
@@ -73,7 +75,7 @@ static void arm(struct job *job, struct tower_drop *drop)
 	if (result == DT_E_TIMEOUT && !tower_is_void(tower, tower->wanted))
 		atomic_fetch_add(&tower->aborts, 1); /* it may be armed all the same */
 	if (result == 0 && !tower_is_void(tower, tower->wanted))
-		answer_token(job, token);
+		answer_token(job, view);
 	else
 		tower_refuse_result(job, result);
 }
@@ -150,10 +152,10 @@ static bool check_sending(struct job *job)
 	return false;
 }
 
-static void release(struct job *job, uint16_t token)
+static void release(struct job *job)
 {
 	struct tower *tower = job->console->tower;
-	int result = session_command(tower->session, WIRE_OP_RELEASE, token);
+	int result = session_command(tower->session, WIRE_OP_RELEASE);
 
 	/* unanswered it may have worked */
 	if (result == 0 || result == DT_E_TIMEOUT || result == DT_E_CLOSED || result == DT_E_LINK ||
@@ -170,11 +172,19 @@ static void send_release(struct job *job)
 	struct tower *tower = job->console->tower;
 	double token;
 
-	if (check_sending(job) && job_number(job, "token", 1, UINT16_MAX, NAN, &token)) {
-		if (tower->phase == TOWER_ARMED)
-			release(job, (uint16_t)token);
-		else
+	if (check_sending(job) && job_number(job, "token", 0, UINT32_MAX, NAN, &token)) {
+		const struct session_view *view = session_view(tower->session);
+
+		if (tower->phase != TOWER_ARMED)
 			job_refuse(job, 409, "nothing is armed");
+		else if (!view->armed && view->state != WIRE_STATE_ARMED)
+			tower_refuse_result(job, DT_E_STATE); /* it says why it let go of it */
+		else if (!view->armed || (uint32_t)token != view->nonce)
+			job_refuse(job, 409, "%s", error_text(DT_E_TOKEN));
+		else if (session_now_ms() < view->release_from_ms)
+			job_refuse(job, 425, "%s", error_text(DT_E_EARLY));
+		else
+			release(job);
 	}
 	finish(job);
 }
@@ -190,7 +200,7 @@ static void send_clear(struct job *job)
 	struct tower *tower = job->console->tower;
 
 	if (check_sending(job)) {
-		int result = session_command(tower->session, WIRE_OP_CLEAR, 0);
+		int result = session_command(tower->session, WIRE_OP_CLEAR);
 
 		if (result == 0)
 			answer_empty(job);
@@ -220,7 +230,7 @@ void tower_obey_abort(struct tower *tower)
 		return;
 	if (tower->phase == TOWER_MOVING)
 		tower->abort_moving = true;
-	tower->abort_result = session_command(tower->session, WIRE_OP_ABORT, 0);
+	tower->abort_result = session_command(tower->session, WIRE_OP_ABORT);
 }
 
 static void answer_abort(struct job *job)

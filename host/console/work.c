@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/command/room.h"
 #include "host/console/work.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/statvfs.h>
 
 #include "host/console/work_private.h"
 
@@ -104,12 +105,12 @@ static void look_at_series(struct work *work)
 
 static void look_at_disk(struct work *work)
 {
-	struct statvfs disk;
+	double bytes = room_bytes(work->options.archive);
 
-	if (statvfs(work->options.archive, &disk) != 0)
+	if (isnan(bytes))
 		return;
 	pthread_mutex_lock(&work->lock);
-	work->view.disk_free_bytes = (double)disk.f_bavail * (double)disk.f_frsize;
+	work->view.disk_free_bytes = bytes;
 	pthread_mutex_unlock(&work->lock);
 }
 

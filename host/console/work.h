@@ -9,9 +9,6 @@
 #include "host/console/job.h"
 #include "host/console/tower.h"
 
-/* Below this much room no drop is begun. */
-#define WORK_RESERVE_BYTES 16e6
-
 struct work;
 
 struct work_options {

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "common/link/link.h"
+#include "host/command/room.h"
 #include "host/command/archived.h"
 #include "host/console/work_private.h"
 #include "host/record/write.h"
@@ -25,9 +26,9 @@ void work_begin(struct job *job, void (*then)(struct job *job))
 	int result = 0;
 
 	work->tower_there = true;
-	if (work->view.disk_free_bytes < WORK_RESERVE_BYTES) {
+	if (work->view.disk_free_bytes < ROOM_RESERVE_BYTES) {
 		job_refuse(job, 507, "%.0f MB left on the disk, expected %.0f MB for a drop",
-		           work->view.disk_free_bytes / 1e6, WORK_RESERVE_BYTES / 1e6);
+		           work->view.disk_free_bytes / 1e6, ROOM_RESERVE_BYTES / 1e6);
 	} else {
 		result = archive_begin(work->archive, drop->series, work->options.operator_name, ".log",
 		                       drop->simulated, &drop->recording);
@@ -143,7 +144,7 @@ static void keep(struct job *way)
 	struct tower_drop *drop = way->maker;
 	struct work *work = way->console->work;
 	const struct archive_recording *r = &drop->recording;
-	char name[ARCHIVE_NAME_MAX + 16] = "", message[ARCHIVE_MESSAGE_MAX] = "";
+	char name[ARCHIVE_NAME_MAX + 16] = "", message[ARCHIVE_MESSAGE_MAX] = "", fault[ARCHIVE_MESSAGE_MAX];
 	bool analysed = false;
 
 	work->tower_there = true;
@@ -151,7 +152,7 @@ static void keep(struct job *way)
 		rescue(work, drop, message);
 	} else {
 		snprintf(name, sizeof(name), "%s/%u", r->series, r->number);
-		analysed = archived_result(work->archive, r->series, r->number, r->raw, message) == 0;
+		analysed = archived_result(work->archive, r->series, r->number, fault, message) == 0;
 	}
 	work_changed(work);
 	pthread_mutex_lock(&work->lock);

@@ -9,6 +9,7 @@
 
 #include "host/archive/print.h"
 #include "host/console/work_private.h"
+#include "host/record/text.h"
 
 enum { COUNT_MAX = 1000000 };
 
@@ -77,9 +78,7 @@ static void answer(struct job *job,
 {
 	struct archive *archive = job->console->work->archive;
 	struct wanted wanted;
-	char *text = NULL;
-	size_t size = 0;
-	FILE *out = NULL;
+	struct text text = {.bytes = NULL};
 	int result;
 
 	if (!read_query(job, &wanted)) {
@@ -87,18 +86,15 @@ static void answer(struct job *job,
 		return;
 	}
 	result = check_series(archive, &wanted);
-	if (result == 0) {
-		out = open_memstream(&text, &size);
-		result = out != NULL ? print(archive, &wanted, out) : DT_E_MEMORY;
-	}
-	if (out != NULL && fclose(out) != 0 && result == 0)
-		result = DT_E_MEMORY;
+	if (result == 0)
+		result = text_open(&text);
+	if (result == 0)
+		result = text_close(&text, print(archive, &wanted, text.out));
 	if (result != 0) {
-		free(text);
 		work_refuse(job, result);
 		return;
 	}
-	job_answer_bytes(job, type, text, size);
+	job_answer_bytes(job, type, text.bytes, text.size);
 	job_done(job);
 }
 
@@ -145,14 +141,13 @@ void work_csv(struct job *job)
 void work_result(struct job *job)
 {
 	struct archive *archive = job->console->work->archive;
-	char series[ARCHIVE_NAME_MAX + 1], raw[ARCHIVE_NAME_MAX + 64], *json;
-	int result = archive_log(archive, job->path, series, raw);
+	char *json;
+	int result = archive_json(archive, job->path, NULL, &json);
 
-	json = result == 0 || result == DT_E_STATE ? archive_json(archive, job->path, NULL) : NULL;
-	if (json != NULL) {
-		job_answer_bytes(job, "application/json", json, strlen(json));
-		job_done(job);
+	if (result != 0) {
+		work_refuse(job, result);
 		return;
 	}
-	work_refuse(job, result == 0 || result == DT_E_STATE ? DT_E_EMPTY : result);
+	job_answer_bytes(job, "application/json", json, strlen(json));
+	job_done(job);
 }

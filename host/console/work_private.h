@@ -8,6 +8,7 @@
 #include <stdatomic.h>
 #include <sys/types.h>
 
+#include "common/link/temporary.h"
 #include "host/console/console.h"
 #include "host/console/work.h"
 
@@ -20,7 +21,8 @@ struct work_scene_file {
 struct work_report {
 	struct job *job; /* NULL: none */
 	pid_t pid;
-	char folder[40], file[64];
+	struct temporary folder;
+	char file[TEMPORARY_PATH_MAX + 16];
 	int errors; /* what it says on stderr */
 };
 

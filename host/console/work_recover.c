@@ -64,7 +64,7 @@ static bool is_whole(const char *log)
 
 static void recover(struct work *work, const char *drop)
 {
-	char message[ARCHIVE_MESSAGE_MAX];
+	char message[ARCHIVE_MESSAGE_MAX], fault[ARCHIVE_MESSAGE_MAX];
 	struct archive_recording r;
 
 	if (archive_resume(work->archive, drop, &r) != 0)
@@ -76,7 +76,7 @@ static void recover(struct work *work, const char *drop)
 	if (archive_finish(work->archive, &r, 0,
 	                   "the console ended before it was noted; the log is complete") != 0)
 		work_trouble(work, archive_message(work->archive));
-	else if (archived_result(work->archive, r.series, r.number, r.raw, message) != 0)
+	else if (archived_result(work->archive, r.series, r.number, fault, message) != 0)
 		work_trouble(work, message);
 	work_changed(work);
 }

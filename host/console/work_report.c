@@ -60,8 +60,7 @@ static int run_program(struct work_report *r, const char *folder, const char *se
 
 static void forget(struct work_report *r)
 {
-	unlink(r->file);
-	rmdir(r->folder);
+	temporary_remove(&r->folder);
 	close(r->errors);
 	job_done(r->job);
 	r->job = NULL;
@@ -77,9 +76,8 @@ static bool make_files(struct work_report *r)
 		fclose(errors);
 	if (r->errors < 0)
 		return false;
-	strcpy(r->folder, "/tmp/droptower-report-XXXXXX");
-	if (mkdtemp(r->folder) != NULL) {
-		snprintf(r->file, sizeof(r->file), "%s/report.html", r->folder);
+	if (temporary_make(&r->folder, "report") == 0) {
+		snprintf(r->file, sizeof(r->file), "%s/report.html", r->folder.path);
 		return true;
 	}
 	close(r->errors);

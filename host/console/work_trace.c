@@ -9,9 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/command/archived.h"
 #include "host/command/evaluate.h"
 #include "host/console/work_private.h"
-#include "host/record/read.h"
 #include "host/report/curves.h"
 #include "host/report/facts.h"
 #include "host/report/put.h"
@@ -28,21 +28,20 @@ struct drop {
 static bool open_drop(struct job *job, struct drop *drop)
 {
 	struct archive *archive = job->console->work->archive;
-	char series[ARCHIVE_NAME_MAX + 1], raw[ARCHIVE_NAME_MAX + 64], path[ARCHIVE_PATH_MAX];
-	char message[READ_MESSAGE_MAX];
-	int result = archive_log(archive, job->path, series, raw);
+	char series[ARCHIVE_NAME_MAX + 1], message[ARCHIVE_MESSAGE_MAX];
+	int result = archived_read(archive, job->path, &drop->record, NULL, message);
 
-	if (result == 0)
-		result = archive_scene(archive, series, &drop->scene);
 	if (result != 0) {
-		work_refuse(job, result);
+		job_refuse(job, work_status(result == DT_E_FORMAT ? DT_E_CORRUPT : result), "%s", message);
+		job_done(job);
 		return false;
 	}
-	snprintf(path, sizeof(path), "%s/%s", archive_folder(archive), raw);
-	if (read_record(&drop->record, path, NULL, message) == 0)
+	snprintf(series, sizeof(series), "%.*s", (int)(strrchr(job->path, '/') - job->path), job->path);
+	result = archive_scene(archive, series, &drop->scene);
+	if (result == 0)
 		return true;
-	job_refuse(job, 500, "%s", message);
-	job_done(job);
+	record_free(&drop->record);
+	work_refuse(job, result);
 	return false;
 }
 
@@ -207,7 +206,7 @@ static void answer_histories(struct job *job, const struct report *report, const
 /* At the instants of the drop's fastest channel. */
 static void answer_model(struct job *job, const struct report *report)
 {
-	const struct channel *times = record_channel(report->record, "S2Y");
+	const struct channel *times = record_axis(report->record, "S2Y");
 	char message[MODEL_MESSAGE_MAX] = "no model of this drop";
 	double start_s, (*value_g)[MODEL_AXES];
 	int result = DT_E_EMPTY;

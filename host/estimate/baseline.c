@@ -10,7 +10,21 @@
 #include "host/estimate/quiet.h"
 #include "host/estimate/zero.h"
 
-enum { DIFFERENCES_MIN = 16 };
+enum { DIFFERENCES_MIN = 16, BEGINNING = 16 };
+
+/* Of the largest sample: what a record without a quiet part may fall by before it rises, and has risen to
+ * where its beginning may be its largest. */
+#define MOTION_PART 0.1
+#define RISEN 0.8
+
+/* What the last samples are off zero: standard deviations of their mean, and of the largest sample; and off
+ * those before them, of that. */
+#define ELSEWHERE 8.0
+#define ELSEWHERE_PART 0.005
+#define AT_REST 0.25
+
+/* Of the good samples, outliers that are none. */
+#define OUTLIERS_MOST 0.03
 
 #define OUTLIER 6.0
 
@@ -60,7 +74,8 @@ static void measure(struct quiet *quiet, struct estimate_baseline *found)
 	found->samples = inner.count;
 	found->from_s = trace_time(trace, quiet->from);
 	found->until_s = trace_time(trace, quiet->until - 1);
-	found->doubtful = found->doubtful || quiet->doubtful;
+	found->doubtful = found->doubtful || quiet->doubtful ||
+	                  (double)inner.count < (1 - OUTLIERS_MOST) * (double)inner.good;
 	if (line.terms == 0)
 		return;
 	hum_note(&line, half_s, (double)quiet->length / trace->rate_hz, found);
@@ -72,8 +87,19 @@ static void measure(struct quiet *quiet, struct estimate_baseline *found)
 /* Once more without what moved before the pulse. */
 static void measure_quietest(struct quiet *quiet, struct estimate_baseline *found)
 {
+	bool restless;
+
 	measure(quiet, found);
-	if (!quiet_restless(quiet, found->noise_g))
+	restless = quiet_restless(quiet, found->noise_g);
+	if (!restless && !found->doubtful)
+		return;
+	if (quiet_settled(quiet)) {
+		*found = nothing_found;
+		measure(quiet, found);
+		found->doubtful = found->unsettled = true;
+		return;
+	}
+	if (!restless)
 		return;
 	found->doubtful = true;
 	if (!quiet_narrow(quiet))
@@ -81,6 +107,74 @@ static void measure_quietest(struct quiet *quiet, struct estimate_baseline *foun
 	*found = nothing_found;
 	found->doubtful = true;
 	measure(quiet, found);
+}
+
+/* The largest good sample, signed, and its place. */
+static double largest(const struct trace *trace, size_t *at)
+{
+	double most = 0;
+
+	for (size_t k = trace->first; k < trace->last; k++)
+		if (trace_good(trace, k) && fabs(trace->value_g[k]) > fabs(most)) {
+			most = trace->value_g[k];
+			*at = k;
+		}
+	return most;
+}
+
+/* Of a record without a quiet part: whether it begins on something else than the rise of its pulse. Then it
+ * is as high as the pulse from the first sample on, or falls before it rises. */
+static bool begins_in_motion(const struct trace *trace, double noise_g)
+{
+	double low = INFINITY, first, sign, peak;
+	size_t at = 0;
+
+	if (trace->count < QUIET_SAMPLES_MIN)
+		return false;
+	peak = largest(trace, &at);
+	sign = peak < 0 ? -1 : 1;
+	first = sign * quiet_glance(trace, 0, BEGINNING, NULL);
+	for (size_t k = 0; k < at; k++)
+		if (trace_good(trace, k))
+			low = fmin(low, sign * trace->value_g[k]);
+	return fmin(first, low) > RISEN * fabs(peak) ||
+	       first - low > fmax(OUTLIER * noise_g, MOTION_PART * fabs(peak));
+}
+
+/* Mean of the good samples [from, until) without zero as it was found; *n of them. */
+static double mean_off(const struct trace *trace, const struct estimate_baseline *found, size_t from,
+                       size_t until, double *n)
+{
+	struct zero zero = zero_from(found, trace, from);
+	double sum = 0;
+
+	*n = 0;
+	for (size_t k = from; k + 2 <= until; k += 2) {
+		const PAIR here = zero_next(&zero);
+
+		for (size_t i = 0; i < 2; i++)
+			if (trace_good(trace, k + i)) {
+				sum += trace->value_g[k + i] - here[i];
+				++*n;
+			}
+	}
+	return *n > 0 ? sum / *n : 0;
+}
+
+/* Whether zero, as it was found, is not that of the last samples before the pulse, which have come to rest:
+ * the foot of a slow pulse has not. */
+static bool ends_elsewhere(const struct quiet *quiet, const struct estimate_baseline *found)
+{
+	const struct trace *trace = quiet->trace;
+	const size_t last = quiet->until - QUIET_SAMPLES_MIN;
+	double noise = quiet_noise(trace, quiet->from, quiet->until), n, m;
+	size_t at = 0;
+	double off = mean_off(trace, found, last, quiet->until, &n), before = off;
+
+	if (last >= quiet->from + QUIET_SAMPLES_MIN)
+		before = mean_off(trace, found, last - QUIET_SAMPLES_MIN, last, &m);
+	return fabs(off - before) < AT_REST * fabs(off) && fabs(off) > ELSEWHERE * noise / sqrt(n) &&
+	       fabs(off) > ELSEWHERE_PART * fabs(largest(trace, &at) - found->offset_g);
 }
 
 void baseline_find(const struct trace *trace, double *scratch, struct estimate_baseline *baseline)
@@ -93,9 +187,12 @@ void baseline_find(const struct trace *trace, double *scratch, struct estimate_b
 	if (quiet_enough(&quiet)) {
 		quiet.length = length > 1 ? (size_t)length : 1;
 		measure_quietest(&quiet, &found);
+		if ((found.doubtful || fabs(found.drift_g_s) > 0) && ends_elsewhere(&quiet, &found))
+			found.doubtful = found.unsettled = true;
 	} else {
 		found.noise_g = found.deviation_g = noise_of_differences(trace, scratch);
 		found.doubtful = true;
+		found.unsettled = begins_in_motion(trace, found.noise_g);
 	}
 	*baseline = found;
 }

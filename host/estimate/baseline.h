@@ -14,6 +14,9 @@
  * coloured still, or runs of samples far quieter than the whole. Of these the longest is then taken for the
  * quiet part. Flagged RECORD_FLAG_ZERO_UNSURE where there is one.
  *
+ * Unsettled is a doubtful zero that decays to the end of the quiet part, is another in its last samples, or
+ * of a record that begins on something else than the rise of its pulse: peak and pulse are ambiguous then.
+ *
  * Outliers are what lies beyond six standard deviations: told at first from the median and the median
  * deviation of a few samples, then from those inside. Offset and noise are mean and deviation of all the
  * rest, which are nearly twice as certain as medians.

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/units.h"
 #include "host/estimate/baseline.h"
 #include "host/estimate/cfc.h"
 #include "host/estimate/clip.h"
@@ -14,6 +15,7 @@
 #include "host/estimate/iepe.h"
 #include "host/estimate/pulse.h"
 #include "host/estimate/rebound.h"
+#include "host/estimate/settle.h"
 #include "host/estimate/spike.h"
 
 /* Around the trigger, what belongs to the impact that fired it: the product comes back for another. */
@@ -23,8 +25,11 @@
 /* What is wrong with single samples, and where zero is without them. */
 static void clean(struct trace *trace, double *scratch, struct estimate_baseline *baseline)
 {
+	struct settle settle = {0};
 	bool marked;
 
+	if (settle_find(trace, &settle))
+		settle_remove(trace, &settle);
 	baseline_find(trace, scratch, baseline);
 	marked = spike_mark(trace, baseline->noise_g);
 	marked |= dropout_mark(trace, baseline->noise_g);
@@ -33,6 +38,8 @@ static void clean(struct trace *trace, double *scratch, struct estimate_baseline
 		if (!baseline_holds(trace, baseline))
 			baseline_find(trace, scratch, baseline);
 	}
+	baseline->doubtful |= settle.extrapolated || settle.inexact;
+	baseline->unsettled |= settle.inexact;
 	clip_judge_twins(trace, baseline->noise_g);
 }
 
@@ -59,7 +66,11 @@ static void analyse_channel(const struct desk *desk, size_t i, struct estimate_c
 	struct work *work = &desk->work[i];
 
 	peak_find(&work->trace, desk->options, &work->peak);
+	if (out->baseline.unsettled && work->peak.result.how.status == ESTIMATE_OK)
+		work->peak.result.how.status = ESTIMATE_AMBIGUOUS;
 	pulse_measure(&work->trace, &work->peak, &out->baseline, desk->options->family, &out->pulse);
+	if (out->baseline.unsettled && out->pulse.status == ESTIMATE_OK)
+		out->pulse.status = ESTIMATE_AMBIGUOUS;
 	out->peak = work->peak.result;
 	out->flags = work->trace.flags;
 }
@@ -69,9 +80,9 @@ size_t estimate_find(const struct desk *desk, const char *sensor, char axis)
 	size_t i;
 
 	for (i = 0; i < desk->record->channel_count; i++) {
-		const char *name = desk->record->channels[i].name;
+		const struct channel *channel = &desk->record->channels[i];
 
-		if (strncmp(name, sensor, 2) == 0 && name[2] == axis && name[3] == '\0')
+		if (channel->sensor > 0 && channel->sensor == sensor[1] - '0' && channel->axis == axis)
 			break;
 	}
 	return i;
@@ -128,6 +139,7 @@ static void flag_short(const struct desk *desk, struct analysis *analysis)
 
 static void analyse_rebound(const struct desk *desk, struct analysis *analysis)
 {
+	const double gravity = desk->options->gravity_m_s2 > 0 ? desk->options->gravity_m_s2 : UNITS_G_M_S2;
 	struct rebound_axes axes = {.count = 0};
 
 	for (const char *axis = "XYZ"; *axis; axis++) {
@@ -140,7 +152,7 @@ static void analyse_rebound(const struct desk *desk, struct analysis *analysis)
 		axes.pulse[axes.count] = &analysis->channels[i].pulse;
 		axes.count++;
 	}
-	rebound_find(&axes, desk->options->impact_speed_m_s, &analysis->rebound);
+	rebound_find(&axes, desk->options->impact_speed_m_s, gravity, &analysis->rebound);
 	analysis->has_rebound = analysis->rebound.status != ESTIMATE_SHORT;
 }
 
@@ -226,7 +238,7 @@ int estimate_record(const struct record *record, const struct estimate_options *
 		return DT_E_EMPTY;
 	if (!allowed(options->lowpass_hz) || !allowed(options->iepe_time_constant_s) ||
 	    !allowed(options->tolerance) || !allowed(options->impact_speed_m_s) ||
-	    (unsigned)options->family >= ESTIMATE_FAMILIES)
+	    !allowed(options->gravity_m_s2) || (unsigned)options->family >= ESTIMATE_FAMILIES)
 		return DT_E_ARGUMENT;
 	desk.work = calloc(record->channel_count, sizeof(*desk.work));
 	found.channels = calloc(record->channel_count, sizeof(*found.channels));

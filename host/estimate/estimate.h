@@ -94,6 +94,7 @@ struct estimate_baseline {
 	double from_s, until_s; /* the quiet part; NAN when there is none */
 	size_t samples;         /* of it that were used */
 	bool doubtful;          /* there is none, or it holds more than noise, hum and a slope */
+	bool unsettled;         /* it decays to its end, by no exponential, or the record begins in motion */
 };
 
 struct estimate_peak {
@@ -209,6 +210,7 @@ struct estimate_options {
 	double tolerance; /* standard uncertainty asked for: part of the value, for instants part of the
 	                     pulse's width; 0 = ESTIMATE_TOLERANCE */
 	double impact_speed_m_s; /* for the rebound; 0 = not known */
+	double gravity_m_s2;     /* that it fell with; 0 = standard gravity */
 };
 
 /* Analyses a record; the record is only read. 0; DT_E_EMPTY if no channel has a single good sample;

@@ -34,10 +34,9 @@ static bool measured(const struct analysis *analysis, size_t i)
  * where noise hides that its X; otherwise the channel itself. */
 static size_t contact_channel(const struct desk *desk, const struct analysis *analysis, size_t i)
 {
-	const char *name = desk->record->channels[i].name;
 	size_t x = estimate_find(desk, "S2", 'X'), y = estimate_find(desk, "S2", 'Y');
 
-	if (strncmp(name, "S1", 2) != 0 && strncmp(name, "S2", 2) != 0)
+	if (desk->record->channels[i].sensor == 0)
 		return i;
 	if (measured(analysis, x) && measured(analysis, y))
 		return fabs(analysis->channels[y].peak.value_g) > fabs(analysis->channels[x].peak.value_g)

@@ -29,7 +29,8 @@ struct desk {
 	double *scratch;
 };
 
-/* Index of the channel of that sensor and axis; the record's channel_count if there is none. */
+/* Index of the channel of that sensor of the tower, "S1" or "S2", and axis; the record's channel_count if
+ * there is none. */
 size_t estimate_find(const struct desk *desk, const char *sensor, char axis);
 
 /* Every channel's ring-down, from the peaks and pulses. */

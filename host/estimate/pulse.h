@@ -3,7 +3,7 @@
 #define DT_HOST_ESTIMATE_PULSE_H
 /*
  * Width and area of the pulse under a peak. The width is between the points where it meets 10 % of the
- * peak, the velocity change its sum with 1 g = 9.81 m/s^2. Both are the samples' own: no family is needed,
+ * peak, the velocity change its sum with 1 g = 9.80665 m/s^2. Both are the samples' own: no family is needed,
  * but where one fits, or another symmetric pulse does, it tells what lies between the samples (guide.h), and
  * what is missing or clipped follows it, from its foot to its foot. Where none fits: straight lines between
  * samples, and the trapezoid sum from where the reading leaves zero to where it is back, at most one width

@@ -12,6 +12,11 @@
 #define RISE_LEVEL 0.1
 
 enum { GLANCE = 31 }; /* samples that tell roughly where the middle is, and how wide */
+enum { SECOND_DIFFERENCES = 255 };
+
+/* A quarter's mean against the next: standard deviations of a mean, and the last step against the first. */
+#define DECAYS_BY 8.0
+#define DECAYS_ON 1.2
 
 /* Noise spreads each block of samples by more than this in its standard deviations, and no block by so much
  * more than another. */
@@ -253,6 +258,56 @@ bool quiet_narrow(struct quiet *quiet)
 		}
 	}
 	return true;
+}
+
+double quiet_noise(const struct trace *trace, size_t from, size_t until)
+{
+	double seen[SECOND_DIFFERENCES];
+	size_t step = (until - from) / SECOND_DIFFERENCES + 1, n = 0;
+
+	for (size_t k = from; k + 2 < until && n < SECOND_DIFFERENCES; k += step)
+		if (trace_good(trace, k) && trace_good(trace, k + 1) && trace_good(trace, k + 2))
+			seen[n++] =
+			        fabs(trace->value_g[k] - 2 * trace->value_g[k + 1] + trace->value_g[k + 2]);
+	return n < GLANCE / 2 ? NAN : MAD_TO_SIGMA * median_find(seen, n) / sqrt(6.0);
+}
+
+/* Whether the means of its quarters fall, or rise, each by more than noise and no faster at the end. */
+static bool decays(const struct trace *trace, size_t from, size_t until)
+{
+	double mean[4] = {0}, noise = quiet_noise(trace, from, until), sign;
+	size_t length = (until - from) / 4;
+
+	for (size_t i = 0; i < 4; i++) {
+		size_t n = 0;
+
+		for (size_t k = from + i * length; k < from + (i + 1) * length; k++)
+			if (trace_good(trace, k)) {
+				mean[i] += trace->value_g[k];
+				n++;
+			}
+		if (n == 0)
+			return false;
+		mean[i] /= (double)n;
+	}
+	noise = DECAYS_BY * noise / sqrt((double)length);
+	sign = mean[0] > mean[1] ? 1 : -1;
+	for (size_t i = 0; i < 3; i++)
+		if (!(sign * (mean[i] - mean[i + 1]) > noise))
+			return false;
+	return fabs(mean[2] - mean[3]) < DECAYS_ON * fabs(mean[0] - mean[1]);
+}
+
+bool quiet_settled(struct quiet *quiet)
+{
+	bool any = false;
+
+	while (quiet->until - quiet->from >= 4 * QUIET_SAMPLES_MIN &&
+	       decays(quiet->trace, quiet->from, quiet->until)) {
+		quiet->from = quiet->until - (quiet->until - quiet->from) / 2;
+		any = true;
+	}
+	return any;
 }
 
 bool quiet_enough(const struct quiet *quiet)

@@ -48,6 +48,14 @@ bool quiet_enough(const struct quiet *quiet);
  * standard deviation from their distances. */
 double quiet_glance(const struct trace *trace, size_t from, size_t until, double *sigma_g);
 
+/* Standard deviation of white noise in samples [from, until), from some of their second differences, in which
+ * a smooth signal nearly vanishes; NAN of too few. */
+double quiet_noise(const struct trace *trace, size_t from, size_t until);
+
+/* From its beginning on a quiet part decays: to the last piece of it that does not, or is as short as may be.
+ * False, and unchanged, where it does not decay. */
+bool quiet_settled(struct quiet *quiet);
+
 /* Moments of what lies within reach of about, and the means of the blocks. */
 struct quiet_moments quiet_take(struct quiet *quiet, double about, double reach);
 

@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#include "common/units.h"
-
 /* An impact is well under way at this part of its peak. It begins this part of a width earlier, more or
  * less: contacts rise steeply. */
 #define EDGE_LEVEL 0.1
@@ -109,10 +107,11 @@ static double contact_end(const struct rebound_axes *axes, unsigned strong, doub
 	return pulse->end_s + (1 + FADE_ON) * fade;
 }
 
-static void by_flight(const struct rebound_axes *axes, double speed_m_s, struct estimate_rebound *rebound)
+static void by_flight(const struct rebound_axes *axes, double speed_m_s, double gravity_m_s2,
+                      struct estimate_rebound *rebound)
 {
 	unsigned strong = strongest(axes);
-	double impact, end, sigma = 0, sigma_end, ratio_s = UNITS_G_M_S2 / (2 * speed_m_s);
+	double impact, end, sigma = 0, sigma_end, ratio_s = gravity_m_s2 / (2 * speed_m_s);
 
 	if (strong == axes->count || !second_impact(axes, strong, &impact, &sigma))
 		return;
@@ -123,7 +122,8 @@ static void by_flight(const struct rebound_axes *axes, double speed_m_s, struct 
 	rebound->sigma_flight_ratio = ratio_s * hypot(sigma, sigma_end);
 }
 
-void rebound_find(const struct rebound_axes *axes, double impact_speed_m_s, struct estimate_rebound *rebound)
+void rebound_find(const struct rebound_axes *axes, double impact_speed_m_s, double gravity_m_s2,
+                  struct estimate_rebound *rebound)
 {
 	struct estimate_rebound found = {NAN, NAN, NAN, NAN, NAN, ESTIMATE_SHORT};
 	double apart;
@@ -133,7 +133,7 @@ void rebound_find(const struct rebound_axes *axes, double impact_speed_m_s, stru
 		return;
 	found.status = ESTIMATE_OK;
 	by_velocity(axes, impact_speed_m_s, &found);
-	by_flight(axes, impact_speed_m_s, &found);
+	by_flight(axes, impact_speed_m_s, gravity_m_s2, &found);
 	apart = fabs(found.velocity_ratio - found.flight_ratio);
 	if (found.status == ESTIMATE_OK && apart > REBOUND_APART &&
 	    !(apart <= SIGMAS * hypot(found.sigma_velocity_ratio, found.sigma_flight_ratio)))

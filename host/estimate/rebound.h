@@ -32,7 +32,8 @@ struct rebound_axes {
  * that chance does not in a whole record. */
 double rebound_again_g(const struct trace *trace, double peak_g);
 
-/* impact_speed_m_s must be positive. */
-void rebound_find(const struct rebound_axes *axes, double impact_speed_m_s, struct estimate_rebound *rebound);
+/* impact_speed_m_s and gravity_m_s2, with which it flies, must be positive. */
+void rebound_find(const struct rebound_axes *axes, double impact_speed_m_s, double gravity_m_s2,
+                  struct estimate_rebound *rebound);
 
 #endif

@@ -8,8 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/record/drop.h"
 #include "host/record/fields.h"
-#include "host/record/source.h"
+#include "host/record/digest.h"
+#include "host/record/seal.h"
 #include "host/record/write.h"
 
 enum {
@@ -163,10 +165,30 @@ static int put_channel(hid_t file, const struct channel *channel)
 	return result;
 }
 
+/* The digits of the record's sealed CSV, which stands for all that the file holds: a program that copies the
+ * file keeps what is in it and not its bytes. */
+static const char *seal_of(const struct text *csv)
+{
+	return csv->bytes + csv->size - 1 - (DIGEST_CHARS - 1);
+}
+
+static int put_seal(hid_t file, const struct record *record)
+{
+	char seal[DIGEST_CHARS];
+	struct text csv;
+
+	if (write_sealed_csv(record, &csv) != 0)
+		return refuse("a channel's name is impossible or there is no memory", "neither");
+	snprintf(seal, sizeof(seal), "%.64s", seal_of(&csv));
+	free(csv.bytes);
+	return put_text(file, "sha256", seal);
+}
+
 static int put_record(hid_t file, const struct record *record)
 {
 	const struct fields_entry *entry;
-	int result = put_text(file, "format", "droptower") | put_whole(file, "version", LAYOUT);
+	int result = put_text(file, "format", "droptower") | put_whole(file, "version", LAYOUT) |
+	             put_seal(file, record);
 
 	for (size_t i = 0; (entry = fields_entry(i)) != NULL && result == 0; i++) {
 		if (!fields_known(record, entry))
@@ -336,7 +358,27 @@ static int get_fields(struct record *record, hid_t file)
 	return 0;
 }
 
-static int get_record(struct record *record, hid_t file)
+/* The samples of a drop are counts. */
+static int check_counts(const struct record *record)
+{
+	for (size_t i = 0; i < record->channel_count; i++) {
+		const struct channel *channel = &record->channels[i];
+
+		for (size_t k = 0; k < channel->count; k++) {
+			char what[128];
+
+			if (channel->sample[k] & (SAMPLE_LOST | SAMPLE_BAD) ||
+			    drop_is_count(channel->value_g[k]))
+				continue;
+			snprintf(what, sizeof(what), "acceleration[%zu] of %s is %.15g g", k, channel->name,
+			         channel->value_g[k]);
+			return refuse(what, "a whole count of 1/32 g within full scale");
+		}
+	}
+	return 0;
+}
+
+static int get_record(struct record *record, hid_t file, char seal[DIGEST_CHARS])
 {
 	char format[16];
 	double version;
@@ -345,11 +387,17 @@ static int get_record(struct record *record, hid_t file)
 	if (get_text(file, "format", format, sizeof(format)) != 0 || strcmp(format, "droptower") != 0 ||
 	    get_real(file, "version", &version) != 0 || version != LAYOUT)
 		return refuse("not by droptower", "attributes format = \"droptower\" and version = 1");
+	seal[0] = '\0';
+	if (H5Aexists(file, "sha256") > 0 && get_text(file, "sha256", seal, DIGEST_CHARS) != 0)
+		return refuse("sha256 is no text", "64 digits");
 	result = get_fields(record, file);
-	return result == 0 ? get_channels(record, file) : result;
+	if (result == 0)
+		result = get_channels(record, file);
+	return result == 0 && record->is_drop ? check_counts(record) : result;
 }
 
-static int read_image(struct record *record, const struct source *source)
+/* seal: the digits the file says; "" in one of a version before it. */
+static int read_image(struct record *record, const struct source *source, char seal[DIGEST_CHARS])
 {
 	hid_t access = H5Pcreate(H5P_FILE_ACCESS), file = -1;
 	int result;
@@ -357,22 +405,44 @@ static int read_image(struct record *record, const struct source *source)
 	H5Pset_fapl_core(access, IMAGE_STEP, false);
 	if (H5Pset_file_image(access, source->bytes, source->size) >= 0)
 		file = H5Fopen("record", H5F_ACC_RDONLY, access);
-	result = file >= 0 ? get_record(record, file) : refuse("damaged", "a whole file");
+	result = file >= 0 ? get_record(record, file, seal) : refuse("damaged", "a whole file");
 	if (file >= 0)
 		H5Fclose(file);
 	H5Pclose(access);
 	return result;
 }
 
+/* The CSV with its seal when the file has that seal, too; without one when it has none. */
+static int put_out(const struct record *record, const char *seal)
+{
+	char what[160];
+	struct text csv;
+	size_t size;
+	int result;
+
+	if (write_sealed_csv(record, &csv) != 0)
+		return refuse("a channel's name is impossible or there is no memory", "neither");
+	size = csv.size - (seal[0] == '\0' ? strlen("# " SEAL_BLANK "\n") : 0);
+	if (seal[0] != '\0' && strncmp(seal_of(&csv), seal, DIGEST_CHARS - 1) != 0) {
+		snprintf(what, sizeof(what), "altered: the SHA-256 of what it holds is %.64s", seal_of(&csv));
+		result = refuse(what, seal);
+	} else {
+		result = fwrite(csv.bytes, 1, size, stdout) == size && fflush(stdout) == 0 ? 0 : -1;
+	}
+	free(csv.bytes);
+	return result;
+}
+
 static int hdf5_to_csv(const struct source *source)
 {
+	char seal[DIGEST_CHARS];
 	struct record record;
 	int result;
 
 	record_init(&record);
-	result = read_image(&record, source);
-	if (result == 0 && write_csv(&record, stdout) != 0)
-		result = refuse("a channel's name is impossible or there is no room", "neither");
+	result = read_image(&record, source, seal);
+	if (result == 0)
+		result = put_out(&record, seal);
 	record_free(&record);
 	return result;
 }

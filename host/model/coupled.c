@@ -3,7 +3,6 @@
 
 #include <math.h>
 
-#include "common/units.h"
 #include "host/model/oscillator.h"
 
 enum { DEPTH, SINKING, OFFSET, OPENING, STATES };
@@ -37,7 +36,7 @@ static void rates(const void *context, const double y[], double rate[])
 	double force = contact_force(c, y);
 
 	rate[DEPTH] = y[SINKING];
-	rate[SINKING] = UNITS_G_M_S2 - force / c->case_mass_kg;
+	rate[SINKING] = c->gravity_m_s2 - force / c->case_mass_kg;
 	if (c->plate_mass_kg > 0.0) {
 		double mount = mount_force(c, y);
 
@@ -153,7 +152,7 @@ static void conclude(const struct coupled *c, const struct ode *ode, const struc
 	r->restitution = released ? -sinking / c->speed_m_s : (double)NAN;
 	r->velocity_change_m_s = c->speed_m_s - sinking +
 	                         opening * c->plate_mass_kg / (c->plate_mass_kg + c->case_mass_kg) +
-	                         UNITS_G_M_S2 * ode->t;
+	                         c->gravity_m_s2 * ode->t;
 	r->evaluations = ode->evaluations;
 }
 

@@ -30,7 +30,7 @@ enum coupled_signal {
 
 struct coupled {
 	double case_mass_kg, plate_mass_kg; /* plate_mass_kg = 0: no plate */
-	double speed_m_s;
+	double gravity_m_s2, speed_m_s;
 	double stiffness_n_m15; /* k of the contact */
 	struct contact_law law;
 	double mount_n_m, mount_damping_n_s_m;

@@ -28,6 +28,7 @@ static int check(const struct scene *s, char *message)
 		double value, above, most;
 	} keys[] = {
 	        {"height_m", s->drop_height_m, 0.0, INFINITY},
+	        {"gravity_m_s2", s->drop_gravity_m_s2, 0.0, INFINITY},
 	        {"angle_deg", s->drop_angle_deg, 0.0, 90.0},
 	        {"case_mass_kg", s->product_case_mass_kg, 0.0, INFINITY},
 	        {"length_m", s->product_length_m, 0.0, INFINITY},
@@ -70,7 +71,8 @@ int drop_of_scene(const struct scene *scene, struct drop *drop, char *message)
 
 	if (error)
 		return error;
-	d.speed_m_s = sqrt(2.0 * UNITS_G_M_S2 * scene->drop_height_m);
+	d.gravity_m_s2 = scene->drop_gravity_m_s2;
+	d.speed_m_s = sqrt(2.0 * d.gravity_m_s2 * scene->drop_height_m);
 	d.has_plate = scene->mount_plate_mass_kg > 0.0;
 	d.lever_y_m = scene->product_width_m / 2.0;
 	d.lever_x_m = d.lever_y_m / tan(UNITS_RAD(scene->product_balance_angle_deg));

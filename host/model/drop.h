@@ -16,7 +16,7 @@
 struct drop {
 	const struct scene *scene;
 	double angle, cosine, sine;
-	double speed_m_s;
+	double gravity_m_s2, speed_m_s;
 	bool has_plate;
 	double lever_x_m, lever_y_m; /* contact corner from the centre of gravity, along -X and -Y */
 	double inertia_kg_m2;

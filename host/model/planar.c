@@ -183,7 +183,7 @@ static void rates(const void *context, const double y[], double rate[])
 	rate[TURN] = y[SPIN];
 	rate[GRIP] = l.creep;
 	rate[V_ACROSS] = across;
-	rate[V_UP] = up - UNITS_G_M_S2;
+	rate[V_UP] = up - p->gravity_m_s2;
 	rate[SPIN] = angular_acceleration(p, &l);
 	if (p->plate_mass_kg > 0.0) {
 		rate[PLATE + OFF_ACROSS] = y[PLATE + OFF_V_ACROSS];
@@ -215,7 +215,7 @@ static void rates_in_flight(const void *context, const double y[], double rate[]
 	rate[TURN] = y[SPIN];
 	rate[GRIP] = rate[SPIN] = 0.0;
 	rate[V_ACROSS] = l.mount_across / p->case_mass_kg;
-	rate[V_UP] = l.mount_up / p->case_mass_kg - UNITS_G_M_S2;
+	rate[V_UP] = l.mount_up / p->case_mass_kg - p->gravity_m_s2;
 }
 
 /* A box whose spin stays, for the plate alone. */
@@ -327,7 +327,7 @@ static void conclude_contact(const struct body *b, const struct ode *ode, bool r
 	        released ? (ode->y[V_UP] - ode->y[SPIN] * l.lever_across) / p->speed_m_s : (double)NAN;
 	r->velocity_change_m_s = p->speed_m_s + ode->y[V_UP] +
 	                         plate * p->plate_mass_kg / (p->plate_mass_kg + p->case_mass_kg) +
-	                         UNITS_G_M_S2 * ode->t;
+	                         p->gravity_m_s2 * ode->t;
 	r->spin_rad_s = ode->y[SPIN];
 }
 

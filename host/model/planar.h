@@ -26,7 +26,7 @@
 struct planar {
 	double case_mass_kg, plate_mass_kg; /* plate_mass_kg = 0: no plate */
 	double inertia_kg_m2;               /* of the box */
-	double angle_rad, speed_m_s;
+	double angle_rad, gravity_m_s2, speed_m_s;
 	double lever_x_m, lever_y_m;
 	double stiffness_n_m15;
 	struct contact_law law;

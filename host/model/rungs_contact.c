@@ -125,6 +125,7 @@ static int coupled_of(const struct drop *drop, const struct model_options *optio
 	*c = (struct coupled){
 	        .case_mass_kg = s->product_case_mass_kg,
 	        .plate_mass_kg = s->mount_plate_mass_kg,
+	        .gravity_m_s2 = drop->gravity_m_s2,
 	        .speed_m_s = drop->speed_m_s,
 	        .mount_n_m = s->mount_stiffness_n_m,
 	        .mount_damping_n_s_m = drop->mount_damping_n_s_m,
@@ -284,6 +285,7 @@ static int planar_of(const struct drop *drop, const struct model_options *option
 	        .plate_mass_kg = s->mount_plate_mass_kg,
 	        .inertia_kg_m2 = drop->inertia_kg_m2,
 	        .angle_rad = drop->angle,
+	        .gravity_m_s2 = drop->gravity_m_s2,
 	        .speed_m_s = drop->speed_m_s,
 	        .lever_x_m = drop->lever_x_m,
 	        .lever_y_m = drop->lever_y_m,

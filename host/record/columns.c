@@ -3,15 +3,9 @@
 
 #include <string.h>
 
-#include "common/units.h"
+#include "host/record/cells.h"
 #include "host/record/number.h"
 #include "host/record/source.h"
-
-/* A stretch of the text. */
-struct piece {
-	const char *text;
-	size_t length;
-};
 
 static int refuse(char *message, struct piece entry, const char *expected)
 {
@@ -52,28 +46,14 @@ static struct piece trim(struct piece piece)
 	return piece;
 }
 
-/* Number in the file / divisor = s or g; 0 for an unknown unit. */
-static double unit_divisor(enum column_kind kind, struct piece unit)
+/* A kg is a mass, unless it stands in a file of accelerations. */
+static const struct unit *unit_of(enum column_kind kind, struct piece text)
 {
-	static const struct {
-		enum column_kind kind;
-		const char *unit;
-		double divisor;
-	} table[] = {
-	        {COLUMN_TIME, "s", 1},
-	        {COLUMN_TIME, "ms", 1e3},
-	        {COLUMN_TIME, "us", 1e6},
-	        {COLUMN_CHANNEL, "g", 1},
-	        {COLUMN_CHANNEL, "m/s2", UNITS_G_M_S2},
-	        {COLUMN_CHANNEL, "m/s^2", UNITS_G_M_S2},
-	        {COLUMN_CHANNEL, "m/s\302\262", UNITS_G_M_S2}, /* a raised 2 in UTF-8 */
-	};
+	const struct unit *unit = unit_find(text.text, text.length);
 
-	for (size_t i = 0; i < sizeof(table) / sizeof(table[0]); i++)
-		if (table[i].kind == kind && strlen(table[i].unit) == unit.length &&
-		    memcmp(table[i].unit, unit.text, unit.length) == 0)
-			return table[i].divisor;
-	return 0;
+	if (!unit || unit->kind != (kind == COLUMN_TIME ? UNIT_TIME : UNIT_ACCELERATION) || unit->divisor < 1)
+		return NULL;
+	return unit;
 }
 
 static bool can_name(struct piece name)
@@ -125,10 +105,11 @@ static int parse_entry(struct columns *columns, struct piece entry, char *messag
 		sign = -1;
 		unit = trim((struct piece){unit.text + 1, unit.length - 1});
 	}
-	column->divisor = sign * unit_divisor(column->kind, unit);
-	if (column->divisor == 0)
+	column->unit = unit_of(column->kind, unit);
+	if (!column->unit)
 		return refuse(message, entry,
 		              column->kind == COLUMN_TIME ? "unit s, ms or us" : "unit g, m/s2, -g or -m/s2");
+	column->divisor = sign * column->unit->divisor;
 	if (has_name(columns, column->name))
 		return refuse(message, entry, "every name once");
 	columns->has_time |= column->kind == COLUMN_TIME;

@@ -6,6 +6,7 @@
  * told in read.h.
  */
 #include "host/record/read.h"
+#include "host/record/unit.h"
 
 enum { COLUMNS_MAX = 256 };
 
@@ -18,7 +19,8 @@ enum column_kind {
 struct column {
 	enum column_kind kind;
 	char name[32];
-	double divisor; /* number in the file / divisor = s or g */
+	const struct unit *unit;
+	double divisor; /* number in the file / divisor = s or g, with the sign asked for */
 };
 
 struct columns {

@@ -33,6 +33,7 @@ int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_
 		channel->range_g =
 		        (double)wire_parameters[WIRE_PARAMETER_range_counts].initial / WIRE_COUNTS_PER_G;
 	}
+	drop_set_axes(&drop);
 	*record = drop;
 	return 0;
 }
@@ -76,6 +77,13 @@ static void get_axis(const struct channel *channel, size_t at, int16_t *counts, 
 	}
 }
 
+bool drop_is_count(double value_g)
+{
+	double value = value_g * WIRE_COUNTS_PER_G;
+
+	return fabs(value) <= WIRE_SAMPLE_FULL_SCALE && value == round(value);
+}
+
 static bool is_lost(const struct record *record, unsigned sensor, uint32_t tick)
 {
 	const struct channel *x = record->channels + 3 * (size_t)(sensor - 1);
@@ -113,10 +121,20 @@ static uint32_t samples_crc32(const struct record *record)
 	return crc;
 }
 
+void drop_set_axes(struct record *record)
+{
+	for (size_t i = 0; i < record->channel_count; i++)
+		for (unsigned k = 0; k < DROP_CHANNELS; k++)
+			if (strcmp(record->channels[i].name, drop_channel_names[k]) == 0) {
+				record->channels[i].sensor = (uint8_t)(k / 3 + 1);
+				record->channels[i].axis = drop_channel_names[k][2];
+			}
+}
+
 bool drop_has_channel(const struct record *record)
 {
-	for (unsigned i = 0; i < DROP_CHANNELS; i++)
-		if (record_channel(record, drop_channel_names[i]))
+	for (size_t i = 0; i < record->channel_count; i++)
+		if (record->channels[i].sensor > 0)
 			return true;
 	return false;
 }
@@ -136,10 +154,32 @@ int drop_check(const struct record *record)
 	return equal ? 0 : DT_E_FORMAT;
 }
 
+void drop_capture_end(const struct record *record, struct frame *frame)
+{
+	struct wire_capture_end end = {
+	        .drop_id = record->drop_id,
+	        .marks = record->marks,
+	        .first_tick_ms = record->first_tick_ms,
+	        .last_tick_ms = record->last_tick_ms,
+	        .crc32 = record->crc32,
+	        .camera_frame = record->camera_frame,
+	        .parameters_crc32 = record->parameters_crc32,
+	        .seal = record->seal,
+	};
+
+	end.trigger_us = record->trigger_us;
+	if (!isnan(record->trigger_s))
+		end.trigger_us = (uint32_t)llround(record->trigger_s * 1e6);
+	if (!isnan(record->frame_speed_m_s))
+		end.frame_speed_mm_s = (uint16_t)lround(record->frame_speed_m_s * 1e3);
+	wire_pack_capture_end(frame, WIRE_ID_CAPTURE_END, &end);
+}
+
 int drop_close(struct record *record)
 {
-	uint32_t ticks = drop_ticks(record);
+	uint32_t ticks = drop_ticks(record), held = 0;
 	bool before = false;
+	struct frame end;
 
 	/* at worst every second tick of both sensors */
 	record->gaps = calloc((size_t)ticks + WIRE_SENSORS, sizeof(*record->gaps));
@@ -158,10 +198,16 @@ int drop_close(struct record *record)
 				record->gaps[record->gap_count - 1].last_tick_ms =
 				        record->first_tick_ms + tick;
 			before = lost;
+			held += !lost;
 		}
 	}
+	if (record->counters.blocks > held)
+		record->counters.blocks = held; /* of a file that ends before the last of them */
 	record->crc_agrees =
 	        record->crc_known && record->gap_count == 0 && samples_crc32(record) == record->crc32;
+	drop_set_axes(record);
+	drop_capture_end(record, &end);
+	record->seal_agrees = record->seal_known && wire_check_capture_end(&end) == 0;
 	record_finish(record);
 	return 0;
 }

@@ -30,7 +30,14 @@ void drop_put(struct record *record, unsigned sensor, uint32_t tick, const int16
 bool drop_get(const struct record *record, unsigned sensor, uint32_t tick, int16_t *x, int16_t *y,
               int16_t *z);
 
-/* Lists the gaps, compares the samples with record->crc32 if crc_known, and finishes the record. On
+/* Whether a good sample of a drop can be of this value: a whole count, within full scale. */
+bool drop_is_count(double value_g);
+
+/* The capture end as it must have come, with the record's seal. */
+void drop_capture_end(const struct record *record, struct frame *frame);
+
+/* Lists the gaps, compares the samples with record->crc32 if crc_known and the capture
+ * end with its seal, and finishes the record. On
  * DT_E_MEMORY the record is freed. */
 DT_MUST_USE int drop_close(struct record *record);
 
@@ -38,7 +45,11 @@ DT_MUST_USE int drop_close(struct record *record);
  * DT_E_FORMAT for the channels, DT_E_MEMORY. */
 DT_MUST_USE int drop_check(const struct record *record);
 
-/* Whether a channel has the name of a drop's. */
+/* Gives sensor and axis to the channels that have the names of a drop's. For those who know that they are:
+ * what reads or simulates drops of the tower. drop_open and drop_close do it. */
+void drop_set_axes(struct record *record);
+
+/* Whether a channel is of the tower. */
 bool drop_has_channel(const struct record *record);
 
 /* Ticks of the window; the record must be a drop. */

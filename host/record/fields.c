@@ -15,9 +15,20 @@ static const struct fields_entry entries[] = {
         FIELD("first_tick_ms", FIELDS_U32, first_tick_ms),
         FIELD("last_tick_ms", FIELDS_U32, last_tick_ms),
         FIELD("trigger_s", FIELDS_REAL, trigger_s),
+        FIELD("trigger_us", FIELDS_U32, trigger_us),
         FIELD("frame_speed_m_s", FIELDS_REAL, frame_speed_m_s),
         FIELD("crc32", FIELDS_U32, crc32),
         FIELD("camera_frame", FIELDS_I16, camera_frame),
+        FIELD("parameters_crc32", FIELDS_U32, parameters_crc32),
+        FIELD("seal", FIELDS_U32, seal),
+        FIELD("measured_dropout_us", FIELDS_U16, measured.dropout_us),
+        FIELD("measured_dropout_used_us", FIELDS_U16, measured.dropout_used_us),
+        FIELD("measured_separation_mm_s", FIELDS_U16, measured.separation_mm_s),
+        FIELD("measured_separation_um", FIELDS_U32, measured.separation_um),
+        FIELD("measured_acceleration_mm_s2", FIELDS_U16, measured.acceleration_mm_s2),
+        FIELD("measured_latch_delay_us", FIELDS_U16, measured.latch_delay_us),
+        FIELD("measured_clock_ppm", FIELDS_I16, measured.clock_ppm),
+        FIELD("measured_trigger_latency_us", FIELDS_U16, measured.trigger_latency_us),
         FIELD("blocks", FIELDS_U64, counters.blocks),
         FIELD("repeated", FIELDS_U64, counters.repeated),
         FIELD("reordered", FIELDS_U64, counters.reordered),
@@ -40,16 +51,31 @@ const struct fields_entry *fields_find(const char *name)
 	return NULL;
 }
 
-/* Both come with the capture end and make no sense without. */
+/* These come with the capture end and make no sense without. */
 static bool of_capture_end(const struct fields_entry *entry)
 {
 	return entry->offset == offsetof(struct record, crc32) ||
-	       entry->offset == offsetof(struct record, camera_frame);
+	       entry->offset == offsetof(struct record, camera_frame) ||
+	       entry->offset == offsetof(struct record, trigger_us) ||
+	       entry->offset == offsetof(struct record, parameters_crc32) ||
+	       entry->offset == offsetof(struct record, seal);
+}
+
+/* What was not measured is there as such: all ones. */
+static bool of_measured(const struct fields_entry *entry)
+{
+	return entry->offset >= offsetof(struct record, measured) &&
+	       entry->offset < offsetof(struct record, measured) + sizeof(struct wire_measured);
 }
 
 bool fields_known(const struct record *record, const struct fields_entry *entry)
 {
-	if (!record->is_drop || (of_capture_end(entry) && !record->crc_known))
+	if (entry->offset == offsetof(struct record, seal) && !record->seal_known)
+		return false;
+	if (entry->offset == offsetof(struct record, trigger_us) && isfinite(record->trigger_s))
+		return false;
+	if (!record->is_drop || (of_capture_end(entry) && !record->crc_known) ||
+	    (of_measured(entry) && !record->measured_known))
 		return false;
 	return entry->kind != FIELDS_REAL || isfinite(fields_real(record, entry));
 }
@@ -128,5 +154,7 @@ int fields_set(struct record *record, const struct fields_entry *entry, double v
 		set_whole(at, entry->kind, value);
 	record->is_drop |= entry->offset == offsetof(struct record, drop_id);
 	record->crc_known |= entry->offset == offsetof(struct record, crc32);
+	record->seal_known |= entry->offset == offsetof(struct record, seal);
+	record->measured_known |= of_measured(entry);
 	return 0;
 }

@@ -10,6 +10,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "host/record/seal.h"
+#include "host/record/text.h"
 #include "host/record/write.h"
 
 static const char HELPER[] = "droptower-hdf5";
@@ -135,14 +137,17 @@ static int read_csv_of(struct record *record, int fd, const char *file, char *me
 {
 	struct source csv;
 	char path[32];
-	int error;
+	int error, sealed;
 
 	snprintf(path, sizeof(path), "/proc/self/fd/%d", fd);
 	error = source_load(&csv, path, "a recording", message);
 	if (error)
 		return error;
 	csv.file = file;
-	error = read_csv(record, &csv, message);
+	sealed = seal_check(&csv, message);
+	error = sealed < 0 ? sealed : read_csv(record, &csv, message);
+	if (!error)
+		record->file_sealed = sealed > 0;
 	source_free(&csv);
 	return error;
 }
@@ -168,16 +173,14 @@ int read_hdf5(struct record *record, const struct source *source, char message[R
 
 static int put_csv(const struct record *record, int fd)
 {
-	char *text = NULL;
-	size_t size = 0;
-	FILE *memory = open_memstream(&text, &size);
-	int error = memory ? write_csv(record, memory) : DT_E_MEMORY;
+	struct text text;
+	int error = text_open(&text);
 
-	if (memory && fclose(memory) != 0)
-		error = DT_E_MEMORY;
 	if (!error)
-		error = put_all(fd, text, size);
-	free(text);
+		error = text_close(&text, write_csv(record, text.out));
+	if (!error)
+		error = put_all(fd, text.bytes, text.size);
+	free(text.bytes);
 	return error;
 }
 

@@ -8,7 +8,9 @@
 #include "common/crc.h"
 #include "common/segment.h"
 #include "common/wire.h"
+#include "common/wire_table.h"
 #include "host/record/drop.h"
+#include "host/record/told.h"
 
 enum { RING_TICKS = DROP_TICKS_MAX }; /* a power of two, as ticks wrap */
 _Static_assert((RING_TICKS & (RING_TICKS - 1)) == 0, "ticks wrap");
@@ -29,6 +31,7 @@ struct join {
 	uint32_t newest_live_ms[WIRE_SENSORS];
 	uint64_t corrupt;
 	struct segment_join segments; /* of classic CAN */
+	struct told told;
 
 	/* the capture, by tick after the first */
 	struct wire_capture_end end;
@@ -40,6 +43,10 @@ struct join {
 	uint32_t ticks;
 	uint32_t missing; /* blocks */
 	uint64_t gaps;
+
+	uint64_t restarts, touched;
+	void (*lost)(void *context, enum join_loss what);
+	void *context;
 };
 
 struct join *join_create(void)
@@ -52,13 +59,32 @@ void join_destroy(struct join *join)
 	free(join);
 }
 
-static void restart(struct join *join)
+void join_on_loss(struct join *join, void (*lost)(void *context, enum join_loss what), void *context)
+{
+	join->lost = lost;
+	join->context = context;
+}
+
+static void tell_loss(struct join *join, enum join_loss what)
+{
+	if (join->lost != NULL)
+		join->lost(join->context, what);
+}
+
+void join_forget_run(struct join *join)
 {
 	memset(join->ring, 0, sizeof(join->ring));
 	join->any = false;
 	join->any_live[0] = join->any_live[1] = false;
 	join->end_seen = false;
 	join->settling = false;
+}
+
+static void restart(struct join *join)
+{
+	tell_loss(join, JOIN_LOSS_RUN);
+	join_forget_run(join);
+	join->restarts++;
 }
 
 uint32_t join_crc32(const struct join *join)
@@ -119,6 +145,7 @@ static void put_in_window(struct join *join, unsigned s, uint32_t tick_ms, const
 		join->settling = false;
 	if (!join->has_capture || tick >= join->ticks || !(resent || join->settling))
 		return;
+	join->touched++;
 	if (put(&join->window[s][tick], frame, resent, reordered)) {
 		join->missing--;
 		if (join->missing == 0)
@@ -173,12 +200,26 @@ static void open_window(struct join *join, uint32_t first_ms, uint32_t ticks)
 	}
 }
 
+static bool is_known(const struct join *join, const struct wire_capture_end *end)
+{
+	return join->end_seen && end->drop_id == join->end.drop_id &&
+	       end->first_tick_ms == join->end.first_tick_ms && end->last_tick_ms == join->end.last_tick_ms;
+}
+
+bool join_is_news(const struct join *join, const struct frame *frame)
+{
+	struct wire_capture_end end;
+
+	return frame->id == WIRE_ID_CAPTURE_END && wire_check_capture_end(frame) == 0 &&
+	       wire_unpack_capture_end(frame, &end) == 0 && !is_known(join, &end);
+}
+
 static int feed_capture_end(struct join *join, const struct frame *frame)
 {
 	struct wire_capture_end end;
 	uint32_t ticks;
 
-	if (wire_unpack_capture_end(frame, &end)) {
+	if (wire_check_capture_end(frame) || wire_unpack_capture_end(frame, &end)) {
 		join->corrupt++;
 		return 0;
 	}
@@ -187,9 +228,10 @@ static int feed_capture_end(struct join *join, const struct frame *frame)
 		join->corrupt++;
 		return 0;
 	}
-	if (join->end_seen && end.drop_id == join->end.drop_id &&
-	    end.first_tick_ms == join->end.first_tick_ms && end.last_tick_ms == join->end.last_tick_ms)
+	if (is_known(join, &end))
 		return 0;
+	if (join->has_capture)
+		tell_loss(join, JOIN_LOSS_CAPTURE);
 	join->end = end;
 	join->end_seen = true;
 	join->has_capture = true;
@@ -201,10 +243,15 @@ static int feed_capture_end(struct join *join, const struct frame *frame)
 
 static void feed_heartbeat(struct join *join, const struct frame *frame)
 {
+	uint32_t incomplete = join->segments.incomplete;
 	struct wire_heartbeat heartbeat;
 
-	if (wire_unpack_heartbeat(frame, &heartbeat) == 0 && heartbeat.nmt_state == 0)
-		restart(join);
+	if (wire_unpack_heartbeat(frame, &heartbeat) != 0 || heartbeat.nmt_state != 0)
+		return;
+	restart(join);
+	/* pieces of a message may not be filled up with those of the next run's, which has the same name */
+	memset(&join->segments, 0, sizeof(join->segments));
+	join->segments.incomplete = incomplete;
 }
 
 int join_feed(struct join *join, const struct frame *part)
@@ -234,6 +281,10 @@ int join_feed(struct join *join, const struct frame *part)
 		return 0;
 	case WIRE_ID_CAPTURE_END:
 		return feed_capture_end(join, frame);
+	case WIRE_ID_MEASURED:
+	case WIRE_ID_PARAMETER:
+		join->corrupt += told_feed(&join->told, frame) != 0;
+		return 0;
 	default:
 		return 0;
 	}
@@ -247,6 +298,11 @@ bool join_has_capture(const struct join *join)
 bool join_complete(const struct join *join)
 {
 	return join->has_capture && join->crc_agrees;
+}
+
+bool join_told(const struct join *join)
+{
+	return join->has_capture && told_whole(&join->told, join->end.drop_id);
 }
 
 bool join_next_gap(const struct join *join, unsigned sensor, uint32_t tick_ms, uint32_t limit,
@@ -285,7 +341,8 @@ void join_forget(struct join *join)
 	join->crc_agrees = false;
 }
 
-/* The longest run of ticks that at least one sensor holds, over holes of less than JOIN_FAR_TICKS. */
+/* The longest run of ticks that at least one sensor holds, over holes of less than JOIN_FAR_TICKS; behind the
+ * last capture of this run of the tower. */
 static uint32_t find_run(const struct join *join, uint32_t *first_ms)
 {
 	uint32_t first = 0, last = 0, best = 0;
@@ -297,6 +354,8 @@ static uint32_t find_run(const struct join *join, uint32_t *first_ms)
 		const struct slot *s2 = &join->ring[1][tick_ms % RING_TICKS];
 
 		if (!(s1->held && s1->tick_ms == tick_ms) && !(s2->held && s2->tick_ms == tick_ms))
+			continue;
+		if (join->end_seen && (int32_t)(tick_ms - join->end.last_tick_ms) <= 0)
 			continue;
 		if (!any || tick_ms - last > JOIN_FAR_TICKS)
 			first = tick_ms;
@@ -310,30 +369,44 @@ static uint32_t find_run(const struct join *join, uint32_t *first_ms)
 	return best;
 }
 
+/* Counts what the window holds; returns the drop number of the last block of it. */
+static uint16_t count_slots(const struct join *join, struct record_counters *counters)
+{
+	uint16_t drop_id = 0;
+
+	for (unsigned s = 0; s < WIRE_SENSORS; s++) {
+		for (uint32_t tick = 0; tick < join->ticks; tick++) {
+			const struct slot *slot = &join->window[s][tick];
+
+			counters->blocks += slot->held;
+			if (slot->held)
+				drop_id = (uint16_t)(slot->data[0] | slot->data[1] << 8);
+			counters->repeated += slot->repeated;
+			counters->conflicting += slot->conflicting;
+			counters->reordered += slot->reordered;
+			counters->resent += slot->resent;
+		}
+	}
+	counters->corrupt = join->corrupt + join->segments.incomplete;
+	counters->gaps = join->gaps;
+	return drop_id;
+}
+
 static void fill_from_window(const struct join *join, struct record *record)
 {
-	struct record_counters *counters = &record->counters;
-
 	for (unsigned s = 0; s < WIRE_SENSORS; s++) {
 		for (uint32_t tick = 0; tick < join->ticks; tick++) {
 			const struct slot *slot = &join->window[s][tick];
 			struct frame frame = {.length = WIRE_LENGTH_block, .flags = FRAME_FD};
 			struct wire_block block;
 
-			counters->repeated += slot->repeated;
-			counters->conflicting += slot->conflicting;
-			counters->reordered += slot->reordered;
-			counters->resent += slot->resent;
 			memcpy(frame.data, slot->data, sizeof(slot->data));
 			if (!slot->held || wire_unpack_block(&frame, &block))
 				continue;
-			counters->blocks++;
-			record->drop_id = block.drop_id;
 			drop_put(record, s + 1, tick, block.x, block.y, block.z);
 		}
 	}
-	counters->corrupt = join->corrupt + join->segments.incomplete;
-	counters->gaps = join->gaps;
+	record->drop_id = count_slots(join, &record->counters);
 }
 
 static void fill_from_end(const struct join *join, struct record *record)
@@ -347,38 +420,103 @@ static void fill_from_end(const struct join *join, struct record *record)
 	record->crc32 = join->end.crc32;
 	record->camera_frame = join->end.camera_frame;
 	record->crc_known = true;
+	record->parameters_crc32 = join->end.parameters_crc32;
+	record->trigger_us = join->end.trigger_us;
+	record->seal_known = true;
+	record->seal = join->end.seal;
+}
+
+/* The capture's window, or one of the longest run; false when there is no block for one. */
+static bool find_window(struct join *join, uint32_t *first_ms)
+{
+	uint32_t run;
+
+	*first_ms = join->end.first_tick_ms;
+	if (join->has_capture)
+		return true;
+	run = join->any ? find_run(join, first_ms) : 0;
+	if (run > 0)
+		open_window(join, *first_ms, run);
+	return run > 0;
+}
+
+static void make_room(struct join *join)
+{
+	if (!join->has_capture)
+		join_forget_run(join);
+	join->has_capture = false;
+	join->corrupt = 0;
+	join->segments.incomplete = 0;
 }
 
 int join_take(struct join *join, struct record *record)
 {
-	uint32_t first_ms = join->end.first_tick_ms;
+	uint32_t first_ms;
 	struct record drop;
 	int error;
 
-	if (!join->has_capture) {
-		uint32_t run = join->any ? find_run(join, &first_ms) : 0;
-
-		if (run == 0)
-			return DT_E_EMPTY;
-		open_window(join, first_ms, run);
-	}
-	if (join->missing == WIRE_SENSORS * join->ticks)
+	if (!find_window(join, &first_ms) || join->missing == WIRE_SENSORS * join->ticks)
 		return DT_E_EMPTY;
 	error = drop_open(&drop, first_ms, first_ms + join->ticks - 1);
 	if (error)
 		return error;
 	fill_from_window(join, &drop);
-	if (join->has_capture)
+	if (join->has_capture) {
 		fill_from_end(join, &drop);
-	else
-		restart(join);
+		told_fill(&join->told, &join->end, &drop);
+	}
 	error = drop_close(&drop);
 	if (error)
 		return error;
 	strcpy(drop.format, "live");
-	join->has_capture = false;
-	join->corrupt = 0;
-	join->segments.incomplete = 0;
+	make_room(join);
 	*record = drop;
 	return 0;
+}
+
+int join_skip(struct join *join, struct log_capture *capture)
+{
+	const struct wire_capture_end *end = &join->end;
+	uint32_t first_ms;
+
+	if (!find_window(join, &first_ms))
+		return DT_E_EMPTY;
+	capture->counters = (struct record_counters){0};
+	capture->drop_id = count_slots(join, &capture->counters);
+	capture->first_tick_ms = first_ms;
+	capture->last_tick_ms = first_ms + join->ticks - 1;
+	capture->ended = join->has_capture;
+	if (join->has_capture)
+		capture->drop_id = end->drop_id;
+	capture->marks = join->has_capture ? end->marks : 0;
+	capture->crc32 = join->has_capture ? end->crc32 : 0;
+	capture->frame_speed_mm_s = join->has_capture ? end->frame_speed_mm_s : 0;
+	capture->crc_agrees = join->has_capture && join->crc_agrees;
+	/* one that does not agree ends no capture */
+	capture->seal_known = capture->seal_agrees = join->has_capture;
+	capture->seal = join->has_capture ? end->seal : 0;
+	make_room(join);
+	return 0;
+}
+
+const struct wire_capture_end *join_end(const struct join *join)
+{
+	return join->has_capture ? &join->end : NULL;
+}
+
+bool join_newest(const struct join *join, uint32_t *tick_ms)
+{
+	if (join->any)
+		*tick_ms = join->newest_ms;
+	return join->any;
+}
+
+uint64_t join_restarts(const struct join *join)
+{
+	return join->restarts;
+}
+
+uint64_t join_touched(const struct join *join)
+{
+	return join->touched;
 }

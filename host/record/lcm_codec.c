@@ -84,11 +84,9 @@ int lcm_codec_state(const struct frame *frame, droptower_state *state)
 
 	if (error)
 		return error;
-	state->utime = frame->time_us;
 	state->state = status.state;
 	state->fault = status.fault;
 	state->checks = status.checks;
-	state->drop_id = status.drop_id;
 	state->io = status.io;
 	return 0;
 }
@@ -101,13 +99,18 @@ static void fill_message(const struct record *record, droptower_drop *drop)
 	drop->marks = record->marks;
 	drop->first_tick_ms = record->first_tick_ms;
 	drop->last_tick_ms = record->last_tick_ms;
-	drop->trigger_us = isnan(record->trigger_s) ? -1 : llround(record->trigger_s * 1e6);
+	drop->trigger_us = isnan(record->trigger_s) ? record->trigger_us : llround(record->trigger_s * 1e6);
+	if (!record->crc_known && isnan(record->trigger_s))
+		drop->trigger_us = -1;
 	drop->crc32 = record->crc32;
 	drop->crc_known = record->crc_known;
 	drop->crc_agrees = record->crc_agrees;
 	drop->frame_speed_mm_s =
 	        isnan(record->frame_speed_m_s) ? 0 : (int32_t)lround(record->frame_speed_m_s * 1e3);
 	drop->camera_frame = record->camera_frame;
+	drop->seal_known = record->seal_known;
+	drop->seal = record->seal;
+	drop->parameters_crc32 = record->parameters_crc32;
 	drop->blocks = (int64_t)counters->blocks;
 	drop->repeated = (int64_t)counters->repeated;
 	drop->reordered = (int64_t)counters->reordered;
@@ -117,9 +120,25 @@ static void fill_message(const struct record *record, droptower_drop *drop)
 	drop->conflicting = (int64_t)counters->conflicting;
 }
 
+static void fill_measured(const struct record *record, droptower_drop *drop)
+{
+	const struct wire_measured *measured = &record->measured;
+
+	drop->measured_known = record->measured_known;
+	drop->dropout_us = measured->dropout_us;
+	drop->dropout_used_us = measured->dropout_used_us;
+	drop->separation_mm_s = measured->separation_mm_s;
+	drop->separation_um = measured->separation_um;
+	drop->acceleration_mm_s2 = measured->acceleration_mm_s2;
+	drop->latch_delay_us = measured->latch_delay_us;
+	drop->clock_ppm = measured->clock_ppm;
+	drop->trigger_latency_us = measured->trigger_latency_us;
+}
+
 static bool allocate(droptower_drop *drop)
 {
-	size_t gaps = (size_t)drop->gap_count + 1, x = (size_t)drop->x_count, yz = (size_t)drop->yz_count;
+	size_t gaps = (size_t)drop->gap_count + 1 + WIRE_SENSORS, x = (size_t)drop->x_count,
+	       yz = (size_t)drop->yz_count;
 
 	drop->gap_sensor = calloc(gaps, sizeof(*drop->gap_sensor));
 	drop->gap_first_tick_ms = calloc(gaps, sizeof(*drop->gap_first_tick_ms));
@@ -155,6 +174,7 @@ int lcm_codec_drop(const struct record *record, int64_t utime, droptower_drop *d
 	if (!record->is_drop)
 		return DT_E_ARGUMENT;
 	fill_message(record, &message);
+	fill_measured(record, &message);
 	message.gap_count = (int32_t)record->gap_count;
 	message.x_count = (int32_t)(drop_ticks(record) * WIRE_X_PER_TICK);
 	message.yz_count = (int32_t)(drop_ticks(record) * WIRE_YZ_PER_TICK);
@@ -177,6 +197,26 @@ int lcm_codec_drop(const struct record *record, int64_t utime, droptower_drop *d
 	return 0;
 }
 
+/* Beyond, a double is not every whole number, and what one format holds another could not. */
+static bool counters_fit(const droptower_drop *drop)
+{
+	const int64_t counters[] = {drop->blocks, drop->repeated, drop->reordered,  drop->corrupt,
+	                            drop->gaps,   drop->resent,   drop->conflicting};
+
+	for (size_t i = 0; i < sizeof(counters) / sizeof(counters[0]); i++)
+		if (!fits(counters[i], (int64_t)1 << 53))
+			return false;
+	return true;
+}
+
+static bool measured_fits(const droptower_drop *drop)
+{
+	return fits(drop->dropout_us, UINT16_MAX) && fits(drop->dropout_used_us, UINT16_MAX) &&
+	       fits(drop->separation_mm_s, UINT16_MAX) && fits(drop->separation_um, UINT32_MAX) &&
+	       fits(drop->acceleration_mm_s2, UINT16_MAX) && fits(drop->latch_delay_us, UINT16_MAX) &&
+	       fits(drop->trigger_latency_us, UINT16_MAX);
+}
+
 static bool message_fits(const droptower_drop *drop)
 {
 	int64_t ticks;
@@ -184,10 +224,12 @@ static bool message_fits(const droptower_drop *drop)
 	if (!fits(drop->first_tick_ms, UINT32_MAX) || !fits(drop->last_tick_ms, UINT32_MAX))
 		return false;
 	ticks = (uint32_t)(drop->last_tick_ms - drop->first_tick_ms + 1);
-	return fits(drop->drop_id, UINT16_MAX) && fits(drop->marks, UINT16_MAX) &&
-	       drop->gap_count <= ticks + WIRE_SENSORS && drop->trigger_us <= UINT32_MAX &&
-	       fits(drop->crc32, UINT32_MAX) && fits(drop->frame_speed_mm_s, UINT16_MAX) &&
-	       drop->x_count == ticks * WIRE_X_PER_TICK && drop->yz_count == ticks * WIRE_YZ_PER_TICK;
+	return fits(drop->drop_id, UINT16_MAX) && fits(drop->marks, UINT16_MAX) && counters_fit(drop) &&
+	       drop->gap_count <= ticks + 2 * WIRE_SENSORS && drop->trigger_us <= UINT32_MAX &&
+	       fits(drop->crc32, UINT32_MAX) && fits(drop->seal, UINT32_MAX) &&
+	       fits(drop->parameters_crc32, UINT32_MAX) && measured_fits(drop) &&
+	       fits(drop->frame_speed_mm_s, UINT16_MAX) && drop->x_count == ticks * WIRE_X_PER_TICK &&
+	       drop->yz_count == ticks * WIRE_YZ_PER_TICK;
 }
 
 static bool in_gap(const droptower_drop *drop, unsigned sensor, uint32_t tick_ms)
@@ -200,17 +242,39 @@ static bool in_gap(const droptower_drop *drop, unsigned sensor, uint32_t tick_ms
 	return false;
 }
 
+static void take_measured(const droptower_drop *drop, struct record *record)
+{
+	record->measured_known = drop->measured_known != 0;
+	record->measured = (struct wire_measured){
+	        .drop_id = (uint16_t)drop->drop_id,
+	        .dropout_us = (uint16_t)drop->dropout_us,
+	        .dropout_used_us = (uint16_t)drop->dropout_used_us,
+	        .separation_mm_s = (uint16_t)drop->separation_mm_s,
+	        .separation_um = (uint32_t)drop->separation_um,
+	        .acceleration_mm_s2 = (uint16_t)drop->acceleration_mm_s2,
+	        .latch_delay_us = (uint16_t)drop->latch_delay_us,
+	        .clock_ppm = drop->clock_ppm,
+	        .trigger_latency_us = (uint16_t)drop->trigger_latency_us,
+	};
+}
+
 static void fill_record(const droptower_drop *drop, struct record *record)
 {
 	record->drop_id = (uint16_t)drop->drop_id;
 	record->marks = (uint16_t)drop->marks;
 	if (drop->trigger_us >= 0)
+		record->trigger_us = (uint32_t)drop->trigger_us;
+	if (drop->trigger_us >= 0 && !(record->marks & WIRE_MARK_NO_IMPACT))
 		record->trigger_s = (double)drop->trigger_us / 1e6;
 	if (drop->frame_speed_mm_s)
 		record->frame_speed_m_s = drop->frame_speed_mm_s / 1e3;
 	record->crc32 = (uint32_t)drop->crc32;
 	record->camera_frame = drop->camera_frame;
 	record->crc_known = drop->crc_known != 0;
+	record->seal_known = record->crc_known && drop->seal_known != 0;
+	record->seal = (uint32_t)drop->seal;
+	record->parameters_crc32 = (uint32_t)drop->parameters_crc32;
+	take_measured(drop, record);
 	record->counters = (struct record_counters){
 	        .blocks = (uint64_t)drop->blocks,
 	        .repeated = (uint64_t)drop->repeated,
@@ -257,39 +321,132 @@ int lcm_codec_decode_block(const void *bytes, size_t size, droptower_block *bloc
 	return 0;
 }
 
-/* A count of an encoded message, or -1 beyond the end. A negative one reads as more than any message holds.
- */
-static int64_t count_at(const uint8_t *bytes, size_t size, size_t at)
+/* ---- a drop's bytes ---- */
+
+/* Of an encoded drop, as drop.lcm has it. */
+enum {
+	SEAL = 1 + 2 * 8,
+	MEASURED = 1 + 3 * 4 + 8 + 2 * 4 + 2 + 4,
+	/* fingerprint, then utime to conflicting */
+	GAP_COUNT = 8 + 8 + 2 * 4 + 4 * 8 + 2 + 4 + 2 + SEAL + MEASURED + 7 * 8,
+	GAP_BYTES = 1 + 8 + 8,
+	MAC = 32,
+	FIXED_BYTES = GAP_COUNT + 3 * 4 + MAC, /* of one without gaps and samples */
+	DROP_BYTES_MAX = 1 << 20,              /* several times the longest drop's: bounds the memory */
+};
+
+/* Bytes that are read one after the other; those beyond the end are 0. */
+struct cursor {
+	const uint8_t *bytes;
+	size_t size, at;
+};
+
+static int64_t take(struct cursor *cursor, unsigned count)
 {
-	if (size < 4 || at > size - 4)
-		return -1;
-	return (int64_t)bytes[at] << 24 | bytes[at + 1] << 16 | bytes[at + 2] << 8 | bytes[at + 3];
+	uint64_t value = cursor->at < cursor->size && cursor->bytes[cursor->at] & 0x80 ? UINT64_MAX : 0;
+
+	for (unsigned i = 0; i < count; i++, cursor->at++)
+		value = value << 8 | (cursor->at < cursor->size ? cursor->bytes[cursor->at] : 0);
+	return (int64_t)value;
 }
 
-/* Whether the arrays that the counts announce fill the message. The offsets are those of drop.lcm. */
-static bool counts_fit(const uint8_t *bytes, size_t size)
+/* How long the message is that the counts announce; 0 for one that ends before them or counts below 0. */
+static size_t announced(const uint8_t *bytes, size_t size, droptower_drop *drop)
 {
-	enum {
-		GAP_COUNT = 8 + 8 + 2 * 4 + 4 * 8 + 2 + 4 + 2 +
-		            7 * 8, /* fingerprint, then utime to conflicting */
-		GAP_BYTES = 1 + 8 + 8,
-	};
-	int64_t gaps = count_at(bytes, size, GAP_COUNT);
-	size_t at = GAP_COUNT + 4 + (size_t)gaps * GAP_BYTES;
-	int64_t x = gaps < 0 ? -1 : count_at(bytes, size, at);
-	int64_t yz = x < 0 ? -1 : count_at(bytes, size, at + 4);
+	struct cursor cursor = {bytes, size, GAP_COUNT};
+	int64_t gaps = take(&cursor, 4), x, yz;
 
-	return yz >= 0 && size == at + 8 + 2 * sizeof(int16_t) * (size_t)(x + 2 * yz);
+	if (gaps < 0 || gaps > INT_MAX / GAP_BYTES)
+		return 0;
+	cursor.at += (size_t)gaps * GAP_BYTES;
+	x = take(&cursor, 4);
+	yz = take(&cursor, 4);
+	if (cursor.at > size || x < 0 || yz < 0)
+		return 0;
+	drop->gap_count = (int32_t)gaps;
+	drop->x_count = (int32_t)x;
+	drop->yz_count = (int32_t)yz;
+	return cursor.at + sizeof(int16_t) * (2 * (size_t)x + 4 * (size_t)yz) + MAC;
 }
 
-int lcm_codec_decode_drop(const void *bytes, size_t size, droptower_drop *drop)
+/* All but gaps and samples, by the library, whose code for these does without memory what it does with it. */
+static bool decode_fixed(const uint8_t *bytes, droptower_drop *drop)
 {
-	droptower_drop decoded = {0};
+	uint8_t fixed[FIXED_BYTES] = {0};
 
-	if (size > INT_MAX || !counts_fit(bytes, size))
+	memcpy(fixed, bytes, GAP_COUNT);
+	return droptower_drop_decode(fixed, 0, sizeof(fixed), drop) == sizeof(fixed);
+}
+
+static void take_samples(struct cursor *cursor, int16_t *samples, int32_t count)
+{
+	for (int32_t i = 0; i < count; i++)
+		samples[i] = (int16_t)take(cursor, sizeof(int16_t));
+}
+
+/* Ticks of a sensor that are there to the last sample; at is where the cursor was behind its Z. */
+static int64_t whole_ticks(const droptower_drop *drop, size_t size, size_t at)
+{
+	size_t missing = at > size ? at - size : 0, z = sizeof(int16_t) * (size_t)drop->yz_count;
+	size_t tick = sizeof(int16_t) * WIRE_YZ_PER_TICK;
+
+	return missing > z ? 0 : (int64_t)((z - missing) / tick);
+}
+
+/* Ticks from the first that is not whole on are a gap more. */
+static void add_gap(droptower_drop *drop, int8_t sensor, int64_t ticks)
+{
+	if (ticks * WIRE_YZ_PER_TICK >= drop->yz_count)
+		return;
+	drop->gap_sensor[drop->gap_count] = sensor;
+	drop->gap_first_tick_ms[drop->gap_count] = (int64_t)((uint64_t)drop->first_tick_ms + (uint64_t)ticks);
+	drop->gap_last_tick_ms[drop->gap_count] = drop->last_tick_ms;
+	drop->gap_count++;
+}
+
+/* Ticks that are whole of the first sensor. */
+static int64_t decode_arrays(const uint8_t *bytes, size_t size, droptower_drop *drop)
+{
+	struct cursor cursor = {bytes, size, GAP_COUNT + 4};
+	int64_t s1, s2;
+
+	for (int32_t i = 0; i < drop->gap_count; i++)
+		drop->gap_sensor[i] = (int8_t)take(&cursor, 1);
+	for (int32_t i = 0; i < drop->gap_count; i++)
+		drop->gap_first_tick_ms[i] = take(&cursor, 8);
+	for (int32_t i = 0; i < drop->gap_count; i++)
+		drop->gap_last_tick_ms[i] = take(&cursor, 8);
+	cursor.at += 8;
+	take_samples(&cursor, drop->s1_x, drop->x_count);
+	take_samples(&cursor, drop->s1_y, drop->yz_count);
+	take_samples(&cursor, drop->s1_z, drop->yz_count);
+	s1 = whole_ticks(drop, size, cursor.at);
+	take_samples(&cursor, drop->s2_x, drop->x_count);
+	take_samples(&cursor, drop->s2_y, drop->yz_count);
+	take_samples(&cursor, drop->s2_z, drop->yz_count);
+	s2 = whole_ticks(drop, size, cursor.at);
+	add_gap(drop, 1, s1);
+	add_gap(drop, 2, s2);
+	return s1;
+}
+
+int lcm_codec_decode_drop(const void *bytes, size_t size, bool cut, droptower_drop *drop)
+{
+	droptower_drop decoded = {0}, counts = {0};
+	size_t whole = size > INT_MAX ? 0 : announced(bytes, size, &counts);
+
+	if (whole == 0 || (cut ? size >= whole : size != whole) || whole > DROP_BYTES_MAX ||
+	    !decode_fixed(bytes, &decoded))
 		return DT_E_FORMAT;
-	if (droptower_drop_decode(bytes, 0, (int)size, &decoded) != (int)size) {
-		droptower_drop_decode_cleanup(&decoded);
+	decoded.gap_count = counts.gap_count;
+	decoded.x_count = counts.x_count;
+	decoded.yz_count = counts.yz_count;
+	if (!allocate(&decoded)) {
+		lcm_codec_free_drop(&decoded);
+		return DT_E_MEMORY;
+	}
+	if (decode_arrays(bytes, size, &decoded) == 0 && cut) {
+		lcm_codec_free_drop(&decoded);
 		return DT_E_FORMAT;
 	}
 	*drop = decoded;

@@ -25,7 +25,7 @@ DT_MUST_USE int lcm_codec_block(const struct frame *frame, droptower_block *bloc
 /* And back, sealed. */
 DT_MUST_USE int lcm_codec_frame(const droptower_block *block, struct frame *frame);
 
-/* A status frame; utime is the frame's time. What the state message says of commands is left alone. */
+/* A status frame. What the state message says of its time, the drop and commands is left alone. */
 DT_MUST_USE int lcm_codec_state(const struct frame *frame, droptower_state *state);
 
 /* The drop of a record, its arrays to be freed with lcm_codec_free_drop. DT_E_ARGUMENT: the record is not
@@ -36,9 +36,10 @@ void lcm_codec_free_drop(droptower_drop *drop);
 /* And back; *record is initialised by the call. crc_agrees is not believed but computed. */
 DT_MUST_USE int lcm_codec_record(const droptower_drop *drop, struct record *record);
 
-/* The generated decoders believe the counts in a message; these check them first. A decoded drop is freed
- * with droptower_drop_decode_cleanup. */
+/* The generated decoders believe the counts in a message, and that there is memory; these check both. A
+ * decoded drop is freed with lcm_codec_free_drop. One that is cut has lost its end: the ticks that are not
+ * whole are gaps of it; DT_E_FORMAT where none is. */
 DT_MUST_USE int lcm_codec_decode_block(const void *bytes, size_t size, droptower_block *block);
-DT_MUST_USE int lcm_codec_decode_drop(const void *bytes, size_t size, droptower_drop *drop);
+DT_MUST_USE int lcm_codec_decode_drop(const void *bytes, size_t size, bool cut, droptower_drop *drop);
 
 #endif

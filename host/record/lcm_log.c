@@ -3,74 +3,126 @@
 
 #include <string.h>
 
-enum { HEADER_BYTES = 28, TIME_AT = 12, CHANNEL_AT = 20, DATA_AT = 24, LOOK_BYTES = 65536 };
+enum { HEADER_BYTES = 28, TIME_AT = 12, CHANNEL_AT = 20, DATA_AT = 24, SYNC_BYTES = 4, LOOK_BYTES = 65536 };
 
-static const uint8_t sync_word[] = {0xED, 0xA1, 0xDA, 0x01};
+static const uint8_t sync_word[SYNC_BYTES] = {0xED, 0xA1, 0xDA, 0x01};
 
 static uint32_t big_endian(const uint8_t *p)
 {
 	return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
 }
 
-static bool sync_at(const struct source *source, size_t at)
+static const uint8_t *bytes_at(struct log_file *log, uint64_t at, size_t want, size_t *held)
 {
-	return source->size - at >= sizeof(sync_word) &&
-	       memcmp(source->bytes + at, sync_word, sizeof(sync_word)) == 0;
+	return (const uint8_t *)log_file_get(log, at, want, held);
+}
+
+static bool sync_at(struct log_file *log, uint64_t at)
+{
+	size_t held;
+	const uint8_t *bytes = bytes_at(log, at, SYNC_BYTES, &held);
+
+	return held >= SYNC_BYTES && memcmp(bytes, sync_word, SYNC_BYTES) == 0;
 }
 
 /* A damaged length swallows the events behind it: it is believed if the next event or the end follows, or
  * if there is no sync word inside. */
-static bool length_holds(const struct source *source, size_t data, size_t size)
+static bool length_holds(struct log_file *log, uint64_t data, size_t size, uint64_t end)
 {
-	size_t behind = data + size;
+	const uint8_t *bytes;
+	size_t held;
 
-	return behind == source->size || sync_at(source, behind) ||
-	       !memmem(source->bytes + data, size, sync_word, sizeof(sync_word));
+	if (data + size == end || sync_at(log, data + size))
+		return true;
+	bytes = bytes_at(log, data, size, &held);
+	return held >= size && !memmem(bytes, size, sync_word, SYNC_BYTES);
 }
 
-/* The event at *at, which moves behind it; false when there is none. */
-static bool event_at(const struct source *source, size_t *at, struct lcm_log_event *event)
+/* Its length leads beyond the log's end, and nothing that is there follows it: the end has cut it. */
+static bool is_cut(struct log_file *log, uint64_t data, size_t size, uint64_t end)
 {
-	const uint8_t *header = (const uint8_t *)source->bytes + *at;
-	size_t left = source->size - *at, channel, data;
+	const uint8_t *bytes;
+	size_t held;
 
-	if (!sync_at(source, *at) || left < HEADER_BYTES)
+	if (end != log->size)
+		return false;
+	bytes = bytes_at(log, data, size, &held);
+	return held >= size && !memmem(bytes, size, sync_word, SYNC_BYTES);
+}
+
+/* The event at *at, which moves behind it; false when there is none before end. */
+static bool event_at(struct log_file *log, uint64_t *at, uint64_t end, struct lcm_log_event *event)
+{
+	size_t held, channel, data;
+	const uint8_t *header = bytes_at(log, *at, HEADER_BYTES + LCM_LOG_CHANNEL_MAX, &held);
+	uint64_t left = end - *at;
+
+	if (held < HEADER_BYTES || left < HEADER_BYTES || memcmp(header, sync_word, SYNC_BYTES) != 0)
 		return false;
 	channel = big_endian(header + CHANNEL_AT);
 	data = big_endian(header + DATA_AT);
 	left -= HEADER_BYTES;
-	if (channel == 0 || channel > LCM_LOG_CHANNEL_MAX || channel > left || data > left - channel ||
-	    !length_holds(source, *at + HEADER_BYTES + channel, data))
+	if (channel == 0 || channel > LCM_LOG_CHANNEL_MAX || channel > left)
 		return false;
+	event->cut = data > left - channel;
+	if (event->cut)
+		data = (size_t)(left - channel);
 	event->time_us =
 	        (int64_t)((uint64_t)big_endian(header + TIME_AT) << 32 | big_endian(header + TIME_AT + 4));
 	memcpy(event->channel, header + HEADER_BYTES, channel);
 	event->channel[channel] = '\0';
-	event->data = header + HEADER_BYTES + channel;
+	event->at = *at;
+	*at += HEADER_BYTES + channel;
+	/* all of it and the next sync word into the window at once */
+	(void)bytes_at(log, event->at, HEADER_BYTES + channel + data + SYNC_BYTES, &held);
+	if (event->cut ? !is_cut(log, *at, data, end) : !length_holds(log, *at, data, end)) {
+		*at = event->at;
+		return false;
+	}
+	event->data = bytes_at(log, *at, data, &held);
 	event->size = data;
-	*at += HEADER_BYTES + channel + data;
+	if (held < data)
+		event->data = NULL;
+	*at += data;
 	return true;
 }
 
-bool lcm_log_is(const struct source *source)
+bool lcm_log_is(struct log_file *log)
 {
-	size_t look = source->size < LOOK_BYTES ? source->size : LOOK_BYTES;
+	size_t held;
+	const uint8_t *head = bytes_at(log, 0, LOOK_BYTES, &held);
 
-	return memmem(source->bytes, look, sync_word, sizeof(sync_word)) != NULL;
+	return memmem(head, held < LOOK_BYTES ? held : LOOK_BYTES, sync_word, SYNC_BYTES) != NULL;
 }
 
-bool lcm_log_next(const struct source *source, struct lcm_log_walk *walk, struct lcm_log_event *event)
+/* To the next byte that a sync word may begin with. */
+static void step(struct log_file *log, struct lcm_log_walk *walk, uint64_t end)
 {
+	size_t held;
+	const uint8_t *bytes = bytes_at(log, ++walk->at, LOOK_BYTES, &held), *found;
+
+	if (walk->at >= end)
+		return;
+	if (held > end - walk->at)
+		held = (size_t)(end - walk->at);
+	found = held > 0 ? memchr(bytes, sync_word[0], held) : NULL;
+	walk->at += found != NULL ? (size_t)(found - bytes) : held;
+}
+
+bool lcm_log_next(struct log_file *log, struct lcm_log_walk *walk, struct lcm_log_event *event)
+{
+	uint64_t end = walk->end != 0 && walk->end < log->size ? walk->end : log->size;
 	bool in_step = true;
 
-	while (walk->at < source->size) {
-		if (event_at(source, &walk->at, event)) {
+	while (walk->at < end && log->failed == 0) {
+		if (event_at(log, &walk->at, end, event)) {
 			walk->events++;
+			walk->skipped += event->cut;
 			return true;
 		}
 		walk->skipped += in_step;
 		in_step = false;
-		walk->at++;
+		step(log, walk, end);
 	}
 	return false;
 }

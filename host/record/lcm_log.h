@@ -6,34 +6,40 @@
  * name, length of data), the name, the data. The library's reader ends at the first bad byte; this one
  * looks for the next sync word and counts. (LCM, eventlog.c)
  *
- * The log is walked in memory: a source that the caller loads and frees.
+ * The log is walked through a log that the caller opens and closes.
  */
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-#include "host/record/source.h"
+#include "host/record/log_file.h"
 
 enum { LCM_LOG_CHANNEL_MAX = 63 };
+
+/* The channel of the event behind a drop message of ours: no message, SEAL_WORD and the SHA-256 of that
+ * message. Logs are put one behind the other and logged again; the two stay together. */
+#define LCM_LOG_SEAL "DT_SEAL"
 
 struct lcm_log_event {
 	int64_t time_us; /* since the epoch */
 	char channel[LCM_LOG_CHANNEL_MAX + 1];
-	const uint8_t *data;
+	const uint8_t *data; /* in the log's window; NULL of an event beyond what that holds */
 	size_t size;
+	bool cut;    /* the end of the log has cut it: data is what is there. Counted as skipped */
+	uint64_t at; /* where in the log it begins; it ends where the walk is */
 };
 
-/* Where a walk is; start with a zeroed one. */
+/* Where a walk is; start with a zeroed one, or at and end where it goes. */
 struct lcm_log_walk {
-	size_t at;
+	uint64_t at, end; /* end 0: the log's */
 	uint64_t events;
 	uint64_t skipped; /* stretches of bytes that are no event */
 };
 
 /* A sync word stands in the first 64 KiB: a log may have lost its beginning, and no text holds one. */
-bool lcm_log_is(const struct source *source);
+bool lcm_log_is(struct log_file *log);
 
 /* The next event; false at the end. */
-bool lcm_log_next(const struct source *source, struct lcm_log_walk *walk, struct lcm_log_event *event);
+bool lcm_log_next(struct log_file *log, struct lcm_log_walk *walk, struct lcm_log_event *event);
 
 #endif

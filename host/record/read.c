@@ -1,12 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/read.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "host/record/hdf5.h"
-#include "host/record/lcm_log.h"
-#include "host/record/source.h"
+#include "host/record/lcm_codec.h"
+#include "host/record/log_index.h"
+#include "host/record/seal.h"
 #include "host/record/uff58.h"
+
+/* ---- what is no log ---- */
 
 static bool is_csv(const struct source *source)
 {
@@ -15,55 +19,337 @@ static bool is_csv(const struct source *source)
 	return source->size >= sizeof(head) - 1 && memcmp(source->bytes, head, sizeof(head) - 1) == 0;
 }
 
-/* The first line that says something begins with '('. */
-static bool is_candump(const struct source *source)
+static int refuse_columns(const char *file, char *message)
 {
-	struct source_line line = {0};
-
-	while (source_next_line(source, &line))
-		if (line.length > 0 && line.text[0] != '#')
-			return line.text[0] == '(';
-	return false;
+	return source_refuse(message, DT_E_ARGUMENT, file, 0,
+	                     "this format names its channels itself, expected no --columns");
 }
 
 static int dispatch(struct record *record, const struct source *source, const char *columns,
                     char message[READ_MESSAGE_MAX])
 {
 	int (*reader)(struct record *, const struct source *, char *) = NULL;
+	int sealed, result;
 
-	if (lcm_log_is(source))
-		reader = read_lcm;
-	else if (hdf5_is(source))
+	if (hdf5_is(source))
 		reader = read_hdf5;
 	else if (is_csv(source))
 		reader = read_csv;
 	else if (uff58_is(source))
 		reader = read_uff58;
-	else if (is_candump(source))
-		reader = read_candump;
 	if (!reader)
 		return read_delimited(record, source, columns, message);
 	if (columns)
-		return source_refuse(message, DT_E_ARGUMENT, source->file, 0,
-		                     "this format names its channels itself, expected no --columns");
-	return reader(record, source, message);
+		return refuse_columns(source->file, message);
+	sealed = reader == read_csv || reader == read_uff58 ? seal_check(source, message) : 0;
+	if (sealed < 0)
+		return sealed;
+	result = reader(record, source, message);
+	if (result == 0 && sealed > 0)
+		record->file_sealed = true;
+	return result;
+}
+
+/* The one recording of the log, which a pipe has left in memory. */
+static int read_one(struct record *record, const struct log_file *log, const char *columns, char *message)
+{
+	struct source loaded = {0}, source = log->whole;
+	int error = 0;
+
+	if (source.bytes == NULL) {
+		error = source_load(&loaded, log->file, log->expected, message);
+		source = loaded;
+	}
+	if (!error)
+		error = dispatch(record, &source, columns, message);
+	if (!error)
+		strcpy(record->file, log->file);
+	source_free(&loaded);
+	return error;
+}
+
+/* ---- the drops of a log ---- */
+
+static int open_recording(struct log_file *log, const char *file, const char *columns, char *message)
+{
+	enum { NAME_MAX_BYTES = sizeof(((struct record *)NULL)->file) };
+	int error;
+
+	if (strlen(file) >= NAME_MAX_BYTES)
+		return source_refuse(message, DT_E_ARGUMENT, file, 0,
+		                     "name of %zu bytes, expected less than %d", strlen(file),
+		                     (int)NAME_MAX_BYTES);
+	error = log_file_open(log, file, "a recording", message);
+	if (error || columns == NULL || !log_is(log))
+		return error;
+	log_file_close(log);
+	return refuse_columns(file, message);
+}
+
+static int refuse_empty(struct log_file *log, const struct log_contents *contents, char *message)
+{
+	if (strcmp(log_format(log), "lcm") == 0)
+		return source_refuse(message, DT_E_EMPTY, log->file, 0,
+		                     "no message of a drop tower in %llu events, %llu refused, expected %s "
+		                     "or %s",
+		                     (unsigned long long)contents->frames,
+		                     (unsigned long long)contents->refused, LCM_CODEC_DROP, LCM_CODEC_BLOCK);
+	if (contents->frames == 0 && contents->refused)
+		return source_refuse(message, DT_E_FORMAT, log->file, contents->first_refused,
+		                     "no frame from column %u on, expected \"(seconds) interface id#data\"",
+		                     contents->column);
+	return source_refuse(message, DT_E_EMPTY, log->file, 0, "no block of a drop tower in %llu frames",
+	                     (unsigned long long)contents->frames);
+}
+
+static void name_record(struct log_file *log, const struct log_capture *capture, struct record *record)
+{
+	strcpy(record->file, log->file);
+	strcpy(record->format, log_format(log));
+	record->log_number = capture->alone ? 0 : capture->number;
+}
+
+struct each {
+	struct log_file *log;
+	int (*each)(void *context, const struct log_capture *capture, struct record *record);
+	void *context;
+};
+
+static int pass_on(void *context, const struct log_capture *capture, struct record *record)
+{
+	struct each *each = context;
+
+	if (record != NULL)
+		name_record(each->log, capture, record);
+	return each->each(each->context, capture, record);
+}
+
+static int each_of_log(struct each *each, char *message)
+{
+	struct log_visitor visitor = {.context = each, .wanted = LOG_EVERY, .capture = pass_on};
+	struct log_contents contents;
+	int result = log_walk(each->log, 0, each->log->size, &visitor, &contents, message);
+
+	return result == 0 && contents.captures == 0 ? refuse_empty(each->log, &contents, message) : result;
+}
+
+int read_each(const char *file, const char *columns,
+              int (*each)(void *context, const struct log_capture *capture, struct record *record),
+              void *context, char message[READ_MESSAGE_MAX])
+{
+	struct log_file log;
+	struct each of = {.log = &log, .each = each, .context = context};
+	struct record record;
+	int result = open_recording(&log, file, columns, message);
+
+	if (result)
+		return result;
+	if (log_is(&log)) {
+		result = each_of_log(&of, message);
+	} else {
+		result = read_one(&record, &log, columns, message);
+		if (result == 0)
+			result = each(context, NULL, &record);
+	}
+	log_file_close(&log);
+	return result;
+}
+
+/* ---- one of them ---- */
+
+struct found {
+	unsigned wanted; /* 0: the only one with a block */
+	bool found;
+	struct log_capture capture;
+	bool has_record;
+	struct record record;
+	unsigned all, held;          /* captures, and those with a block */
+	struct log_visitor *visitor; /* of a search for the only one: with a second, no more samples */
+};
+
+static void keep(struct found *found, const struct log_capture *capture, struct record *record)
+{
+	found->found = true;
+	found->capture = *capture;
+	found->has_record = record != NULL;
+	if (record != NULL)
+		found->record = *record;
+}
+
+static int find(void *context, const struct log_capture *capture, struct record *record)
+{
+	struct found *found = context;
+
+	found->all++;
+	found->held += capture->counters.blocks > 0;
+	if (found->wanted != 0 ? capture->number == found->wanted
+	                       : found->held == 1 && capture->counters.blocks > 0)
+		keep(found, capture, record);
+	else if (record != NULL)
+		record_free(record);
+	if (found->visitor != NULL && found->held > 1)
+		found->visitor->wanted = 0;
+	return 0;
+}
+
+static void forget(struct found *found)
+{
+	if (found->has_record)
+		record_free(&found->record);
+	*found = (struct found){.wanted = found->wanted};
+}
+
+/* The bytes that the index names, if what they hold is what it says. */
+static bool read_span(struct log_file *log, struct found *found)
+{
+	const struct log_capture indexed = found->capture;
+	struct found span = {.wanted = 1};
+	struct log_visitor visitor = {.context = &span, .wanted = 1, .capture = find};
+	struct log_contents contents;
+	char message[READ_MESSAGE_MAX];
+	int error = log_walk(log, indexed.from, indexed.to, &visitor, &contents, message);
+
+	if (error || !span.found || !log_capture_equal(&span.capture, &indexed)) {
+		forget(&span);
+		return false;
+	}
+	keep(found, &indexed, span.has_record ? &span.record : NULL);
+	if (found->has_record)
+		found->record.counters.corrupt = indexed.counters.corrupt;
+	return true;
+}
+
+static bool find_in_index(struct log_file *log, struct found *found)
+{
+	struct log_visitor visitor = {.context = found, .capture = find};
+	FILE *index = log_index_open(log);
+	bool done = false;
+
+	if (index == NULL)
+		return false;
+	if (log_index_visit(index, log, &visitor) == 0)
+		done = !found->found || read_span(log, found);
+	fclose(index);
+	if (!done)
+		forget(found);
+	return done;
+}
+
+static int find_drop(struct log_file *log, struct found *found, char *message)
+{
+	struct log_visitor visitor = {.context = found, .wanted = found->wanted, .capture = find};
+	struct log_contents contents;
+	int error;
+
+	if (find_in_index(log, found))
+		return 0;
+	error = log_index_walk(log, &visitor, &contents, message);
+	return error == 0 && contents.captures == 0 ? refuse_empty(log, &contents, message) : error;
+}
+
+static int find_only(struct log_file *log, struct found *found, char *message)
+{
+	struct log_visitor visitor = {.context = found, .wanted = LOG_EVERY, .capture = find};
+	struct log_contents contents;
+	int error;
+
+	found->visitor = &visitor;
+	error = log_walk(log, 0, log->size, &visitor, &contents, message);
+	if (error == 0 && found->held > 1)
+		return source_refuse(
+		        message, DT_E_ARGUMENT, log->file, 0,
+		        "%u drops, expected one: 'droptower analyze --list' shows them, --drop N "
+		        "takes one",
+		        found->all);
+	return error == 0 && found->held == 0 ? refuse_empty(log, &contents, message) : error;
+}
+
+static int read_of_log(struct record *record, struct log_file *log, unsigned number, char *message)
+{
+	struct found found = {.wanted = number};
+	int error = number != 0 ? find_drop(log, &found, message) : find_only(log, &found, message);
+
+	if (error == 0 && !found.found)
+		error = source_refuse(message, DT_E_ARGUMENT, log->file, 0,
+		                      found.all == 1 ? "no drop %u, %u is there" : "no drop %u, %u are there",
+		                      number, found.all);
+	if (error == 0 && !found.has_record)
+		error = source_refuse(message, DT_E_EMPTY, log->file, 0, "drop %u: no block of it", number);
+	if (error != 0) {
+		forget(&found);
+		return error;
+	}
+	*record = found.record;
+	name_record(log, &found.capture, record);
+	return 0;
+}
+
+int read_nth(struct record *record, const char *file, const char *columns, unsigned number,
+             char message[READ_MESSAGE_MAX])
+{
+	struct log_file log;
+	int error = open_recording(&log, file, columns, message);
+
+	if (error)
+		return error;
+	if (log_is(&log))
+		error = read_of_log(record, &log, number, message);
+	else if (number > 1)
+		error = source_refuse(message, DT_E_ARGUMENT, file, 0, "no drop %u, 1 is there", number);
+	else
+		error = read_one(record, &log, columns, message);
+	log_file_close(&log);
+	return error;
 }
 
 int read_record(struct record *record, const char *file, const char *columns, char message[READ_MESSAGE_MAX])
 {
-	struct source source;
-	int error;
+	return read_nth(record, file, columns, 0, message);
+}
 
-	if (strlen(file) >= sizeof(record->file))
-		return source_refuse(message, DT_E_ARGUMENT, file, 0,
-		                     "name of %zu bytes, expected less than %zu", strlen(file),
-		                     sizeof(record->file));
-	error = source_load(&source, file, "a recording", message);
+/* ---- all of them, without samples ---- */
+
+static int list_one(const struct log_file *log, struct log_visitor *visitor, char *message)
+{
+	struct log_capture capture = {.number = 1, .alone = true, .to = log->size};
+	struct record record;
+	int error = read_one(&record, log, NULL, message);
+
 	if (error)
 		return error;
-	error = dispatch(record, &source, columns, message);
-	if (!error)
-		strcpy(record->file, file);
-	source_free(&source);
-	return error;
+	if (!record.is_drop)
+		error = source_refuse(message, DT_E_EMPTY, log->file, 0, "no drop of the tower");
+	else
+		log_capture_of_record(&record, &capture);
+	record_free(&record);
+	return error ? error : visitor->capture(visitor->context, &capture, NULL);
+}
+
+static int list_log(struct log_file *log, struct log_visitor *visitor, char *message)
+{
+	struct log_contents contents;
+	FILE *index = log_index_open(log);
+	int result;
+
+	if (index == NULL) {
+		result = log_index_walk(log, visitor, &contents, message);
+		return result == 0 && contents.captures == 0 ? refuse_empty(log, &contents, message) : result;
+	}
+	result = log_index_visit(index, log, visitor);
+	fclose(index);
+	if (result == DT_E_FORMAT)
+		source_refuse(message, result, log->file, 0, "its index holds a line that is none");
+	return result;
+}
+
+int read_list(const char *file, struct log_visitor *visitor, char message[READ_MESSAGE_MAX])
+{
+	struct log_file log;
+	int result = open_recording(&log, file, NULL, message);
+
+	if (result)
+		return result;
+	result = log_is(&log) ? list_log(&log, visitor, message) : list_one(&log, visitor, message);
+	log_file_close(&log);
+	return result;
 }

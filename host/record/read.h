@@ -7,8 +7,8 @@
  * content, not from the file's name.
  *
  * columns, as on the command line: "time:ms,fixture:g,board:-g,-" names one entry per column: name:unit;
- * '-' in front of the unit flips the sign; a lone '-' skips. Units: s ms us for time; g m/s2 for channels,
- * the latter as m/s^2 and with a raised 2, too. Blanks around names, units and entries are left out. The
+ * '-' in front of the unit flips the sign; a lone '-' skips. Units: s ms us ns for time; g mg m/s2 and
+ * others for channels (unit.h). Blanks around names, units and entries are left out. The
  * first column named "time" is the time; without one, give "name:unit@RATE_HZ". Needed for foreign text,
  * refused for our own formats. NULL otherwise.
  *
@@ -17,9 +17,30 @@
  */
 #include "host/record/record.h"
 
+struct log_capture;
+struct log_visitor;
+
 enum { READ_MESSAGE_MAX = 512 };
 
+/* A log of several drops is refused: DT_E_ARGUMENT. */
 DT_MUST_USE int read_record(struct record *record, const char *file, const char *columns,
                             char message[READ_MESSAGE_MAX]);
+
+/* The drop of that number in its log, from 1; read_list tells what they are. 0: as read_record. Of a large
+ * log an index beside it is used, or made (log_index.h). */
+DT_MUST_USE int read_nth(struct record *record, const char *file, const char *columns, unsigned number,
+                         char message[READ_MESSAGE_MAX]);
+
+/* Calls each for every drop of a log, or once for any other recording, which has no capture (NULL). *record
+ * belongs to who is called; it is NULL when no block of the drop is held. What each returns ends it if it is
+ * not 0, and is returned. A recording without a drop is refused. */
+DT_MUST_USE int read_each(const char *file, const char *columns,
+                          int (*each)(void *context, const struct log_capture *capture,
+                                      struct record *record),
+                          void *context, char message[READ_MESSAGE_MAX]);
+
+/* Calls the visitor for all that a log holds (log_walk.h), without records; a drop in another format is a
+ * capture, too. */
+DT_MUST_USE int read_list(const char *file, struct log_visitor *visitor, char message[READ_MESSAGE_MAX]);
 
 #endif

@@ -1,94 +1,43 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  *
- * candump text: every line through the join, as if the frames came now.
+ * candump text: every line through the walk, as if the frames came now.
  */
-#include <string.h>
-
 #include "common/link/candump.h"
-#include "host/record/join.h"
-#include "host/record/source.h"
+#include "host/record/log_walk.h"
 
-struct reading {
-	struct join *join;
-	struct record kept; /* the last complete capture */
-	bool has_kept;
-	uint64_t frames, malformed;
-	uint64_t first_malformed; /* its line */
-	unsigned first_column;
-};
-
-/* Takes a capture as soon as it is complete, as a live host does. The last one of the log is the one to
- * read, unless it comes without a single block. */
-static void keep(struct reading *reading)
+/* The first line that says something begins with '('. */
+bool candump_is(struct log_file *log)
 {
-	struct record record;
+	enum { LOOK_BYTES = 1 << 16 };
+	struct log_line line = {.next = log->begin};
 
-	if (!join_complete(reading->join) || join_take(reading->join, &record))
-		return;
-	if (reading->has_kept)
-		record_free(&reading->kept);
-	reading->kept = record;
-	reading->has_kept = true;
+	while (log_file_next_line(log, log->begin + LOOK_BYTES, &line))
+		if (line.length > 0 && line.text[0] != '#')
+			return line.text[0] == '(';
+	return false;
 }
 
-static void read_lines(struct reading *reading, const struct source *source)
+void read_candump(struct log_walk *walk, struct log_file *log, uint64_t from, uint64_t to)
 {
-	struct source_line line = {0};
+	struct log_contents *contents = walk->contents;
+	struct log_line line = {.next = from > log->begin ? from : log->begin};
 
-	while (source_next_line(source, &line)) {
+	while (walk->result == 0 && log_file_next_line(log, to, &line)) {
 		struct frame frame;
 		unsigned column = 0;
 		int result = candump_parse(line.text, line.length, &frame, &column);
 
-		if (result < 0 && reading->malformed++ == 0) {
-			reading->first_malformed = line.number;
-			reading->first_column = column;
+		walk->at = line.at;
+		walk->next = line.next;
+		if (result < 0 && contents->refused++ == 0) {
+			contents->first_refused = line.number;
+			contents->column = column;
 		}
+		walk->corrupt += result < 0;
 		if (result <= 0)
 			continue;
-		reading->frames++;
-		join_feed(reading->join, &frame);
-		keep(reading);
+		contents->frames++;
+		walk->time_us = frame.time_us;
+		log_walk_frame(walk, &frame);
 	}
-}
-
-static int finish(struct reading *reading, struct record *record, const struct source *source, char *message)
-{
-	int error = DT_E_EMPTY;
-
-	if (join_has_capture(reading->join) || !reading->has_kept)
-		error = join_take(reading->join, record);
-	if (error && reading->has_kept) {
-		*record = reading->kept;
-		reading->has_kept = false;
-		error = 0;
-	}
-	if (error == DT_E_EMPTY && reading->frames == 0 && reading->malformed)
-		return source_refuse(message, DT_E_FORMAT, source->file, reading->first_malformed,
-		                     "no frame from column %u on, expected \"(seconds) interface id#data\"",
-		                     reading->first_column);
-	if (error == DT_E_EMPTY)
-		return source_refuse(message, error, source->file, 0,
-		                     "no block of a drop tower in %llu frames",
-		                     (unsigned long long)reading->frames);
-	if (error)
-		return source_refuse(message, error, source->file, 0, "%s", error_text(error));
-	strcpy(record->format, "candump");
-	record->counters.corrupt += reading->malformed;
-	return 0;
-}
-
-int read_candump(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX])
-{
-	struct reading reading = {.join = join_create()};
-	int error;
-
-	if (!reading.join)
-		return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
-	read_lines(&reading, source);
-	error = finish(&reading, record, source, message);
-	if (reading.has_kept)
-		record_free(&reading.kept);
-	join_destroy(reading.join);
-	return error;
 }

@@ -10,7 +10,7 @@
 #include "host/record/drop.h"
 #include "host/record/fields.h"
 #include "host/record/number.h"
-#include "host/record/source.h"
+#include "host/record/seal.h"
 
 struct reading {
 	const struct source *source;
@@ -177,6 +177,10 @@ static int read_sample(struct reading *reading, size_t i, double time_s, const c
 		return REFUSE(reading, DT_E_FORMAT,
 		              "\"%.*s\" for %s, expected a number, lost, bad or nothing",
 		              (int)(length < 80 ? length : 80), cell, channel->name);
+	else if (reading->record->is_drop && !drop_is_count(value_g))
+		return REFUSE(reading, DT_E_FORMAT,
+		              "\"%.*s\" for %s, expected a whole count of 1/32 g within full scale",
+		              (int)(length < 80 ? length : 80), cell, channel->name);
 	channel->value_g[k] = value_g;
 	channel->sample[k] = sample;
 	return 0;
@@ -221,8 +225,12 @@ static int read_rows(struct reading *reading)
 	const struct record *record = reading->record;
 
 	while (source_next_line(reading->source, &reading->line)) {
-		int error = read_row(reading);
+		int error;
 
+		if (starts_with(&reading->line, "# " SEAL_WORD) &&
+		    reading->line.next == reading->source->size)
+			break; /* read_record has checked it */
+		error = read_row(reading);
 		if (error)
 			return error;
 	}

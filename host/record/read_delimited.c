@@ -1,42 +1,17 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  *
  * Text with columns, as other people's programs write it, among them LabVIEW measurement files (.lvm).
- *
- * Separators are runs of blanks and tabs, single commas, single semicolons, in any mix; a comma between
- * two digits is a decimal one where a semicolon or tab separates and no point is there. A LabVIEW file
- * says in its header which one it uses. ("Specification for the LabVIEW Measurement File", National
- * Instruments)
  */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/record/columns.h"
-#include "host/record/number.h"
-#include "host/record/source.h"
+#include "host/record/header.h"
+#include "host/record/lvm.h"
+#include "host/record/timebase.h"
 
-enum {
-	HEADER_LINES_MAX = 1000,
-	CELLS_MAX = COLUMNS_MAX + 1, /* one more than any row may have shows that it is too long */
-};
-
-/* The time column may place a sample this part of a step off an even grid before it counts as uneven; more
- * where it is rounded and the step is known from a header. */
-static const double UNEVEN_STEPS = 0.1, UNEVEN_STEPS_ROUNDED = 0.75;
-
-/* What the step in a LabVIEW header may be off from its time column, besides one step for rounding. */
-static const double DELTA_TOLERANCE = 0.01;
-
-struct piece {
-	const char *text;
-	size_t length;
-};
-
-struct row {
-	struct piece cell[CELLS_MAX];
-	size_t count; /* cells, also those that found no room */
-	char decimal;
-};
+enum { HEADER_LINES_MAX = 1000 };
 
 struct reading {
 	const struct source *source;
@@ -46,103 +21,53 @@ struct reading {
 	struct record *record;
 
 	bool is_lvm;
-	char separator; /* of an .lvm; 0 = any */
-	char decimal;
-	double delta_s; /* of an .lvm; 0 = not said */
+	struct lvm lvm;
+	struct cells_style style;
+	struct header header;
 
 	double *time_s;
+	uint64_t *row_line;
 	size_t rows;
-	size_t bad[COLUMNS_MAX]; /* by column */
-	struct row row;
+	size_t bad[COLUMNS_MAX];  /* by column */
+	size_t used[COLUMNS_MAX]; /* rows up to the last that is not empty */
+	struct cells row;
+	size_t tail[COLUMNS_MAX]; /* of the row before */
+
+	/* of the time column, in its own unit: the finest place of all rows, most digits, the largest number
+	 */
+	double digit, largest;
+	int digits;
+
+	/* decimal commas: whether any can be nothing else, and the first line with one that could */
+	bool comma_sure;
+	uint64_t comma_doubt;
+	bool unterminated;
 };
 
 #define REFUSE(reading, code, ...) \
 	source_refuse((reading)->message, code, (reading)->source->file, (reading)->line.number, __VA_ARGS__)
 
-/* ---- a line to cells ---- */
-
-static bool is_blank(char c)
+static int refuse_memory(const struct reading *reading)
 {
-	return c == ' ' || c == '\t';
+	return source_refuse(reading->message, DT_E_MEMORY, reading->source->file, 0, "%s",
+	                     error_text(DT_E_MEMORY));
 }
 
-static bool is_digit(char c)
+static bool is_blank(const struct source_line *line)
 {
-	return c >= '0' && c <= '9';
+	for (size_t i = 0; i < line->length; i++)
+		if (line->text[i] != ' ' && line->text[i] != '\t')
+			return false;
+	return true;
 }
 
-static char decimal_of(const char *text, size_t length)
+static bool is_comment(const struct source_line *line)
 {
-	bool separated = memchr(text, ';', length) || memchr(text, '\t', length);
-
-	if (!separated || memchr(text, '.', length))
-		return '.';
-	for (size_t i = 1; i + 1 < length; i++)
-		if (text[i] == ',' && is_digit(text[i - 1]) && is_digit(text[i + 1]))
-			return ',';
-	return '.';
-}
-
-static size_t skip_blanks(const char *text, size_t length, size_t at)
-{
-	while (at < length && is_blank(text[at]))
-		at++;
-	return at;
-}
-
-/* The end of the cell that begins at `at`. */
-static size_t cell_end(const struct reading *reading, const struct row *row, const char *text, size_t length,
-                       size_t at)
-{
-	for (; at < length; at++) {
-		char c = text[at];
-
-		if (reading->separator ? c == reading->separator
-		                       : is_blank(c) || c == ';' || (c == ',' && row->decimal != ','))
-			break;
-	}
-	return at;
-}
-
-/* A cell without the blanks and quotes around it. */
-static struct piece trim(struct piece cell)
-{
-	while (cell.length > 0 && is_blank(cell.text[cell.length - 1]))
-		cell.length--;
-	if (cell.length >= 2 && cell.text[0] == '"' && cell.text[cell.length - 1] == '"')
-		cell = (struct piece){cell.text + 1, cell.length - 2};
-	return cell;
-}
-
-static void split(const struct reading *reading, const char *text, size_t length, struct row *row)
-{
-	bool more = true; /* a separator announced another cell */
 	size_t at = 0;
 
-	row->count = 0;
-	row->decimal = reading->is_lvm ? reading->decimal : decimal_of(text, length);
-	while (at < length || more) {
-		size_t start, end;
-
-		if (reading->separator != '\t')
-			at = skip_blanks(text, length, at);
-		start = end = at;
-		if (start < length && text[start] == '"') {
-			const char *quote = memchr(text + start + 1, '"', length - start - 1);
-
-			if (quote)
-				end = (size_t)(quote - text) + 1;
-		}
-		end = cell_end(reading, row, text, length, end);
-		if (row->count < CELLS_MAX)
-			row->cell[row->count] = trim((struct piece){text + start, end - start});
-		row->count++;
-		if (reading->separator != '\t')
-			end = skip_blanks(text, length, end);
-		more = end < length && (reading->separator ? text[end] == reading->separator
-		                                           : text[end] == ';' || text[end] == ',');
-		at = end + more;
-	}
+	while (line->text[at] == ' ' || line->text[at] == '\t')
+		at++;
+	return line->text[at] == '#';
 }
 
 /* Steps to the next line that is neither blank nor a comment, and splits it. */
@@ -151,78 +76,43 @@ static bool next_row(struct reading *reading)
 	struct source_line *line = &reading->line;
 
 	while (source_next_line(reading->source, line)) {
-		size_t start = skip_blanks(line->text, line->length, 0);
-
-		if (start == line->length || line->text[start] == '#')
+		if (is_blank(line))
 			continue;
-		split(reading, line->text, line->length, &reading->row);
+		if (is_comment(line)) {
+			if (reading->rows == 0)
+				header_offer(&reading->header, reading->style, &reading->columns, line);
+			continue;
+		}
+		cells_split(reading->style, line->text, line->length, &reading->row);
 		return true;
 	}
 	return false;
 }
 
-static bool cell_number(const struct row *row, size_t i, double *value)
-{
-	return i < row->count && number_parse(row->cell[i].text, row->cell[i].length, row->decimal, value);
-}
-
 /* ---- the header ---- */
 
-static bool line_starts(const struct source_line *line, const char *text)
+/* Whether a cell is a number, or was meant to be one: what is wrong with it is told when it is taken. */
+static bool is_numeric(const struct reading *reading, size_t i)
 {
-	size_t length = strlen(text);
+	double value;
 
-	return line->length >= length && memcmp(line->text, text, length) == 0;
-}
-
-static void read_lvm_line(struct reading *reading)
-{
-	const struct source_line *line = &reading->line;
-	double delta;
-
-	if (line_starts(line, "Separator") && line->length > 10)
-		reading->separator = line->text[10] == 'C' ? ',' : '\t';
-	else if (line_starts(line, "Decimal_Separator") && line->length > 18)
-		reading->decimal = line->text[18] == ',' ? ',' : '.';
-	else if (!line_starts(line, "Delta_X"))
-		return;
-	split(reading, line->text, line->length, &reading->row);
-	if (line->text[0] == 'D' && cell_number(&reading->row, 1, &delta) && delta > 0)
-		reading->delta_s = delta;
-}
-
-/* Two headers, each with its end: one of the file, one of the measurement. */
-static int read_lvm_header(struct reading *reading)
-{
-	unsigned ends = 0;
-
-	reading->separator = '\t';
-	while (ends < 2) {
-		if (!source_next_line(reading->source, &reading->line) ||
-		    reading->line.number > HEADER_LINES_MAX)
-			return REFUSE(reading, DT_E_FORMAT,
-			              "%u headers of a LabVIEW file end above, expected 2", ends);
-		ends += line_starts(&reading->line, "***End_of_Header***");
-		read_lvm_line(reading);
-	}
-	return 0;
+	return cells_number(&reading->row, i, &value) || cells_oddity(&reading->row, i) != CELLS_PLAIN;
 }
 
 /* Whether a row is one of numbers: has them where the columns want one, or has nothing else. */
 static bool is_data(const struct reading *reading)
 {
-	const struct row *row = &reading->row;
+	const struct cells *row = &reading->row;
 	bool any = false;
-	double value;
 
 	for (size_t i = 0; i < reading->columns.count && row->count == reading->columns.count; i++) {
 		enum column_kind kind = reading->columns.column[i].kind;
 
 		if (kind == COLUMN_TIME || (kind == COLUMN_CHANNEL && !reading->columns.has_time))
-			return cell_number(row, i, &value);
+			return is_numeric(reading, i);
 	}
 	for (size_t i = 0; i < row->count && i < CELLS_MAX; i++) {
-		if (cell_number(row, i, &value))
+		if (is_numeric(reading, i))
 			any = true;
 		else if (row->cell[i].length > 0)
 			return false;
@@ -236,13 +126,17 @@ static int find_data(struct reading *reading)
 	uint64_t first = 0;
 
 	/* behind the headers of a LabVIEW file stands one line of names, and nothing else */
-	if (reading->is_lvm && next_row(reading) && next_row(reading))
-		return 0;
+	if (reading->is_lvm && next_row(reading)) {
+		header_offer(&reading->header, reading->style, &reading->columns, &reading->line);
+		if (next_row(reading))
+			return 0;
+	}
 	while (next_row(reading) && reading->line.number <= HEADER_LINES_MAX) {
 		if (first == 0)
 			first = reading->line.number;
 		if (is_data(reading))
 			return 0;
+		header_offer(&reading->header, reading->style, &reading->columns, &reading->line);
 	}
 	return source_refuse(reading->message, DT_E_FORMAT, reading->source->file, first,
 	                     "no row of numbers from here on, expected %zu columns", reading->columns.count);
@@ -265,43 +159,98 @@ static int allocate(struct reading *reading)
 	for (size_t i = 0; i < columns->count && whole; i++)
 		if (columns->column[i].kind == COLUMN_CHANNEL)
 			whole = record_add_channel(reading->record, columns->column[i].name, 0, rows) != NULL;
-	if (columns->has_time)
+	if (columns->has_time) {
 		reading->time_s = calloc(rows, sizeof(*reading->time_s));
-	if (!whole || (columns->has_time && !reading->time_s))
-		return source_refuse(reading->message, DT_E_MEMORY, reading->source->file, 0, "%s",
-		                     error_text(DT_E_MEMORY));
+		reading->row_line = calloc(rows, sizeof(*reading->row_line));
+		whole = whole && reading->time_s && reading->row_line;
+	}
+	return whole ? 0 : refuse_memory(reading);
+}
+
+/* What is no number and looks like one is refused: it may be the peak. */
+static int check_oddity(struct reading *reading, size_t i)
+{
+	enum cells_oddity oddity = cells_oddity(&reading->row, i);
+	struct piece cell = reading->row.cell[i < CELLS_MAX ? i : 0];
+	int length = (int)(cell.length < 60 ? cell.length : 60);
+
+	if (oddity == CELLS_THOUSANDS)
+		return REFUSE(reading, DT_E_FORMAT,
+		              "\"%.*s\" in column %zu has a thousands separator, expected numbers without",
+		              length, cell.text, i + 1);
+	if (oddity == CELLS_UNIT)
+		return REFUSE(
+		        reading, DT_E_FORMAT,
+		        "\"%.*s\" in column %zu has a unit behind its number, expected the number alone",
+		        length, cell.text, i + 1);
 	return 0;
+}
+
+/* Notes of a number what tells a decimal comma from a thousands separator, and one that the file's end has
+ * cut. */
+static void note_number(struct reading *reading, size_t i)
+{
+	struct piece cell = reading->row.cell[i];
+
+	reading->tail[i] = cells_tail(&reading->row, i);
+	if (reading->style.decimal || reading->row.decimal != ',' || cell.length == 0)
+		return;
+	if (cells_could_be_thousands(cell))
+		reading->comma_doubt = reading->comma_doubt ? reading->comma_doubt : reading->line.number;
+	else
+		reading->comma_sure |= memchr(cell.text, ',', cell.length) != NULL;
+}
+
+/* Whether the last cell of a line without an end is no number, or one without digits that the row before has.
+ */
+static bool is_cut(const struct reading *reading, size_t i)
+{
+	double value;
+
+	return reading->unterminated && i + 1 == reading->row.count &&
+	       (!cells_number(&reading->row, i, &value) ||
+	        (reading->rows > 0 && cells_tail(&reading->row, i) < reading->tail[i]));
 }
 
 static int take_time(struct reading *reading, size_t i)
 {
-	const struct row *row = &reading->row;
-	double *time_s = reading->time_s + reading->rows;
-	double value;
+	double value, digit;
+	int digits;
 
-	if (!cell_number(row, i, &value))
-		return REFUSE(reading, DT_E_FORMAT, "no number in the time column");
-	*time_s = value / reading->columns.column[i].divisor;
-	if (reading->rows == 0 || time_s[0] > time_s[-1])
-		return 0;
-	/* rounding may have made two times of a LabVIEW file equal; its header has the step */
-	if (reading->delta_s > 0 && time_s[0] >= time_s[-1])
-		return 0;
-	return REFUSE(reading, DT_E_FORMAT, "time %.9g s after %.9g s, expected it to increase", time_s[0],
-	              time_s[-1]);
+	if (!cells_number(&reading->row, i, &value)) {
+		int error = check_oddity(reading, i);
+
+		return error ? error : REFUSE(reading, DT_E_FORMAT, "no number in the time column");
+	}
+	if (is_cut(reading, i))
+		return REFUSE(reading, DT_E_FORMAT, "the file ends within a time, expected a line end");
+	digit = cells_last_digit(&reading->row, i, &digits);
+	reading->digit = reading->rows == 0 ? digit : fmin(reading->digit, digit);
+	reading->digits = digits > reading->digits ? digits : reading->digits;
+	reading->largest = fmax(reading->largest, fabs(value));
+	reading->time_s[reading->rows] = value / reading->columns.column[i].divisor;
+	reading->row_line[reading->rows] = reading->line.number;
+	note_number(reading, i);
+	return 0;
 }
 
-static void take_sample(struct reading *reading, size_t i, struct channel *channel)
+static int take_sample(struct reading *reading, size_t i, struct channel *channel)
 {
+	size_t k = reading->rows;
+	bool empty = i >= reading->row.count || reading->row.cell[i].length == 0, cut = is_cut(reading, i);
 	double value;
 
-	if (cell_number(&reading->row, i, &value)) {
-		channel->value_g[reading->rows] = value / reading->columns.column[i].divisor;
-		channel->sample[reading->rows] = 0;
-	} else {
-		channel->sample[reading->rows] = SAMPLE_BAD;
-		reading->bad[i]++;
+	channel->sample[k] = SAMPLE_BAD;
+	if (!empty)
+		reading->used[i] = k + 1;
+	if (!cut && cells_number(&reading->row, i, &value)) {
+		channel->value_g[k] = value / reading->columns.column[i].divisor;
+		channel->sample[k] = 0;
+		note_number(reading, i);
+		return 0;
 	}
+	reading->bad[i]++;
+	return cut ? 0 : check_oddity(reading, i);
 }
 
 static int take_row(struct reading *reading)
@@ -310,18 +259,32 @@ static int take_row(struct reading *reading)
 	struct channel *channel = reading->record->channels;
 	int error = 0;
 
+	if (reading->is_lvm && lvm_is_segment(&reading->line))
+		return REFUSE(reading, DT_E_FORMAT,
+		              "another segment begins, expected one: cut the file here");
 	/* a LabVIEW row ends where its last channel that still has samples does */
 	if (reading->row.count > columns->count || (reading->row.count < columns->count && !reading->is_lvm))
 		return REFUSE(reading, DT_E_FORMAT, "%zu columns, expected %zu", reading->row.count,
 		              columns->count);
+	reading->unterminated =
+	        reading->line.text + reading->line.length == reading->source->bytes + reading->source->size;
 	for (size_t i = 0; i < columns->count && !error; i++) {
 		if (columns->column[i].kind == COLUMN_TIME)
 			error = take_time(reading, i);
 		if (columns->column[i].kind == COLUMN_CHANNEL)
-			take_sample(reading, i, channel++);
+			error = take_sample(reading, i, channel++);
 	}
 	reading->rows++;
 	return error;
+}
+
+static int check_commas(const struct reading *reading)
+{
+	if (reading->comma_sure || reading->comma_doubt == 0)
+		return 0;
+	return source_refuse(reading->message, DT_E_FORMAT, reading->source->file, reading->comma_doubt,
+	                     "a comma before three digits may part thousands or decimals, and no number of "
+	                     "the file tells which, expected decimal points");
 }
 
 static int take_rows(struct reading *reading)
@@ -331,98 +294,149 @@ static int take_rows(struct reading *reading)
 	do
 		error = take_row(reading);
 	while (!error && next_row(reading));
+	if (!error)
+		error = check_commas(reading);
 	if (error)
 		return error;
 	if (reading->rows < 2)
 		return REFUSE(reading, DT_E_FORMAT, "one row of numbers, expected more");
-	for (size_t i = 0; i < reading->columns.count; i++)
-		if (reading->bad[i] > reading->rows / 2)
-			return source_refuse(reading->message, DT_E_FORMAT, reading->source->file, 0,
-			                     "%s has no number in %zu of %zu rows, expected at least half",
-			                     reading->columns.column[i].name, reading->bad[i], reading->rows);
 	return 0;
 }
 
 /* ---- the time base ---- */
 
-/* The header of a LabVIEW file has the step, its time column is rounded; but they must be of one measurement
- * and one unit. */
-static int check_delta(const struct reading *reading, double step_s)
+/* What the last digit of the time column is worth, s. One with an exponent has it in other places than
+ * another. */
+static double digit_s(const struct reading *reading, double divisor)
 {
-	double steps = (double)(reading->rows - 1);
+	double places = reading->largest > 0 ? floor(log10(reading->largest)) + 1 : 0;
+	double digit = fmax(reading->digit, pow(10, places - reading->digits));
 
-	if (!reading->columns.has_time ||
-	    fabs(step_s / reading->delta_s - 1) * steps < 1 + DELTA_TOLERANCE * steps)
-		return 0;
-	return source_refuse(reading->message, DT_E_FORMAT, reading->source->file, 0,
-	                     "time column steps by %.9g s, expected Delta_X = %.9g s", step_s,
-	                     reading->delta_s);
+	return fmax(digit, reading->largest * DBL_EPSILON) / divisor;
 }
 
-static int find_rate(const struct reading *reading, double *rate_hz)
+static int find_timebase(struct reading *reading, struct timebase *timebase)
 {
-	double step_s = 0;
+	struct timebase_fault fault;
+	size_t i = 0;
+	double step_s;
+	int error;
+
+	if (!reading->columns.has_time)
+		return 0;
+	while (reading->columns.column[i].kind != COLUMN_TIME)
+		i++;
+	step_s = reading->is_lvm ? lvm_time_step(&reading->lvm, i) : 0;
+	error = timebase_find(reading->time_s, reading->rows,
+	                      digit_s(reading, reading->columns.column[i].divisor), step_s, timebase, &fault);
+	if (error == DT_E_MEMORY)
+		return refuse_memory(reading);
+	return error ? source_refuse(reading->message, error, reading->source->file,
+	                             reading->row_line[fault.row], "%s", fault.why)
+	             : 0;
+}
+
+/* A channel of a LabVIEW file has its own step, beginning and count of samples. */
+static int finish_lvm(struct reading *reading, size_t i, struct channel *channel)
+{
+	const struct lvm_column *own = &reading->lvm.column[i];
+
+	if (own->has_samples && reading->used[i] != own->samples)
+		return source_refuse(reading->message, DT_E_FORMAT, reading->source->file,
+		                     reading->lvm.samples_line,
+		                     "column %zu, %s, has %zu samples, expected Samples = %zu", i + 1,
+		                     channel->name, reading->used[i], own->samples);
+	reading->bad[i] -= reading->rows - reading->used[i];
+	channel->count = reading->used[i];
+	channel->start_s = own->start_s;
+	if (own->delta_s > 0)
+		channel->rate_hz = 1 / own->delta_s;
+	if (channel->rate_hz > 0)
+		return 0;
+	return source_refuse(reading->message, DT_E_FORMAT, reading->source->file, reading->lvm.delta_line,
+	                     "column %zu, %s, has no Delta_X, expected one as others have", i + 1,
+	                     channel->name);
+}
+
+static int finish_channel(struct reading *reading, size_t i, const struct timebase *timebase,
+                          struct channel *channel)
+{
 	int error = 0;
 
-	if (reading->columns.has_time)
-		step_s = (reading->time_s[reading->rows - 1] - reading->time_s[0]) /
-		         (double)(reading->rows - 1);
-	if (reading->delta_s > 0) {
-		error = check_delta(reading, step_s);
-		step_s = reading->delta_s;
-	}
-	*rate_hz = reading->columns.rate_hz > 0 ? reading->columns.rate_hz : 1 / step_s;
-	if (!error && (!isfinite(*rate_hz) || *rate_hz <= 0))
-		error = source_refuse(reading->message, DT_E_FORMAT, reading->source->file, 0,
-		                      "time column without a rate, expected it to increase");
+	channel->rate_hz = reading->columns.rate_hz > 0 ? reading->columns.rate_hz
+	                   : reading->columns.has_time  ? 1 / timebase->step_s
+	                                                : 0;
+	channel->count = reading->rows;
+	channel->flags = timebase->uneven ? RECORD_FLAG_UNEVEN : 0;
+	channel->flags |= reading->unterminated ? RECORD_FLAG_NO_LINE_END : 0;
+	channel->flags |= header_has_twins(&reading->header, &reading->columns) ? RECORD_FLAG_SAME_NAMES : 0;
+	if (reading->is_lvm)
+		error = finish_lvm(reading, i, channel);
+	if (!error && (channel->count == 0 || reading->bad[i] > channel->count / 2))
+		return source_refuse(reading->message, DT_E_FORMAT, reading->source->file, 0,
+		                     "%s has no number in %zu of %zu rows, expected at least half",
+		                     channel->name, reading->bad[i], channel->count);
+	if (!error && timebase_spread(timebase, channel) != 0)
+		error = refuse_memory(reading);
 	return error;
-}
-
-static bool is_uneven(const struct reading *reading, double rate_hz)
-{
-	double limit = reading->delta_s > 0 ? UNEVEN_STEPS_ROUNDED : UNEVEN_STEPS;
-
-	for (size_t k = 0; reading->time_s && k < reading->rows; k++)
-		if (fabs((reading->time_s[k] - reading->time_s[0]) * rate_hz - (double)k) > limit)
-			return true;
-	return false;
 }
 
 static int finish(struct reading *reading)
 {
 	struct record *record = reading->record;
-	double rate_hz = 0;
-	int error = find_rate(reading, &rate_hz);
-	bool uneven;
+	struct channel *channel = record->channels;
+	struct timebase timebase = {.places = reading->rows};
+	int error = find_timebase(reading, &timebase);
 
+	for (size_t i = 0; i < reading->columns.count && !error; i++)
+		if (reading->columns.column[i].kind == COLUMN_CHANNEL)
+			error = finish_channel(reading, i, &timebase, channel++);
+	timebase_free(&timebase);
 	if (error)
 		return error;
-	uneven = is_uneven(reading, rate_hz);
-	for (size_t i = 0; i < record->channel_count; i++) {
-		record->channels[i].rate_hz = rate_hz;
-		record->channels[i].count = reading->rows;
-		record->channels[i].flags = uneven ? RECORD_FLAG_UNEVEN : 0;
-	}
+	record_begin_at_zero(record);
 	strcpy(record->format, reading->is_lvm ? "lvm" : "delimited");
 	record_finish(record);
 	return 0;
 }
 
-static int read_all(struct reading *reading)
+/* ---- the file ---- */
+
+static bool any_delta(const struct reading *reading)
 {
-	static const char lvm[] = "LabVIEW Measurement";
+	for (size_t i = 0; i < reading->lvm.columns; i++)
+		if (reading->lvm.column[i].delta_s > 0)
+			return true;
+	return false;
+}
+
+static int read_headers(struct reading *reading)
+{
+	const struct source *source = reading->source;
 	int error = 0;
 
-	reading->is_lvm = reading->source->size >= sizeof(lvm) - 1 &&
-	                  memcmp(reading->source->bytes, lvm, sizeof(lvm) - 1) == 0;
-	if (reading->is_lvm)
-		error = read_lvm_header(reading);
-	if (!error && !reading->columns.has_time && reading->columns.rate_hz == 0 && reading->delta_s == 0)
+	reading->is_lvm = lvm_is(source);
+	if (reading->is_lvm) {
+		error = lvm_read(&reading->lvm, source, &reading->line, reading->message);
+		reading->style = reading->lvm.style;
+	}
+	if (!error && !reading->columns.has_time && reading->columns.rate_hz == 0 && !any_delta(reading))
 		error = source_refuse(
-		        reading->message, DT_E_ARGUMENT, reading->source->file, 0,
+		        reading->message, DT_E_ARGUMENT, source->file, 0,
 		        "neither a time column nor a rate, expected time:ms or name:unit@RATE_HZ");
 	if (!error)
 		error = find_data(reading);
+	if (!error)
+		error = header_check(&reading->header, &reading->columns, source->file, reading->message);
+	return error || !reading->is_lvm
+	               ? error
+	               : lvm_check(&reading->lvm, &reading->columns, source->file, reading->message);
+}
+
+static int read_all(struct reading *reading)
+{
+	int error = read_headers(reading);
+
 	if (!error)
 		error = allocate(reading);
 	if (!error)
@@ -434,7 +448,7 @@ int read_delimited(struct record *record, const struct source *source, const cha
                    char message[READ_MESSAGE_MAX])
 {
 	struct record filled;
-	struct reading reading = {.source = source, .message = message, .record = &filled, .decimal = '.'};
+	struct reading *reading;
 	int error;
 
 	if (source->size >= 2 &&
@@ -446,12 +460,19 @@ int read_delimited(struct record *record, const struct source *source, const cha
 		return source_refuse(message, DT_E_FORMAT, source->file, 0,
 		                     "not a log of a drop tower; for other text expected --columns "
 		                     "\"time:ms,name:g,-\", one entry per column");
-	error = columns_parse(&reading.columns, columns, message);
-	if (error)
-		return error;
+	reading = calloc(1, sizeof(*reading));
+	if (!reading)
+		return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
+	reading->source = source;
+	reading->message = message;
+	reading->record = &filled;
+	error = columns_parse(&reading->columns, columns, message);
 	record_init(&filled);
-	error = read_all(&reading);
-	free(reading.time_s);
+	if (!error)
+		error = read_all(reading);
+	free(reading->time_s);
+	free(reading->row_line);
+	free(reading);
 	if (error)
 		record_free(&filled);
 	else

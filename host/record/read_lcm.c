@@ -1,42 +1,37 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  *
- * LCM event logs: the last drop message is the drop; without one the block messages go through the join.
+ * LCM event logs: each drop message is a drop; block messages go through the join, for what never became one.
  */
 #include <string.h>
 
-#include "host/record/join.h"
+#include "host/record/digest.h"
 #include "host/record/lcm_codec.h"
 #include "host/record/lcm_log.h"
-#include "host/record/source.h"
+#include "host/record/log_walk.h"
+#include "host/record/seal.h"
 
 struct reading {
-	struct join *join;
-	struct record drop;
-	bool has_drop;
-	struct lcm_log_walk walk;
-	uint64_t refused; /* messages on our channels that are none of ours */
+	struct log_walk *walk;
+	bool has_drop; /* the event before was a drop, decoded or not; this is its SHA-256 */
+	char digest[DIGEST_CHARS];
 };
 
-static int take_drop(struct reading *reading, const struct lcm_log_event *event)
+static int take_drop(struct log_walk *walk, const struct lcm_log_event *event)
 {
 	droptower_drop drop;
 	struct record record;
-	int error = lcm_codec_decode_drop(event->data, event->size, &drop);
+	int error = lcm_codec_decode_drop(event->data, event->size, event->cut, &drop);
 
 	if (error)
 		return error;
 	error = lcm_codec_record(&drop, &record);
-	droptower_drop_decode_cleanup(&drop);
-	if (error)
-		return error;
-	if (reading->has_drop)
-		record_free(&reading->drop);
-	reading->drop = record;
-	reading->has_drop = true;
-	return 0;
+	lcm_codec_free_drop(&drop);
+	if (!error)
+		log_walk_drop(walk, &record);
+	return error;
 }
 
-static int take_block(struct reading *reading, const struct lcm_log_event *event)
+static int take_block(struct log_walk *walk, const struct lcm_log_event *event)
 {
 	droptower_block block;
 	struct frame frame;
@@ -45,56 +40,64 @@ static int take_block(struct reading *reading, const struct lcm_log_event *event
 	if (!error)
 		error = lcm_codec_frame(&block, &frame);
 	if (!error)
-		join_feed(reading->join, &frame);
+		log_walk_frame(walk, &frame);
 	return error;
 }
 
-static void take_events(struct reading *reading, const struct source *source)
+/* Seals the drop message before it. */
+static int take_seal(struct reading *reading, const struct lcm_log_event *event)
 {
-	struct lcm_log_event event;
+	size_t word = strlen(SEAL_WORD);
+	const char *expected = (const char *)event->data + word;
 
-	while (lcm_log_next(source, &reading->walk, &event)) {
-		int error = 0;
-
-		if (strcmp(event.channel, LCM_CODEC_DROP) == 0)
-			error = take_drop(reading, &event);
-		else if (strcmp(event.channel, LCM_CODEC_BLOCK) == 0)
-			error = take_block(reading, &event);
-		reading->refused += error != 0;
-	}
-}
-
-static int finish(struct reading *reading, struct record *record, const struct source *source, char *message)
-{
-	int error = 0;
-
-	if (reading->has_drop)
-		*record = reading->drop;
+	if (!reading->has_drop || event->size != word + DIGEST_CHARS - 1 ||
+	    memcmp(event->data, SEAL_WORD, word) != 0)
+		return DT_E_FORMAT;
+	if (memcmp(expected, reading->digest, DIGEST_CHARS - 1) == 0)
+		log_walk_sealed(reading->walk);
 	else
-		error = join_take(reading->join, record);
-	if (error == DT_E_EMPTY)
-		return source_refuse(
-		        message, error, source->file, 0,
-		        "no message of a drop tower in %llu events, %llu refused, expected %s or %s",
-		        (unsigned long long)reading->walk.events, (unsigned long long)reading->refused,
-		        LCM_CODEC_DROP, LCM_CODEC_BLOCK);
-	if (error)
-		return source_refuse(message, error, source->file, 0, "%s", error_text(error));
-	strcpy(record->format, "lcm");
+		log_walk_altered(reading->walk, reading->digest, expected);
 	return 0;
 }
 
-int read_lcm(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX])
+static int take_event(struct reading *reading, const struct lcm_log_event *event)
 {
-	struct reading reading = {.join = join_create()};
-	int error;
+	bool is_drop = strcmp(event->channel, LCM_CODEC_DROP) == 0;
+	int error = 0;
 
-	if (!reading.join)
-		return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
-	take_events(&reading, source);
-	error = finish(&reading, record, source, message);
-	if (!error)
-		record->counters.corrupt += reading.walk.skipped + reading.refused;
-	join_destroy(reading.join);
+	if (event->data == NULL || (event->cut && !is_drop))
+		return 0;
+	if (is_drop) {
+		digest_of(event->data, event->size, reading->digest);
+		error = take_drop(reading->walk, event);
+	} else if (strcmp(event->channel, LCM_LOG_SEAL) == 0) {
+		error = take_seal(reading, event);
+	} else if (strcmp(event->channel, LCM_CODEC_BLOCK) == 0) {
+		error = take_block(reading->walk, event);
+	}
+	reading->has_drop = is_drop;
 	return error;
+}
+
+void read_lcm(struct log_walk *walk, struct log_file *log, uint64_t from, uint64_t to)
+{
+	struct lcm_log_walk events = {.at = from, .end = to};
+	struct reading reading = {.walk = walk};
+	struct lcm_log_event event;
+	uint64_t skipped = 0;
+
+	while (walk->result == 0 && lcm_log_next(log, &events, &event)) {
+		bool refused;
+
+		walk->corrupt += events.skipped - skipped;
+		skipped = events.skipped;
+		walk->at = event.at;
+		walk->next = events.at;
+		walk->time_us = event.time_us;
+		refused = take_event(&reading, &event) != 0;
+		walk->corrupt += refused;
+		walk->contents->refused += refused;
+	}
+	walk->corrupt += events.skipped - skipped;
+	walk->contents->frames = events.events;
 }

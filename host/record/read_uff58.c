@@ -7,34 +7,30 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
-#include "common/units.h"
 #include "host/record/drop.h"
 #include "host/record/fields.h"
 #include "host/record/number.h"
+#include "host/record/timebase.h"
 #include "host/record/uff58_text.h"
+#include "host/record/unit.h"
 
 struct reading {
 	struct uff58_text text;
 	struct record *record;
-	bool foreign;   /* some channel is not ours */
-	size_t samples; /* announced */
+	bool foreign;                 /* some channel is not ours */
+	size_t samples;               /* announced */
+	uint64_t line[DROP_CHANNELS]; /* of the first samples of each of the first channels */
 };
 
 /* ---- channels ---- */
 
 /* Number in the file times this is g; 0 for a unit that is none of acceleration. */
-static double unit_factor_g(const char *unit)
+static double unit_factor_g(const char *text)
 {
-	static const char *const metric[] = {"m/s2", "m/s^2", "m/s**2", "m/s/s", "m/sec2", "m/sec^2"};
+	const struct unit *unit = unit_find(text, strlen(text));
 
-	if (strcasecmp(unit, "g") == 0)
-		return 1;
-	for (size_t i = 0; i < sizeof(metric) / sizeof(metric[0]); i++)
-		if (strcasecmp(unit, metric[i]) == 0)
-			return 1 / UNITS_G_M_S2;
-	return 0;
+	return unit && unit->kind == UNIT_ACCELERATION && unit->divisor >= 1 ? 1 / unit->divisor : 0;
 }
 
 static bool can_be(const struct reading *reading, const char *name)
@@ -94,17 +90,28 @@ static void settle_samples(struct channel *channel, double factor)
 	}
 }
 
-/* The place of a sample is its number; times only have to agree with it. */
-static void settle_times(struct channel *channel, const double *time_s)
+/* Times stand in six digits. */
+static int settle_times(struct reading *reading, const struct uff58_head *head, uint64_t line,
+                        struct channel *channel, const double *time_s)
 {
-	double span_s = time_s[channel->count - 1] - time_s[0];
-	double step_s = span_s / (double)(channel->count - 1);
+	double largest = fmax(fabs(time_s[0]), fabs(time_s[channel->count - 1]));
+	size_t pairs = head->precision == UFF58_DOUBLE ? 2 : 3;
+	struct timebase timebase;
+	struct timebase_fault fault;
+	int error = timebase_find(time_s, channel->count, pow(10, floor(log10(largest)) - 5), 0, &timebase,
+	                          &fault);
 
-	channel->rate_hz = 1 / step_s;
-	channel->start_s = time_s[0];
-	for (size_t k = 0; k < channel->count; k++)
-		if (!(fabs(time_s[k] - time_s[0] - (double)k * step_s) <= 0.1 * step_s))
-			channel->flags |= RECORD_FLAG_UNEVEN;
+	if (error == DT_E_FORMAT)
+		return source_refuse(reading->text.message, error, reading->text.source->file,
+		                     line + fault.row / pairs, "\"%.32s\": %s", head->id[0], fault.why);
+	if (!error) {
+		channel->rate_hz = 1 / timebase.step_s;
+		channel->start_s = time_s[0];
+		channel->flags |= timebase.uneven ? RECORD_FLAG_UNEVEN : 0;
+		error = timebase_spread(&timebase, channel);
+		timebase_free(&timebase);
+	}
+	return error ? UFF58_REFUSE(&reading->text, error, "%s", error_text(error)) : 0;
 }
 
 static int read_channel(struct reading *reading, const struct uff58_head *head)
@@ -112,6 +119,7 @@ static int read_channel(struct reading *reading, const struct uff58_head *head)
 	struct channel *channel;
 	double *time_s = NULL;
 	int error = check_channel(reading, head);
+	uint64_t line;
 	char name[32];
 
 	if (error)
@@ -126,12 +134,14 @@ static int read_channel(struct reading *reading, const struct uff58_head *head)
 		time_s = malloc(head->count * sizeof(*time_s));
 	if (!head->even && !time_s)
 		return UFF58_REFUSE(&reading->text, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+	line = reading->text.line.number + 1;
+	if (reading->record->channel_count <= DROP_CHANNELS)
+		reading->line[reading->record->channel_count - 1] = line;
 	error = uff58_read_data(&reading->text, head, channel->value_g, time_s);
-	if (!error) {
+	if (!error)
 		settle_samples(channel, unit_factor_g(head->unit));
-		if (time_s)
-			settle_times(channel, time_s);
-	}
+	if (!error && time_s)
+		error = settle_times(reading, head, line, channel, time_s);
 	free(time_s);
 	return error;
 }
@@ -184,6 +194,44 @@ static int read_fields(struct reading *reading, const char *line)
 	return 0;
 }
 
+/* The line of sample k of one of the first channels of ours; 0 of another. */
+static uint64_t line_of(const struct reading *reading, const struct channel *channel, size_t k)
+{
+	size_t i = (size_t)(channel - reading->record->channels);
+
+	return i < DROP_CHANNELS ? reading->line[i] + k / UFF58_DOUBLES : 0;
+}
+
+/* A field that is no number is no good sample, whatever its mask says. */
+static int check_good(const struct reading *reading, const struct channel *channel)
+{
+	for (size_t k = 0; k < channel->count; k++)
+		if (!isfinite(channel->value_g[k]) && !(channel->sample[k] & (SAMPLE_LOST | SAMPLE_BAD)))
+			return source_refuse(reading->text.message, DT_E_FORMAT, reading->text.source->file,
+			                     line_of(reading, channel, k),
+			                     "sample %zu of %s is no number and its mask calls it good, "
+			                     "expected a number",
+			                     k + 1, channel->name);
+	return 0;
+}
+
+/* The samples of a drop are counts. */
+static int check_counts(const struct reading *reading)
+{
+	for (size_t i = 0; i < reading->record->channel_count; i++) {
+		const struct channel *channel = &reading->record->channels[i];
+
+		for (size_t k = 0; k < channel->count; k++)
+			if (isfinite(channel->value_g[k]) && !drop_is_count(channel->value_g[k]))
+				return source_refuse(reading->text.message, DT_E_FORMAT,
+				                     reading->text.source->file, line_of(reading, channel, k),
+				                     "%.15g g for %s, expected a whole count of 1/32 g "
+				                     "within full scale",
+				                     channel->value_g[k], channel->name);
+	}
+	return 0;
+}
+
 static int read_mask(struct reading *reading, const struct uff58_head *head)
 {
 	struct record *record = reading->record;
@@ -211,6 +259,8 @@ static int read_mask(struct reading *reading, const struct uff58_head *head)
 			channel->value_g[k] = NAN;
 	}
 	free(mask);
+	if (!error)
+		error = check_good(reading, channel);
 	if (!error)
 		error = read_fields(reading, head->id[3]);
 	return error ? error : read_fields(reading, head->id[4]);
@@ -266,28 +316,20 @@ static int read_all(struct reading *reading)
 	return error;
 }
 
-/* A record begins at 0, whenever a foreign clock began. */
-static void shift(struct record *record)
-{
-	double first_s = INFINITY;
-
-	for (size_t i = 0; i < record->channel_count; i++)
-		first_s = fmin(first_s, record->channels[i].start_s);
-	for (size_t i = 0; i < record->channel_count; i++)
-		record->channels[i].start_s -= first_s;
-}
-
 static int finish(struct reading *reading)
 {
 	struct record *record = reading->record;
 	int error;
 
 	if (reading->foreign)
-		shift(record);
+		record_begin_at_zero(record);
 	if (!record->is_drop) {
 		record_finish(record);
 		return 0;
 	}
+	error = check_counts(reading);
+	if (error)
+		return error;
 	error = drop_check(record);
 	if (!error)
 		error = drop_close(record);

@@ -48,6 +48,12 @@ struct channel *record_add_channel(struct record *record, const char *name, doub
 	return channel;
 }
 
+bool record_lacks_seal(const struct record *record)
+{
+	return record->is_drop && !record->file_sealed && strcmp(record->format, "candump") != 0 &&
+	       strcmp(record->format, "live") != 0;
+}
+
 const struct channel *record_channel(const struct record *record, const char *name)
 {
 	for (size_t i = 0; i < record->channel_count; i++)
@@ -56,10 +62,20 @@ const struct channel *record_channel(const struct record *record, const char *na
 	return NULL;
 }
 
+const struct channel *record_axis(const struct record *record, const char *which)
+{
+	for (size_t i = 0; i < record->channel_count; i++)
+		if (record->channels[i].sensor > 0 && record->channels[i].sensor == which[1] - '0' &&
+		    record->channels[i].axis == which[2])
+			return &record->channels[i];
+	return NULL;
+}
+
 static void finish_channel(struct record *record, struct channel *channel)
 {
 	const double full_scale_g = (double)WIRE_SAMPLE_FULL_SCALE / WIRE_COUNTS_PER_G;
-	unsigned flags = channel->flags & RECORD_FLAG_UNEVEN; /* only the reader knows */
+	const unsigned readers = RECORD_FLAG_UNEVEN | RECORD_FLAG_NO_LINE_END | RECORD_FLAG_SAME_NAMES;
+	unsigned flags = channel->flags & readers; /* only the reader knows */
 	uint64_t lost = 0;
 
 	for (size_t k = 0; k < channel->count; k++) {
@@ -93,6 +109,9 @@ static unsigned flags_of_marks(unsigned marks)
 	        {WIRE_MARK_ZERO_SHIFT, RECORD_FLAG_ZERO_SHIFT},
 	        {WIRE_MARK_CABLE, RECORD_FLAG_CABLE},
 	        {WIRE_MARK_STUCK, RECORD_FLAG_STUCK},
+	        {WIRE_MARK_SEPARATED_LATE, RECORD_FLAG_SEPARATED_LATE},
+	        {WIRE_MARK_DROPOUT_CHANGED, RECORD_FLAG_DROPOUT_CHANGED},
+	        {WIRE_MARK_FRAME_NOT_DOWN, RECORD_FLAG_FRAME_NOT_DOWN},
 	};
 	unsigned flags = 0;
 
@@ -100,6 +119,16 @@ static unsigned flags_of_marks(unsigned marks)
 		if (marks & table[i].mark)
 			flags |= table[i].flag;
 	return flags;
+}
+
+void record_begin_at_zero(struct record *record)
+{
+	double first_s = INFINITY;
+
+	for (size_t i = 0; i < record->channel_count; i++)
+		first_s = fmin(first_s, record->channels[i].start_s);
+	for (size_t i = 0; i < record->channel_count; i++)
+		record->channels[i].start_s -= first_s;
 }
 
 void record_finish(struct record *record)
@@ -115,15 +144,42 @@ void record_finish(struct record *record)
 		record->flags |= RECORD_FLAG_NO_CRC;
 	else if (!record->crc_agrees)
 		record->flags |= RECORD_FLAG_INCOMPLETE;
+	if (record->seal_known && !record->seal_agrees)
+		record->flags |= RECORD_FLAG_ALTERED;
 }
 
 const char *record_flag_name(unsigned flags)
 {
 	static const char *const names[] = {
-	        "lost_samples", "bad_samples", "clipped",         "incomplete", "crc_unknown", "slow_frame",
-	        "no_impact",    "fault",       "uneven_sampling", "full_scale", "overrun",     "zero_shift",
-	        "cable",        "stuck",       "spike",           "zeroed",     "offset",      "drift",
-	        "hum",          "too_short",   "zero_unsure",     "unfiltered",
+	        "lost_samples",
+	        "bad_samples",
+	        "clipped",
+	        "incomplete",
+	        "crc_unknown",
+	        "slow_frame",
+	        "no_impact",
+	        "fault",
+	        "uneven_sampling",
+	        "full_scale",
+	        "overrun",
+	        "zero_shift",
+	        "cable",
+	        "stuck",
+	        "spike",
+	        "zeroed",
+	        "offset",
+	        "drift",
+	        "hum",
+	        "too_short",
+	        "zero_unsure",
+	        "unfiltered",
+	        "no_line_end",
+	        "same_names",
+	        "settling",
+	        "altered",
+	        "separated_late",
+	        "dropout_changed",
+	        "frame_not_down",
 	};
 
 	for (size_t bit = 0; bit < sizeof(names) / sizeof(names[0]); bit++)

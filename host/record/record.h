@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "common/error.h"
+#include "common/wire.h"
 
 /* What is known of one sample; 0 is a good one. A sample keeps its place whatever it is. */
 enum {
@@ -32,9 +33,9 @@ enum {
 	RECORD_FLAG_SLOW_FRAME = 1u << 5, /* "slow_frame" */
 	RECORD_FLAG_NO_IMPACT = 1u << 6,  /* "no_impact" */
 	RECORD_FLAG_FAULT = 1u << 7,      /* "fault" */
-	RECORD_FLAG_UNEVEN = 1u << 8,     /* "uneven_sampling": the time column deviates from its mean step */
-	RECORD_FLAG_FULL_SCALE = 1u << 9, /* "full_scale" */
-	RECORD_FLAG_OVERRUN = 1u << 10,   /* "overrun" */
+	RECORD_FLAG_UNEVEN = 1u << 8, /* "uneven_sampling": the time column is a little off an even grid */
+	RECORD_FLAG_FULL_SCALE = 1u << 9,  /* "full_scale" */
+	RECORD_FLAG_OVERRUN = 1u << 10,    /* "overrun" */
 	RECORD_FLAG_ZERO_SHIFT = 1u << 11, /* "zero_shift": offset after the drop not the one before */
 	RECORD_FLAG_CABLE = 1u << 12,      /* "cable": a sensor's bias was lost */
 	RECORD_FLAG_STUCK = 1u << 13,      /* "stuck": a channel gave one value for 20 ms */
@@ -47,10 +48,22 @@ enum {
 	RECORD_FLAG_SHORT = 1u << 19,  /* "too_short": ends inside its pulse, or has hardly a sample */
 	RECORD_FLAG_ZERO_UNSURE = 1u << 20, /* "zero_unsure": more than noise before the pulse */
 	RECORD_FLAG_UNFILTERED = 1u << 21, /* "unfiltered": too slow for the low-pass asked for, left alone */
+	RECORD_FLAG_SETTLING =
+	        1u << 24, /* "settling": zero decays from the record's beginning on; taken off */
+	/* of foreign text */
+	RECORD_FLAG_NO_LINE_END = 1u << 22, /* "no_line_end": the last row may be cut */
+	RECORD_FLAG_SAME_NAMES = 1u << 23,  /* "same_names": two columns are named alike in the file */
+	/* of a drop by our tower */
+	RECORD_FLAG_ALTERED = 1u << 25,         /* "altered": the capture end is not what its seal is of */
+	RECORD_FLAG_SEPARATED_LATE = 1u << 26,  /* "separated_late" */
+	RECORD_FLAG_DROPOUT_CHANGED = 1u << 27, /* "dropout_changed": of the magnet */
+	RECORD_FLAG_FRAME_NOT_DOWN = 1u << 28,  /* "frame_not_down" */
 };
 
 struct channel {
 	char name[32];   /* "S1X", or the name given in --columns */
+	uint8_t sensor;  /* of our tower: 1 or 2; 0 of another, whatever its name (drop_set_axes) */
+	char axis;       /* of it: 'X' 'Y' 'Z'; else 0 */
 	double rate_hz;  /* native rate */
 	double start_s;  /* time of sample 0, s after the record's first instant; sample k is at start_s +
 	                    k/rate_hz */
@@ -80,21 +93,31 @@ struct record_counters {
 };
 
 struct record {
-	char file[4096]; /* as given on the command line, or the link's URL */
-	char format[16]; /* "live" "candump" "lcm" "csv" "uff58" "hdf5" "delimited" "lvm" */
+	char file[4096];  /* as given on the command line, or the link's URL */
+	char format[16];  /* "live" "candump" "lcm" "csv" "uff58" "hdf5" "delimited" "lvm" */
+	bool file_sealed; /* the file says its own SHA-256, and that is so */
 	struct channel *channels;
 	size_t channel_count;
 
 	/* Of a drop by our tower; zero for foreign recordings. */
 	bool is_drop;
+	unsigned log_number; /* which of the drops of its log, from 1; 0: it is the only one */
 	uint16_t drop_id;
 	uint16_t marks; /* WIRE_MARK_* */
 	uint32_t first_tick_ms, last_tick_ms;
 	double trigger_s;       /* after the first instant; NAN if unknown */
+	uint32_t trigger_us;    /* as sent, where trigger_s is not known; if crc_known */
 	double frame_speed_m_s; /* between the gates; NAN if unknown */
 	uint32_t crc32;         /* as sent in the capture end */
 	int16_t camera_frame;   /* video frame, 1 000 a second, at the first instant; if crc_known */
 	bool crc_known, crc_agrees;
+	bool seal_known, seal_agrees;
+	uint32_t seal;             /* as sent in the capture end: checksum of all of it */
+	uint32_t parameters_crc32; /* of the set that the drop was made with; if crc_known */
+	bool parameters_known;     /* the whole set, and its CRC-32 agrees */
+	uint32_t parameters[WIRE_PARAMETERS];
+	bool measured_known; /* what the drop has measured of its tower */
+	struct wire_measured measured;
 	struct record_counters counters;
 	struct record_gap *gaps; /* what stayed missing */
 	size_t gap_count;
@@ -110,8 +133,18 @@ void record_free(struct record *record);
  * is valid until the next call. */
 struct channel *record_add_channel(struct record *record, const char *name, double rate_hz, size_t count);
 
+/* Whether it is a drop from a file that should say its SHA-256 and does not: by an older version, or by
+ * another program. Logs have the capture's CRC-32 instead. */
+bool record_lacks_seal(const struct record *record);
+
 /* NULL if there is none of that name. */
 const struct channel *record_channel(const struct record *record, const char *name);
+
+/* That of our tower which measured this: "S1X" to "S2Z". NULL if there is none: a name alone is none. */
+const struct channel *record_axis(const struct record *record, const char *which);
+
+/* The earliest channel begins at 0, whenever a foreign clock began. */
+void record_begin_at_zero(struct record *record);
 
 /* Recomputes lost_samples and every flag that follows from samples, gaps, CRC and marks. Readers call it
  * last. */

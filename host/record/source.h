@@ -41,10 +41,7 @@ __attribute__((format(printf, 5, 6))) int source_refuse(char message[READ_MESSAG
                                                         const char *file, uint64_t line, const char *format,
                                                         ...);
 
-/* The formats. Each fills *record, initialised by the call, except for its file name. */
-DT_MUST_USE int read_candump(struct record *record, const struct source *source,
-                             char message[READ_MESSAGE_MAX]);
-DT_MUST_USE int read_lcm(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX]);
+/* The formats that are no logs. Each fills *record, initialised by the call, except for its file name. */
 DT_MUST_USE int read_csv(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX]);
 DT_MUST_USE int read_delimited(struct record *record, const struct source *source, const char *columns,
                                char message[READ_MESSAGE_MAX]);

@@ -17,6 +17,7 @@ enum {
 	UFF58_TIME = 17,         /* quantity */
 	UFF58_SINGLE = 2,        /* real data, 13 columns a number */
 	UFF58_DOUBLE = 4,        /* real data, 20 columns a number */
+	UFF58_DOUBLES = 4,       /* of them in a line */
 	UFF58_ID_CHARS = 80,
 };
 
@@ -32,7 +33,8 @@ bool uff58_is(const struct source *source);
 DT_MUST_USE int read_uff58(struct record *record, const struct source *source,
                            char message[READ_MESSAGE_MAX]);
 
-/* 0; DT_E_ARGUMENT if a channel's name cannot be written; DT_E_SYSTEM if out did not take it all. */
+/* With an empty seal. 0; DT_E_ARGUMENT if a channel's name cannot be written; DT_E_SYSTEM if out did not take
+ * it all. */
 DT_MUST_USE int write_uff58(const struct record *record, FILE *out);
 
 #endif

@@ -180,7 +180,7 @@ int uff58_read_data(struct uff58_text *text, const struct uff58_head *head, doub
 {
 	size_t width = head->precision == UFF58_DOUBLE ? 20 : 13;
 	size_t pairs_per_line = head->precision == UFF58_DOUBLE ? 2 : 3;
-	size_t per_line = time_s ? 2 * pairs_per_line : head->precision == UFF58_DOUBLE ? 4 : 6;
+	size_t per_line = time_s ? 2 * pairs_per_line : head->precision == UFF58_DOUBLE ? UFF58_DOUBLES : 6;
 	struct cells cells = {.per_line = per_line, .next = per_line};
 	int error = 0;
 

@@ -9,6 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "host/record/text.h"
+
 static int refuse(char *message, size_t size, const char *file, int result)
 {
 	enum { NAME_MAX_CHARS = 256 }; /* the explanation must fit behind it */
@@ -70,7 +72,7 @@ int whole_close(struct whole *whole, int result, char *message, size_t size)
 {
 	int before = errno; /* of the writer, who may know why */
 
-	if (fclose(whole->out) != 0 && result == 0) {
+	if (stream_close(whole->out) != 0 && result == 0) {
 		result = DT_E_SYSTEM;
 		before = errno;
 	}

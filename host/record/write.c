@@ -9,12 +9,16 @@
 
 #include "common/link/candump.h"
 #include "common/wire.h"
+#include "common/wire_table.h"
+#include "host/record/digest.h"
 #include "host/record/drop.h"
 #include "host/record/fields.h"
 #include "host/record/hdf5.h"
 #include "host/record/lcm_codec.h"
 #include "host/record/number.h"
-#include "host/record/source.h"
+#include "host/record/lcm_log.h"
+#include "host/record/seal.h"
+#include "host/record/text.h"
 #include "host/record/uff58.h"
 #include "host/record/whole.h"
 
@@ -28,17 +32,6 @@ static bool clips(const struct record *record, unsigned channel, uint32_t tick, 
 		if (sample[i] & SAMPLE_CLIPPED)
 			return true;
 	return false;
-}
-
-static bool overruns(const struct wire_block *block)
-{
-	bool any = false;
-
-	for (unsigned i = 0; i < WIRE_X_PER_TICK; i++)
-		any |= block->x[i] == WIRE_SAMPLE_NOT_TAKEN;
-	for (unsigned i = 0; i < WIRE_YZ_PER_TICK; i++)
-		any |= block->y[i] == WIRE_SAMPLE_NOT_TAKEN || block->z[i] == WIRE_SAMPLE_NOT_TAKEN;
-	return any;
 }
 
 /* false if the block is lost */
@@ -59,28 +52,34 @@ static bool make_block(const struct record *record, unsigned sensor, uint32_t ti
 	if (clips(record, first + 2, tick, WIRE_YZ_PER_TICK))
 		status |= WIRE_STATUS_CLIP_Z;
 	block.status = (uint8_t)status;
-	block.io = overruns(&block) ? WIRE_IO_OVERRUN : 0;
 	wire_pack_block(frame, ids[sensor - 1], &block);
 	wire_seal_block(frame);
 	return true;
 }
 
-static void make_capture_end(const struct record *record, struct frame *frame)
+/* What follows the capture end. */
+static int send_told(const struct record *record, int (*send)(void *context, const struct frame *frame),
+                     void *context, struct frame *frame)
 {
-	struct wire_capture_end end = {
-	        .drop_id = record->drop_id,
-	        .marks = record->marks,
-	        .first_tick_ms = record->first_tick_ms,
-	        .last_tick_ms = record->last_tick_ms,
-	        .crc32 = record->crc32,
-	        .camera_frame = record->camera_frame,
-	};
+	int result = 0;
 
-	if (!isnan(record->trigger_s))
-		end.trigger_us = (uint32_t)llround(record->trigger_s * 1e6);
-	if (!isnan(record->frame_speed_m_s))
-		end.frame_speed_mm_s = (uint16_t)lround(record->frame_speed_m_s * 1e3);
-	wire_pack_capture_end(frame, WIRE_ID_CAPTURE_END, &end);
+	if (record->measured_known) {
+		struct wire_measured measured = record->measured;
+
+		measured.drop_id = record->drop_id;
+		wire_pack_measured(frame, WIRE_ID_MEASURED, &measured);
+		wire_seal_measured(frame);
+		result = send(context, frame);
+	}
+	for (unsigned i = 0; i < WIRE_PARAMETERS && record->parameters_known && result == 0; i++) {
+		struct wire_parameter parameter = {.drop_id = record->drop_id,
+		                                   .index = wire_parameters[i].index,
+		                                   .value = record->parameters[i]};
+
+		wire_pack_parameter(frame, WIRE_ID_PARAMETER, &parameter);
+		result = send(context, frame);
+	}
+	return result;
 }
 
 int write_frames(const struct record *record, int (*send)(void *context, const struct frame *frame),
@@ -99,8 +98,10 @@ int write_frames(const struct record *record, int (*send)(void *context, const s
 				result = send(context, &frame);
 	}
 	if (result == 0 && record->crc_known) {
-		make_capture_end(record, &frame);
+		drop_capture_end(record, &frame);
 		result = send(context, &frame);
+		if (result == 0)
+			result = send_told(record, send, context, &frame);
 	}
 	return result;
 }
@@ -234,9 +235,8 @@ static int write_candump(const struct record *record, FILE *out)
 	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
 }
 
-static int put_event(FILE *out, int64_t time_us, uint8_t *bytes, int size)
+static int put_event(FILE *out, int64_t time_us, char *channel, uint8_t *bytes, int size)
 {
-	char channel[] = LCM_CODEC_DROP;
 	lcm_eventlog_t log = {.f = out};
 	lcm_eventlog_event_t event = {
 	        .timestamp = time_us,
@@ -254,6 +254,7 @@ static int put_event(FILE *out, int64_t time_us, uint8_t *bytes, int size)
 static int write_lcm(const struct record *record, FILE *out)
 {
 	int64_t time_us = ((int64_t)record->first_tick_ms + drop_ticks(record)) * 1000;
+	char channel[] = LCM_CODEC_DROP, of_seal[] = LCM_LOG_SEAL, seal[] = SEAL_BLANK;
 	droptower_drop drop;
 	int error = lcm_codec_drop(record, time_us, &drop), size;
 	uint8_t *bytes;
@@ -267,10 +268,53 @@ static int write_lcm(const struct record *record, FILE *out)
 	else if (droptower_drop_encode(bytes, 0, size, &drop) != size)
 		error = DT_E_FORMAT;
 	else
-		error = put_event(out, time_us, bytes, size);
+		error = put_event(out, time_us, channel, bytes, size);
+	if (!error) {
+		digest_of(bytes, (size_t)size, seal + strlen(SEAL_WORD));
+		error = put_event(out, time_us, of_seal, (uint8_t *)seal, sizeof(seal) - 1);
+	}
 	free(bytes);
 	lcm_codec_free_drop(&drop);
 	return error;
+}
+
+int write_sealed_csv(const struct record *record, struct text *text)
+{
+	int error = text_open(text);
+
+	if (error)
+		return error;
+	error = write_csv(record, text->out);
+	if (!error && fputs("# " SEAL_BLANK "\n", text->out) < 0)
+		error = DT_E_SYSTEM;
+	error = text_close(text, error);
+	return error ? error : seal_fill(text->bytes, text->size);
+}
+
+static int put_csv(const struct record *record, FILE *out)
+{
+	struct text text;
+	int error = write_sealed_csv(record, &text);
+
+	if (!error && fwrite(text.bytes, 1, text.size, out) != text.size)
+		error = DT_E_SYSTEM;
+	free(text.bytes);
+	return error ? error : fflush(out) ? DT_E_SYSTEM : 0;
+}
+
+static int put_uff58(const struct record *record, FILE *out)
+{
+	struct text text;
+	int error = text_open(&text);
+
+	if (!error)
+		error = text_close(&text, write_uff58(record, text.out));
+	if (!error)
+		error = seal_fill(text.bytes, text.size);
+	if (!error && fwrite(text.bytes, 1, text.size, out) != text.size)
+		error = DT_E_SYSTEM;
+	free(text.bytes);
+	return error ? error : fflush(out) ? DT_E_SYSTEM : 0;
 }
 
 /* With a message of its own, which tells more than the code. */
@@ -285,15 +329,15 @@ static int write_whole_hdf5(const struct record *record, struct whole *whole, ch
 	return closed;
 }
 
-/* What the endings mean; write is NULL for HDF5. */
+/* What the endings mean; write is NULL for HDF5, which its helper seals. */
 static const struct format {
 	const char *ending;
 	int (*write)(const struct record *, FILE *);
 	bool drops_only;
 } formats[] = {
-        {".csv", write_csv, false},    {".lcm", write_lcm, true},
+        {".csv", put_csv, false},      {".lcm", write_lcm, true},
         {".log", write_candump, true}, {".candump", write_candump, true},
-        {".unv", write_uff58, false},  {".uff", write_uff58, false},
+        {".unv", put_uff58, false},    {".uff", put_uff58, false},
         {".h5", NULL, false},          {".hdf5", NULL, false},
 };
 

@@ -13,6 +13,7 @@
 
 #include "common/frame.h"
 #include "host/record/read.h"
+#include "host/record/text.h"
 
 /* Writes file in the format its name ends in: .csv, .lcm, .log or .candump, .unv or .uff,
  * .h5 or .hdf5. 0 or DT_E_* with one line in
@@ -21,6 +22,9 @@ DT_MUST_USE int write_record(const struct record *record, const char *file, char
 
 /* 0; DT_E_ARGUMENT if a channel's name cannot be written; DT_E_SYSTEM if out did not take it all. */
 DT_MUST_USE int write_csv(const struct record *record, FILE *out);
+
+/* The same with its SHA-256 in the last line (seal.h), as a file has it; bytes are the caller's after 0. */
+DT_MUST_USE int write_sealed_csv(const struct record *record, struct text *text);
 
 /* The frames of a drop, each given to send at its turn with time_us in the tower's clock: every block held,
  * then the capture end if one is known. Ends early with what send returns if that is not 0.

@@ -8,6 +8,7 @@
 
 #include "host/record/fields.h"
 #include "host/record/number.h"
+#include "host/record/seal.h"
 #include "host/record/uff58.h"
 
 enum { ID_MAX = UFF58_ID_CHARS - 2 }; /* some programs take lines of less than 80 */
@@ -127,7 +128,7 @@ static void put_channel(const struct record *record, size_t i, size_t *next_fiel
 	char rate[NUMBER_CHARS], start[NUMBER_CHARS], range[NUMBER_CHARS];
 	char own[UFF58_ID_CHARS + 1], more[UFF58_ID_CHARS + 1], fields[2][UFF58_ID_CHARS + 1];
 	struct dataset dataset = {
-	        .id = {channel->name, own, "NONE", more, "NONE"},
+	        .id = {channel->name, own, "NONE", more, i == 0 ? SEAL_BLANK : "NONE"},
 	        .function = UFF58_TIME_RESPONSE,
 	        .precision = UFF58_DOUBLE,
 	        .count = channel->count,

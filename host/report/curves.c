@@ -14,12 +14,12 @@ bool curves_axes(const struct report *report, const char *sensor, struct curves_
 
 	snprintf(x, sizeof(x), "%.8sX", sensor);
 	snprintf(y, sizeof(y), "%.8sY", sensor);
-	axes->x = record_channel(report->record, x);
-	axes->y = record_channel(report->record, y);
+	axes->x = record_axis(report->record, x);
+	axes->y = record_axis(report->record, y);
 	if (!axes->x || !axes->y)
 		return false;
-	axes->x_offset_g = report_offset(report_estimate(report, x));
-	axes->y_offset_g = report_offset(report_estimate(report, y));
+	axes->x_offset_g = report_offset(report_axis(report, x));
+	axes->y_offset_g = report_offset(report_axis(report, y));
 	return true;
 }
 
@@ -48,7 +48,7 @@ double curves_resultant(const struct curves_axes *axes, size_t k)
 
 bool curves_model_start(const struct report *report, double *start_s)
 {
-	const struct estimate_channel *s2x = report_estimate(report, "S2X");
+	const struct estimate_channel *s2x = report_axis(report, "S2X");
 	double peak_s = s2x ? s2x->peak.time_s : (double)NAN;
 
 	for (size_t i = 0; i < report->analysis->resultant_count; i++)

@@ -7,9 +7,9 @@
 
 #include "host/record/drop.h"
 
-const struct estimate_channel *report_estimate(const struct report *report, const char *name)
+const struct estimate_channel *report_axis(const struct report *report, const char *which)
 {
-	const struct channel *channel = record_channel(report->record, name);
+	const struct channel *channel = record_axis(report->record, which);
 
 	return channel ? &report->analysis->channels[channel - report->record->channels] : NULL;
 }
@@ -31,9 +31,11 @@ static bool better_zero(const struct report *report, size_t i, size_t best)
 {
 	const struct estimate_channel *channels = report->analysis->channels;
 
-	if (!strcmp(report->record->channels[best].name, "S2X"))
+	const struct channel *s2x = record_axis(report->record, "S2X");
+
+	if (s2x == &report->record->channels[best])
 		return false;
-	return !strcmp(report->record->channels[i].name, "S2X") ||
+	return s2x == &report->record->channels[i] ||
 	       channels[i].pulse.start_s < channels[best].pulse.start_s;
 }
 
@@ -52,7 +54,7 @@ struct report_zero report_zero(const struct report *report)
 	}
 	if (best < a->channel_count) {
 		zero.time_s = a->channels[best].pulse.start_s;
-		if (!strcmp(report->record->channels[best].name, "S2X"))
+		if (record_axis(report->record, "S2X") == &report->record->channels[best])
 			zero.width_s = a->channels[best].pulse.duration_s;
 		snprintf(zero.name, sizeof(zero.name), "%s leaves 10 %% of its peak",
 		         report->record->channels[best].name);
@@ -110,7 +112,7 @@ bool report_verdict(const struct report *report, char *line, size_t size)
 {
 	const struct record *r = report->record;
 	char end[96], lost[96];
-	bool open = tell_end(r, end, sizeof(end));
+	bool open = tell_end(r, end, sizeof(end)), altered = (r->flags & RECORD_FLAG_ALTERED) != 0;
 
 	tell_lost(r, lost, sizeof(lost));
 	if (r->lost_samples)
@@ -121,9 +123,12 @@ bool report_verdict(const struct report *report, char *line, size_t size)
 		snprintf(line, size, "UNPROVEN: %s; nothing says what the tower sent", end);
 	else if (!r->crc_agrees)
 		snprintf(line, size, "CORRUPT: no sample is missing, yet the CRC-32 does not agree");
+	else if (altered)
+		snprintf(line, size,
+		         "ALTERED: the CRC-32 agrees, yet the capture end is not what was sealed");
 	else
 		snprintf(line, size, "complete: every sample arrived, and the CRC-32 agrees");
-	return !r->lost_samples && (!r->is_drop || (r->crc_known && r->crc_agrees));
+	return !r->lost_samples && !altered && (!r->is_drop || (r->crc_known && r->crc_agrees));
 }
 
 void report_filter(const struct report *report, char *name, size_t size)
@@ -195,7 +200,7 @@ const char *report_flag_words(unsigned flag)
 	case RECORD_FLAG_FAULT:
 		return "a fault was latched during the drop";
 	case RECORD_FLAG_UNEVEN:
-		return "the time column is not evenly spaced; its mean step was used";
+		return "the time column is not evenly spaced; the even grid next to it was used";
 	case RECORD_FLAG_FULL_SCALE:
 		return "samples are at the converter's limit: the true value is unknown";
 	case RECORD_FLAG_OVERRUN:
@@ -206,6 +211,15 @@ const char *report_flag_words(unsigned flag)
 		return "a sensor lost its supply during the drop: check its cable";
 	case RECORD_FLAG_STUCK:
 		return "a channel gave one value for 20 ms: check sensor and converter";
+	case RECORD_FLAG_ALTERED:
+		return "the capture end is not what the tower sealed: trust no number of this drop";
+	case RECORD_FLAG_SEPARATED_LATE:
+		return "the product left the frame later than planned";
+	case RECORD_FLAG_DROPOUT_CHANGED:
+		return "the magnet let go earlier or later than in the drops before: check it";
+	case RECORD_FLAG_FRAME_NOT_DOWN:
+		return "the frame was neither down nor latched when the window closed: check rails and "
+		       "dampers";
 	case RECORD_FLAG_SPIKE:
 		return "outliers of one or two samples were left out: look for a loose contact";
 	case RECORD_FLAG_ZEROED:
@@ -223,6 +237,13 @@ const char *report_flag_words(unsigned flag)
 		return "more than noise before the pulse: zero, and what hangs on it, is unsure";
 	case RECORD_FLAG_UNFILTERED:
 		return "sampled too slowly for the low-pass asked for; left as it was";
+	case RECORD_FLAG_SETTLING:
+		return "zero decays from the record's beginning on; its exponential was taken off: let the "
+		       "supply settle";
+	case RECORD_FLAG_NO_LINE_END:
+		return "the file ends without a line end: its last row may be cut";
+	case RECORD_FLAG_SAME_NAMES:
+		return "two columns have one name in the file: check which is which";
 	default:
 		return record_flag_name(flag);
 	}
@@ -319,7 +340,7 @@ bool report_video_frame(const struct report *report, double time_s, long *frame)
 
 bool report_video(const struct report *report, const struct report_zero *zero, char *line, size_t size)
 {
-	const struct estimate_channel *s2x = report_estimate(report, "S2X");
+	const struct estimate_channel *s2x = report_axis(report, "S2X");
 	long at_zero, at_peak;
 
 	line[0] = '\0';
@@ -362,7 +383,7 @@ static void compare_peaks(const struct report *report, struct report_row *rows, 
 	static const char *const labels[MODEL_AXES] = {"S1 X peak", "S1 Y peak", "S2 X peak", "S2 Y peak"};
 
 	for (enum model_axis axis = 0; axis < MODEL_AXES; axis++) {
-		const struct estimate_channel *e = report_estimate(report, names[axis]);
+		const struct estimate_channel *e = report_axis(report, names[axis]);
 
 		add_row(rows, count,
 		        (struct report_row){.key = keys[axis],

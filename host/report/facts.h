@@ -60,8 +60,8 @@ size_t report_notes(const struct report *report, struct report_note notes[REPORT
 /* A sentence for one ESTIMATE_FLAG_*. */
 const char *report_note_words(unsigned flag);
 
-/* The estimate of the channel of that name; NULL if there is none. */
-const struct estimate_channel *report_estimate(const struct report *report, const char *name);
+/* The estimate of an axis of the tower's, "S1X" to "S2Z"; NULL where the record has none (record_axis). */
+const struct estimate_channel *report_axis(const struct report *report, const char *which);
 
 /* The baseline that is taken off for pictures, g. */
 double report_offset(const struct estimate_channel *estimate);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "host/record/whole.h"
+#include "host/report/measured.h"
 #include "host/report/page.h"
 #include "host/report/shock.h"
 
@@ -37,8 +38,9 @@ static void head(struct page *page)
 	fputs(r->is_drop ? ". " : "", out);
 	fputs("<span class=\"soft file\">", out);
 	page_text(out, r->file);
-	fprintf(out, " (%s)</span></p>\n<div class=\"verdict %s\">%s %s</div>\n", r->format,
-	        good ? "good" : "bad", good ? "&#10003;" : "&#9888;", verdict);
+	fprintf(out, " (%s%s)</span></p>\n<div class=\"verdict %s\">%s %s</div>\n", r->format,
+	        record_lacks_seal(r) ? ", not sealed" : "", good ? "good" : "bad",
+	        good ? "&#10003;" : "&#9888;", verdict);
 	if (report->simulated)
 		fputs("<p><b>Simulated tower: no product fell.</b></p>\n", out);
 	if (report_processing(report, processing, sizeof(processing)))
@@ -48,20 +50,22 @@ static void head(struct page *page)
 static void band(struct page *page)
 {
 	const struct band *band = page->report->band;
-	char *text = NULL;
-	size_t size = 0;
-	FILE *line = band ? open_memstream(&text, &size) : NULL;
+	struct text line;
 
-	if (!line)
+	if (!band)
 		return;
-	shock_write_band(band, line);
-	if (fclose(line) == 0) {
+	page->error = text_open(&line);
+	if (page->error)
+		return;
+	shock_write_band(band, line.out);
+	page->error = text_close(&line, 0);
+	if (!page->error) {
 		fprintf(page->out, "<div><div class=\"verdict %s\">%s ", band->verdict.pass ? "good" : "bad",
 		        band->verdict.pass ? "&#10003;" : "&#9888;");
-		page_text(page->out, text);
+		page_text(page->out, line.bytes);
 		fputs("</div></div>\n", page->out);
 	}
-	free(text);
+	free(line.bytes);
 }
 
 static const char *unless_ok(enum estimate_status status, const char *note)
@@ -161,8 +165,10 @@ static void foot(struct page *page)
 {
 	const struct record *r = page->report->record;
 	FILE *out = page->out;
+	char tower[400];
 
 	fputs("<footer>", out);
+	measured_text(r, tower, sizeof(tower));
 	if (r->is_drop) {
 		const struct record_counters *c = &r->counters;
 
@@ -173,6 +179,8 @@ static void foot(struct page *page)
 		        c->repeated, c->reordered, c->corrupt, c->conflicting);
 		if (r->crc_known)
 			fprintf(out, "Capture CRC-32 %08" PRIX32 ". ", r->crc32);
+		if (tower[0] != '\0')
+			fprintf(out, "Tower: %s. ", tower);
 		fprintf(out, "Ticks %" PRIu32 " to %" PRIu32 " ms.</p>\n", r->first_tick_ms, r->last_tick_ms);
 	}
 	page_end(out, page->report->version);
@@ -191,22 +199,21 @@ static void write_page(struct page *page)
 
 int report_html(const struct report *report, const char *file, char *message, size_t size)
 {
-	char *buffer = NULL;
-	size_t length = 0;
-	struct page page = {.out = open_memstream(&buffer, &length),
+	struct text text;
+	int result = text_open(&text);
+	struct page page = {.out = text.out,
 	                    .report = report,
 	                    .zero = report_zero(report),
 	                    .message = message,
 	                    .size = size};
 
 	snprintf(message, size, "%s", error_text(DT_E_MEMORY));
-	if (!page.out)
-		return DT_E_MEMORY;
+	if (result)
+		return result;
 	write_page(&page);
-	if (fclose(page.out) != 0 && !page.error)
-		page.error = DT_E_MEMORY;
-	if (!page.error)
-		page.error = whole_write(file, buffer, length, message, size);
-	free(buffer);
-	return page.error;
+	result = text_close(&text, page.error);
+	if (!result)
+		result = whole_write(file, text.bytes, text.size, message, size);
+	free(text.bytes);
+	return result;
 }

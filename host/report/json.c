@@ -7,6 +7,7 @@
 
 #include "host/estimate/cfc.h"
 #include "host/report/facts.h"
+#include "host/report/measured.h"
 #include "host/report/put.h"
 #include "host/report/shock.h"
 
@@ -136,7 +137,7 @@ static void put_processing(struct builder *b, cJSON *root, const struct report *
 	put_number(b, item, "highpass_undone_s", undone_s > 0.0 ? undone_s : (double)NAN);
 }
 
-static void put_drop(struct builder *b, cJSON *root, const struct record *r)
+static void put_drop(struct builder *b, cJSON *root, const struct record *r, bool unattended)
 {
 	cJSON *drop, *counters, *gaps;
 
@@ -146,6 +147,8 @@ static void put_drop(struct builder *b, cJSON *root, const struct record *r)
 	}
 	drop = put_object(b, root, "drop");
 	put_number(b, drop, "drop_id", r->drop_id);
+	if (r->log_number > 0)
+		put_number(b, drop, "log_number", r->log_number);
 	put_number(b, drop, "first_tick_ms", r->first_tick_ms);
 	put_number(b, drop, "last_tick_ms", r->last_tick_ms);
 	put_number(b, drop, "trigger_s", r->trigger_s);
@@ -153,6 +156,8 @@ static void put_drop(struct builder *b, cJSON *root, const struct record *r)
 	put_number(b, drop, "crc32", r->crc_known ? (double)r->crc32 : (double)NAN);
 	put_bool(b, drop, "crc_agrees", r->crc_known && r->crc_agrees);
 	put_number(b, drop, "camera_frame", r->crc_known ? r->camera_frame : (double)NAN);
+	if (unattended)
+		put_bool(b, drop, "unattended", true);
 	counters = put_object(b, drop, "counters");
 	put_number(b, counters, "blocks", (double)r->counters.blocks);
 	put_number(b, counters, "repeated", (double)r->counters.repeated);
@@ -295,10 +300,13 @@ static cJSON *build(struct builder *b, const struct report *report)
 	b->failed = !root;
 	put_text(b, root, "file", r->file);
 	put_text(b, root, "format", r->format);
+	if (record_lacks_seal(r)) /* by an older version or another program */
+		put_item(b, root, "sealed", cJSON_CreateFalse());
 	put_flags(b, root, report_flags(report), record_flag_name);
 	put_number(b, root, "lost_samples", (double)r->lost_samples);
 	put_processing(b, root, report);
-	put_drop(b, root, r);
+	put_drop(b, root, r, report->unattended);
+	measured_put(b, root, r);
 	put_scene(b, root, report->scene);
 	channels = put_array(b, root, "channels");
 	for (size_t i = 0; i < a->channel_count; i++)

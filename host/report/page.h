@@ -5,6 +5,7 @@
  * HTML pages while they are written: what the page of a drop (html.c, page_*.c) and that of a series
  * (series*.c) share. page_text is for everybody who writes HTML.
  */
+#include "host/record/text.h"
 #include "host/report/facts.h"
 
 /* The first picture that fails is remembered and the rest are left out. */
@@ -46,13 +47,11 @@ void page_end(FILE *out, const char *version);
 void page_begin_card(FILE *out, const char *label);
 void page_end_card(FILE *out, const char *unit, const char *note);
 
-/* A gnuplot script in the making; NULL, with the page's error set, without memory or after an earlier error.
- */
-FILE *page_begin_script(struct page *page, char **buffer, size_t *length);
+/* Opens a gnuplot script; false, with the page's error set, without memory or after an earlier error. */
+bool page_begin_script(struct page *page, struct text *script);
 
 /* Closes and frees it and puts its picture into the page. drawn: whether there is something to see. */
-void page_draw(struct page *page, FILE *script, char **buffer, const size_t *length, bool drawn,
-               const char *label);
+void page_draw(struct page *page, struct text *script, bool drawn, const char *label);
 
 /* The sections of a drop that are pictures, and those that are tables. */
 void page_pictures(struct page *page);

@@ -38,29 +38,27 @@ static void inline_svg(FILE *out, const char *svg, bool first, const char *label
 	}
 }
 
-void page_draw(struct page *page, FILE *script, char **buffer, const size_t *length, bool drawn,
-               const char *label)
+void page_draw(struct page *page, struct text *script, bool drawn, const char *label)
 {
 	char *svg = NULL;
 
-	if (fclose(script) != 0) {
-		page->error = DT_E_MEMORY;
-	} else if (drawn) {
-		page->error = picture_draw(*buffer, *length, &svg, page->message, page->size);
+	page->error = text_close(script, 0);
+	if (page->error)
+		return;
+	if (drawn) {
+		page->error = picture_draw(script->bytes, script->size, &svg, page->message, page->size);
 		if (!page->error)
 			inline_svg(page->out, svg, page->pictures++ == 0, label);
 		free(svg);
 	} else {
 		fputs("<p class=\"soft\">Nothing to draw: no good sample here.</p>", page->out);
 	}
-	free(*buffer);
+	free(script->bytes);
 }
 
-FILE *page_begin_script(struct page *page, char **buffer, size_t *length)
+bool page_begin_script(struct page *page, struct text *script)
 {
-	FILE *script = page->error ? NULL : open_memstream(buffer, length);
-
-	if (!script && !page->error)
-		page->error = DT_E_MEMORY;
-	return script;
+	if (!page->error)
+		page->error = text_open(script);
+	return !page->error;
 }

@@ -11,11 +11,10 @@ static void picture_of_channel(struct page *page, size_t channel)
 {
 	const struct channel *c = &page->report->record->channels[channel];
 	const struct estimate_channel *e = &page->report->analysis->channels[channel];
-	size_t length;
-	char *buffer, status[48];
-	FILE *script = page_begin_script(page, &buffer, &length);
+	struct text script;
+	char status[48];
 
-	if (!script)
+	if (!page_begin_script(page, &script))
 		return;
 	fputs("<figure><figcaption><b>", page->out);
 	page_channel_name(page->out, c->name);
@@ -29,8 +28,7 @@ static void picture_of_channel(struct page *page, size_t channel)
 	if (strcmp(report_channel_status(e, status, sizeof(status)), "ok") != 0)
 		fprintf(page->out, "(%s)", status);
 	fputs("</span></figcaption>", page->out);
-	page_draw(page, script, &buffer, &length, traces_channel(script, page->report, &page->zero, channel),
-	          c->name);
+	page_draw(page, &script, traces_channel(script.out, page->report, &page->zero, channel), c->name);
 	fputs("</figure>\n", page->out);
 }
 
@@ -39,35 +37,30 @@ static void wide_picture(struct page *page,
                          bool (*traces)(FILE *, const struct report *, const struct report_zero *),
                          const char *name)
 {
-	size_t length;
-	char *buffer;
-	FILE *script = page_begin_script(page, &buffer, &length);
+	struct text script;
 
-	if (!script)
+	if (!page_begin_script(page, &script))
 		return;
 	fputs("<figure class=\"scroll\">", page->out);
-	page_draw(page, script, &buffer, &length, traces(script, page->report, &page->zero), name);
+	page_draw(page, &script, traces(script.out, page->report, &page->zero), name);
 	fputs("</figure>\n", page->out);
 }
 
 static void picture_of_ringdown(struct page *page, char axis)
 {
-	size_t length;
-	char *buffer;
-	FILE *script = page_begin_script(page, &buffer, &length);
+	struct text script;
 
-	if (!script)
+	if (!page_begin_script(page, &script))
 		return;
 	fprintf(page->out, "<figure><figcaption><b>S1 %c</b></figcaption>", axis);
-	page_draw(page, script, &buffer, &length, traces_ringdown(script, page->report, &page->zero, axis),
-	          "ring-down");
+	page_draw(page, &script, traces_ringdown(script.out, page->report, &page->zero, axis), "ring-down");
 	fputs("</figure>\n", page->out);
 }
 
 static bool any_model(const struct report *report)
 {
 	for (size_t i = 0; i < report->record->channel_count; i++)
-		if (traces_has_model(report, report->record->channels[i].name))
+		if (traces_has_model(report, &report->record->channels[i]))
 			return true;
 	return false;
 }
@@ -75,7 +68,7 @@ static bool any_model(const struct report *report)
 static void legend(struct page *page)
 {
 	const struct record *r = page->report->record;
-	bool two = record_channel(r, "S2X") != NULL;
+	bool two = record_axis(r, "S2X") != NULL;
 	FILE *out = page->out;
 
 	fputs("<div class=\"legend\">", out);
@@ -115,9 +108,9 @@ static void traces(struct page *page)
 	legend(page);
 	fputs("<div class=\"grid\">", page->out);
 	for (size_t i = 0; i < sizeof(order) / sizeof(order[0]); i++)
-		tower += record_channel(r, order[i]) != NULL;
+		tower += record_axis(r, order[i]) != NULL;
 	for (size_t i = 0; i < sizeof(order) / sizeof(order[0]) && tower == r->channel_count; i++) {
-		const struct channel *c = record_channel(r, order[i]);
+		const struct channel *c = record_axis(r, order[i]);
 
 		if (c)
 			picture_of_channel(page, (size_t)(c - r->channels));
@@ -156,7 +149,7 @@ static void more_pictures(struct page *page)
 		fputs("</div>\n", out);
 	}
 	fprintf(out, "<h2>The whole record</h2>\n<p class=\"soft\">%s. Shaded: the part shown above.</p>\n",
-	        record_channel(report->record, "S1X") || record_channel(report->record, "S2X")
+	        record_axis(report->record, "S1X") || record_axis(report->record, "S2X")
 	                ? "Along X"
 	                : "The channel with the largest peak");
 	wide_picture(page, traces_overview, "whole capture");

@@ -3,7 +3,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <ftw.h>
 #include <poll.h>
 #include <signal.h>
 #include <spawn.h>
@@ -16,10 +15,11 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "common/link/temporary.h"
 #include "host/archive/durable.h"
 #include "host/record/whole.h"
 
-enum { LIMIT_MS = 60000, ASK_MS = 100, FOLDER_MAX = 512, PROGRAM_MAX = 4096 };
+enum { LIMIT_MS = 60000, ASK_MS = 100, FOLDER_MAX = TEMPORARY_PATH_MAX, PROGRAM_MAX = 4096 };
 
 static const char *const browsers[] = {"chromium", "chromium-browser", "google-chrome"};
 enum { BROWSERS = sizeof(browsers) / sizeof(browsers[0]) };
@@ -120,14 +120,6 @@ static int wait_for(pid_t pid, int (*stop)(void))
 	return result;
 }
 
-static int remove_one(const char *path, const struct stat *status, int type, struct FTW *place)
-{
-	(void)status;
-	(void)type;
-	(void)place;
-	return remove(path);
-}
-
 static int fail(int result, const char *why, char *message, size_t size)
 {
 	snprintf(message, size, "no PDF: %s", why);
@@ -162,23 +154,21 @@ static int print_in(const char *folder, const char *program, int (*stop)(void), 
 int pdf_print(const char *page, size_t length, int (*stop)(void), char **pdf, size_t *pdf_length,
               char *message, size_t size)
 {
-	const char *temporary = getenv("TMPDIR");
-	char folder[FOLDER_MAX], file[FOLDER_MAX + 32], program[PROGRAM_MAX], *made = NULL;
+	struct temporary folder;
+	char file[FOLDER_MAX + 32], program[PROGRAM_MAX], *made = NULL;
 	size_t made_length = 0;
 	int result;
 
 	if (!find_browser(program))
 		return fail(DT_E_UNKNOWN, "neither chromium, chromium-browser nor google-chrome is on PATH",
 		            message, size);
-	if (snprintf(folder, sizeof(folder), "%s/droptower-pdf-XXXXXX",
-	             temporary && temporary[0] == '/' ? temporary : "/tmp") >= (int)sizeof(folder) ||
-	    !mkdtemp(folder))
+	if (temporary_make(&folder, "pdf") != 0)
 		return fail(DT_E_SYSTEM, "no temporary folder", message, size);
-	snprintf(file, sizeof(file), "%s/page.html", folder);
+	snprintf(file, sizeof(file), "%s/page.html", folder.path);
 	result = whole_write(file, page, length, message, size);
 	if (!result)
-		result = print_in(folder, program, stop, &made, &made_length, message, size);
-	nftw(folder, remove_one, 16, FTW_DEPTH | FTW_PHYS);
+		result = print_in(folder.path, program, stop, &made, &made_length, message, size);
+	temporary_remove(&folder);
 	if (result)
 		return result;
 	*pdf = made;

@@ -27,6 +27,7 @@ struct report {
 	const struct band *band;                   /* NULL: no band was given */
 	bool show_events;                          /* in the table too */
 	bool simulated;                            /* no product fell: the page says so */
+	bool unattended;                           /* nobody was asked before it fell */
 	bool tolerance_asked;                      /* what is less certain than it gets a note */
 	const char *version;                       /* of the program, for the page's foot; NULL: not said */
 };

@@ -8,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/archive/durable.h"
 #include "host/record/read.h"
 #include "host/report/series_private.h"
 
@@ -61,29 +60,39 @@ static int take_drop(void *context, const struct archive_drop *drop)
 	                                    &a->version, &a->flags};
 	for (size_t i = 0; i < SERIES_TEXTS; i++)
 		keep(d->text[i], texts[i]);
-	d->counts = archive_counts(drop, page->request->undecided);
-	if (d->counts)
-		archive_cell_add(&page->cell, drop);
 	return 0;
 }
 
-/* The log, if its bytes are those that were recorded. */
-static void read_log(struct series_page *page, struct series_drop *drop)
+/* The log, if it and all that is kept with it are what was recorded. */
+static int read_log(struct series_page *page, struct series_drop *drop, const char *name)
 {
-	char path[ARCHIVE_PATH_MAX], hash[DURABLE_HASH_CHARS], message[READ_MESSAGE_MAX];
-	int64_t bytes;
+	struct archive *archive = page->request->archive;
+	char message[READ_MESSAGE_MAX];
+	struct archive_log log;
+	int result;
 
-	snprintf(path, sizeof(path), "%s/%.200s", archive_folder(page->request->archive), drop->a.raw);
-	if (!drop->a.sha256[0])
+	if (!drop->a.sha256[0]) {
 		snprintf(drop->no_log, sizeof(drop->no_log), "recording was not finished");
-	else if (durable_hash(path, hash, &bytes) != 0)
-		snprintf(drop->no_log, sizeof(drop->no_log), "the raw log is missing");
-	else if (strcmp(hash, drop->a.sha256))
-		snprintf(drop->no_log, sizeof(drop->no_log), "the raw log is not the one that was recorded");
-	else if (read_record(&drop->record, path, NULL, message) != 0) {
-		snprintf(drop->no_log, sizeof(drop->no_log), "the raw log cannot be read");
+		return 0;
+	}
+	result = archive_open_log(archive, name, &log);
+	drop->a.state = "recorded";
+	if (result == DT_E_CORRUPT) {
+		drop->a.state = "altered"; /* or missing: it counts nowhere */
+		snprintf(drop->no_log, sizeof(drop->no_log), "%.300s", archive_message(archive));
+		return 0;
+	}
+	if (result)
+		return result;
+	if (log.fault[0]) {
+		drop->a.state = "altered";
+		snprintf(drop->no_log, sizeof(drop->no_log), "%.300s", log.fault);
+	} else if (read_record(&drop->record, log.file, NULL, message) != 0) {
+		snprintf(drop->no_log, sizeof(drop->no_log), "%.100s: the raw log cannot be read", log.raw);
 		record_init(&drop->record);
 	}
+	archive_close_log(&log);
+	return 0;
 }
 
 static int read_drop(struct series_page *page, struct series_drop *drop)
@@ -91,14 +100,17 @@ static int read_drop(struct series_page *page, struct series_drop *drop)
 	char name[ARCHIVE_NAME_MAX + 16], *json;
 	int result;
 
-	read_log(page, drop);
-	drop->model_s = (double)NAN;
-	if (!drop->a.version)
-		return 0;
 	snprintf(name, sizeof(name), "%.60s/%u", page->series.name, drop->a.number);
-	json = archive_json(page->request->archive, name, drop->a.version);
-	if (!json)
-		return DT_E_EMPTY;
+	drop->model_s = (double)NAN;
+	result = read_log(page, drop, name);
+	drop->counts = archive_counts(&drop->a, page->request->undecided);
+	if (drop->counts)
+		archive_cell_add(&page->cell, &drop->a);
+	if (result || !drop->a.version)
+		return result;
+	result = archive_json(page->request->archive, name, drop->a.version, &json);
+	if (result)
+		return result;
 	result = series_result_read(drop, json);
 	free(json);
 	if (result)
@@ -162,6 +174,39 @@ static void draw_model(struct series_page *page)
 		                                  page->curve_g, SCRIPT_CURVE_POINTS, NULL) == 0;
 }
 
+/* A trace that a reader of the page will miss. */
+static bool tell_lacking(const struct series_page *page, const struct series_drop *drop)
+{
+	const struct series_report *request = page->request;
+	char text[420], name[ARCHIVE_NAME_MAX + 16];
+
+	if (series_is_drawn(drop) || !drop->a.sha256[0] || (!drop->no_log[0] && !drop->counts))
+		return false;
+	snprintf(name, sizeof(name), "%.60s/%u", page->series.name, drop->a.number);
+	if (drop->no_log[0] && !strncmp(drop->no_log, name, strlen(name)))
+		snprintf(text, sizeof(text), "%s", drop->no_log);
+	else
+		snprintf(text, sizeof(text), "%s: %s", name,
+		         drop->no_log[0] ? drop->no_log : "no result, so no trace");
+	if (request->lacking)
+		request->lacking(request->context, text);
+	return true;
+}
+
+static int tell_all_lacking(struct series_page *page)
+{
+	size_t count = 0;
+
+	for (size_t i = 0; i < page->count; i++)
+		count += tell_lacking(page, page->drop[i]);
+	if (!count || page->request->partial)
+		return 0;
+	snprintf(page->page.message, page->page.size,
+	         "%s: %zu of %zu drops lack what a report rests on; --partial makes it all the same",
+	         page->series.name, count, page->count);
+	return DT_E_CORRUPT;
+}
+
 static int gather(struct series_page *page)
 {
 	struct archive *archive = page->request->archive;
@@ -173,6 +218,8 @@ static int gather(struct series_page *page)
 		result = archive_each_series(archive, &filter, take_series, page);
 	if (result == 0)
 		result = archive_each_drop(archive, &filter, take_drop, page);
+	if (result == 0)
+		result = archive_seal(archive, &page->seal);
 	solve_model(page);
 	for (size_t i = 0; i < page->count && result == 0; i++)
 		result = read_drop(page, page->drop[i]);
@@ -180,9 +227,13 @@ static int gather(struct series_page *page)
 		snprintf(page->page.message, page->page.size, "%s",
 		         result == DT_E_MEMORY || !archive_message(archive)[0] ? error_text(result)
 		                                                               : archive_message(archive));
+	if (result == 0)
+		result = tell_all_lacking(page);
+	if (result != 0)
+		return result;
 	set_window(page);
 	draw_model(page);
-	return result;
+	return 0;
 }
 
 static void release(struct series_page *page)
@@ -221,6 +272,7 @@ static int write_page(struct series_page *page)
 	series_model(page);
 	series_records(page);
 	page_end(page->page.out, page->request->version);
+	series_evidence(page);
 	if (page->page.error)
 		return page->page.error;
 	if (fflush(page->page.out) == 0 && !ferror(page->page.out))

@@ -53,6 +53,15 @@ static size_t decided(const struct series_page *page, const char *decision)
 	return count;
 }
 
+static size_t faulty(const struct series_page *page)
+{
+	size_t count = 0;
+
+	for (size_t i = 0; i < page->count; i++)
+		count += archive_is_faulty(&page->drop[i]->a);
+	return count;
+}
+
 static size_t unfinished(const struct series_page *page)
 {
 	size_t count = 0;
@@ -83,13 +92,16 @@ static bool verdict(const struct series_page *page, char line[240])
 {
 	size_t counted = series_counted(page), rejected = decided(page, "rejected");
 	unsigned planned = page->series.planned;
-	size_t partial = unfinished(page);
-	char more[80] = "";
+	size_t partial = unfinished(page), wrong = faulty(page);
+	char more[140] = "";
 
 	if (rejected)
 		snprintf(more, sizeof(more), "; %zu rejected and in no mean", rejected);
 	if (partial)
 		snprintf(more + strlen(more), sizeof(more) - strlen(more), "; %zu never finished", partial);
+	if (wrong)
+		snprintf(more + strlen(more), sizeof(more) - strlen(more),
+		         "; %zu altered or missing and in no mean", wrong);
 	if (!page->count)
 		snprintf(line, 240, "EMPTY: no drop yet of %u planned", planned);
 	else if (!counted)
@@ -105,7 +117,7 @@ static bool verdict(const struct series_page *page, char line[240])
 		         planned, more);
 	else
 		snprintf(line, 240, "complete: %zu drops count, %u were planned%s", counted, planned, more);
-	return counted && counted >= planned && all_whole(page) && !any_remark(page);
+	return counted && counted >= planned && !wrong && all_whole(page) && !any_remark(page);
 }
 
 /* What is known of it: of drops whose origin nobody noted nothing is said. */
@@ -164,19 +176,19 @@ void series_head(struct series_page *page)
 {
 	FILE *out = page->page.out;
 	const struct scene *scene = &page->scene;
-	char line[240], *more = NULL;
-	size_t length;
-	FILE *css = open_memstream(&more, &length);
+	struct text more;
+	char line[240];
 	bool good = verdict(page, line);
 
-	if (!css) {
-		page->page.error = DT_E_MEMORY;
+	page->page.error = text_open(&more);
+	if (page->page.error)
 		return;
-	}
-	write_style(page, css);
-	if (fclose(css) == 0)
-		page_begin(out, scene->title[0] ? scene->title : scene->name, more);
-	free(more);
+	write_style(page, more.out);
+	page->page.error = text_close(&more, 0);
+	if (page->page.error)
+		return;
+	page_begin(out, scene->title[0] ? scene->title : scene->name, more.bytes);
+	free(more.bytes);
 	fputs("<p>Drop series <b>", out);
 	page_text(out, page->series.name);
 	fprintf(out, "</b>: dropped from %g m at %g&deg;. <span class=\"soft\">Campaign ",

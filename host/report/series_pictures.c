@@ -31,31 +31,29 @@ static void legend(const struct series_page *page)
 static void picture_over(struct series_page *page, size_t sensor, char axis)
 {
 	struct page *p = &page->page;
-	size_t length;
-	char *buffer, label[40];
-	FILE *script = page_begin_script(p, &buffer, &length);
+	struct text script;
+	char label[40];
 
-	if (!script)
+	if (!page_begin_script(p, &script))
 		return;
 	snprintf(label, sizeof(label), "S%zu %c of all drops that count", sensor + 1, axis);
 	fprintf(p->out, "<figure><figcaption><b>S%zu %c</b><span>g over ms</span></figcaption>", sensor + 1,
 	        axis);
-	page_draw(p, script, &buffer, &length, series_traces_over(script, page, sensor, axis), label);
+	page_draw(p, &script, series_traces_over(script.out, page, sensor, axis), label);
 	fputs("</figure>\n", p->out);
 }
 
 static void picture_drop(struct series_page *page, const struct series_drop *drop, char axis)
 {
 	struct page *p = &page->page;
-	size_t length;
-	char *buffer, label[48];
-	FILE *script = page_begin_script(p, &buffer, &length);
+	struct text script;
+	char label[48];
 
-	if (!script)
+	if (!page_begin_script(p, &script))
 		return;
 	snprintf(label, sizeof(label), "drop %u, S1 and S2 along %c", drop->a.number, axis);
 	fprintf(p->out, "<figure><figcaption><b>%c</b></figcaption>", axis);
-	page_draw(p, script, &buffer, &length, series_traces_drop(script, page, drop, axis), label);
+	page_draw(p, &script, series_traces_drop(script.out, page, drop, axis), label);
 	fputs("</figure>\n", p->out);
 }
 
@@ -102,6 +100,8 @@ static void excluded_reason(FILE *out, const struct series_drop *drop)
 	if (!strcmp(decision, "rejected")) {
 		fputs(": ", out);
 		page_text(out, drop->a.reason[0] ? drop->a.reason : "no reason was noted");
+	} else if (archive_is_faulty(&drop->a)) {
+		fputs(": what is kept of it is not what was recorded, or is not there", out);
 	} else if (!strcmp(decision, "undecided")) {
 		fputs(": nobody has accepted or rejected it yet", out);
 	} else if (!drop->a.sha256[0]) {

@@ -16,7 +16,7 @@ struct series_drop {
 	char text[SERIES_TEXTS][ARCHIVE_TEXT_MAX + 1];
 	bool counts;              /* goes into the means */
 	bool has_result;          /* analysis is filled */
-	char no_log[128];         /* why there is no trace to draw; "": there is one */
+	char no_log[320];         /* why there is no trace to draw; "": there is one */
 	struct record record;     /* from the log; without it, what the result knows of it, without samples */
 	struct analysis analysis; /* from the result: what pictures and remarks need */
 	double highpass_undone_s; /* says the result; NAN or 0: does not */
@@ -29,6 +29,7 @@ struct series_page {
 	struct page page;
 	const struct series_report *request;
 	struct archive_series series; /* its texts stand in text */
+	struct archive_seal seal;
 	char text[6][ARCHIVE_TEXT_MAX + 1];
 	struct scene scene;
 	bool has_model, has_below;
@@ -71,5 +72,8 @@ void series_pictures(struct series_page *page);
 void series_excluded(struct series_page *page);
 void series_model(struct series_page *page);
 void series_records(struct series_page *page);
+
+/* Behind the page. */
+void series_evidence(const struct series_page *page);
 
 #endif

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/record/seal.h"
 #include "host/report/series_private.h"
 
 /* ---- remarks ---- */
@@ -88,7 +89,7 @@ static void add_statuses(struct remarks *remarks, const struct series_drop *drop
 	const struct analysis *a = &drop->analysis;
 
 	for (size_t i = 0; i < sizeof(peak) / sizeof(peak[0]); i++) {
-		const struct estimate_channel *e = report_estimate(&drop->report, peak[i].channel);
+		const struct estimate_channel *e = report_axis(&drop->report, peak[i].channel);
 
 		if (e)
 			add_status(remarks, drop, peak[i].value, peak[i].of, e->peak.how.status);
@@ -227,6 +228,27 @@ static void logs(const struct series_page *page)
 		fprintf(out, "</td><td>%" PRId64 "</td></tr>\n", d->a.bytes);
 	}
 	fputs("</tbody></table></div>\n", out);
+	if (page->seal.entry > 0)
+		fprintf(out,
+		        "<p class=\"note\">Chain of the archive: entry %" PRId64
+		        ", which stands for all before "
+		        "it, head <span class=\"hash\">%s</span></p>\n",
+		        page->seal.entry, page->seal.head);
+	else
+		fputs("<p class=\"note\">Not sealed: recorded before the archive had a chain.</p>\n", out);
+}
+
+void series_evidence(const struct series_page *page)
+{
+	FILE *out = page->page.out;
+
+	fprintf(out, SERIES_EVIDENCE "series %s\n", page->series.name);
+	for (size_t i = 0; i < page->count; i++)
+		if (page->drop[i]->a.sha256[0])
+			fprintf(out, "log %s %s\n", page->drop[i]->a.raw, page->drop[i]->a.sha256);
+	if (page->seal.entry > 0)
+		fprintf(out, "chain %" PRId64 " %s\n", page->seal.entry, page->seal.head);
+	fputs(SEAL_BLANK "\n-->\n", out);
 }
 
 /* ---- decisions ---- */

@@ -28,7 +28,7 @@ enum { PEAKS = sizeof(peaks) / sizeof(peaks[0]), OTHERS = sizeof(others) / sizeo
 
 const char *series_decision(const struct series_drop *drop)
 {
-	if (!drop->a.sha256[0])
+	if (!drop->a.sha256[0] || archive_is_faulty(&drop->a))
 		return drop->a.state;
 	return strcmp(drop->a.decision, "open") ? drop->a.decision : "undecided";
 }

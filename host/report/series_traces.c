@@ -16,7 +16,7 @@ static const struct channel *channel_of(const struct series_drop *drop, size_t s
 {
 	char name[] = {'S', (char)('1' + sensor), axis, '\0'};
 
-	return series_is_drawn(drop) ? record_channel(&drop->record, name) : NULL;
+	return series_is_drawn(drop) ? record_axis(&drop->record, name) : NULL;
 }
 
 static double offset_of(const struct series_drop *drop, const struct channel *channel)

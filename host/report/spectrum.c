@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/record/text.h"
 #include "host/report/picture.h"
 #include "host/report/put.h"
 #include "host/shock/signal.h"
@@ -254,17 +255,16 @@ static void write_script(const struct spectrum_report *report, FILE *script)
 
 int spectrum_svg(const struct spectrum_report *report, FILE *out, char *message, size_t size)
 {
-	char *text = NULL, *svg = NULL;
-	size_t length = 0;
-	FILE *script = open_memstream(&text, &length);
-	int result = DT_E_MEMORY;
+	struct text script;
+	char *svg = NULL;
+	int result = text_open(&script);
 
-	if (script) {
-		write_script(report, script);
-		result = fclose(script) == 0 ? 0 : DT_E_MEMORY;
+	if (result == 0) {
+		write_script(report, script.out);
+		result = text_close(&script, 0);
 	}
 	if (result == 0)
-		result = picture_draw(text, length, &svg, message, size);
+		result = picture_draw(script.bytes, script.size, &svg, message, size);
 	else
 		snprintf(message, size, "%s", error_text(result));
 	if (result == 0) {
@@ -272,6 +272,6 @@ int spectrum_svg(const struct spectrum_report *report, FILE *out, char *message,
 		result = finished(out);
 	}
 	free(svg);
-	free(text);
+	free(script.bytes);
 	return result;
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "host/report/facts.h"
+#include "host/report/measured.h"
 #include "host/report/shock.h"
 
 enum { TEXT_GAPS_MAX = 8, TEXT_WIDTH = 90 };
@@ -66,11 +67,13 @@ static void write_flags(const struct report *report, FILE *out)
 static void write_head(const struct report *report, FILE *out)
 {
 	const struct record *r = report->record;
-	char verdict[160];
+	char verdict[160], tower[400];
 
-	fprintf(out, "%s (%s)", r->file, r->format);
+	fprintf(out, "%s (%s%s)", r->file, r->format, record_lacks_seal(r) ? ", not sealed" : "");
 	if (r->is_drop)
 		fprintf(out, ", drop %u", (unsigned)r->drop_id);
+	if (r->log_number > 0)
+		fprintf(out, ", number %u in the log", r->log_number);
 	if (r->is_drop && isfinite(r->frame_speed_m_s))
 		fprintf(out, ", frame %.3f m/s between the gates", r->frame_speed_m_s);
 	fputc('\n', out);
@@ -80,6 +83,11 @@ static void write_head(const struct report *report, FILE *out)
 		        report->scene->drop_angle_deg, report->scene->drop_height_m);
 	(void)report_verdict(report, verdict, sizeof(verdict));
 	fprintf(out, "%s\n", verdict);
+	measured_text(r, tower, sizeof(tower));
+	if (tower[0] != '\0') {
+		(void)fill(out, fprintf(out, "tower:"), tower, "");
+		fputc('\n', out);
+	}
 	write_flags(report, out);
 }
 
@@ -267,7 +275,9 @@ static void write_model(const struct report *report, FILE *out)
 			fprintf(out, " %10s\n", "-");
 	}
 	if (!compared)
-		fputs("Nothing to compare: the model speaks of channels named S1X, S1Y, S2X and S2Y.\n", out);
+		fputs("Nothing to compare: the model speaks of S1 and S2 of the tower, which has not "
+		      "recorded this.\n",
+		      out);
 	column = fprintf(out, "Model %s,", report->prediction->fidelity);
 	fill(out, column, report->prediction->reason, ".");
 	fputc('\n', out);

@@ -24,19 +24,18 @@ static struct script_window impact_window(const struct report *report, const str
 
 /* ---- the model ---- */
 
-static bool model_axis_of(const char *channel, enum model_axis *axis)
+static bool model_axis_of(const struct channel *channel, enum model_axis *axis)
 {
-	static const char *const names[MODEL_AXES] = {"S1X", "S1Y", "S2X", "S2Y"};
-
-	for (enum model_axis a = 0; a < MODEL_AXES; a++)
-		if (!strcmp(names[a], channel)) {
-			*axis = a;
-			return true;
-		}
-	return false;
+	if (channel->sensor == 0 || channel->axis == 'Z')
+		return false;
+	if (channel->sensor == 1)
+		*axis = channel->axis == 'X' ? MODEL_S1X : MODEL_S1Y;
+	else
+		*axis = channel->axis == 'X' ? MODEL_S2X : MODEL_S2Y;
+	return true;
 }
 
-bool traces_has_model(const struct report *report, const char *channel)
+bool traces_has_model(const struct report *report, const struct channel *channel)
 {
 	enum model_axis axis;
 	double start_s;
@@ -62,8 +61,7 @@ static bool model_values(const struct report *report, enum model_axis axis, stru
 /* Channels of the tower along the same axis are drawn to the same scale. */
 static bool same_scale(const struct channel *a, const struct channel *b)
 {
-	return a == b || (strlen(a->name) == 3 && strlen(b->name) == 3 && a->name[0] == 'S' &&
-	                  b->name[0] == 'S' && a->name[2] == b->name[2]);
+	return a == b || (a->sensor > 0 && b->sensor > 0 && a->axis == b->axis);
 }
 
 static struct script_range channel_range(const struct report *report, size_t channel,
@@ -80,7 +78,7 @@ static struct script_range channel_range(const struct report *report, size_t cha
 		if (!same_scale(c, &record->channels[channel]))
 			continue;
 		script_reach_samples(&range, c, report_offset(&report->analysis->channels[i]), window);
-		if (!model_axis_of(c->name, &axis) || !model_values(report, axis, window, model))
+		if (!model_axis_of(c, &axis) || !model_values(report, axis, window, model))
 			continue;
 		for (int k = 0; k < SCRIPT_CURVE_POINTS; k++)
 			script_reach(&range, model[k]);
@@ -90,7 +88,7 @@ static struct script_range channel_range(const struct report *report, size_t cha
 
 static const char *colour(const struct channel *channel)
 {
-	return !strncmp(channel->name, "S2", 2) ? SCRIPT_COLOUR_S2 : SCRIPT_COLOUR_S1;
+	return channel->sensor == 2 ? SCRIPT_COLOUR_S2 : SCRIPT_COLOUR_S1;
 }
 
 bool traces_channel(FILE *out, const struct report *report, const struct report_zero *zero, size_t channel)
@@ -101,7 +99,7 @@ bool traces_channel(FILE *out, const struct report *report, const struct report_
 	struct script_range range = channel_range(report, channel, window);
 	double offset = report_offset(e), model[SCRIPT_CURVE_POINTS];
 	enum model_axis axis;
-	bool has_model = model_axis_of(c->name, &axis) && model_values(report, axis, window, model);
+	bool has_model = model_axis_of(c, &axis) && model_values(report, axis, window, model);
 	bool has_peak = isfinite(e->peak.time_s) && isfinite(e->peak.value_g);
 	size_t points, clipped;
 
@@ -210,10 +208,11 @@ bool traces_resultant(FILE *out, const struct report *report, const struct repor
 static bool overview_shows(const struct report *report, size_t channel)
 {
 	const struct analysis *a = report->analysis;
-	const char *name = report->record->channels[channel].name;
+	const struct channel *x[] = {record_axis(report->record, "S1X"), record_axis(report->record, "S2X")};
 
-	if (record_channel(report->record, "S1X") || record_channel(report->record, "S2X"))
-		return !strcmp(name, "S1X") || !strcmp(name, "S2X");
+	if (x[0] || x[1])
+		return x[0] == &report->record->channels[channel] ||
+		       x[1] == &report->record->channels[channel];
 	for (size_t i = 0; i < a->channel_count; i++)
 		if (fabs(a->channels[i].peak.value_g) > fabs(a->channels[channel].peak.value_g))
 			return false;

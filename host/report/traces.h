@@ -15,7 +15,7 @@
 #include "host/report/facts.h"
 
 /* Whether the scene's model has that channel. */
-bool traces_has_model(const struct report *report, const char *channel);
+bool traces_has_model(const struct report *report, const struct channel *channel);
 
 /* One channel with its peak and the model. */
 bool traces_channel(FILE *out, const struct report *report, const struct report_zero *zero, size_t channel);

@@ -81,7 +81,7 @@ static bool fit_decay(struct decay *d, const struct channel *c, double offset, s
 static bool decay_of_plate(const struct report *report, struct decay *decay)
 {
 	const struct estimate_ringdown *plate = &report->analysis->plate;
-	const struct estimate_channel *s2 = report_estimate(report, "S2X");
+	const struct estimate_channel *s2 = report_axis(report, "S2X");
 	double frequency_hz = plate->frequency_hz, zeta = plate->damping_ratio;
 
 	if (!report->analysis->has_plate || !s2 || !(frequency_hz > 0.0) || !(zeta >= 0.0 && zeta < 1.0))
@@ -95,7 +95,7 @@ static bool decay_of_plate(const struct report *report, struct decay *decay)
 bool traces_ringdown(FILE *out, const struct report *report, const struct report_zero *zero, char axis)
 {
 	const char name[] = {'S', '1', axis, '\0'};
-	const struct channel *c = record_channel(report->record, name);
+	const struct channel *c = record_axis(report->record, name);
 	struct script_window whole = script_whole(report->record), window;
 	struct script_range range = {0.0, 0.0};
 	struct decay decay;
@@ -105,7 +105,7 @@ bool traces_ringdown(FILE *out, const struct report *report, const struct report
 	gsl_set_error_handler_off();
 	if (!c || !decay_of_plate(report, &decay))
 		return false;
-	offset = report_offset(report_estimate(report, name));
+	offset = report_offset(report_axis(report, name));
 	window.from_s = decay.start_s;
 	window.to_s = fmin(whole.to_s, decay.start_s + RINGDOWN_CYCLES * 2.0 * UNITS_PI / decay.omega);
 	if (!(window.to_s > window.from_s) || !fit_decay(&decay, c, offset, window))

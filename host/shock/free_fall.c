@@ -7,8 +7,6 @@
 
 #include <gsl/gsl_statistics_double.h>
 
-#include "common/units.h"
-
 #define FALL_G 0.35
 #define EDGE_G 0.5
 #define LEFT_G 0.9
@@ -90,7 +88,8 @@ static bool rests_before(const struct axes *axes, double start_s)
 }
 
 /* The run of samples [first, last] as a fall; false when it is none. */
-static bool judge(const struct axes *axes, size_t first, size_t last, struct free_fall *fall)
+static bool judge(const struct axes *axes, double gravity_m_s2, size_t first, size_t last,
+                  struct free_fall *fall)
 {
 	double dt = 1 / axes->axis[0]->rate_hz, left, met, impact, release, stop;
 
@@ -110,8 +109,8 @@ static bool judge(const struct axes *axes, size_t first, size_t last, struct fre
 	fall->sensor = axes->count > 1;
 	fall->duration_s = fall->end_s - fall->start_s;
 	fall->sigma_duration_s = hypot(release, stop);
-	fall->height_m = UNITS_G_M_S2 * fall->duration_s * fall->duration_s / 2;
-	fall->sigma_height_m = UNITS_G_M_S2 * fall->duration_s * fall->sigma_duration_s;
+	fall->height_m = gravity_m_s2 * fall->duration_s * fall->duration_s / 2;
+	fall->sigma_height_m = gravity_m_s2 * fall->duration_s * fall->sigma_duration_s;
 	return true;
 }
 
@@ -142,7 +141,7 @@ static size_t run_end(const struct axes *axes, size_t k, int step)
 }
 
 /* Looks often enough to meet every fall, and closer where there may be one. */
-static void scan(const struct axes *axes, struct free_falls *falls)
+static void scan(const struct axes *axes, double gravity_m_s2, struct free_falls *falls)
 {
 	size_t step = (size_t)(LOOK_S * axes->axis[0]->rate_hz) + 1, k = 0;
 
@@ -160,13 +159,13 @@ static void scan(const struct axes *axes, struct free_falls *falls)
 			continue;
 		}
 		last = run_end(axes, k, +1);
-		if (judge(axes, run_end(axes, k, -1), last, &fall))
+		if (judge(axes, gravity_m_s2, run_end(axes, k, -1), last, &fall))
 			keep(falls, &fall);
 		k = last + step;
 	}
 }
 
-int free_fall_find(const struct record *record, struct free_falls *falls)
+int free_fall_find(const struct record *record, double gravity_m_s2, struct free_falls *falls)
 {
 	struct axes *axes = malloc((record->channel_count + 1) * sizeof(*axes));
 	size_t count;
@@ -178,7 +177,7 @@ int free_fall_find(const struct record *record, struct free_falls *falls)
 	for (size_t most = AXES_MAX; most > 0; most--)
 		for (size_t i = 0; i < count; i++)
 			if (axes[i].count == most)
-				scan(&axes[i], falls);
+				scan(&axes[i], gravity_m_s2, falls);
 	free(axes);
 	return 0;
 }

@@ -30,8 +30,8 @@ struct free_falls {
 	size_t count;
 };
 
-/* The first FREE_FALLS_MAX. One that several channels show is told once, by the sensor with the most axes.
- * 0 or DT_E_MEMORY. */
-DT_MUST_USE int free_fall_find(const struct record *record, struct free_falls *falls);
+/* The first FREE_FALLS_MAX, heights by the gravity at the site. One that several channels show is told once,
+ * by the sensor with the most axes. 0 or DT_E_MEMORY. */
+DT_MUST_USE int free_fall_find(const struct record *record, double gravity_m_s2, struct free_falls *falls);
 
 #endif

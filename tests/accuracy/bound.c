@@ -8,7 +8,7 @@
 #include <gsl/gsl_linalg.h>
 
 #define PI 3.14159265358979323846
-#define G_M_S2 9.81
+#define G_M_S2 9.80665
 
 enum { UNKNOWNS_MAX = 8, ONSETS = 6, LAG_EVERY = 3, SAMPLES_MAX = 2000 };
 

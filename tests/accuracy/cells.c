@@ -9,7 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#define G_M_S2 9.81
+#define G_M_S2 9.80665
 #define GROSS 0.15
 
 enum { SCENES_MAX = 200 };

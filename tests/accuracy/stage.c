@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/drop.h"
 #include "tests/accuracy/stage.h"
 
 #include <math.h>
@@ -83,6 +84,7 @@ void stage_open(struct stage *stage, const struct scene *scene)
 		if (!record_add_channel(&stage->record, names[i], stage_rate((enum stage_channel)i),
 		                        (size_t)((STAGE_PRE_S + POST_S) * stage_rate((enum stage_channel)i))))
 			abort();
+	drop_set_axes(&stage->record);
 	stage->onset_s = STAGE_PRE_S;
 }
 

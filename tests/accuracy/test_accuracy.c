@@ -64,7 +64,7 @@ static void bounds_agree_with_closed_forms(void **state)
 	assert_near_part(b.peak_g[0], peak, 0.005);
 	assert_near_part(b.peak_s[0], instant, 0.005);
 	assert_near_part(b.contact_s[0], contact, 0.01);
-	assert_near_part(b.velocity_m_s[0], 9.81 * sqrt(0.9995 * STAGE_CONTACT_S / 7000), 0.005);
+	assert_near_part(b.velocity_m_s[0], 9.80665 * sqrt(0.9995 * STAGE_CONTACT_S / 7000), 0.005);
 	assert_near_part(b.frequency_hz[0], hz, 0.06);
 	assert_near_part(b.joint_hz, 1 / sqrt(pow(b.frequency_hz[0], -2) + pow(b.frequency_hz[1], -2)), 0.01);
 }

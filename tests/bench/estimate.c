@@ -181,7 +181,7 @@ static void list_shocks(void *context)
 	struct events events;
 
 	must(events_find(&material->record, &options, &events) == 0, "the shocks");
-	must(free_fall_find(&material->record, &falls) == 0, "the falls");
+	must(free_fall_find(&material->record, UNITS_G_M_S2, &falls) == 0, "the falls");
 }
 
 static double own_solution[UNKNOWNS], gsl_solution[UNKNOWNS];

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/drop.h"
 #include "tests/bench/material.h"
 
 #include <math.h>
@@ -75,6 +76,7 @@ void material_make(struct material *material, enum material_kind kind)
 	material->contact_end_s = ONSET_S + BASE_S;
 	material->record.channels = material->channel;
 	material->record.channel_count = MATERIAL_CHANNELS;
+	drop_set_axes(&material->record);
 	material->record.is_drop = true;
 	material->record.trigger_s = ONSET_S + 0.0002;
 }

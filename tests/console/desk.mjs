@@ -159,17 +159,27 @@ export class Desk {
 		await this.untilText("#series-head", new RegExp(name));
 	}
 
-	/* A machine that is too busy loses heartbeats, and then the tower holds a fault, as it must. */
+	/* Whatever opened a guard is acknowledged, each drop does. A machine that is too busy loses heartbeats, and then the
+	 * tower holds a fault, as it must. */
 	async ready() {
-		await this.until({ step: ["arm", "fault"] });
-		if (await this.data("step") === "fault")
-			await this.click("#clear");
-		await this.until({ step: "arm", state: "READY" });
+		const asked = this.page.locator("#acknowledge:enabled:visible, #clear:enabled:visible");
+		const armable = this.page.locator('html[data-step="arm"][data-state="READY"]');
+		for (let asks = 0; asks < 10; asks++) {
+			await asked.or(armable).waitFor();
+			if (await armable.count())
+				return;
+			await this.key("Shift+C");
+			await asked.waitFor({ state: "hidden", ...SOON }).catch(() => note("a CLEAR did nothing yet"));
+			this.forgive("clear"); // a guard may have opened in between
+		}
+		throw new Error("the tower asks again and again to be acknowledged or cleared");
 	}
 
 	async arm() {
 		await this.again(async () => {
 			await this.ready();
+			if (await this.page.locator("#arm-cancel").isVisible()) // an attempt before got as far as that
+				await this.click("#arm-cancel", SOON);
 			await this.click("#arm", SOON);
 			await this.click("#arm-confirm", SOON);
 			await this.until({ step: "release", state: "ARMED" }, SOON.timeout);
@@ -182,7 +192,7 @@ export class Desk {
 			if (tries > 1 && underWay.includes(await this.data("step")))
 				return; // it was only slow to show
 			await this.arm();
-			await this.click("#release", SOON);
+			await this.click("#release"); // once it can be: not while horn and lamp warn
 			await this.until({ step: underWay }, SOON.timeout);
 		});
 	}
@@ -196,9 +206,15 @@ export class Desk {
 				if (tries === 3)
 					throw error;
 				note(`tried again: ${error.message.split("\n")[0]}`);
-				this.errors = this.errors.filter((text) => !/status of 4\d\d .*api\/(arm|release)/.test(text));
+				this.forgive("arm");
+				this.forgive("release");
 			}
 		}
+	}
+
+	/* A request that the tower refused, as it may, is no error of the page. */
+	forgive(request) {
+		this.errors = this.errors.filter((text) => !(/status of 4\d\d /.test(text) && text.endsWith(`/api/${request}`)));
 	}
 
 	/* Released, and something else at once: with the console's answer, before the page hears of it. */

@@ -25,7 +25,7 @@ for (let drop = 1; drop <= 5; drop++) {
 	await desk.click("#accept");
 	await page.waitForSelector(`#series-table tr[data-drop="${SERIES}/${drop}"][data-decision="accepted"]`);
 }
-await desk.until({ state: "READY" });
+await desk.ready();
 await desk.click("#tab-overlay");
 await page.waitForSelector("#overlay canvas");
 await page.getByRole("button", { name: "Pulse" }).locator("visible=true").click();

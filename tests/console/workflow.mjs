@@ -3,7 +3,7 @@
 // A technician's afternoon at the simulated tower that the console starts for itself: one series of five drops, one
 // of them rejected; ABORT wherever it can be needed; a reload and a second console in the middle of it.
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
+import { chmodSync, readFileSync, renameSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { Desk, browse } from "./desk.mjs";
 import { look } from "./looks.mjs";
@@ -84,16 +84,61 @@ async function armByKey() {
 	await desk.untilText("#countdown", /^\d+$/);
 }
 
+/* A tower that has just been switched on asks for it; nothing else makes it ready. */
+async function acknowledgeByKey() {
+	await desk.until({ step: "checks", state: "SAFE" });
+	await desk.page.waitForSelector(check("ACKNOWLEDGE", "no"));
+	await desk.untilText("#checks-say", /^A guard was open, or the tower was off\..* Then acknowledge\.$/);
+	assert.ok(!await desk.page.locator("#arm").isVisible(), "nothing to arm with");
+	await desk.states();
+	await look(desk, "2-acknowledge");
+	assert.ok(!(await desk.states()).includes("READY"), "ready without being acknowledged");
+	await desk.key("Shift+C");
+	await desk.page.waitForSelector(check("ACKNOWLEDGE", "yes"));
+	await desk.until({ step: "arm", state: "READY" });
+}
+
+/* In the page: key and button during the warning, which is over before a program outside could be sure of it. */
+function tooEarly() {
+	const button = document.querySelector("#release");
+	if (button.dataset.warns !== "yes" || button.offsetParent === null)
+		return null;
+	document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "R", shiftKey: true, bubbles: true, cancelable: true }));
+	button.click();
+	return { isDisabled: button.disabled, says: document.querySelector("#release-say").textContent };
+}
+
+/* Neither key nor button does anything while horn and lamp warn. */
+async function warningByKey() {
+	const asked = [];
+	const listen = (request) => asked.push(request.url());
+	desk.page.on("request", listen);
+	const early = await desk.again(async () => {
+		await armByKey();
+		const found = await desk.page.waitForFunction(tooEarly, null, { polling: 20, timeout: 4000 });
+		await desk.picture("5-warning");
+		return found.jsonValue();
+	});
+	assert.ok(early.isDisabled, "RELEASE during the warning");
+	assert.match(early.says, /^Horn and lamp warn: \d+ s\. Nobody near the tower\?$/);
+	await desk.page.waitForSelector("#release:enabled");
+	desk.page.off("request", listen);
+	await desk.untilText("#release-say", /Then release/);
+	assert.equal(await desk.data("state"), "ARMED");
+	assert.ok(!asked.some((url) => url.endsWith("/api/release")), "nothing was asked of the tower");
+}
+
 async function dropByKey() {
 	await desk.until({ step: "arm", state: "READY" });
 	await look(desk, "3-arm");
 	await desk.key("Shift+A");
 	await look(desk, "4-confirm");
-	await armByKey();
+	await warningByKey();
 	await look(desk, "5-release");
 	await desk.key("Escape");
 	await desk.again(async () => {
 		await armByKey();
+		await desk.page.waitForSelector("#release:enabled");
 		await desk.states();
 		await desk.key("Shift+R");
 		await desk.until({ step: "moving" }, 4000);
@@ -118,7 +163,7 @@ async function simulated(fault, isOn) {
 }
 
 async function faultPanel() {
-	await desk.until({ step: "arm", state: "READY" });
+	await desk.ready();
 	for (const [fault, name, words] of [["estop", "ESTOP", /emergency stop/i], ["door_open", "DOOR", /close the door/i],
 		["supply_low", "SUPPLY", /supply/i], ["dampers_out", "DAMPERS", /damper/i], ["cable_s1", "OPEN_S1", /plug/i]]) {
 		await desk.page.waitForSelector(check(name, "yes"));
@@ -131,6 +176,10 @@ async function faultPanel() {
 			await look(desk, "2-checks");
 		await simulated(fault, false);
 		await desk.page.waitForSelector(check(name, "yes"));
+		if (["ESTOP", "DOOR"].includes(name)) { // the others are no guards: their being good is enough
+			await desk.page.waitForSelector(check("ACKNOWLEDGE", "no"));
+			await desk.click("#acknowledge");
+		}
 		await desk.until({ step: "arm", state: "READY" });
 	}
 }
@@ -150,7 +199,7 @@ async function abortAtRest() {
 	await desk.until({ state: "SAFE" });
 	await desk.abort("SAFE");
 	await simulated("estop", false);
-	await desk.until({ step: "arm", state: "READY" });
+	await desk.ready();
 	await desk.abort("READY");
 	await desk.until({ step: "arm", state: "READY" });
 }
@@ -394,6 +443,48 @@ async function history() {
 	await desk.click("#view-drop");
 }
 
+/* Somebody changes a byte of a log and takes another away. Both say so by name, offer no Accept and are in no mean. */
+async function altered() {
+	const rows = (await drops(SERIES)).drops;
+	const [bad, gone] = [2, 4].map((number) => join(archive, rows[number - 1].raw));
+	const whole = readFileSync(bad, "latin1");
+	const at = whole.lastIndexOf("4");
+	chmodSync(bad, 0o644);
+	writeFileSync(bad, `${whole.slice(0, at)}5${whole.slice(at + 1)}`, "latin1");
+	renameSync(gone, `${gone}.away`);
+	const row = (table, number) => `${table} tr[data-drop="${SERIES}/${number}"]`;
+	for (const [view, table, open] of [
+		["#view-history", "#history-drops", async () => {
+			await desk.page.fill("#history-text", "");
+			await desk.click("#history-go");
+			await desk.page.click(`#history-list tr[data-series="${SERIES}"] button`);
+		}],
+		["#view-drop", "#series-table", async () => {}]]) {
+		await desk.click(view);
+		await open();
+		for (const [number, state, file] of [[2, "altered", rows[1].raw], [4, "missing", rows[3].raw]]) {
+			await desk.page.waitForSelector(`${row(table, number)}[data-state="${state}"]`);
+			const says = await desk.text(`${row(table, number)} .decision`);
+			assert.ok(says.includes(`⚠ ${state}`) && says.includes(file), says);
+			assert.equal(await desk.page.locator(`${row(table, number)} .accept`).count(), 0, "nobody may accept it");
+			assert.equal(await desk.page.locator(`${row(table, number)} .reject`).count(), 1);
+		}
+		assert.equal(await desk.page.locator(`${row(table, 5)}[data-state="recorded"][data-decision="accepted"]`).count(), 1);
+		await desk.untilText(`${table} tr[data-row="n"]`, /^n2{11}$/);
+	}
+	await desk.untilText("#series-head", /4 of 5 accepted, 1 rejected, 2 altered or missing/);
+	await look(desk, "12-altered");
+	await desk.click("#view-history");
+	await desk.click("#history-go");
+	await desk.untilText(`#history-list tr[data-series="${SERIES}"] td[data-label="partial"]`, /^2 altered or missing$/);
+	writeFileSync(bad, whole, "latin1");
+	renameSync(`${gone}.away`, gone);
+	await desk.page.click(`#history-list tr[data-series="${SERIES}"] button`);
+	for (const number of [2, 4])
+		await desk.page.waitForSelector(`${row("#history-drops", number)}[data-state="recorded"][data-decision="accepted"]`);
+	await desk.click("#view-drop");
+}
+
 /* The drop that was kept; none within five seconds when nothing fell. */
 async function kept(series) {
 	for (let tries = 0; tries < 25; tries++) {
@@ -438,6 +529,7 @@ async function abortAfterRelease() {
 async function tooHigh() {
 	await desk.click("#change-series");
 	await desk.setUp({ name: "high", scene: "geometry-2A", angle: 25, height: 4, planned: 1 });
+	await desk.ready(); // as the tower has it
 	await desk.untilText("#state", /^NOT READY$/);
 	assert.notEqual(await desk.page.getAttribute("#state-tile", "data-state"), "READY");
 	for (const where of ["#state-text", "#arm-say"])
@@ -471,6 +563,7 @@ export default {
 		["what must always be seen is", alwaysVisible],
 		["ABORT by key while a list is open", abortFromAList],
 		["set-up by keyboard", setUpByKey],
+		["a tower that was switched on is acknowledged by keyboard", acknowledgeByKey],
 		["a drop by keyboard", dropByKey],
 		["each fault of the panel turns its check red, with words, and green again", faultPanel],
 		["ABORT by key in SAFE and READY", abortAtRest],
@@ -490,6 +583,7 @@ export default {
 		["the accepted drops over each other, with the model", overlay],
 		["table as CSV, report as one file", files],
 		["history: search, any drops over each other", history],
+		["a log that was altered and one that is gone: said by name, in no mean, not to be accepted", altered],
 		["ABORT after the release brakes, and the drop is kept with a note", abortAfterRelease],
 		["a tower that cannot be set up is not called ready, and why is shown in full", tooHigh],
 		["no error on the page; the console ends in order", nothingWrong],

@@ -9,7 +9,7 @@ MUTATED_C = firmware/sequence.c firmware/command.c firmware/stream.c firmware/ca
 	common/segment.c host/record/join.c
 MUTATED_O = $(MUTATED_C:%.c=$(BUILD)/mutate/%.o)
 # The unit tests that come near them. Not test_port_faults: thousands of drops for each mutant.
-MUTATED_BY = sequence command stream capture wire segment join acquire health parameter
+MUTATED_BY = sequence hosts input measure command stream capture wire segment join acquire health parameter
 MUTATED_UNIT_C = $(wildcard $(foreach m,$(MUTATED_BY),tests/unit/test_$m.c tests/unit/test_$m_*.c))
 MUTATED_UNITS = $(MUTATED_UNIT_C:tests/unit/%.c=$(BUILD)/mutate/%)
 
@@ -20,7 +20,7 @@ $(BUILD)/mutate/%.src.i: %.c Makefile
 	$(Q)clang -std=c11 $(if $(filter $(FREESTANDING_C),$<),-ffreestanding,$(LINUX)) $(CPPFLAGS) -E -MMD -MP -MT $@ \
 		-MF $(@:.i=.d) $< -o $@
 
-$(BUILD)/mutate/%.i: $(BUILD)/mutate/%.src.i tests/fault/instrument
+$(BUILD)/mutate/%.i: $(BUILD)/mutate/%.src.i tests/fault/instrument tests/fault/fault.mk
 	$(call say,MUTATE,$*.c)
 	$(Q)tests/fault/instrument $$(echo $(MUTATED_C) | tr ' ' '\n' | grep -n '^$*.c$$' | cut -d: -f1)0000 $< $@ \
 		$(BUILD)/mutate/$(subst /,-,$*).json $*.c $(if $(filter %wire,$*),common/wire.def)
@@ -65,6 +65,12 @@ $(BUILD)/tests/test_port_faults: LDFLAGS += $(WRAPPED:%=-Wl,--wrap=%)
 WRAPPED_LINK = calloc malloc strdup fopen poll epoll_create1 epoll_ctl epoll_wait eventfd fstat stat lstat flock dup \
 	socket bind listen connect accept4 send recv read write tcgetattr tcsetattr tcflush open
 $(BUILD)/tests/test_link_faults: LDFLAGS += $(WRAPPED_LINK:%=-Wl,--wrap=%)
+
+# ---- failing calls of the programs ---------------------------------------------------------------------------
+
+.PHONY: faults
+faults: setup-test all ## fail every Nth call of each kind in the commands, once, and say what came of it
+	@tests/fault/calls $(BUILD) 40
 
 # ---- canaries: what must be caught, built exactly as the unit tests are ------------------------------------
 

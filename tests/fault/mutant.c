@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 enum {
-	MUTANTS_MAX = 100000,
+	MUTANTS_MAX = 200000,
 	MUTANT_KILLED = 99,
 };
 

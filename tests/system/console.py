@@ -173,14 +173,22 @@ class Console:
         self.post("/api/select", {"series": name})
 
     def ready(self, stream):
-        """At rest and green, also after a pause of the machine that outlasted an ARM or the heartbeat of 500 ms."""
+        """At rest, acknowledged and green, also after a pause of the machine that outlasted an ARM or the heartbeat of
+        500 ms."""
         while True:
             old = stream.state
-            state = stream.wait(lambda s: s is not old and (self.is_ready(s) or s["tower"]["state"] == "FAULT_HELD" and
-                                                            s["tower"]["fault"] == "HOST_LOST"), "all checks green")
+            state = stream.wait(lambda s: s is not old and (
+                self.is_ready(s) or self.to_acknowledge(s) or
+                s["tower"]["state"] == "FAULT_HELD" and s["tower"]["fault"] == "HOST_LOST"), "all checks green")
             if self.is_ready(state):
                 return state
-            self.clear()
+            self.post("/api/clear", expect=None)
+
+    @staticmethod
+    def to_acknowledge(state):
+        """Guards were open, and are good again."""
+        red = {c["name"] for c in state["checks"] if not c["green"]}
+        return state["tower"]["state"] == "SAFE" and "ACKNOWLEDGE" in red and not red & {"ESTOP", "DOOR", "LATCH", "PRODUCT"}
 
     @staticmethod
     def is_ready(state):
@@ -190,7 +198,7 @@ class Console:
 
     def arm(self):
         answer = self.post("/api/arm")
-        assert answer["token"] > 0 and 0 < answer["expires_s"] <= 60, answer
+        assert 0 <= answer["token"] < 2**32 and 0 < answer["warning_s"] < answer["expires_s"] <= 60, answer
         return answer["token"]
 
     def drop(self, stream):
@@ -221,6 +229,9 @@ class Console:
             if state["tower"]["phase"] == "idle" and state["tower"]["state"] == "READY":
                 return False  # it has been, and the tower has let go of it
             status, _, answer = self.ask("POST", "/api/release", {"token": token})
+            while status == 425:  # horn and lamp warn
+                time.sleep(0.05)
+                status, _, answer = self.ask("POST", "/api/release", {"token": token})
         if status == 409 and (b"no host heartbeat" in answer or b"start a host" in answer):
             return False
         equal(status, 200, f"ARM and RELEASE: {answer[:300]}")

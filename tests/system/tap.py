@@ -16,6 +16,7 @@ BUILD = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else "build")
 SANITIZED = os.path.abspath(sys.argv[2] if len(sys.argv) > 2 else "build/sanitize")
 SHARED_DATA = os.path.join(ROOT, "..", "shared", "data")
 SCENE = "common/scenes/geometry-2A.ini"
+os.environ.setdefault("DROPTOWER_JOURNAL", os.path.join(BUILD, "tests", "journal.log"))  # not the one of who runs this
 
 
 class Skip(Exception):

@@ -99,9 +99,51 @@ uint32_t hand_drop_crc32(const struct hand_drop *drop)
 	return crc;
 }
 
+/* Not one is as at first, and each another. */
+static uint32_t parameter(unsigned i)
+{
+	return 100000 + 7 * i;
+}
+
+static uint32_t parameters_crc32(void)
+{
+	uint8_t bytes[4 * HAND_PARAMETERS];
+
+	for (unsigned i = 0; i < HAND_PARAMETERS; i++)
+		put_le(bytes + 4 * i, parameter(i), 4);
+	return hand_crc32(bytes, sizeof(bytes));
+}
+
+void hand_told(const struct hand_drop *drop, unsigned i, struct frame *frame)
+{
+	*frame = (struct frame){.id = 0x687, .flags = FRAME_FD | FRAME_BRS, .length = 8, .time_us = 1};
+	put_le(frame->data, drop->drop_id, 2);
+	if (i > 0) {
+		put_le(frame->data + 2, 0x2000 + i - 1, 2);
+		put_le(frame->data + 4, parameter(i - 1), 4);
+		return;
+	}
+	frame->id = 0x686;
+	frame->length = 24;
+	put_le(frame->data + 2, 8123, 2);    /* drop-out, us */
+	put_le(frame->data + 4, 8000, 2);    /* used */
+	put_le(frame->data + 6, 3870, 2);    /* mm/s */
+	put_le(frame->data + 8, 780123, 4);  /* um */
+	put_le(frame->data + 12, 9712, 2);   /* mm/s2 */
+	put_le(frame->data + 14, 0xFFFF, 2); /* latch: not measured */
+	put_le(frame->data + 16, 0xFFFD, 2); /* -3 ppm */
+	put_le(frame->data + 18, 70, 2);     /* us */
+	put_le(frame->data + 20, hand_crc32(frame->data, 20), 4);
+}
+
+void hand_seal(struct frame *frame)
+{
+	put_le(frame->data + 28, hand_crc32(frame->data, 28), 4);
+}
+
 void hand_capture_end(const struct hand_drop *drop, struct frame *frame)
 {
-	*frame = (struct frame){.id = 0x681, .flags = FRAME_FD | FRAME_BRS, .length = 24, .time_us = 1};
+	*frame = (struct frame){.id = 0x681, .flags = FRAME_FD | FRAME_BRS, .length = 32, .time_us = 1};
 	put_le(frame->data, drop->drop_id, 2);
 	put_le(frame->data + 2, drop->marks, 2);
 	put_le(frame->data + 4, drop->first_tick_ms, 4);
@@ -110,6 +152,8 @@ void hand_capture_end(const struct hand_drop *drop, struct frame *frame)
 	put_le(frame->data + 16, hand_drop_crc32(drop), 4);
 	put_le(frame->data + 20, drop->frame_speed_mm_s, 2);
 	put_le(frame->data + 22, (uint16_t)drop->camera_frame, 2);
+	put_le(frame->data + 24, parameters_crc32(), 4);
+	hand_seal(frame);
 }
 
 size_t hand_candump(const struct frame *frame, int64_t time_us, char line[256])
@@ -187,6 +231,21 @@ void hand_check_equal(const struct record *a, const struct record *b)
 	assert_int_equal(a->crc_known, b->crc_known);
 	assert_int_equal(a->camera_frame, b->camera_frame);
 	assert_int_equal(a->crc_agrees, b->crc_agrees);
+	assert_int_equal(a->seal_known, b->seal_known);
+	assert_int_equal(a->seal, b->seal);
+	assert_int_equal(a->seal_agrees, b->seal_agrees);
+	assert_int_equal(a->parameters_crc32, b->parameters_crc32);
+	assert_int_equal(a->measured_known, b->measured_known);
+	if (a->measured_known) {
+		assert_int_equal(a->measured.dropout_us, b->measured.dropout_us);
+		assert_int_equal(a->measured.dropout_used_us, b->measured.dropout_used_us);
+		assert_int_equal(a->measured.separation_mm_s, b->measured.separation_mm_s);
+		assert_int_equal(a->measured.separation_um, b->measured.separation_um);
+		assert_int_equal(a->measured.acceleration_mm_s2, b->measured.acceleration_mm_s2);
+		assert_int_equal(a->measured.latch_delay_us, b->measured.latch_delay_us);
+		assert_int_equal(a->measured.clock_ppm, b->measured.clock_ppm);
+		assert_int_equal(a->measured.trigger_latency_us, b->measured.trigger_latency_us);
+	}
 	assert_memory_equal(&a->counters, &b->counters, sizeof(a->counters));
 	assert_int_equal(a->gap_count, b->gap_count);
 	for (size_t i = 0; i < a->gap_count; i++)

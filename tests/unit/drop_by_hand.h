@@ -12,7 +12,7 @@
 #include "common/frame.h"
 #include "host/record/record.h"
 
-enum { HAND_TICKS_MAX = 1024, HAND_PER_TICK = 27 };
+enum { HAND_TICKS_MAX = 1024, HAND_PER_TICK = 27, HAND_PARAMETERS = 21 };
 
 struct hand_drop {
 	uint16_t drop_id, marks;
@@ -35,6 +35,9 @@ void hand_fill(struct hand_drop *drop, uint32_t first_tick_ms, uint32_t ticks, u
 void hand_block(const struct hand_drop *drop, unsigned sensor, uint32_t tick, bool resent,
                 struct frame *frame);
 void hand_capture_end(const struct hand_drop *drop, struct frame *frame);
+void hand_seal(struct frame *frame); /* again, after a change by hand */
+/* What follows it: 0 what the drop measured, then the parameters. */
+void hand_told(const struct hand_drop *drop, unsigned i, struct frame *frame);
 uint32_t hand_drop_crc32(const struct hand_drop *drop);
 
 /* candump -L text of a frame at time_us; returns its length. */

@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware/port.h"
-
 struct fake_port fake;
 
 void fake_init(void)
@@ -14,6 +12,7 @@ void fake_init(void)
 	fake.inputs = FAKE_ALL_GOOD;
 	fake.can_room = UINT32_MAX;
 	fake.outputs = WIRE_IO_MAGNET_HOLD;
+	fake.random = 0x9E3779B9;
 }
 
 void fake_time(uint32_t now_us)
@@ -28,6 +27,8 @@ void fake_time(uint32_t now_us)
 
 void fake_receive(const struct frame *frame)
 {
+	if (fake.tape != NULL)
+		fake.tape(frame);
 	if (fake.received_next == fake.received_count)
 		fake.received_next = fake.received_count = 0;
 	if (fake.received_count == FAKE_RECEIVED_MAX)
@@ -58,6 +59,13 @@ uint32_t fake_random(uint32_t *seed)
 	*seed ^= *seed >> 17;
 	*seed ^= *seed << 5;
 	return *seed;
+}
+
+/* Main may be interrupted here. */
+static void interrupt(void)
+{
+	if (fake.interrupt != NULL && fake.locks == 0)
+		fake.interrupt();
 }
 
 uint32_t port_time_us(void)
@@ -114,7 +122,8 @@ int port_can_setup(bool classic, uint32_t data_kbit_s)
 
 int port_can_send(const struct frame *frame)
 {
-	if (fake.can_full || fake.bus_off || fake.can_room == 0)
+	interrupt();
+	if (fake.can_full || fake.bus == PORT_BUS_OFF || fake.can_room == 0)
 		return DT_E_FULL;
 	if (fake.sent_count == FAKE_SENT_MAX)
 		abort();
@@ -125,20 +134,46 @@ int port_can_send(const struct frame *frame)
 
 int port_can_receive(struct frame *frame)
 {
+	interrupt();
 	if (fake.received_next == fake.received_count)
 		return 0;
 	*frame = fake.received[fake.received_next++];
 	return 1;
 }
 
-uint32_t port_can_errors(bool *bus_off)
+void port_keep(uint8_t byte)
 {
-	*bus_off = fake.bus_off;
+	fake.kept = byte;
+}
+
+uint8_t port_kept(void)
+{
+	return fake.kept;
+}
+
+int port_random(uint32_t *value)
+{
+	if (fake.no_random)
+		return DT_E_SYSTEM;
+	*value = fake.random;
+	fake.random = fake.random * 1664525u + 1013904223u;
+	return 0;
+}
+
+bool port_brown_out_set(void)
+{
+	return !fake.brown_out_unset;
+}
+
+uint32_t port_can_errors(enum port_bus *state)
+{
+	*state = fake.bus;
 	return fake.bus_errors;
 }
 
 void port_watchdog_kick(void)
 {
+	interrupt();
 	fake.kicks++;
 }
 
@@ -149,6 +184,7 @@ void port_reset(void)
 
 void port_lock(void)
 {
+	interrupt();
 	if (fake.locks++ != 0)
 		abort(); /* not nested */
 }
@@ -157,4 +193,5 @@ void port_unlock(void)
 {
 	if (--fake.locks != 0)
 		abort();
+	interrupt();
 }

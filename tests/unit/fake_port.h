@@ -10,9 +10,10 @@
 
 #include "common/frame.h"
 #include "common/wire.h"
+#include "firmware/port.h"
 
 enum {
-	FAKE_SENT_MAX = 4096,
+	FAKE_SENT_MAX = 16384,
 	FAKE_RECEIVED_MAX = 64,
 	FAKE_ALL_GOOD = WIRE_IO_LATCH_CLOSED | WIRE_IO_PRODUCT_HELD | WIRE_IO_DAMPERS_ENGAGED |
 	                WIRE_IO_DOOR_CLOSED | WIRE_IO_ESTOP_CLEAR | WIRE_IO_SUPPLY_GOOD | WIRE_IO_IEPE_S1 |
@@ -27,7 +28,8 @@ struct fake_port {
 	uint32_t off_us[16]; /* when it comes, or came; by bit */
 	struct frame sent[FAKE_SENT_MAX];
 	unsigned sent_count;
-	bool can_full, bus_off;
+	bool can_full;
+	enum port_bus bus;
 	uint32_t can_room;    /* frames the controller takes; as many as come at first */
 	bool no_fd;           /* port_can_setup refuses FD */
 	bool no_setup;        /* and everything else */
@@ -38,7 +40,13 @@ struct fake_port {
 	struct frame received[FAKE_RECEIVED_MAX];
 	unsigned received_count, received_next;
 	unsigned kicks, resets;
-	int locks; /* now held: 0 or 1 */
+	int locks;               /* now held: 0 or 1 */
+	uint8_t kept;            /* over a reset */
+	uint32_t random;         /* the next port_random; it counts on */
+	bool no_random;          /* the generator does not deliver */
+	bool brown_out_unset;    /* the option bytes are not set */
+	void (*interrupt)(void); /* called where main may be interrupted, but not while locked */
+	void (*tape)(const struct frame *frame); /* sees what the firmware is given */
 };
 
 extern struct fake_port fake;

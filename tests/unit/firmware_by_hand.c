@@ -23,8 +23,10 @@ static void host_beat(void)
 {
 	struct frame frame;
 
-	wire_pack_heartbeat(&frame, WIRE_ID_HEARTBEAT_HOST,
-	                    &(struct wire_heartbeat){.nmt_state = 5, .wire_hash = by_hand.host_hash});
+	wire_pack_host_heartbeat(&frame, WIRE_ID_HEARTBEAT_HOST,
+	                         &(struct wire_host_heartbeat){.nmt_state = 5,
+	                                                       .session = by_hand.session,
+	                                                       .wire_hash_low = (uint16_t)by_hand.host_hash});
 	fake_receive(&frame);
 }
 
@@ -33,12 +35,25 @@ void firmware_forget_frames(void)
 	fake.sent_count = 0;
 }
 
+/* What the tower does by itself. */
+static void world(void)
+{
+	if (by_hand.down_ms != 0 && by_hand.next_ms == by_hand.down_ms)
+		fake.inputs |= WIRE_IO_FRAME_DOWN;
+	if (by_hand.keeper_us != 0 && (int32_t)(by_hand.next_ms * 1000 - by_hand.keeper_us) >= 0) {
+		app_on_keeper(by_hand.keeper_us);
+		fake.inputs &= (uint16_t)~WIRE_IO_PRODUCT_HELD;
+		by_hand.keeper_us = 0;
+	}
+}
+
 /* One millisecond; main runs after each sample instant of Y. */
 void firmware_run_ms(void)
 {
 	fake_time(by_hand.next_ms * 1000);
 	if (by_hand.host_alive && by_hand.next_ms % 100 == 10)
 		host_beat();
+	world();
 	app_on_turn();
 	app_on_tick();
 	for (int k = 0; k < 10; k++) {
@@ -62,11 +77,10 @@ void firmware_run(unsigned ms)
 void firmware_power_on(enum port_reset cause)
 {
 	fake_init();
-	by_hand.next_ms = 0;
-	by_hand.host_alive = true;
-	by_hand.host_hash = wire_hash();
-	by_hand.s2x = 0;
-	by_hand.s2y_offset = 0;
+	by_hand = (struct firmware_by_hand){.host_alive = true,
+	                                    .host_hash = wire_hash(),
+	                                    .session = FIRMWARE_SESSION,
+	                                    .dropout_us = FIRMWARE_DROPOUT_US};
 	app_init(cause);
 }
 
@@ -97,11 +111,13 @@ uint32_t firmware_counter(unsigned index)
 	return 0;
 }
 
-struct wire_reply firmware_order(unsigned op, uint16_t token, uint32_t argument)
+struct wire_reply firmware_order(unsigned op, uint32_t argument)
 {
 	static uint8_t sequence;
-	struct wire_command command = {
-	        .op = (uint8_t)op, .sequence = ++sequence, .token = token, .argument = argument};
+	struct wire_command command = {.op = (uint8_t)op,
+	                               .sequence = ++sequence,
+	                               .host = (uint16_t)by_hand.session,
+	                               .argument = argument};
 	struct wire_reply reply = {0};
 	struct frame frame;
 
@@ -134,6 +150,53 @@ struct wire_sdo firmware_sdo(unsigned specifier, unsigned index, unsigned subind
 	return m;
 }
 
+static uint32_t read_parameters(void)
+{
+	static const uint16_t indices[WIRE_PARAMETERS] = {
+#define WIRE_PARAMETER(name, index, unit, min, max, initial, doc) index,
+#include "common/wire.def"
+	};
+	uint32_t value[WIRE_PARAMETERS];
+
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
+		value[i] = firmware_sdo(0x40, indices[i], 0, 0).value;
+	return wire_parameters_crc32(value);
+}
+
+struct wire_reply firmware_arm(void)
+{
+	struct wire_reply reply;
+	struct wire_armed armed;
+
+	by_hand.parameters = read_parameters();
+	reply = firmware_order(WIRE_OP_ARM, wire_arm_key(by_hand.session, by_hand.parameters));
+	if (reply.result == 0) {
+		assert_int_equal(fake_count(WIRE_ID_ARMED), 1);
+		assert_true(firmware_last(WIRE_ID_ARMED) < firmware_last(WIRE_ID_REPLY));
+		assert_int_equal(wire_unpack_armed(firmware_last(WIRE_ID_ARMED), &armed), 0);
+		assert_int_equal(armed.host, (uint16_t)by_hand.session);
+		by_hand.nonce = armed.nonce;
+	}
+	return reply;
+}
+
+struct wire_reply firmware_release(unsigned drop_id)
+{
+	return firmware_order(WIRE_OP_RELEASE,
+	                      wire_release_key(by_hand.nonce, (uint16_t)drop_id, by_hand.parameters));
+}
+
+void firmware_wait_for_warning(void)
+{
+	firmware_run(1000);
+}
+
+void firmware_acknowledge(void)
+{
+	assert_int_equal(firmware_order(WIRE_OP_CLEAR, 0).result, 0);
+	firmware_run(1005);
+}
+
 void firmware_ask(unsigned sensor, uint32_t first_ms, unsigned count)
 {
 	struct frame frame;
@@ -149,24 +212,25 @@ void firmware_to_ready(void)
 {
 	firmware_power_on(PORT_RESET_POWER_ON);
 	firmware_run(250);
+	firmware_acknowledge();
 	assert_int_equal(firmware_status().state, WIRE_STATE_READY);
 }
 
 void firmware_to_armed(void)
 {
 	firmware_to_ready();
-	assert_int_equal(firmware_order(WIRE_OP_ARM, FIRMWARE_TOKEN, 0).result, 0);
+	assert_int_equal(firmware_arm().result, 0);
 }
 
 void firmware_fall(unsigned drop_id)
 {
 	struct wire_reply reply;
 
-	assert_int_equal(firmware_order(WIRE_OP_ARM, FIRMWARE_TOKEN, 0).result, 0);
-	reply = firmware_order(WIRE_OP_RELEASE, FIRMWARE_TOKEN, 0);
+	assert_int_equal(firmware_arm().result, 0);
+	firmware_wait_for_warning();
+	reply = firmware_release(drop_id);
 	assert_int_equal(reply.result, 0);
 	assert_int_equal(reply.state, WIRE_STATE_FALLING);
-	assert_int_equal(reply.drop_id, drop_id);
 	by_hand.release_ms = by_hand.next_ms - 1;
 	firmware_run(12);
 	fake.inputs &= (uint16_t)~WIRE_IO_LATCH_CLOSED;
@@ -189,7 +253,11 @@ void firmware_separate(void)
 	app_on_gate(1, start_us + 377773);
 	firmware_run(14);
 	assert_false(fake.outputs & WIRE_IO_MAGNET_HOLD);
-	fake.inputs &= (uint16_t)~WIRE_IO_PRODUCT_HELD;
+	if (by_hand.dropout_us != 0)
+		by_hand.keeper_us = fake.off_us[1] + by_hand.dropout_us;
+	else
+		fake.inputs &= (uint16_t)~WIRE_IO_PRODUCT_HELD;
+	by_hand.down_ms = by_hand.next_ms + 15;
 }
 
 void firmware_to_separated(void)

@@ -13,13 +13,19 @@
 #include "common/wire.h"
 #include "firmware/port.h"
 
-enum { FIRMWARE_TOKEN = 0x1234 };
+enum { FIRMWARE_SESSION = 0x51E7A0D3, FIRMWARE_DROPOUT_US = 8000 };
 
 struct firmware_by_hand {
 	uint32_t next_ms; /* the tick that comes next */
 	uint32_t release_ms;
 	bool host_alive;
+	uint32_t session; /* of the host that beats, and commands */
 	uint32_t host_hash;
+	uint32_t nonce;      /* of the last `armed` */
+	uint32_t parameters; /* CRC-32 of the set as read before the last ARM */
+	uint32_t dropout_us; /* of the magnet; 0: the keeper says nothing */
+	uint32_t down_ms;    /* tick at which the frame is down, and when the keeper falls; 0 never */
+	uint32_t keeper_us;
 	int16_t s2x; /* what S2 X reads, 0: noise only */
 	int16_t s2y_offset;
 };
@@ -40,8 +46,17 @@ struct wire_status firmware_status(void);
 uint32_t firmware_counter(unsigned index);
 
 /* A command, or a parameter, and what the firmware answers. */
-struct wire_reply firmware_order(unsigned op, uint16_t token, uint32_t argument);
+struct wire_reply firmware_order(unsigned op, uint32_t argument);
 struct wire_sdo firmware_sdo(unsigned specifier, unsigned index, unsigned subindex, uint32_t value);
+
+/* ARM as a host does it, with the set it reads, and RELEASE with the nonce that came back; RELEASE after the
+ * warning. */
+struct wire_reply firmware_arm(void);
+struct wire_reply firmware_release(unsigned drop_id);
+void firmware_wait_for_warning(void);
+
+/* CLEAR, then all checks green for a second. */
+void firmware_acknowledge(void);
 
 /* For blocks again. */
 void firmware_ask(unsigned sensor, uint32_t first_ms, unsigned count);

@@ -91,3 +91,14 @@ void register_release(uint32_t mask)
 {
 	model.held = (int)mask;
 }
+
+void register_mask(uint32_t priority)
+{
+	model.masked = priority;
+	model.masks++;
+}
+
+void register_barrier(void)
+{
+	model.barrier_at = model.writes;
+}

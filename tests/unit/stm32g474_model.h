@@ -23,7 +23,10 @@ struct model {
 	} log[MODEL_LOG]; /* writes in their order */
 	int writes;
 	unsigned reads;
-	int held; /* register_hold without register_release */
+	int held;        /* register_hold without register_release */
+	uint32_t masked; /* by register_mask */
+	int masks;
+	int barrier_at; /* writes before the last register_barrier */
 	/* What a read gives, and what a write leaves; NULL: the value kept, the value written. */
 	uint32_t (*on_read)(uint32_t address, uint32_t kept);
 	uint32_t (*on_write)(uint32_t address, uint32_t written, uint32_t kept);

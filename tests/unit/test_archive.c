@@ -61,7 +61,7 @@ static void test_nothing_stays_of_what_was_discarded(void **state)
 	char path[ARCHIVE_PATH_MAX];
 
 	(void)state;
-	assert_int_equal(archive_begin(archive, "one", "", ".log", false, &r), 0);
+	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", false, &r), 0);
 	strcpy(path, r.log);
 	archive_discard(archive, &r);
 	assert_int_equal(access(path, F_OK), -1);
@@ -78,7 +78,7 @@ static void test_a_log_that_stands_there_is_not_written_over(void **state)
 	FILE *out;
 
 	(void)state;
-	assert_int_equal(archive_begin(archive, "one", "", ".log", false, &r), 0);
+	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", false, &r), 0);
 	strcpy(path, r.log);
 	archive_discard(archive, &r);
 	out = fopen(path, "w");
@@ -143,6 +143,8 @@ static void test_a_rejection_needs_a_reason(void **state)
 	trial_record(archive, "one", "abc");
 	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_REJECTED, "Ann", ""), DT_E_ARGUMENT);
 	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_REJECTED, "Ann", "  "), DT_E_ARGUMENT);
+	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_REJECTED, " ", "cable"), DT_E_ARGUMENT);
+	assert_int_equal(archive_note(archive, "one/1", "", "seen"), DT_E_ARGUMENT);
 	assert_string_equal(trial_look(archive, "one", 1, NULL).decision, "open");
 	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_REJECTED, "Ann", "cable"), 0);
 	assert_string_equal(trial_look(archive, "one", 1, NULL).decision, "rejected");
@@ -160,12 +162,12 @@ static void test_what_is_not_whole_is_not_decided(void **state)
 	struct archive_recording r;
 
 	(void)state;
-	assert_int_equal(archive_begin(archive, "one", "", ".log", false, &r), 0);
-	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "", ""), DT_E_STATE);
+	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", false, &r), 0);
+	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "Ann", ""), DT_E_STATE);
 	archive_abandon(&r);
-	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "", ""), DT_E_STATE);
-	assert_int_equal(archive_decide(archive, "one/2", ARCHIVE_ACCEPTED, "", ""), DT_E_UNKNOWN);
-	assert_int_equal(archive_decide(archive, "one", ARCHIVE_ACCEPTED, "", ""), DT_E_ARGUMENT);
+	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "Ann", ""), DT_E_STATE);
+	assert_int_equal(archive_decide(archive, "one/2", ARCHIVE_ACCEPTED, "Ann", ""), DT_E_UNKNOWN);
+	assert_int_equal(archive_decide(archive, "one", ARCHIVE_ACCEPTED, "Ann", ""), DT_E_ARGUMENT);
 	archive_close(archive);
 }
 
@@ -190,7 +192,11 @@ static void test_names_stay_inside_the_folder(void **state)
 	assert_int_equal(archive_new_series(archive, "two", "trial", "README.md", 25, NAN, 5), DT_E_FORMAT);
 	assert_int_equal(archive_new_series(archive, "two", "trial", TRIAL_SCENE, 95, NAN, 5), DT_E_RANGE);
 	trial_record(archive, "one", "abc");
-	assert_int_equal(archive_note(archive, "one/1", "", "two\nlines"), DT_E_ARGUMENT);
+	assert_int_equal(archive_note(archive, "one/1", "Bo", "a C1 \xC2\x9B control"), DT_E_ARGUMENT);
+	assert_int_equal(archive_note(archive, "one/1", "Bo", "turned \xE2\x80\xAE round"), DT_E_ARGUMENT);
+	assert_int_equal(archive_note(archive, "one/1", "Bo", "Latin 1 \xFC"), DT_E_ARGUMENT);
+	assert_int_equal(archive_note(archive, "one/1", "", "by nobody"), DT_E_ARGUMENT);
+	assert_int_equal(archive_note(archive, "one/1", "Bo", "two\nlines"), DT_E_ARGUMENT);
 	archive_close(archive);
 }
 
@@ -220,10 +226,10 @@ static void test_old_results_stay(void **state)
 	assert_string_equal(trial_look(archive, "one", 1, NULL).version, "v1");
 	assert_near(trial_look(archive, "one", 1, "v1").s1x, -301, 0);
 	assert_string_equal(trial_look(archive, "one", 1, "v3").version, "none");
-	json = archive_json(archive, "one/1", "v2");
+	assert_int_equal(archive_json(archive, "one/1", "v2", &json), 0);
 	assert_non_null(strstr(json, "-310.5"));
 	free(json);
-	assert_null(archive_json(archive, "one/1", "v3"));
+	assert_int_equal(archive_json(archive, "one/1", "v3", &json), DT_E_EMPTY);
 	assert_int_equal(archive_result(archive, "one/1", "v4", "{\"channels\":"), DT_E_FORMAT);
 	assert_int_equal(archive_result(archive, "one/1", "../v4", "{\"channels\":[]}"), DT_E_ARGUMENT);
 	archive_close(archive);

@@ -74,7 +74,7 @@ static void test_a_version_1_index_is_migrated(void **state)
 	(void)state;
 	trial_sql(version_1);
 	archive = trial_open(ARCHIVE_READ);
-	assert_int_equal(schema_version(), 3);
+	assert_int_equal(schema_version(), 5);
 	seen = trial_look(archive, "one", 1, NULL);
 	assert_string_equal(seen.decision, "accepted");
 	assert_string_equal(seen.version, "v0");
@@ -140,7 +140,7 @@ static void make_many_things(void)
 	trial_record(archive, "one", "def");
 	assert_int_equal(archive_decide(archive, "one/2", ARCHIVE_REJECTED, "Ann", "a \"reason\", = 5; [x]"),
 	                 0);
-	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "", ""), 0);
+	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "Ann", ""), 0);
 	assert_int_equal(archive_note(archive, "one/2", "J\xc3\xbcrg", "  blanks kept  "), 0);
 	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", true, &r), 0);
 	archive_abandon(&r);
@@ -158,7 +158,7 @@ static void test_the_index_can_be_made_again(void **state)
 	before = listing();
 	snprintf(path, sizeof(path), "%s/index.sqlite", trial_folder);
 	assert_int_equal(truncate(path, 5000), 0);
-	assert_int_equal(archive_rebuild(trial_folder, trial_count, &wrong, trial_message), 0);
+	assert_int_equal(archive_rebuild(trial_folder, false, trial_count, &wrong, trial_message), 0);
 	assert_int_equal(wrong, 0);
 	after = listing();
 	assert_string_equal(after, before);
@@ -166,7 +166,7 @@ static void test_the_index_can_be_made_again(void **state)
 	assert_int_equal(unlink(path), 0);
 	assert_null(archive_open(trial_folder, ARCHIVE_CREATE, trial_message));
 	assert_non_null(strstr(trial_message, "--rebuild"));
-	assert_int_equal(archive_rebuild(trial_folder, trial_count, &wrong, trial_message), 0);
+	assert_int_equal(archive_rebuild(trial_folder, false, trial_count, &wrong, trial_message), 0);
 	after = listing();
 	assert_string_equal(after, before);
 	free(after);
@@ -187,13 +187,17 @@ static void test_a_damaged_sidecar_is_left_out_and_told(void **state)
 	strcpy(strrchr(raw, '.'), ".ini");
 	snprintf(path, sizeof(path), "%s/%s", trial_folder, raw);
 	assert_int_equal(truncate(path, 300), 0);
-	assert_int_equal(archive_rebuild(trial_folder, trial_count, &wrong, trial_message), 0);
+	assert_int_equal(archive_rebuild(trial_folder, false, trial_count, &wrong, trial_message),
+	                 DT_E_STATE);
+	assert_non_null(strstr(trial_message, "2 drops in the raw files, expected the 3 known"));
+	wrong = 0;
+	assert_int_equal(archive_rebuild(trial_folder, true, trial_count, &wrong, trial_message), 0);
 	assert_int_equal(wrong, 1);
 	archive = trial_open(ARCHIVE_WRITE);
 	assert_int_equal(trial_look(archive, "one", 1, NULL).count, 1);
 	assert_int_equal(trial_look(archive, "one", 2, NULL).count, 0);
 	assert_null(archive_open("/", ARCHIVE_READ, trial_message));
-	assert_int_equal(archive_rebuild(trial_folder, trial_count, &wrong, trial_message), DT_E_STATE);
+	assert_int_equal(archive_rebuild(trial_folder, true, trial_count, &wrong, trial_message), DT_E_STATE);
 	assert_non_null(strstr(trial_message, "another program"));
 	archive_close(archive);
 }
@@ -208,16 +212,17 @@ static void test_raw_files_are_verified(void **state)
 	(void)state;
 	trial_record(archive, "one", "abc");
 	trial_record(archive, "one", "def");
-	assert_int_equal(archive_verify(archive, trial_count, &wrong), 0);
+	assert_int_equal(archive_verify(archive, NULL, 0, trial_count, &wrong), 0);
 	snprintf(path, sizeof(path), "%s/%s", trial_folder, trial_look(archive, "one", 1, NULL).raw);
 	out = fopen(path, "r+");
 	assert_non_null(out);
 	fputs("abd", out);
 	fclose(out);
-	assert_int_equal(archive_verify(archive, trial_count, &wrong), 1);
-	assert_string_equal(trial_look(archive, "one", 1, NULL).state, "recorded");
+	assert_int_equal(archive_verify(archive, NULL, 0, trial_count, &wrong), 1);
+	assert_string_equal(trial_look(archive, "one", 1, NULL).state, "altered");
+	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "Ann", ""), DT_E_CORRUPT);
 	assert_int_equal(unlink(path), 0);
-	assert_int_equal(archive_verify(archive, trial_count, &wrong), 1);
+	assert_int_equal(archive_verify(archive, NULL, 0, trial_count, &wrong), 1);
 	assert_int_equal(wrong, 2);
 	assert_string_equal(trial_look(archive, "one", 1, NULL).state, "missing");
 	archive_close(archive);
@@ -270,7 +275,7 @@ static void test_a_series_from_another_height(void **state)
 	assert_int_equal(unlink(path), 0);
 	snprintf(path, sizeof(path), "%s/index.sqlite", trial_folder);
 	assert_int_equal(unlink(path), 0);
-	assert_int_equal(archive_rebuild(trial_folder, trial_count, &(int){0}, trial_message), 0);
+	assert_int_equal(archive_rebuild(trial_folder, false, trial_count, &(int){0}, trial_message), 0);
 	archive = trial_open(ARCHIVE_READ);
 	assert_int_equal(archive_scene(archive, "s1", &scene), 0);
 	assert_memory_equal(&scene, &expected, sizeof(scene));

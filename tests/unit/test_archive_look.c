@@ -29,7 +29,7 @@ static void fill_eight(struct archive *archive, const char *series, double facto
 		snprintf(text, sizeof(text), "%s %u", series, i);
 		snprintf(drop, sizeof(drop), "%s/%u", series, trial_record(archive, series, text));
 		trial_result(archive, drop, "v1", -factor * values[i], 10 * values[i]);
-		assert_int_equal(archive_decide(archive, drop, ARCHIVE_ACCEPTED, "", ""), 0);
+		assert_int_equal(archive_decide(archive, drop, ARCHIVE_ACCEPTED, "Ann", ""), 0);
 	}
 }
 
@@ -48,7 +48,7 @@ static void test_means_by_hand(void **state)
 	trial_result(archive, "one/9", "v1", -1000, 1);
 	trial_record(archive, "one", "rejected");
 	trial_result(archive, "one/10", "v1", -1e6, 1);
-	assert_int_equal(archive_decide(archive, "one/10", ARCHIVE_REJECTED, "", "spike"), 0);
+	assert_int_equal(archive_decide(archive, "one/10", ARCHIVE_REJECTED, "Ann", "spike"), 0);
 	assert_int_equal(archive_table(archive, &filter, false, &table), 0);
 	assert_int_equal(table.count, 2);
 	bare = &table.cell[0];
@@ -217,8 +217,9 @@ static struct archive *with_words(void)
 	trial_record(archive, "box", "abc");
 	trial_record(archive, "box", "def");
 	trial_record(archive, "rig_b", "ghi");
-	assert_int_equal(archive_note(archive, "box/1", "", "100% of J\xc3\xbcrg's \\ load_cell"), 0);
-	assert_int_equal(archive_decide(archive, "box/2", ARCHIVE_REJECTED, "", "hit the Wrong corner"), 0);
+	assert_int_equal(archive_note(archive, "box/1", "Ann", "100% of J\xc3\xbcrg's \\ load_cell"), 0);
+	assert_int_equal(archive_decide(archive, "box/2", ARCHIVE_REJECTED, "Ann", "hit the Wrong corner"),
+	                 0);
 	trial_result(archive, "box/1", "v1", 1, 2);
 	return archive;
 }

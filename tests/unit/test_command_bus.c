@@ -31,7 +31,14 @@ static void parameters_by_sdo(void **state)
 	        {0x23, 0x2007, 0, 320, 0, 0x60},
 	        {0x40, 0x2007, 0, 0, 320, 0x43},
 	        {0x40, 0x1FFF, 0, 0, 0x06020000, 0x80},
-	        {0x23, 0x2010, 0, 1, 0x06020000, 0x80},
+	        {0x23, 0x2015, 0, 1, 0x06020000, 0x80},
+	        {0x23, 0x2010, 0, 999, 0x06090032, 0x80}, /* settle and warning can only be lengthened */
+	        {0x23, 0x2011, 0, 999, 0x06090032, 0x80},
+	        {0x23, 0x2011, 0, 9001, 0x06040043, 0x80}, /* a second of 10 s has to be left */
+	        {0x23, 0x2011, 0, 9000, 0, 0x60},
+	        {0x23, 0x2009, 0, 9999, 0x06040043, 0x80},
+	        {0x23, 0x2011, 0, 1000, 0, 0x60},
+	        {0x23, 0x2009, 0, 2000, 0, 0x60},
 	        {0x23, 0x200E, 0, 2, 0x06090031, 0x80},
 	        {0x40, 0x200F, 0, 0, 5000, 0x43},
 	        {0x23, 0x200F, 0, 1999, 0x06090032, 0x80},
@@ -87,6 +94,7 @@ static void parameters_are_not_written_while_armed(void **state)
 	assert_int_equal(firmware_sdo(0x23, 0x2007, 0, 320).value, 0x08000022);
 	firmware_to_captured();
 	assert_int_equal(firmware_sdo(0x23, 0x2007, 0, 320).value, 0x08000022);
+	assert_int_equal(firmware_order(WIRE_OP_DISCARD, 1).result, 0);
 	firmware_power_on(PORT_RESET_WATCHDOG);
 	firmware_run(10);
 	assert_int_equal(firmware_sdo(0x23, 0x2007, 0, 320).specifier, 0x60);
@@ -98,10 +106,13 @@ static void new_parameters_move_the_edges(void **state)
 
 	(void)state;
 	firmware_to_ready();
+	/* the fall is planned with the set before, and the wrong key refused */
+	assert_int_equal(firmware_order(WIRE_OP_ARM, 0).result, DT_E_PARAMETERS);
 	assert_int_equal(firmware_sdo(0x23, 0x2004, 0, 0).specifier, 0x60);
 	assert_int_equal(firmware_sdo(0x23, 0x2002, 0, 750000).specifier, 0x60);
 	firmware_fall(1);
 	start_us = fake.now_us;
+	firmware_run(5); /* until the latch is seen open */
 	app_on_gate(0, start_us + 200000);
 	app_on_gate(1, start_us + 375000);
 	/* (sqrt .75 - sqrt .7) / (sqrt .7 - sqrt .2) = .0293654 / .3894464 = .0754029, of 175 ms: 13.1955 ms
@@ -115,10 +126,10 @@ static void bus_off_is_counted_and_told(void **state)
 
 	(void)state;
 	firmware_to_ready();
-	fake.bus_off = true;
+	fake.bus = PORT_BUS_OFF;
 	fake.bus_errors = 17;
 	firmware_run(5);
-	fake.bus_off = false;
+	fake.bus = PORT_BUS_ACTIVE;
 	firmware_forget_frames();
 	firmware_run(5);
 	assert_int_equal(wire_unpack_emcy(firmware_last(WIRE_ID_EMCY), &emcy), 0);
@@ -130,13 +141,37 @@ static void bus_off_is_counted_and_told(void **state)
 	assert_true(firmware_counter(WIRE_COUNTER_frames_deferred) > 0);
 	assert_int_equal(firmware_counter(WIRE_COUNTER_frames_dropped), 0);
 	firmware_to_armed();
-	fake.bus_off = true;
+	fake.bus = PORT_BUS_OFF;
 	firmware_run(2);
-	fake.bus_off = false;
+	fake.bus = PORT_BUS_ACTIVE;
 	firmware_forget_frames();
 	firmware_run(5);
 	assert_int_equal(fake_count(WIRE_ID_EMCY), 1);
 	assert_int_equal(firmware_status().fault, WIRE_FAULT_BUS_OFF);
+}
+
+/* It can still be sent, so it is told at once, and once for each spell. */
+static void error_passive_is_counted_and_told(void **state)
+{
+	struct wire_emcy emcy;
+
+	(void)state;
+	firmware_to_armed();
+	firmware_forget_frames();
+	fake.bus = PORT_BUS_PASSIVE;
+	firmware_run(50);
+	assert_int_equal(fake_count(WIRE_ID_EMCY), 1);
+	assert_int_equal(wire_unpack_emcy(firmware_last(WIRE_ID_EMCY), &emcy), 0);
+	assert_int_equal(emcy.code, 0x8120);
+	assert_int_equal(emcy.error_register, 0x11);
+	assert_int_equal(firmware_status().state, WIRE_STATE_ARMED);
+	assert_int_equal(firmware_status().fault, WIRE_FAULT_NONE);
+	fake.bus = PORT_BUS_ACTIVE;
+	firmware_run(2);
+	fake.bus = PORT_BUS_PASSIVE;
+	firmware_run(2);
+	assert_int_equal(firmware_counter(WIRE_COUNTER_bus_passives), 2);
+	assert_int_equal(firmware_counter(WIRE_COUNTER_bus_offs), 0);
 }
 
 static void bus_is_set_up_at_reset(void **state)
@@ -180,9 +215,9 @@ static void bus_follows_its_parameters(void **state)
 static void refused_bus_is_asked_for_again(void **state)
 {
 	(void)state;
+	firmware_power_on(PORT_RESET_POWER_ON);
 	fake_init();
 	fake.no_setup = true;
-	by_hand.next_ms = 0;
 	app_init(PORT_RESET_POWER_ON);
 	fake.can_full = true;
 	firmware_run(50);
@@ -193,11 +228,12 @@ static void refused_bus_is_asked_for_again(void **state)
 	assert_true(fake.classic);
 	firmware_run(200);
 	assert_int_equal(fake.setups, 1);
+	firmware_power_on(PORT_RESET_POWER_ON);
 	fake_init();
 	fake.no_setup = true;
-	by_hand.next_ms = 0;
 	app_init(PORT_RESET_POWER_ON);
 	firmware_run(250);
+	firmware_acknowledge();
 	firmware_fall(1);
 	fake.no_setup = false;
 	firmware_run(100);
@@ -269,7 +305,7 @@ static void classic_drop(void)
 	firmware_run(3);
 	assert_int_equal(collect(WIRE_ID_RESENT_S2, s1, 64), 1);
 	assert_memory_equal(s1[0].data, s2[7].data, 64);
-	assert_int_equal(firmware_order(WIRE_OP_ACCEPT, 0, end.crc32).result, 0);
+	assert_int_equal(firmware_order(WIRE_OP_ACCEPT, end.crc32).result, 0);
 	firmware_run(300);
 	assert_int_equal(firmware_status().state, WIRE_STATE_SAFE);
 	assert_int_equal(firmware_counter(WIRE_COUNTER_frames_dropped), 0);
@@ -282,11 +318,12 @@ static void classic_bus_uploads_after_the_drop(void **state)
 	firmware_to_ready();
 	assert_int_equal(firmware_sdo(0x23, 0x200E, 0, 1).specifier, 0x60);
 	classic_drop();
+	firmware_power_on(PORT_RESET_POWER_ON);
 	fake_init(); /* a controller without FD */
 	fake.no_fd = true;
-	by_hand.next_ms = 0;
 	app_init(PORT_RESET_POWER_ON);
 	firmware_run(250);
+	firmware_acknowledge();
 	assert_int_equal(firmware_status().state, WIRE_STATE_READY);
 	assert_int_equal(firmware_sdo(0x40, 0x200E, 0, 0).value, 1);
 	assert_int_equal(firmware_sdo(0x23, 0x200E, 0, 0).value, 0x06060000);
@@ -301,6 +338,7 @@ int main(void)
 	        cmocka_unit_test(parameters_are_not_written_while_armed),
 	        cmocka_unit_test(new_parameters_move_the_edges),
 	        cmocka_unit_test(bus_off_is_counted_and_told),
+	        cmocka_unit_test(error_passive_is_counted_and_told),
 	        cmocka_unit_test(bus_is_set_up_at_reset),
 	        cmocka_unit_test(bus_follows_its_parameters),
 	        cmocka_unit_test(refused_bus_is_asked_for_again),

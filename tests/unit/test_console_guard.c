@@ -288,6 +288,47 @@ static void test_who_needs_the_hold(void **state)
 	assert_true(route_find("POST", "abort", &rest, &other)->always);
 }
 
+static unsigned granted(struct guard_rates *rates, const char *console, unsigned asked, int64_t now_ms)
+{
+	unsigned count = 0;
+
+	for (unsigned i = 0; i < asked; i++)
+		count += guard_take_of(rates, console, now_ms);
+	return count;
+}
+
+/* Who asks for all there is takes nothing of another's; who makes names up gets what sixteen would. */
+static void test_each_console_has_its_own_rate(void **state)
+{
+	struct guard_rates rates;
+	char name[GUARD_CONSOLE_MAX + 1];
+	unsigned all = 0;
+
+	(void)state;
+	guard_rates_init(&rates, 10, 5);
+	assert_int_equal(granted(&rates, "greedygreedygreedy", 1000, 100000), 10);
+	assert_int_equal(granted(&rates, "", 1000, 100000), 10);
+	assert_int_equal(granted(&rates, "modestmodestmodest", 4, 100001), 4);
+	assert_int_equal(granted(&rates, "greedygreedygreedy", 1000, 101000), 5);
+	assert_int_equal(granted(&rates, "modestmodestmodest", 1000, 101001), 10);
+	for (int i = 0; i < 1000; i++) {
+		snprintf(name, sizeof(name), "madeup%012d", i);
+		all += granted(&rates, name, 2, 101002);
+	}
+	assert_in_range(all, 1, 14 * 10 + 1);
+}
+
+static void test_json_with_nul(void **state)
+{
+	(void)state;
+	assert_true(guard_json_has_nul("{\"a\":\"b\\u0000c\"}"));
+	assert_true(guard_json_has_nul("\\\\\\u0000"));
+	assert_false(guard_json_has_nul("\\\\u0000")); /* a backslash, and the letters */
+	assert_false(guard_json_has_nul("{\"a\":\"\\u0001\\n\"}"));
+	assert_false(guard_json_has_nul("\\"));
+	assert_false(guard_json_has_nul(""));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -300,6 +341,8 @@ int main(void)
 	        cmocka_unit_test(test_hold),
 	        cmocka_unit_test(test_console_names),
 	        cmocka_unit_test(test_names_in_paths),
+	        cmocka_unit_test(test_each_console_has_its_own_rate),
+	        cmocka_unit_test(test_json_with_nul),
 	        cmocka_unit_test(test_who_needs_the_hold),
 	};
 

@@ -51,14 +51,15 @@ static struct {
 	uint8_t fault;  /* in motion */
 	/* what it is */
 	uint8_t state;
-	uint16_t token;
+	uint32_t session; /* in the host's heartbeat */
+	uint32_t nonce;
 	bool captured;
 	struct hand_drop drop;
 	/* what it heard: ops; of parameters only how many */
 	uint8_t heard[HEARD_MAX];
-	unsigned heard_count, parameters, resends;
-	struct parameters values; /* and what it took of them */
-	atomic_uint ends;         /* said so often that it holds a drop */
+	unsigned heard_count, parameters, resends; /* parameters: written */
+	struct parameters values;                  /* and what it took of them */
+	atomic_uint ends;                          /* said so often that it holds a drop */
 } fake = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
 static void send(struct frame frame)
@@ -72,7 +73,7 @@ static void send_status(void)
 	struct frame frame;
 
 	wire_pack_status(&frame, WIRE_ID_STATUS,
-	                 &(struct wire_status){.state = fake.state, .fault = fake.fault, .drop_id = 1});
+	                 &(struct wire_status){.state = fake.state, .fault = fake.fault});
 	send(frame);
 	wire_pack_heartbeat(
 	        &frame, WIRE_ID_HEARTBEAT_TOWER,
@@ -87,6 +88,10 @@ static void send_capture_end(void)
 
 	hand_capture_end(&fake.drop, &frame);
 	send(frame);
+	for (unsigned i = 0; i <= HAND_PARAMETERS; i++) {
+		hand_told(&fake.drop, i, &frame);
+		send(frame);
+	}
 	atomic_fetch_add(&fake.ends, 1);
 }
 
@@ -115,17 +120,32 @@ static void fall_unseen(void)
 	fake.captured = true;
 }
 
+static void send_armed(uint16_t host)
+{
+	struct wire_armed armed = {
+	        .drop_id = (uint16_t)(fake.drop.drop_id + 1), .host = host, .nonce = fake.nonce};
+	struct frame frame;
+
+	wire_pack_armed(&frame, WIRE_ID_ARMED, &armed);
+	send(frame);
+}
+
 static int obey(const struct wire_command *command)
 {
 	switch (command->op) {
 	case WIRE_OP_ARM:
 		if (fake.refusal != 0)
 			return fake.refusal;
+		if (command->argument != wire_arm_key(fake.session, wire_parameters_crc32(fake.values.value)))
+			return DT_E_PARAMETERS;
+		if (fake.state != WIRE_STATE_ARMED)
+			fake.nonce += 0x9E3779B9u;
 		fake.state = WIRE_STATE_ARMED;
-		fake.token = command->token;
+		send_armed(command->host);
 		return 0;
 	case WIRE_OP_RELEASE:
-		if (command->token != fake.token)
+		if (command->argument != wire_release_key(fake.nonce, (uint16_t)(fake.drop.drop_id + 1),
+		                                          wire_parameters_crc32(fake.values.value)))
 			return DT_E_TOKEN;
 		fake.state = WIRE_STATE_FALLING;
 		if (fake.falls)
@@ -193,6 +213,12 @@ static void hear_parameter(const struct frame *frame)
 
 	if (wire_unpack_sdo(frame, &sdo) != 0)
 		return;
+	if (sdo.specifier == 0x40) {
+		sdo.specifier = parameters_get(&fake.values, sdo.index, &sdo.value) == 0 ? 0x43 : 0x80;
+		wire_pack_sdo(&answer, WIRE_ID_SDO_REPLY, &sdo);
+		send(answer);
+		return;
+	}
 	fake.parameters++;
 	sdo.specifier = 0x60;
 	if (parameters_set(&fake.values, sdo.index, sdo.value) != 0) {
@@ -201,6 +227,14 @@ static void hear_parameter(const struct frame *frame)
 	}
 	wire_pack_sdo(&answer, WIRE_ID_SDO_REPLY, &sdo);
 	send(answer);
+}
+
+static void hear_heartbeat(const struct frame *frame)
+{
+	struct wire_host_heartbeat heartbeat;
+
+	if (wire_unpack_host_heartbeat(frame, &heartbeat) == 0)
+		fake.session = heartbeat.session;
 }
 
 static void beat(void)
@@ -231,6 +265,8 @@ static void *play(void *unused)
 			hear_command(&frame);
 		else if (got == 1 && frame.id == WIRE_ID_RESEND)
 			hear_resend(&frame);
+		else if (got == 1 && frame.id == WIRE_ID_HEARTBEAT_HOST)
+			hear_heartbeat(&frame);
 		else if (got == 1 && frame.id == WIRE_ID_SDO_REQUEST)
 			hear_parameter(&frame);
 		if (session_now_ms() >= due_ms) {
@@ -437,22 +473,27 @@ static void must(void (*verb)(struct job *), const char *body)
 static unsigned arm(void)
 {
 	char text[512];
-	unsigned token = 0, expires_s = 0;
+	unsigned token = 0;
+	double warning_s = 0, expires_s = 0;
 
 	if (say(tower_arm, "{}", text) != 200 ||
-	    sscanf(text, "{\"token\":%u,\"expires_s\":%u}", &token, &expires_s) != 2)
+	    sscanf(text, "{\"token\":%u,\"warning_s\":%lf,\"expires_s\":%lf}", &token, &warning_s,
+	           &expires_s) != 3)
 		fail_msg("%s", text);
-	assert_int_equal(expires_s, 10);
-	assert_true(token > 0 && token <= UINT16_MAX);
+	assert_true(warning_s > 0 && warning_s <= 1 && expires_s > warning_s && expires_s <= 10);
 	return token;
 }
 
 static void release(unsigned token)
 {
-	char body[64];
+	char body[64], text[512];
+	int status;
 
 	snprintf(body, sizeof(body), "{\"token\":%u}", token);
-	must(tower_release, body);
+	while ((status = say(tower_release, body, text)) == 425) /* the warning is not over */
+		usleep(50000);
+	if (status != 200)
+		fail_msg("%d %s", status, text);
 }
 
 static void nap(void)
@@ -696,7 +737,7 @@ static void a_wrong_token_leaves_it_armed(void **state)
 	(void)state;
 	select_box();
 	token = arm();
-	snprintf(body, sizeof(body), "{\"token\":%u}", token % UINT16_MAX + 1);
+	snprintf(body, sizeof(body), "{\"token\":%u}", token ^ 1u);
 	assert_int_equal(say(tower_release, body, text), 409);
 	assert_non_null(strstr(text, error_text(DT_E_TOKEN)));
 	assert_int_equal(wait_view(is_armed).phase, TOWER_ARMED);

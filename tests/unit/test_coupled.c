@@ -22,6 +22,7 @@ static struct coupled study(double mount_n_m, double restitution, double toleran
 {
 	struct coupled c = {.case_mass_kg = 0.169,
 	                    .plate_mass_kg = 0.014,
+	                    .gravity_m_s2 = G,
 	                    .speed_m_s = IMPACT_M_S,
 	                    .stiffness_n_m15 = 4227303.27134065,
 	                    .mount_n_m = mount_n_m,

@@ -11,6 +11,7 @@
 
 #include "host/record/join.h"
 #include "host/record/read.h"
+#include "host/record/seal.h"
 #include "host/record/write.h"
 #include "tests/unit/drop_by_hand.h"
 
@@ -155,14 +156,17 @@ static void test_any_record_comes_back_exactly(void **state)
 /* The layout itself, once, byte by byte. */
 static void test_the_layout(void **state)
 {
-	static const char expected[] = "# droptower csv 1\n"
-	                               "# channel rate_hz=4 start_s=0 range_g=500 count=3 uneven=0 name=A\n"
-	                               "# channel rate_hz=2 start_s=0.25 range_g=0 count=2 uneven=1 name=B\n"
-	                               "time_s,A_g,B_g\n"
-	                               "0,0.1,\n"
-	                               "0.25,600*,lost\n"
-	                               "0.5,-0.03125,\n"
-	                               "0.75,,bad\n";
+	static const char expected[] =
+	        "# droptower csv 1\n"
+	        "# channel rate_hz=4 start_s=0 range_g=500 count=3 uneven=0 name=A\n"
+	        "# channel rate_hz=2 start_s=0.25 range_g=0 count=2 uneven=1 name=B\n"
+	        "time_s,A_g,B_g\n"
+	        "0,0.1,\n"
+	        "0.25,600*,lost\n"
+	        "0.5,-0.03125,\n"
+	        "0.75,,bad\n"
+	        /* by sha256sum, of this text with 64 times '0' here */
+	        "# sha256 76b620e8dffc8eb6fa6ce25530227826f35fe285e1ecd4eb60171d633c12ac7d\n";
 	char message[READ_MESSAGE_MAX], *file = hand_file(".csv", "", 0), *bytes;
 	struct record record;
 	struct channel *a, *b;
@@ -351,9 +355,92 @@ static void test_damage(void **state)
 	record_free(&record);
 }
 
+/* ---- samples of a drop ---- */
+
+/* The file with the first `from` behind `after` replaced; returns the line it stands in. */
+static unsigned replace(const char *file, const char *after, const char *from, const char *to)
+{
+	size_t size;
+	char *text = hand_read(file, &size), *end = malloc(size + 1), *place, *altered, *seal;
+	unsigned line = 1;
+	FILE *out;
+
+	assert_non_null(end);
+	memcpy(end, text, size);
+	end[size] = '\0';
+	place = strstr(strstr(end, after), from);
+	assert_non_null(place);
+	for (char *p = end; p < place; p++)
+		line += *p == '\n';
+	altered = malloc(size + strlen(to) + 1);
+	assert_non_null(altered);
+	sprintf(altered, "%.*s%s%s", (int)(place - end), end, to, place + strlen(from));
+	seal = strstr(altered, SEAL_WORD);
+	if (seal != NULL) { /* who altered it has sealed it again */
+		memset(seal + strlen(SEAL_WORD), '0', 64);
+		assert_int_equal(seal_fill(altered, strlen(altered)), 0);
+	}
+	out = fopen(file, "w");
+	assert_non_null(out);
+	fputs(altered, out);
+	fclose(out);
+	free(altered);
+	free(text);
+	free(end);
+	return line;
+}
+
+static void expect_refused(char *file, unsigned line, const char *why)
+{
+	char message[READ_MESSAGE_MAX] = "", place[16];
+	struct record record;
+
+	snprintf(place, sizeof(place), ":%u: ", line);
+	assert_int_equal(read_record(&record, file, NULL, message), DT_E_FORMAT);
+	if (!strstr(message, place) || !strstr(message, why))
+		fail_msg("\"%s\", expected %s%s", message, place, why);
+	hand_unlink(file);
+}
+
+/* They are counts: a number between two is refused beside its line, in any of the formats. */
+static void test_samples_are_counts(void **state)
+{
+	struct record record;
+
+	(void)state;
+	hand_fill(&drop, 1000, 30, 21);
+	for (int i = 0; i < 7; i++)
+		drop.sample[0][3][i] = (int16_t)(32 * i + 3200); /* 100, 101 .. g */
+	record = make_drop(22, false, true);
+	for (int i = 0; i < 3; i++) {
+		static const char *const values[] = {"101.01", "1024", "-1024"};
+		char *file = round_trip(&record, ".csv", "csv");
+		char cell[32];
+		unsigned line;
+
+		snprintf(cell, sizeof(cell), ",%s,", values[i]);
+		line = replace(file, "time_s,", ",101,", cell);
+		expect_refused(file, line, "expected a whole count of 1/32 g");
+	}
+	{
+		char *file = round_trip(&record, ".unv", "uff58");
+		unsigned line = replace(file, "S1X", "1.010000000000E+02", "1.010100000000E+02");
+
+		expect_refused(file, line, "101.01 g for S1X, expected a whole count of 1/32 g");
+	}
+	{
+		char *file = round_trip(&record, ".unv", "uff58");
+		unsigned line = replace(file, "S1X", "1.010000000000E+02", "1.01000000O000E+02");
+
+		expect_refused(file, line, "sample 23 of S1X is no number and its mask calls it good");
+	}
+	record_free(&record);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(test_samples_are_counts),
 	        cmocka_unit_test(test_one_drop_in_every_format),
 	        cmocka_unit_test(test_any_record_comes_back_exactly),
 	        cmocka_unit_test(test_the_layout),

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "host/estimate/estimate.h"
+#include "host/record/drop.h"
 #include "tests/unit/near.h"
 #include "tests/unit/synth.h"
 
@@ -68,6 +69,7 @@ static void make(struct drop *drop, enum product product, double noise_g, uint64
 	}
 	drop->record.channels = drop->channel;
 	drop->record.channel_count = CHANNELS;
+	drop_set_axes(&drop->record);
 	drop->record.is_drop = true;
 	drop->record.trigger_s = ONSET_S + 0.0002;
 }
@@ -130,7 +132,7 @@ static void mounted(void **state)
 		assert_int_equal(a.channels[i].flags, 0);
 	}
 	assert_near(a.channels[S2X].pulse.velocity_change_m_s,
-	            9.81 * 0.906 * HEIGHT_G * BASE_S * synth_pulse_area(SYNTH_HUNT_CROSSLEY), 0.05);
+	            9.80665 * 0.906 * HEIGHT_G * BASE_S * synth_pulse_area(SYNTH_HUNT_CROSSLEY), 0.05);
 	assert_near(a.plate.three_cycle_frequency_hz, damped_hz(), 1);
 	estimate_free(&a);
 	assert_null(a.channels);
@@ -340,7 +342,8 @@ static void weak_zero(void **state)
 		assert_int_equal(a.channels[S2X].pulse.flags, 0);
 		if (!lost)
 			assert_near(z->velocity_change_m_s,
-			            9.81 * 0.04 * HEIGHT_G * BASE_S * synth_pulse_area(SYNTH_HUNT_CROSSLEY),
+			            9.80665 * 0.04 * HEIGHT_G * BASE_S *
+			                    synth_pulse_area(SYNTH_HUNT_CROSSLEY),
 			            3 * z->sigma_velocity_m_s);
 		estimate_free(&a);
 		drop_free(&drop);

@@ -12,7 +12,7 @@
 #include "tests/unit/near.h"
 #include "tests/unit/synth.h"
 
-#define G 9.81
+#define G 9.80665
 
 /* A half-sine of 3 ms. */
 static void add(struct channel *channel, double start_s, double peak_g)

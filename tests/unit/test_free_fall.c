@@ -64,7 +64,7 @@ static size_t count_falls(const struct scene *s, struct free_fall *fall)
 	struct record record = made(s, names);
 	struct free_falls falls;
 
-	assert_int_equal(free_fall_find(&record, &falls), 0);
+	assert_int_equal(free_fall_find(&record, 9.80665, &falls), 0);
 	if (falls.count > 0 && fall)
 		*fall = falls.fall[0];
 	record_free(&record);
@@ -85,8 +85,8 @@ static void height(void **state)
 		assert_near(fall.start_s, 1.2, 0.002);
 		assert_near(fall.end_s, 1.2 + duration, 0.002);
 		assert_near(fall.duration_s, duration, 0.002);
-		assert_near(fall.height_m, 9.81 * duration * duration / 2, 2 * fall.sigma_height_m);
-		assert_near_part(fall.sigma_height_m, 9.81 * duration * fall.sigma_duration_s, 0.02);
+		assert_near(fall.height_m, 9.80665 * duration * duration / 2, 2 * fall.sigma_height_m);
+		assert_near_part(fall.sigma_height_m, 9.80665 * duration * fall.sigma_duration_s, 0.02);
 		assert_true(fall.sigma_duration_s > 2e-4 && fall.sigma_duration_s < 3e-3);
 	}
 }
@@ -149,14 +149,14 @@ static void channels(void **state)
 	}
 	record.channels[1].value_g[1400] = NAN; /* holes in the fall do not end it */
 	record.channels[2].value_g[1300] = NAN;
-	assert_int_equal(free_fall_find(&record, &falls), 0);
+	assert_int_equal(free_fall_find(&record, 9.80665, &falls), 0);
 	assert_int_equal(falls.count, 1);
 	assert_string_equal(falls.fall[0].name, "a");
 	assert_true(falls.fall[0].sensor);
 	strcpy(record.channels[0].name, "p");
 	strcpy(record.channels[1].name, "q");
 	strcpy(record.channels[2].name, "r");
-	assert_int_equal(free_fall_find(&record, &falls), 0);
+	assert_int_equal(free_fall_find(&record, 9.80665, &falls), 0);
 	assert_int_equal(falls.count, 1);
 	assert_string_equal(falls.fall[0].name, "total");
 	assert_false(falls.fall[0].sensor);
@@ -183,7 +183,7 @@ static void phones(void **state)
 			skip();
 		assert_int_equal(
 		        read_record(&record, table[i].file, "time:s,x:m/s2,y:m/s2,z:m/s2,-", message), 0);
-		assert_int_equal(free_fall_find(&record, &falls), 0);
+		assert_int_equal(free_fall_find(&record, 9.80665, &falls), 0);
 		assert_int_equal(falls.count, 1);
 		assert_true(falls.fall[0].duration_s > table[i].window_s && falls.fall[0].duration_s < 0.7);
 		assert_true(falls.fall[0].end_s < table[i].impact_s &&

@@ -32,8 +32,17 @@ static int16_t *at(struct acquire_tick *tick, unsigned channel, unsigned k)
 	return channel % 3 == 0 ? &samples->x[k] : channel % 3 == 1 ? &samples->y[k] : &samples->z[k];
 }
 
+static struct health_view seen = {.host_good = true, .clocks_good = true, .brown_out_set = true};
+
+static uint32_t checks_of(unsigned io, unsigned bias_high)
+{
+	seen.io = (uint16_t)io;
+	seen.bias_high = (uint16_t)bias_high;
+	return health_checks(&health, &seen);
+}
+
 /* 100 ms in which all is 0 but one channel, which alternates offset +- swing. */
-static uint16_t after_window(unsigned channel, int offset, int swing)
+static uint32_t after_window(unsigned channel, int offset, int swing)
 {
 	unsigned per_tick = channel % 3 == 0 ? 7 : 10;
 	unsigned n = 0;
@@ -45,7 +54,7 @@ static uint16_t after_window(unsigned channel, int offset, int swing)
 			*at(&tick, channel, k) = (int16_t)(offset + (n++ % 2 ? swing : -swing));
 		health_samples(&health, &tick);
 	}
-	return health_checks(&health, FAKE_ALL_GOOD, 0) & (WIRE_CHECK_SENSOR_S1 | WIRE_CHECK_SENSOR_S2);
+	return checks_of(FAKE_ALL_GOOD, 0) & (WIRE_CHECK_SENSOR_S1 | WIRE_CHECK_SENSOR_S2);
 }
 
 static void sensors_are_red_until_seen(void **state)
@@ -55,17 +64,17 @@ static void sensors_are_red_until_seen(void **state)
 	(void)state;
 	for (unsigned t = 0; t < 99; t++)
 		health_samples(&health, &tick);
-	assert_true(health_checks(&health, FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S1);
-	assert_true(health_checks(&health, FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S2);
+	assert_true(checks_of(FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S1);
+	assert_true(checks_of(FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S2);
 	health_samples(&health, &tick);
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), WIRE_CHECK_HOST);
+	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), 0);
 }
 
 static void offset_and_noise_of_each_axis(void **state)
 {
 	(void)state;
 	for (unsigned channel = 0; channel < 6; channel++) {
-		uint16_t red = channel < 3 ? WIRE_CHECK_SENSOR_S1 : WIRE_CHECK_SENSOR_S2;
+		uint32_t red = channel < 3 ? WIRE_CHECK_SENSOR_S1 : WIRE_CHECK_SENSOR_S2;
 
 		assert_int_equal(after_window(channel, 320, 0), 0);
 		assert_int_equal(after_window(channel, 321, 0), red);
@@ -90,15 +99,15 @@ static void absent_samples_make_a_sensor_red(void **state)
 				*at(&tick, 5, k) = WIRE_SAMPLE_NOT_TAKEN;
 			health_samples(&health, &tick);
 		}
-		assert_int_equal((health_checks(&health, FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S2) != 0,
-		                 missing > 5);
+		assert_int_equal((checks_of(FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S2) != 0, missing > 5);
 	}
 }
 
 static void each_input_has_its_check(void **state)
 {
 	static const struct {
-		uint16_t input, check;
+		uint16_t input;
+		uint32_t check;
 	} pairs[] = {
 	        {WIRE_IO_LATCH_CLOSED, WIRE_CHECK_LATCH},      {WIRE_IO_PRODUCT_HELD, WIRE_CHECK_PRODUCT},
 	        {WIRE_IO_DAMPERS_ENGAGED, WIRE_CHECK_DAMPERS}, {WIRE_IO_DOOR_CLOSED, WIRE_CHECK_DOOR},
@@ -110,10 +119,9 @@ static void each_input_has_its_check(void **state)
 
 	(void)state;
 	assert_int_equal(after_window(0, 0, 0), 0);
-	health_host(&health, 0, wire_hash());
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), 0);
+	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), 0);
 	for (size_t i = 0; i < sizeof(pairs) / sizeof(pairs[0]); i++)
-		assert_int_equal(health_checks(&health, FAKE_ALL_GOOD ^ pairs[i].input, 0), pairs[i].check);
+		assert_int_equal(checks_of((uint16_t)(FAKE_ALL_GOOD ^ pairs[i].input), 0), pairs[i].check);
 }
 
 /* Which sensor by the input, which fault by the level. */
@@ -121,7 +129,8 @@ static void open_and_short_are_told_apart(void **state)
 {
 	const uint16_t s1 = WIRE_IO_IEPE_S1, s2 = WIRE_IO_IEPE_S2;
 	const struct {
-		uint16_t lost, high, checks;
+		uint16_t lost, high;
+		uint32_t checks;
 	} cables[] = {
 	        {0, 0, 0},
 	        {0, s1 | s2, 0}, /* in their windows again */
@@ -136,30 +145,24 @@ static void open_and_short_are_told_apart(void **state)
 
 	(void)state;
 	assert_int_equal(after_window(0, 0, 0), 0);
-	health_host(&health, 0, wire_hash());
 	for (size_t i = 0; i < sizeof(cables) / sizeof(cables[0]); i++)
-		assert_int_equal(
-		        health_checks(&health, (uint16_t)(FAKE_ALL_GOOD & ~cables[i].lost), cables[i].high),
-		        cables[i].checks);
+		assert_int_equal(checks_of((uint16_t)(FAKE_ALL_GOOD & ~cables[i].lost), cables[i].high),
+		                 cables[i].checks);
 }
 
-static void host_must_beat_and_have_our_hash(void **state)
+static void host_clocks_and_brown_out_level(void **state)
 {
 	(void)state;
 	assert_int_equal(after_window(0, 0, 0), 0);
-	health_tick(&health, 5000);
-	assert_int_equal(counters[WIRE_COUNTER_host_heartbeats_lost], 0); /* never was there */
-	health_host(&health, 5000, wire_hash());
-	health_tick(&health, 5500);
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), 0);
-	health_tick(&health, 5501);
-	health_tick(&health, 5502);
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), WIRE_CHECK_HOST);
-	assert_int_equal(counters[WIRE_COUNTER_host_heartbeats_lost], 1);
-	health_host(&health, 5600, wire_hash() ^ 1);
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), WIRE_CHECK_HOST);
-	health_host(&health, 5601, wire_hash());
-	assert_int_equal(health_checks(&health, FAKE_ALL_GOOD, 0), 0);
+	seen.host_good = false;
+	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), WIRE_CHECK_HOST);
+	seen.clocks_good = false;
+	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), WIRE_CHECK_HOST | WIRE_CHECK_CLOCKS);
+	seen.brown_out_set = false;
+	seen.host_good = seen.clocks_good = true;
+	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), WIRE_CHECK_BROWN_OUT_LEVEL);
+	seen.brown_out_set = true;
+	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), 0);
 }
 
 /* 100 ticks at rest with one S2 sample of a code. */
@@ -172,7 +175,7 @@ static bool trigger_is_red(unsigned channel, unsigned k, int16_t code, unsigned 
 			*at(&tick, channel, k) = code;
 		health_samples(&health, &tick);
 	}
-	return (health_checks(&health, FAKE_ALL_GOOD, 0) & WIRE_CHECK_TRIGGER) != 0;
+	return (checks_of(FAKE_ALL_GOOD, 0) & WIRE_CHECK_TRIGGER) != 0;
 }
 
 static void trigger_must_be_quiet_at_rest(void **state)
@@ -256,7 +259,7 @@ int main(void)
 	        cmocka_unit_test_setup(absent_samples_make_a_sensor_red, begin),
 	        cmocka_unit_test_setup(each_input_has_its_check, begin),
 	        cmocka_unit_test_setup(open_and_short_are_told_apart, begin),
-	        cmocka_unit_test_setup(host_must_beat_and_have_our_hash, begin),
+	        cmocka_unit_test_setup(host_clocks_and_brown_out_level, begin),
 	        cmocka_unit_test_setup(trigger_must_be_quiet_at_rest, begin),
 	        cmocka_unit_test_setup(zero_is_the_offset_of_the_last_window_at_rest, begin),
 	        cmocka_unit_test_setup(stuck_channel_in_motion_is_counted_once, begin),

@@ -105,7 +105,7 @@ static void whole(void **state)
 {
 	struct channel channel = make(7000, 0.3, 1.5, 0.1, 3);
 	struct estimate_channel plain = analyse(&channel, 0), undone = analyse(&channel, 0.3);
-	double area = 9.81 * 485 * 2 * BASE_S / PI;
+	double area = 9.80665 * 485 * 2 * BASE_S / PI;
 
 	(void)state;
 	assert_near(plain.peak.value_g, 485 - 1.5, 0.5);

@@ -724,11 +724,184 @@ static void test_a_capture_without_a_block(void **state)
 	record_free(&record);
 }
 
+/* What is known of a capture without its samples is what its record says. */
+static void test_skipped_is_as_taken(void **state)
+{
+	struct log_capture taken = {0}, skipped = {0};
+	struct record record;
+
+	(void)state;
+	for (unsigned round = 0; round < 4; round++) {
+		bool losses = round & 1u, ended = round < 2;
+
+		for (unsigned skip = 0; skip < 2; skip++) {
+			struct frame boot = {.id = 0x701, .length = 5};
+
+			hand_fill(&drop, 5000, 200, 40 + round);
+			drop.drop_id = (uint16_t)(300 + round);
+			drop.marks = 5;
+			join_feed(join, &boot);
+			join_by_hand_feed_both(0, 99);
+			join_by_hand_feed_both(losses ? 120 : 100, 199);
+			join_by_hand_feed_both(150, 151); /* again */
+			if (ended)
+				assert_int_equal(join_by_hand_feed_end(), 1);
+			if (skip) {
+				assert_int_equal(join_skip(join, &skipped), 0);
+			} else {
+				assert_int_equal(join_take(join, &record), 0);
+				log_capture_of_record(&record, &taken);
+				record_free(&record);
+			}
+			assert_false(join_has_capture(join));
+		}
+		assert_true(log_capture_equal(&taken, &skipped));
+		assert_int_equal(skipped.ended, ended);
+		assert_int_equal(skipped.drop_id, 300 + round);
+		assert_int_equal(skipped.marks, ended ? 5 : 0);
+		assert_int_equal(skipped.crc_agrees, ended && !losses);
+		assert_int_equal(log_capture_missing(&skipped), losses ? 40 : 0);
+		assert_int_equal(skipped.counters.corrupt, taken.counters.corrupt);
+		assert_int_equal(skipped.counters.repeated, 4);
+		skipped.counters.resent++;
+		assert_false(log_capture_equal(&taken, &skipped));
+	}
+	assert_int_equal(join_skip(join, &skipped), DT_E_EMPTY);
+	/* the CRC-32 that agreed was another capture's */
+	hand_fill(&drop, 7000, 60, 45);
+	join_by_hand_feed_both(0, 59);
+	drop.ticks = 50;
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	assert_int_equal(join_skip(join, &skipped), 0);
+	assert_true(skipped.crc_agrees);
+	assert_int_equal(join_skip(join, &skipped), 0);
+	assert_int_equal(skipped.counters.blocks, 20);
+	assert_false(skipped.crc_agrees);
+	/* a capture end without a block */
+	hand_fill(&drop, 90000, 50, 47);
+	drop.drop_id = 999;
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	assert_int_equal(join_skip(join, &skipped), 0);
+	assert_int_equal(skipped.drop_id, 999);
+	assert_int_equal(log_capture_missing(&skipped), 100);
+}
+
+/* What is told of the capture and of the stream without taking anything. */
+static void test_what_the_join_has(void **state)
+{
+	struct record record;
+	uint32_t tick_ms = 77;
+	uint64_t touched;
+
+	(void)state;
+	hand_fill(&drop, 5000, 60, 46);
+	assert_false(join_newest(join, &tick_ms));
+	assert_int_equal(tick_ms, 77);
+	join_by_hand_feed_both(0, 48);
+	assert_true(join_newest(join, &tick_ms));
+	assert_int_equal(tick_ms, 5048);
+	assert_null(join_end(join));
+	touched = join_touched(join);
+	assert_int_equal(touched, 0);
+	drop.ticks = 50;
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	assert_int_equal(join_end(join)->first_tick_ms, 5000);
+	join_by_hand_feed_both(49, 49);
+	assert_int_equal(join_touched(join), 2);
+	drop.ticks = 60;
+	join_by_hand_feed_both(50, 59);
+	assert_int_equal(join_touched(join), 2);
+	drop.ticks = 50;
+	record = take();
+	assert_true(record.crc_agrees);
+	record_free(&record);
+	assert_null(join_end(join));
+	/* what comes behind a capture is a run of its own */
+	assert_int_equal(join_take(join, &record), 0);
+	assert_int_equal(record.first_tick_ms, 5050);
+	assert_int_equal(record.last_tick_ms, 5059);
+	assert_false(record.crc_known);
+	record_free(&record);
+}
+
+static unsigned losses_told[2];
+
+static void count_loss(void *context, enum join_loss what)
+{
+	assert_ptr_equal(context, join);
+	losses_told[what]++;
+	if (what == JOIN_LOSS_CAPTURE) {
+		struct record record;
+
+		assert_int_equal(join_take(join, &record), 0);
+		assert_int_equal(record.first_tick_ms, 5000);
+		assert_int_equal(record.counters.blocks, 98);
+		record_free(&record);
+	}
+}
+
+/* A capture that was not taken can be taken when the next one ends, and the blocks of a run before it is
+ * gone. */
+static void test_losses_are_told(void **state)
+{
+	const struct frame boot = {.id = 0x701, .length = 5};
+	struct record record;
+
+	(void)state;
+	join_on_loss(join, count_loss, join);
+	hand_fill(&drop, 5000, 50, 41);
+	join_by_hand_feed_both(0, 48);
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	assert_int_equal(join_by_hand_feed_end(), 0); /* a repetition displaces nothing */
+	assert_int_equal(losses_told[JOIN_LOSS_CAPTURE], 0);
+	hand_fill(&drop, 5200, 50, 42);
+	join_by_hand_feed_both(0, 49);
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	assert_int_equal(losses_told[JOIN_LOSS_CAPTURE], 1);
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	record_free(&record);
+	assert_int_equal(losses_told[JOIN_LOSS_RUN], 0);
+	join_feed(join, &boot);
+	assert_int_equal(losses_told[JOIN_LOSS_RUN], 1);
+	assert_int_equal(join_restarts(join), 1);
+}
+
+/* Pieces of a message that never became whole are not filled up by the next run's of the same name. */
+static void test_segments_end_with_the_run(void **state)
+{
+	const struct frame boot = {.id = 0x701, .length = 5};
+	struct record record;
+	struct frame frame;
+
+	(void)state;
+	for (unsigned round = 0; round < 2; round++) {
+		hand_fill(&drop, 1000, 20, 50 + round);
+		join_feed(join, &boot);
+		hand_capture_end(&drop, &frame);
+		feed_segments(&frame, 99);
+		for (uint32_t tick = 0; tick < 20; tick++)
+			for (unsigned sensor = 1; sensor <= 2; sensor++) {
+				hand_block(&drop, sensor, tick, true, &frame);
+				feed_segments(&frame, round == 0 ? 1 : 99);
+			}
+	}
+	record = take();
+	hand_check_samples(&record, &drop, NULL);
+	assert_true(record.crc_agrees);
+	assert_int_equal(record.counters.corrupt, 40); /* copies that lost a piece, and no splice */
+	record_free(&record);
+}
+
 #define TEST(name) cmocka_unit_test_setup_teardown(name, join_by_hand_begin, join_by_hand_end)
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+	        TEST(test_skipped_is_as_taken),
+	        TEST(test_what_the_join_has),
+	        TEST(test_losses_are_told),
+	        TEST(test_segments_end_with_the_run),
 	        TEST(test_a_lossless_drop),
 	        TEST(test_classic_upload),
 	        TEST(test_marks_and_marked_samples),

@@ -279,6 +279,7 @@ static void lengths_of_a_window(void **state)
 		hand_capture_end(&drop, &frame);
 		for (unsigned k = 0; k < 4; k++)
 			frame.data[8 + k] = (uint8_t)(last_ms >> 8 * k);
+		hand_seal(&frame);
 		assert_int_equal(join_feed(join, &frame), cases[i].taken);
 	}
 }
@@ -335,6 +336,31 @@ static void what_was_taken_is_gone(void **state)
 	assert_false(join_next_gap(join, 0, 0, 100, &gap));
 }
 
+/* Each bit of the capture end is under its seal. */
+static void an_altered_end_is_no_end(void **state)
+{
+	struct frame frame;
+
+	(void)state;
+	hand_fill(&drop, 1000, 20, 16);
+	join_by_hand_feed_both(0, 19);
+	for (unsigned bit = 0; bit < 32 * 8; bit++) {
+		hand_capture_end(&drop, &frame);
+		frame.data[bit / 8] ^= (uint8_t)(1u << bit % 8);
+		assert_int_equal(join_feed(join, &frame), 0);
+		assert_false(join_is_news(join, &frame));
+	}
+	assert_false(join_has_capture(join));
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	assert_true(join_complete(join));
+	for (unsigned i = 0; i <= HAND_PARAMETERS; i++) {
+		assert_false(join_told(join));
+		hand_told(&drop, i, &frame);
+		assert_int_equal(join_feed(join, &frame), 0);
+	}
+	assert_true(join_told(join));
+}
+
 static void the_longest_window(void **state)
 {
 	struct frame frame;
@@ -348,10 +374,12 @@ static void the_longest_window(void **state)
 	hand_capture_end(&drop, &frame);
 	frame.data[8] = (20000 + 2047) & 0xFF;
 	frame.data[9] = (20000 + 2047) >> 8;
+	hand_seal(&frame);
 	assert_int_equal(join_feed(join, &frame), 1);
 	first_gap(1, 21023, 21023);
 	take_ticks(20000, 22047, 4092);
 	frame.data[0]++; /* another drop, of the same ticks */
+	hand_seal(&frame);
 	assert_int_equal(join_feed(join, &frame), 1);
 	join_forget(join);
 	first_gap(1, 20000, 22047);
@@ -469,6 +497,7 @@ int main(void)
 	        TEST(lengths_of_a_window),
 	        TEST(ends_that_are_news),
 	        TEST(what_was_taken_is_gone),
+	        TEST(an_altered_end_is_no_end),
 	        TEST(the_longest_window),
 	        TEST(the_end_says_which_drop),
 	        TEST(a_run_of_one_tick),

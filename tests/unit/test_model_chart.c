@@ -208,6 +208,7 @@ static void motions(void **state)
 	                   .box_kg = 0.169,
 	                   .plate_kg = 0.014,
 	                   .inertia_kg_m2 = 0.169 * (0.289 * 0.289 + 0.101 * 0.101) / 12,
+	                   .gravity_m_s2 = 9.81,
 	                   .speed_m_s = 4.18811174636,
 	                   .angle_rad = 25 * acos(-1) / 180,
 	                   .lever_x_m = 0.1445,

@@ -36,7 +36,7 @@ static void names_of_numbers(void **state)
 	check_names(wire_counter_name, WIRE_COUNTERS);
 	check_names(wire_check_name, WIRE_CHECKS);
 	check_names(wire_check_text, WIRE_CHECKS);
-	check_names(wire_mark_name, 9);
+	check_names(wire_mark_name, 13);
 	assert_string_equal(wire_op_name(0), "?");
 	for (unsigned op = 1; op <= 6; op++)
 		assert_string_not_equal(wire_op_name(op), "?");
@@ -54,7 +54,7 @@ static void names_of_the_design(void **state)
 	assert_int_equal(wire_fault_emcy(WIRE_FAULT_HOST_LOST), 0x8130);
 	assert_int_equal(wire_fault_emcy(WIRE_FAULTS), 0xFF00);
 	for (unsigned s = 0; s < WIRE_STATES + 5; s++)
-		assert_int_equal(wire_state_moving(s), (s >= 4 && s <= 6) || s == 10);
+		assert_int_equal(wire_state_moving(s), (s >= 4 && s <= 6) || s == 10 || s == 11);
 }
 
 static void messages_by_identifier(void **state)
@@ -87,14 +87,14 @@ static void errors_have_texts(void **state)
 {
 	(void)state;
 	assert_string_equal(error_text(0), "done");
-	assert_string_equal(error_text(DT_E_TOKEN), "wrong token");
+	assert_string_equal(error_text(DT_E_TOKEN), "not the answer to this ARM");
 	assert_string_equal(error_text(1), "unknown error");
-	for (int code = -1; code >= -19; code--) {
+	for (int code = -1; code >= -23; code--) {
 		assert_string_not_equal(error_text(code), "unknown error");
 		for (int other = 0; other > code; other--)
 			assert_string_not_equal(error_text(code), error_text(other));
 	}
-	for (int code = -20; code >= -128; code--)
+	for (int code = -24; code >= -128; code--)
 		assert_string_equal(error_text(code), "unknown error");
 }
 

@@ -12,6 +12,7 @@
 #include <cmocka.h>
 
 #include "host/estimate/estimate.h"
+#include "host/record/drop.h"
 #include "tests/unit/near.h"
 #include "tests/unit/synth.h"
 
@@ -87,6 +88,7 @@ static void make(struct drop *drop, const struct scene *scene, double tolerance,
 	}
 	drop->record.channels = drop->channel;
 	drop->record.channel_count = CHANNELS;
+	drop_set_axes(&drop->record);
 	assert_int_equal(estimate_record(&drop->record, &options, &drop->analysis), 0);
 }
 

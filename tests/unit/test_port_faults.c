@@ -4,9 +4,9 @@
  *
  * A whole drop, short because the gates are high and the window is small, runs in a simple world: a latch, a
  * frame that falls, two gates, a product that hits, and a host that arms, releases, collects with the join
- * and accepts. The calls of each kind are counted once; then the drop is done again for each call of each
- * kind with that one failed. Whatever fails, the tower must come to rest braked, and account for what
- * happened exactly.
+ * and accepts. The waits before READY and before a release are made short, or they would be nearly all of it.
+ * The calls of each kind are counted once; then the drop is done again for each call of each kind with that
+ * one failed. Whatever fails, the tower must come to rest braked, and account for what happened exactly.
  *
  * The linker puts the __wrap_ functions between the firmware and the fake port (--wrap,
  * tests/fault/fault.mk).
@@ -66,7 +66,8 @@ static const char *const names[KINDS] = {
 };
 
 enum {
-	TOKEN = 0x5A5A,
+	SESSION = 0x5A5A7001,
+	WAIT_MS = 20,
 	READY_MS = 230,        /* by then the tower is at rest and green */
 	END_MS = 4000,         /* by then it is at rest again, whatever happens */
 	LATCH_MS = 5,          /* from the latch's coil to the frame's first movement */
@@ -98,6 +99,7 @@ static struct {
 	bool released, ended, complete, accepted;
 	uint32_t sent, blocks[2], given, overruns, late_edges, bus_offs, lost, garbage;
 	struct wire_capture_end end;
+	struct wire_armed armed;
 } host;
 
 static struct join *the_join; /* one for all drops: the tower's boot message parts them */
@@ -135,7 +137,7 @@ void __real_port_off_cancel(uint16_t output);
 int __real_port_can_setup(bool classic, uint32_t data_kbit_s);
 int __real_port_can_send(const struct frame *frame);
 int __real_port_can_receive(struct frame *frame);
-uint32_t __real_port_can_errors(bool *bus_off);
+uint32_t __real_port_can_errors(enum port_bus *state);
 void __real_port_watchdog_kick(void);
 void __real_command_handle(struct app *app, const struct frame *frame);
 
@@ -148,7 +150,7 @@ void __wrap_port_off_cancel(uint16_t output);
 int __wrap_port_can_setup(bool classic, uint32_t data_kbit_s);
 int __wrap_port_can_send(const struct frame *frame);
 int __wrap_port_can_receive(struct frame *frame);
-uint32_t __wrap_port_can_errors(bool *bus_off);
+uint32_t __wrap_port_can_errors(enum port_bus *state);
 void __wrap_port_watchdog_kick(void);
 void __wrap_command_handle(struct app *app, const struct frame *frame);
 
@@ -209,6 +211,8 @@ static void hear(const struct frame *frame)
 
 	host.blocks[0] += frame->id == WIRE_ID_BLOCK_S1;
 	host.blocks[1] += frame->id == WIRE_ID_BLOCK_S2;
+	if (frame->id == WIRE_ID_ARMED)
+		assert_int_equal(wire_unpack_armed(frame, &host.armed), 0);
 	if (whole == NULL)
 		return;
 	if (join_feed(the_join, whole) == 1 || (whole->id == WIRE_ID_CAPTURE_END && !host.ended)) {
@@ -219,7 +223,7 @@ static void hear(const struct frame *frame)
 
 int __wrap_port_can_send(const struct frame *frame)
 {
-	if (fails(SEND_FULL) || lasts(SEND_FULL_LONG) || (fault.kind == BUS_OFF && fake.bus_off))
+	if (fails(SEND_FULL) || lasts(SEND_FULL_LONG) || (fault.kind == BUS_OFF && fake.bus == PORT_BUS_OFF))
 		return DT_E_FULL;
 	host.sent++;
 	if (fails(SEND_LOST)) {
@@ -256,13 +260,13 @@ int __wrap_port_can_receive(struct frame *frame)
 	return result;
 }
 
-uint32_t __wrap_port_can_errors(bool *bus_off)
+uint32_t __wrap_port_can_errors(enum port_bus *state)
 {
 	bool off = lasts(BUS_OFF);
 
-	host.bus_offs += off && !fake.bus_off;
-	fake.bus_off = off;
-	return __real_port_can_errors(bus_off);
+	host.bus_offs += off && fake.bus != PORT_BUS_OFF;
+	fake.bus = off ? PORT_BUS_OFF : PORT_BUS_ACTIVE;
+	return __real_port_can_errors(state);
 }
 
 void __wrap_port_watchdog_kick(void)
@@ -357,8 +361,10 @@ static void sample(void)
 
 static void say(unsigned op, uint32_t argument)
 {
-	struct wire_command command = {
-	        .op = (uint8_t)op, .sequence = ++host.sequence, .token = TOKEN, .argument = argument};
+	struct wire_command command = {.op = (uint8_t)op,
+	                               .sequence = ++host.sequence,
+	                               .host = (uint16_t)SESSION,
+	                               .argument = argument};
 	struct frame frame;
 
 	wire_pack_command(&frame, WIRE_ID_COMMAND, &command);
@@ -382,6 +388,8 @@ static void make_it_short(void)
 	set(0x2003, 40000);
 	set(0x2005, 20);
 	set(0x2006, 20);
+	the_app->parameters.value[WIRE_PARAMETER_settle_ms] = WAIT_MS; /* less than anybody may set */
+	the_app->parameters.value[WIRE_PARAMETER_warning_ms] = WAIT_MS;
 }
 
 static void ask_again(void)
@@ -406,15 +414,22 @@ static void ask_again(void)
 static void operate(void)
 {
 	uint8_t state = the_app->sequence.state;
+	uint32_t set_crc32 = wire_parameters_crc32(the_app->parameters.value);
 
 	host.complete |= host.ended && join_complete(the_join);
 	if (state == WIRE_STATE_READY && !world.opened)
-		say(WIRE_OP_ARM, 0);
-	if (state == WIRE_STATE_ARMED) {
+		say(WIRE_OP_ARM, wire_arm_key(SESSION, set_crc32));
+	if (state == WIRE_STATE_ARMED && host.armed.nonce == 0) /* it did not come */
+		say(WIRE_OP_ARM, wire_arm_key(SESSION, set_crc32));
+	if (state == WIRE_STATE_ARMED && host.armed.nonce != 0) {
 		host.released = true;
-		say(WIRE_OP_RELEASE, 0);
+		say(WIRE_OP_RELEASE, wire_release_key(host.armed.nonce, host.armed.drop_id, set_crc32));
 	}
-	if (state == WIRE_STATE_FAULT_HELD && !world.opened)
+	if (state != WIRE_STATE_ARMED)
+		host.armed.nonce = 0;
+	if ((state == WIRE_STATE_FAULT_HELD ||
+	     (state == WIRE_STATE_SAFE && !the_app->sequence.acknowledged)) &&
+	    !world.opened)
 		say(WIRE_OP_CLEAR, 0);
 	if (state != WIRE_STATE_CAPTURED || !host.ended)
 		return;
@@ -431,8 +446,10 @@ static void hosts_part(void)
 	struct frame frame;
 
 	if (world.now_ms % 100 == 5) {
-		wire_pack_heartbeat(&frame, WIRE_ID_HEARTBEAT_HOST,
-		                    &(struct wire_heartbeat){.nmt_state = 5, .wire_hash = wire_hash()});
+		wire_pack_host_heartbeat(
+		        &frame, WIRE_ID_HEARTBEAT_HOST,
+		        &(struct wire_host_heartbeat){
+		                .nmt_state = 5, .session = SESSION, .wire_hash_low = (uint16_t)wire_hash()});
 		fake_receive(&frame);
 	}
 	if (world.now_ms == READY_MS)

@@ -90,7 +90,7 @@ static void shapes(void **state)
 	for (unsigned shape = 0; shape < SYNTH_SHAPES; shape++) {
 		for (int phase = 0; phase < 10; phase++) {
 			struct channel channel = make(shape, 7000, phase / 10.0, 0, 0, NULL);
-			double velocity = 9.81 * HEIGHT_G * BASE_S * synth_pulse_area(shape);
+			double velocity = 9.80665 * HEIGHT_G * BASE_S * synth_pulse_area(shape);
 			struct estimate_baseline baseline;
 			struct estimate_pulse pulse = measure(&channel, &baseline);
 
@@ -109,7 +109,7 @@ static void shapes(void **state)
 static void noise(void **state)
 {
 	enum { TIMES = 400 };
-	double truth = 9.81 * HEIGHT_G * BASE_S * 2 / PI, square = 0, mean = 0, long_square = 0;
+	double truth = 9.80665 * HEIGHT_G * BASE_S * 2 / PI, square = 0, mean = 0, long_square = 0;
 	struct synth_random random = {31};
 	int covered = 0, long_covered = 0;
 
@@ -149,7 +149,7 @@ static void between_samples(void **state)
 
 	(void)state;
 	for (unsigned shape = 0; shape < SYNTH_HUNT_CROSSLEY; shape++) {
-		double truth = 9.81 * HEIGHT_G * BASE_S * synth_pulse_area(shape), square = 0,
+		double truth = 9.80665 * HEIGHT_G * BASE_S * synth_pulse_area(shape), square = 0,
 		       wide_square = 0;
 		int covered = 0, wide_covered = 0;
 
@@ -181,7 +181,7 @@ static void between_samples(void **state)
 static void faint(void **state)
 {
 	enum { TIMES = 100 };
-	const double height_g = 5, base_s = 0.02, truth = 9.81 * height_g * base_s * 2 / PI;
+	const double height_g = 5, base_s = 0.02, truth = 9.80665 * height_g * base_s * 2 / PI;
 	struct synth_random random = {36};
 	int most = 0;
 
@@ -250,7 +250,7 @@ static void hole(void **state)
 	for (unsigned i = 0; i < 2; i++) {
 		struct synth_random random = {32};
 		struct channel channel = make(shapes[i], 7000, 0.4, 0, 1, &random);
-		double truth = 9.81 * HEIGHT_G * BASE_S * synth_pulse_area(shapes[i]);
+		double truth = 9.80665 * HEIGHT_G * BASE_S * synth_pulse_area(shapes[i]);
 		struct estimate_baseline baseline;
 		struct estimate_pulse whole = measure(&channel, &baseline), pulse;
 
@@ -267,7 +267,7 @@ static void hole(void **state)
 static void hole_covered(void **state)
 {
 	enum { TIMES = 400 };
-	double truth = 9.81 * HEIGHT_G * BASE_S * 2 / PI;
+	double truth = 9.80665 * HEIGHT_G * BASE_S * 2 / PI;
 	struct synth_random random = {35};
 	int covered = 0;
 
@@ -303,7 +303,7 @@ static struct contact contacts(enum synth_shape shape, double noise_g, enum esti
                                uint64_t seed)
 {
 	enum { TIMES = 200 };
-	double truth = 9.81 * HEIGHT_G * BASE_S * synth_pulse_area(shape);
+	double truth = 9.80665 * HEIGHT_G * BASE_S * synth_pulse_area(shape);
 	struct synth_random random = {seed};
 	struct contact c = {{0}, 0, 0, 0, 0};
 
@@ -374,7 +374,7 @@ static void clipped(void **state)
 {
 	struct synth_random random = {60};
 	struct channel channel = make(SYNTH_HALF_SINE, 7000, 0.4, 0, 1, &random);
-	double truth = 9.81 * HEIGHT_G * BASE_S * 2 / PI;
+	double truth = 9.80665 * HEIGHT_G * BASE_S * 2 / PI;
 	struct estimate_baseline baseline;
 	struct estimate_pulse pulse;
 
@@ -412,7 +412,7 @@ static void of_weak(void **state)
 	/* its own zero over the pulse */
 	trace.noise_g = 10;
 	pulse_of_weak(&trace, &weak, &baseline, &strong, &pulse);
-	assert_near(pulse.sigma_velocity_m_s, hypot(hypot(0.0005, 0.01), 9.81 * 1 * 2e-3), 1e-12);
+	assert_near(pulse.sigma_velocity_m_s, hypot(hypot(0.0005, 0.01), 9.80665 * 1 * 2e-3), 1e-12);
 	baseline.doubtful = true;
 	pulse_of_weak(&trace, &weak, &baseline, &strong, &pulse);
 	assert_int_equal(pulse.flags, ESTIMATE_FLAG_ZERO);
@@ -462,7 +462,7 @@ static void starts_inside(void **state)
 	assert_int_equal(baseline.samples, 0);
 	assert_near(baseline.offset_g, 0, 0);
 	assert_near(baseline.noise_g, 1, 0.2);
-	assert_near(pulse.velocity_change_m_s, 9.81 * HEIGHT_G * BASE_S * 2 / PI, 0.05);
+	assert_near(pulse.velocity_change_m_s, 9.80665 * HEIGHT_G * BASE_S * 2 / PI, 0.05);
 	assert_true(isnan(pulse.sigma_velocity_m_s));
 	assert_int_equal(pulse.flags, ESTIMATE_FLAG_ZERO);
 	pulse = measure(&channel, &baseline);

@@ -170,22 +170,44 @@ static void test_resent_blocks_are_joined(void **state)
 	record_free(&record);
 }
 
-static void test_the_last_of_several_drops(void **state)
+static struct record read_number(unsigned number)
 {
+	char *file = hand_file(".log", log_text, log_size), message[READ_MESSAGE_MAX] = "";
+	struct record record;
+
+	if (read_nth(&record, file, NULL, number, message))
+		fail_msg("%s", message);
+	hand_unlink(file);
+	return record;
+}
+
+static void test_several_drops(void **state)
+{
+	char message[READ_MESSAGE_MAX] = "";
 	struct record record;
 
 	(void)state;
-	hand_fill(&drop, 7000, 50, 4);
-	add_blocks(0, 49);
-	add_end();
 	hand_fill(&drop, 9000, 60, 5);
 	drop.drop_id = 4;
 	add_blocks(0, 58); /* one tick is lost for good */
 	add_end();
-	record = read_log();
+	hand_fill(&drop, 12000, 50, 4);
+	drop.drop_id = 5;
+	add_blocks(0, 49);
+	add_end();
+	assert_int_equal(read_part(log_size, &record, message), DT_E_ARGUMENT);
+	assert_memory_equal(message, ": 2 drops, expected one", 23);
+	record = read_number(1);
 	assert_int_equal(record.drop_id, 4);
+	assert_int_equal(record.log_number, 1);
 	assert_int_equal(record.flags, RECORD_FLAG_LOST | RECORD_FLAG_INCOMPLETE);
 	assert_int_equal(record.gap_count, 2);
+	record_free(&record);
+	record = read_number(2);
+	hand_check_samples(&record, &drop, NULL);
+	assert_int_equal(record.drop_id, 5);
+	assert_int_equal(record.log_number, 2);
+	assert_int_equal(record.flags, 0);
 	record_free(&record);
 
 	/* a capture end without a single block does not hide the drop before it */
@@ -199,6 +221,7 @@ static void test_the_last_of_several_drops(void **state)
 	record = read_log();
 	hand_check_samples(&record, &drop, NULL);
 	assert_int_equal(record.flags, 0);
+	assert_int_equal(record.log_number, 1);
 	record_free(&record);
 }
 
@@ -339,7 +362,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 	        TEST(test_a_whole_drop),
 	        TEST(test_resent_blocks_are_joined),
-	        TEST(test_the_last_of_several_drops),
+	        TEST(test_several_drops),
 	        TEST(test_a_truncated_log),
 	        TEST(test_garbage_is_counted),
 	        TEST(test_refusals),

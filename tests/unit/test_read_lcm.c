@@ -125,19 +125,19 @@ static void test_blocks_that_do_not_fit_the_wire(void **state)
 static void test_a_status(void **state)
 {
 	struct frame frame = {
-	        .id = 0x682, .length = 8, .time_us = 99, .data = {3, 2, 0x34, 0x12, 0x78, 0x56, 0xBC, 0x9A}};
-	droptower_state message = {.command_utime = 5, .command_result = -7};
+	        .id = 0x682, .length = 8, .time_us = 99, .data = {3, 2, 0x34, 0x12, 0x78, 0x96, 0xBC, 0x9A}};
+	droptower_state message = {.utime = 5, .counter = 6, .result = -7, .drop_id = 8};
 
 	(void)state;
 	assert_int_equal(lcm_codec_state(&frame, &message), 0);
-	assert_int_equal(message.utime, 99);
 	assert_int_equal(message.state, 3);
 	assert_int_equal(message.fault, 2);
-	assert_int_equal(message.checks, 0x1234);
-	assert_int_equal(message.drop_id, 0x5678);
+	assert_int_equal(message.checks, 0x96781234); /* all 32, and no sign */
 	assert_int_equal(message.io, 0x9ABC);
-	assert_int_equal(message.command_utime, 5);
-	assert_int_equal(message.command_result, -7);
+	assert_int_equal(message.utime, 5); /* what is the publisher's stays */
+	assert_int_equal(message.counter, 6);
+	assert_int_equal(message.result, -7);
+	assert_int_equal(message.drop_id, 8);
 	frame.id = 0x683;
 	assert_int_equal(lcm_codec_state(&frame, &message), DT_E_UNKNOWN);
 }
@@ -160,7 +160,7 @@ static void test_a_drop_there_and_back(void **state)
 		assert_int_equal(lcm_codec_drop(&record, 1234, &message), 0);
 		assert_int_equal(message.utime, 1234);
 		assert_int_equal(message.drop_id, 3);
-		assert_int_equal(message.trigger_us, losses ? -1 : 10123);
+		assert_int_equal(message.trigger_us, 10123); /* as sent, whatever the mark says of it */
 		assert_int_equal(message.x_count, 350);
 		assert_int_equal(message.s2_z[6 * 10 + 9], 16001);
 		assert_int_equal(message.gap_count, losses);
@@ -169,16 +169,22 @@ static void test_a_drop_there_and_back(void **state)
 		bytes = malloc((size_t)size);
 		assert_non_null(bytes);
 		assert_int_equal(droptower_drop_encode(bytes, 0, size, &message), size);
-		assert_int_equal(lcm_codec_decode_drop(bytes, (size_t)size, &decoded), 0);
+		assert_int_equal(lcm_codec_decode_drop(bytes, (size_t)size, false, &decoded), 0);
 		assert_int_equal(lcm_codec_record(&decoded, &again), 0);
 		hand_check_equal(&again, &record);
 		for (int cut = 0; cut < size; cut++) /* every truncation is refused */
-			assert_int_equal(lcm_codec_decode_drop(bytes, (size_t)cut, &refused), DT_E_FORMAT);
-		droptower_drop_decode_cleanup(&decoded);
+			assert_int_equal(lcm_codec_decode_drop(bytes, (size_t)cut, false, &refused),
+			                 DT_E_FORMAT);
+		lcm_codec_free_drop(&decoded);
 		lcm_codec_free_drop(&message);
 		free(bytes);
-		record_free(&record);
 		record_free(&again);
+		record.crc_known = false; /* nothing has told it then */
+		record.trigger_s = NAN;
+		assert_int_equal(lcm_codec_drop(&record, 1234, &message), 0);
+		assert_int_equal(message.trigger_us, -1);
+		lcm_codec_free_drop(&message);
+		record_free(&record);
 	}
 }
 
@@ -206,6 +212,17 @@ static void test_drops_that_do_not_fit(void **state)
 	REFUSE(x_count, 139);
 	REFUSE(yz_count, 201);
 	REFUSE(gap_count, 1000);
+	for (int i = 0; i < 2; i++) {
+		int64_t hostile = i ? -1 : ((int64_t)1 << 53) + 1;
+
+		REFUSE(blocks, hostile);
+		REFUSE(repeated, hostile);
+		REFUSE(reordered, hostile);
+		REFUSE(corrupt, hostile);
+		REFUSE(gaps, hostile);
+		REFUSE(resent, hostile);
+		REFUSE(conflicting, hostile);
+	}
 #undef REFUSE
 	message.crc_agrees = 0; /* not believed, computed */
 	assert_int_equal(lcm_codec_record(&message, &record), 0);
@@ -225,10 +242,11 @@ static void test_drops_that_do_not_fit(void **state)
 
 static void test_a_written_log(void **state)
 {
-	char message[READ_MESSAGE_MAX] = "", *file = hand_file(".lcm", "", 0);
+	char message[READ_MESSAGE_MAX] = "", *file = hand_file(".lcm", "", 0), *bytes;
 	struct record record, again;
 	lcm_eventlog_event_t *event;
 	lcm_eventlog_t *log;
+	size_t size;
 
 	(void)state;
 	hand_fill(&drop, 1000, 500, 4);
@@ -245,10 +263,79 @@ static void test_a_written_log(void **state)
 	assert_int_equal(event->timestamp, 1500000);
 	assert_in_range(event->datalen, 54000, 60000);
 	lcm_eventlog_free_event(event);
+	event = lcm_eventlog_read_next_event(log);
+	assert_non_null(event);
+	assert_string_equal(event->channel, "DT_SEAL");
+	lcm_eventlog_free_event(event);
 	assert_null(lcm_eventlog_read_next_event(log));
 	lcm_eventlog_destroy(log);
-	record_free(&record);
+	assert_true(again.file_sealed);
 	record_free(&again);
+	/* what stands in place of the digits is not printed, whatever it is */
+	bytes = hand_read(file, &size);
+	bytes[size - 1] = '\n';
+	assert_int_equal(read_bytes(bytes, size, &again, message), DT_E_CORRUPT);
+	assert_non_null(strstr(message, ": altered: the seal of its drop is no SHA-256, expected "));
+	assert_null(strchr(message, '\n'));
+	free(bytes);
+	record_free(&record);
+	hand_unlink(file);
+}
+
+/* A log that ends within its drop: the ticks that are whole are there, the others lost and marked. */
+static void test_a_log_cut_in_its_drop(void **state)
+{
+	enum {
+		TICKS = 8,
+		SEAL = 28 + 7 + 7 + 64,
+		MAC = 32,
+		END = 1 + 8 + 8,
+		MEASURED = 1 + 12 + 8 + 8 + 2 + 4
+	};
+	enum { FRONT = 28 + 7 + 8 + 8 + 8 + 32 + 2 + 4 + 2 + END + MEASURED + 56 + 12 };
+	char *file = hand_file(".lcm", "", 0), *bytes, message[READ_MESSAGE_MAX];
+	struct record record, again;
+	size_t size;
+	unsigned whole = 0;
+
+	(void)state;
+	hand_fill(&drop, 1000, TICKS, 9);
+	record = make_record(false);
+	assert_int_equal(write_record(&record, file, message), 0);
+	bytes = hand_read(file, &size);
+	assert_int_equal(size, FRONT + 2 * 27 * 2 * TICKS + MAC + SEAL);
+	size -= SEAL;
+	for (size_t cut = 1; cut < size; cut++) {
+		size_t samples = cut > FRONT ? (cut - FRONT) / 2 : 0;
+		/* 7 X, 10 Y, 10 Z of all ticks of S1, then of S2 */
+		size_t s1 = samples <= 17 * TICKS ? 0 : (samples - 17 * TICKS) / 10;
+		size_t s2 = samples <= 44 * TICKS ? 0 : (samples - 44 * TICKS) / 10;
+		bool held[2][HAND_TICKS_MAX] = {{false}};
+		char *part = hand_file(".lcm", bytes, cut);
+		int error = read_record(&again, part, NULL, message);
+
+		s1 = s1 < TICKS ? s1 : TICKS;
+		s2 = s2 < TICKS ? s2 : TICKS; /* behind these comes the MAC */
+		assert_int_equal(error == 0, s1 > 0);
+		if (!error) {
+			for (size_t k = 0; k < TICKS; k++) {
+				held[0][k] = k < s1;
+				held[1][k] = k < s2;
+			}
+			hand_check_samples(&again, &drop, held);
+			assert_int_equal(again.flags,
+			                 s2 < TICKS ? RECORD_FLAG_INCOMPLETE | RECORD_FLAG_LOST : 0);
+			assert_false(again.file_sealed);
+			assert_int_equal(again.counters.corrupt, record.counters.corrupt + 1);
+			assert_int_equal(again.drop_id, record.drop_id);
+			record_free(&again);
+			whole++;
+		}
+		hand_unlink(part);
+	}
+	assert_true(whole > size / 2);
+	free(bytes);
+	record_free(&record);
 	hand_unlink(file);
 }
 
@@ -359,31 +446,32 @@ static void test_bad_bytes_cost_one_event_each(void **state)
 
 static void test_events_in_turn(void **state)
 {
-	struct source source = {.file = "log"}, text = {.file = "text", .bytes = NULL, .size = 0};
+	struct log_file log = {.file = "log", .descriptor = -1}, text = {.file = "text", .descriptor = -1};
 	struct lcm_log_walk walk = {0};
 	struct lcm_log_event event;
 
 	(void)state;
 	hand_fill(&drop, 1000, 5, 8);
-	source.bytes = make_log(false, &source.size);
-	assert_true(lcm_log_is(&source));
+	log.whole.bytes = make_log(false, &log.whole.size);
+	log.size = log.whole.size;
+	assert_true(lcm_log_is(&log));
 	for (unsigned i = 0; i < 10; i++) {
-		assert_true(lcm_log_next(&source, &walk, &event));
+		assert_true(lcm_log_next(&log, &walk, &event));
 		assert_string_equal(event.channel, "DT_BLOCK");
 		assert_int_equal(event.time_us, 1000 * i);
 		assert_int_equal(event.size, 90);
 		if (i == 3) {
-			assert_true(lcm_log_next(&source, &walk, &event));
+			assert_true(lcm_log_next(&log, &walk, &event));
 			assert_string_equal(event.channel, "OTHER");
 		}
 	}
-	assert_false(lcm_log_next(&source, &walk, &event));
+	assert_false(lcm_log_next(&log, &walk, &event));
 	assert_int_equal(walk.events, 11);
 	assert_int_equal(walk.skipped, 0);
-	text.bytes = source.bytes + 4;
-	text.size = 40;
+	text.whole.bytes = log.whole.bytes + 4;
+	text.size = text.whole.size = 40;
 	assert_false(lcm_log_is(&text));
-	free(source.bytes);
+	free(log.whole.bytes);
 }
 
 static void test_refusals(void **state)
@@ -438,8 +526,8 @@ static void test_damaged_counts(void **state)
 	for (int at = 100; at < 160; at++) {
 		for (int value = 1; value < 256; value++) {
 			bytes[at] = (uint8_t)(bytes[at] ^ value);
-			if (lcm_codec_decode_drop(bytes, (size_t)size, &decoded) == 0)
-				droptower_drop_decode_cleanup(&decoded);
+			if (lcm_codec_decode_drop(bytes, (size_t)size, false, &decoded) == 0)
+				lcm_codec_free_drop(&decoded);
 			bytes[at] = (uint8_t)(bytes[at] ^ value);
 		}
 	}
@@ -456,6 +544,7 @@ int main(void)
 	        cmocka_unit_test(test_a_drop_there_and_back),
 	        cmocka_unit_test(test_drops_that_do_not_fit),
 	        cmocka_unit_test(test_a_written_log),
+	        cmocka_unit_test(test_a_log_cut_in_its_drop),
 	        cmocka_unit_test(test_blocks_without_a_drop),
 	        cmocka_unit_test(test_a_drop_goes_before_blocks),
 	        cmocka_unit_test(test_bad_bytes_cost_one_event_each),

@@ -14,6 +14,8 @@
 #include "tests/unit/synth.h"
 
 #define SPEED_M_S 4.2
+#define G_M_S2 9.80665    /* of a reading */
+#define GRAVITY_M_S2 9.78 /* of the flight */
 #define BASE_S 3e-3
 #define ONSET_S 0.1
 
@@ -32,8 +34,8 @@ struct bench {
 static struct estimate_rebound run(struct bench *b, double ratio, double gain, double until_s, uint64_t seed)
 {
 	static const double part[AXES] = {0.906, -0.423, 0}, again[AXES] = {-0.3, 0.6, 0};
-	double height = SPEED_M_S * (1 + ratio) / (9.81 * BASE_S * synth_pulse_area(SYNTH_HUNT_CROSSLEY));
-	double flight = 2 * ratio * SPEED_M_S / 9.81;
+	double height = SPEED_M_S * (1 + ratio) / (G_M_S2 * BASE_S * synth_pulse_area(SYNTH_HUNT_CROSSLEY));
+	double flight = 2 * ratio * SPEED_M_S / GRAVITY_M_S2;
 	struct synth_random random = {seed};
 	struct rebound_axes axes = {.count = AXES};
 	struct estimate_rebound rebound;
@@ -59,7 +61,7 @@ static struct estimate_rebound run(struct bench *b, double ratio, double gain, d
 		axes.peak[i] = &b->peak[i];
 		axes.pulse[i] = &b->pulse[i];
 	}
-	rebound_find(&axes, SPEED_M_S, &rebound);
+	rebound_find(&axes, SPEED_M_S, GRAVITY_M_S2, &rebound);
 	for (unsigned i = 0; i < AXES; i++) {
 		trace_close(&b->trace[i]);
 		synth_free(&b->channel[i]);
@@ -76,7 +78,7 @@ static void both_ways(void **state)
 	for (size_t i = 0; i < 3; i++) {
 		struct bench b = {.noise_g = 0.3};
 		struct estimate_rebound r = run(&b, ratio[i], 1, 0.8, 10 + i);
-		double flight = 2 * ratio[i] * SPEED_M_S / 9.81;
+		double flight = 2 * ratio[i] * SPEED_M_S / GRAVITY_M_S2;
 
 		printf("seed %zu: %.4f +- %.4f, %.5f +- %.5f of %.2f\n", 10 + i, r.velocity_ratio,
 		       r.sigma_velocity_ratio, r.flight_ratio, r.sigma_flight_ratio, ratio[i]);
@@ -131,7 +133,7 @@ static void noisy(void **state)
 		assert_true(isfinite(r.velocity_ratio));
 		ghosts += !isnan(r.second_impact_s) || !isnan(r.flight_ratio);
 		r = run(&b, 0.5, 1, 0.8, seed);
-		found += fabs(r.second_impact_s - (ONSET_S + BASE_S + SPEED_M_S / 9.81)) < 2e-3;
+		found += fabs(r.second_impact_s - (ONSET_S + BASE_S + SPEED_M_S / GRAVITY_M_S2)) < 2e-3;
 	}
 	printf("seeds 40 to 59: %d of %d second impacts that are none, %d found\n", ghosts, RUNS, found);
 	assert_int_equal(ghosts, 0);

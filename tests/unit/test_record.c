@@ -126,6 +126,9 @@ static void test_names(void **state)
 	        {RECORD_FLAG_SHORT, "too_short"},
 	        {RECORD_FLAG_ZERO_UNSURE, "zero_unsure"},
 	        {RECORD_FLAG_UNFILTERED, "unfiltered"},
+	        {RECORD_FLAG_NO_LINE_END, "no_line_end"},
+	        {RECORD_FLAG_SAME_NAMES, "same_names"},
+	        {RECORD_FLAG_SETTLING, "settling"},
 	        {0, ""},
 	        {1u << 31, ""},
 	};

@@ -19,6 +19,7 @@
 #include <cjson/cJSON.h>
 
 #include "common/wire.h"
+#include "host/record/drop.h"
 #include "host/report/facts.h"
 #include "host/report/picture.h"
 #include "host/report/traces.h"
@@ -135,6 +136,7 @@ static int set_up(void **state)
 	f->record.counters.blocks = 1000;
 	for (size_t i = 0; i < CHANNELS; i++)
 		make_channel(f, i, names[i]);
+	drop_set_axes(&f->record);
 	f->analysis = (struct analysis){
 	        .channels = f->estimates,
 	        .channel_count = CHANNELS,
@@ -576,7 +578,7 @@ static void test_processing(void **state)
 	                 "filter lowpass 1650 Hz; sensor high-pass not undone, which takes --scene or --iepe",
 	                 "lowpass 1650 Hz", 1650, 0);
 	for (size_t i = 0; i < CHANNELS; i++)
-		f->record.channels[i].name[0] = 'a';
+		f->record.channels[i].sensor = 0;
 	check_processing(&f->report, "filter lowpass 1650 Hz", "lowpass 1650 Hz", 1650, 0);
 	done->lowpass_hz = 0;
 	check_processing(&f->report, "", NULL, 0, 0);
@@ -929,7 +931,7 @@ static void test_html_foreign(void **state)
 		many[i].pulse.status = ESTIMATE_SHORT;
 	}
 	for (size_t i = 0; i < CHANNELS; i++)
-		f->record.channels[i].name[0] = 'Q';
+		f->record.channels[i].sensor = 0; /* whatever its name */
 	f->analysis = (struct analysis){.channels = many, .channel_count = 15};
 	f->record.is_drop = false;
 	f->report.scene = NULL;

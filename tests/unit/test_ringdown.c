@@ -383,7 +383,7 @@ static double soften(double *reading, size_t count, double rate_hz, double natur
 			k[stage] = -2 * damping * w * vs -
 			           w * w * xs * (1 + (1.0 / 3) / (1 + u * u)) / (4.0 / 3);
 			if (stage == 1 && i % FINE == 0)
-				reading[i / FINE] = k[1] / 9.81;
+				reading[i / FINE] = k[1] / 9.80665;
 		}
 		double moved = h / 6 * (l[1] + 2 * l[2] + 2 * l[3] + l[4]);
 

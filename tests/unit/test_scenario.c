@@ -115,7 +115,6 @@ static void silence_means_nominal(void **state)
 static void reads_events(void **state)
 {
 	struct scenario s;
-	static const uint8_t release[8] = {2, 0x81, 0x34, 0x12};
 	static const uint8_t set[8] = {0x23, 0x04, 0x20, 0, 0x10, 0x27, 0, 0};
 
 	(void)state;
@@ -134,8 +133,11 @@ static void reads_events(void **state)
 	assert_int_equal(s.event[0].line, 5);
 	assert_int_equal(s.event[1].state, EVENT_AT_TIME);
 	assert_true(s.event[1].time_s == 1.5);
-	assert_int_equal(s.event[1].frame.id, 0x201);
-	assert_memory_equal(s.event[1].frame.data, release, sizeof(release));
+	assert_int_equal(s.event[1].action, EVENT_VERB);
+	assert_int_equal(s.event[1].command.op, WIRE_OP_RELEASE);
+	assert_int_equal(s.event[1].command.sequence, 0x81);
+	assert_int_equal(s.event[1].command.argument, 0x1234);
+	assert_true(s.event[1].forged && !s.event[1].second);
 	assert_int_equal(s.event[2].frame.id, 0x601);
 	assert_memory_equal(s.event[2].frame.data, set, sizeof(set));
 	assert_int_equal(s.event[3].frame.id, 0);
@@ -147,7 +149,60 @@ static void reads_events(void **state)
 	assert_int_equal(s.event[6].number, 2);
 	assert_int_equal(s.event[7].number, 50);
 	assert_int_equal(s.event[8].action, EVENT_REPAIR);
-	assert_int_equal(s.event[9].frame.data[0], WIRE_OP_ABORT);
+	assert_int_equal(s.event[9].command.op, WIRE_OP_ABORT);
+	assert_false(s.event[9].forged || s.event[9].second);
+}
+
+static void reads_events_of_the_tower_and_of_other_hosts(void **state)
+{
+	static const struct event known[] = {
+	        {.action = EVENT_GLITCH, .number = 0, .pulses = 3},
+	        {.action = EVENT_GLITCH, .number = 1, .pulses = 1000},
+	        {.action = EVENT_DROPOUT, .duration_s = 0.02},
+	        {.action = EVENT_HOST_SECOND, .duration_s = 2},
+	        {.action = EVENT_HOST_REPLAY, .duration_s = 3},
+	        {.action = EVENT_HOST_FORGE, .duration_s = 4},
+	        {.action = EVENT_BUS_PASSIVE, .duration_s = 0.5},
+	        {.action = EVENT_RESET, .number = 4},
+	        {.action = EVENT_FAULT, .number = TOWER_FRAME_JAMMED},
+	        {.action = EVENT_VERB, .second = true, .command = {.op = WIRE_OP_ARM}},
+	        {.action = EVENT_VERB,
+	         .second = true,
+	         .forged = true,
+	         .command = {.op = WIRE_OP_ARM, .argument = 7}},
+	};
+	struct scenario s;
+
+	(void)state;
+	good(&s,
+	     "[at]\ngate = upper 3 at 1\ngate = lower 1000 at 1\ndropout = 0.02 at 1\nhost = second 2 at 1\n"
+	     "host = replay 3 at 1\nhost = forge 4 at 1\nbus = passive 0.5 at 1\nreset = pin at 1\n"
+	     "fault = frame_jammed at 1\nsend = arm second at 1\nsend = arm second 7 at 1\n");
+	assert_int_equal(s.event_count, sizeof(known) / sizeof(known[0]));
+	for (unsigned i = 0; i < s.event_count; i++) {
+		assert_int_equal(s.event[i].action, known[i].action);
+		assert_int_equal(s.event[i].number, known[i].number);
+		assert_int_equal(s.event[i].pulses, known[i].pulses);
+		assert_true(s.event[i].duration_s == known[i].duration_s);
+		assert_int_equal(s.event[i].command.op, known[i].command.op);
+		assert_int_equal(s.event[i].command.argument, known[i].command.argument);
+		assert_int_equal(s.event[i].second, known[i].second);
+		assert_int_equal(s.event[i].forged, known[i].forged);
+	}
+}
+
+/* The longest there is, and what comes with it. */
+static void reads_a_frame_of_64_bytes(void **state)
+{
+	struct scenario s;
+	char body[400];
+
+	(void)state;
+	snprintf(body, sizeof(body), "[at]\nsend = frame 181##1%0126d7F at FAULT_MOVING +0.123456\n", 0);
+	good(&s, body);
+	assert_int_equal(s.event[0].frame.length, 64);
+	assert_int_equal(s.event[0].frame.data[63], 0x7F);
+	assert_int_equal(s.event[0].state, WIRE_STATE_FAULT_MOVING);
 }
 
 static void names_the_line_of_a_mistake(void **state)
@@ -184,7 +239,13 @@ static void names_the_line_of_a_mistake(void **state)
 	        {"[at]\nfault = door_open\n", ":5: 'door_open', expected ... at STATE"},
 	        {"[at]\nfault = door_open at ARMED 0.1\n", ":5: 'door_open at ARMED 0.1', expected"},
 	        {"[at]\nsend = jump at 1\n", ":5: 'send = jump at 1' is no event"},
-	        {"[at]\nsend = arm 70000 at 1\n", ":5: 'send = arm 70000 at 1' is no event"},
+	        {"[at]\nsend = arm 5000000000 at 1\n", ":5: 'send = arm 5000000000 at 1' is no event"},
+	        {"[at]\nsend = arm third at 1\n", ":5: 'send = arm third at 1' is no event"},
+	        {"[at]\nsend = arm 1 2 at 1\n", ":5: 'send = arm 1 2 at 1' is no event"},
+	        {"[at]\ngate = middle 1 at 1\n", ":5: 'gate = middle 1 at 1' is no event"},
+	        {"[at]\ngate = upper at 1\n", ":5: 'gate = upper at 1' is no event"},
+	        {"[at]\ndropout = 0.051 at 1\n", ":5: 'dropout = 0.051 at 1' is no event"},
+	        {"[at]\nhost = replay at 1\n", ":5: 'host = replay at 1' is no event"},
 	        {"[at]\nsend = frame 12345#00 at 1\n", ":5: 'send = frame 12345#00 at 1' is no event"},
 	        {"[at]\nbus = off at 1\n", ":5: 'bus = off at 1' is no event"},
 	        {"[at]\nreset = button at 1\n", ":5: 'reset = button at 1' is no event"},
@@ -275,6 +336,8 @@ int main(void)
 	        cmocka_unit_test(lists_go_on),
 	        cmocka_unit_test(silence_means_nominal),
 	        cmocka_unit_test(reads_events),
+	        cmocka_unit_test(reads_events_of_the_tower_and_of_other_hosts),
+	        cmocka_unit_test(reads_a_frame_of_64_bytes),
 	        cmocka_unit_test(names_the_line_of_a_mistake),
 	        cmocka_unit_test(names_what_is_missing),
 	        cmocka_unit_test(refuses_a_line_that_is_too_long),

@@ -13,7 +13,7 @@
 #include "common/segment.h"
 #include "tests/unit/fake_port.h"
 
-enum { BLOCK_SEGMENTS = 10, END_SEGMENTS = 4 };
+enum { BLOCK_SEGMENTS = 10, END_SEGMENTS = 5 };
 
 static struct segment_join join;
 
@@ -77,7 +77,7 @@ static void cut_by_hand(void **state)
 
 static void identifiers_interleave(void **state)
 {
-	struct frame s1 = message(0x381, 64, 1), s2 = message(0x481, 64, 2), end = message(0x681, 24, 3);
+	struct frame s1 = message(0x381, 64, 1), s2 = message(0x481, 64, 2), end = message(0x681, 32, 3);
 
 	(void)state;
 	for (unsigned i = 0; i < BLOCK_SEGMENTS; i++) {
@@ -176,7 +176,7 @@ static bool feed_without(const struct frame *whole, unsigned count, unsigned los
 
 static void the_second_copy_fills_what_is_missing(void **state)
 {
-	struct frame block = message(0x381, 64, 1), end = message(0x681, 24, 2);
+	struct frame block = message(0x381, 64, 1), end = message(0x681, 32, 2);
 
 	(void)state;
 	for (unsigned first = 1; first < BLOCK_SEGMENTS; first++)
@@ -357,12 +357,12 @@ static void anything_may_come(void **state)
 
 		for (unsigned k = 0; k < 8; k++)
 			frame.data[k] = (uint8_t)fake_random(&seed);
-		frame.data[0] &= fake_random(&seed) % 2 ? 0x83 : 0x0F;
+		frame.data[0] &= fake_random(&seed) % 2 ? 0x84 : 0x0F;
 		got = segment_feed(&join, &frame);
 		if (got == NULL)
 			continue;
 		whole++;
-		assert_int_equal(got->length, got->id == 0x381 ? 64 : 24);
+		assert_int_equal(got->length, got->id == 0x381 ? 64 : 32);
 	}
 	assert_true(whole > 0);
 	assert_true(join.incomplete > 0);

@@ -52,7 +52,8 @@ static void broken_off_after_the_first(void **state)
 	assert_int_equal(join.incomplete, 1);
 	assert_null(feed(1, 2));
 	assert_null(feed(2, 2));
-	assert_non_null(feed(3 | 0x80, 2));
+	assert_null(feed(3, 2));
+	assert_non_null(feed(4 | 0x80, 2));
 	assert_int_equal(join.incomplete, 1);
 }
 

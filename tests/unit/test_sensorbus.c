@@ -14,13 +14,14 @@
 static void request_bytes(void **state)
 {
 	static const uint8_t bytes[SENSORBUS_REQUEST_BYTES] = {
-	        0x78, 0x56, 0x34, 0x12, 3, 0, 0x0B, 0x00, 2, 1, 1, 0, 0, 0, 0, 0, 0xD2, 0x04, 0, 0};
+	        0x78, 0x56, 0x34, 0x12, 3, 0, 0x0B, 0x00, 2, 1, 1, 6, 0, 0, 0, 0, 0xD2, 0x04, 0, 0};
 	struct sensorbus_request request = {.tick_ms = 0x12345678,
 	                                    .group = SENSORBUS_X | SENSORBUS_YZ,
 	                                    .outputs = 0x000B,
 	                                    .edges = 2,
 	                                    .frames = 1,
 	                                    .reset = 1,
+	                                    .kept = 6,
 	                                    .edge_us = {0, 1234}};
 	struct sensorbus_request back;
 	uint8_t out[SENSORBUS_REQUEST_BYTES];
@@ -35,8 +36,9 @@ static void request_bytes(void **state)
 static void answer_bytes(void **state)
 {
 	static const uint8_t bytes[SENSORBUS_ANSWER_BYTES] = {
-	        1, 0, 0xFF, 0xFF, 0,    0x80, 4,    0, 5, 0, 6, 0, 0xF0, 0x03, 2, 1,
-	        0, 0, 0,    0,    0x40, 0xE2, 0x01, 0, 3, 1, 9, 0, 1,    1,    2, 1};
+	        1, 0, 0xFF, 0xFF, 0, 0x80, 4,    0,    5,    0,    6,    0,   0xF0, 0x03,
+	        6, 1, 0,    0,    0, 0,    0x40, 0xE2, 0x01, 0,    0x07, 0,   0,    1,
+	        3, 1, 9,    0,    2, 1,    2,    1,    0x78, 0x56, 0x34, 0x92};
 	struct sensorbus_answer back;
 	uint8_t out[SENSORBUS_ANSWER_BYTES];
 
@@ -47,16 +49,18 @@ static void answer_bytes(void **state)
 	assert_int_equal(back.codes[2], -32768);
 	assert_int_equal(back.codes[5], 6);
 	assert_int_equal(back.inputs, 0x3F0);
-	assert_int_equal(back.captures, 2);
+	assert_int_equal(back.captures, 6);
 	assert_int_equal(back.frames, 1);
 	assert_int_equal(back.capture_us[1], 123456);
+	assert_int_equal(back.capture_us[2], 0x01000007);
 	assert_int_equal(back.ready, 3);
 	assert_int_equal(back.stop, 1);
 	assert_int_equal(back.bus_errors, 9);
-	assert_int_equal(back.bus_off, 1);
+	assert_int_equal(back.bus_state, SENSORBUS_BUS_OFF);
 	assert_int_equal(back.tx_blocked, 1);
 	assert_int_equal(back.bias_high, 2);
 	assert_int_equal(back.hang, 1);
+	assert_int_equal(back.random, 0x92345678);
 	assert_int_equal(sensorbus_put_answer(out, &back), SENSORBUS_ANSWER_BYTES);
 	assert_memory_equal(out, bytes, sizeof(bytes));
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
  * The sequence: its table against a list written from the design, its guards, the times of its edges against
- * the physics of a fall, and random walks that look for a way to an unsafe output.
+ * the physics of a fall.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,30 +13,30 @@
 #include <string.h>
 
 #include "common/wire_table.h"
-#include "firmware/health.h"
 #include "firmware/sequence.h"
 #include "tests/unit/fake_port.h"
 
 #define STATE(NAME) WIRE_STATE_##NAME
 #define EVENT(NAME) SEQUENCE_##NAME
 
-enum { TOKEN = 0x5A17 };
+enum { SESSION = 0x7E115A17, NONCE = 0x1EE7C0DE, SET = 0x0D15EA5E };
 
 static struct sequence sequence;
 static struct parameters parameters;
 static uint32_t counters[WIRE_COUNTERS];
 static uint32_t now_ms;
-static uint16_t checks;
-static bool clocks_good, hash_differs;
+static uint32_t checks;
+static uint16_t known; /* inputs */
+static struct hosts hosts;
+static bool no_nonce;
 
 static struct sequence_view look(void)
 {
 	return (struct sequence_view){
 	        .now_us = fake.now_us,
 	        .io = port_io(),
+	        .known = known,
 	        .checks = checks,
-	        .clocks_good = clocks_good,
-	        .hash_differs = hash_differs,
 	};
 }
 
@@ -56,12 +56,41 @@ static void ticks(unsigned count)
 		tick();
 }
 
-static int command(unsigned op, uint16_t token, uint32_t argument)
+static int command_by(uint32_t host, unsigned op, uint32_t argument)
 {
-	struct wire_command c = {.op = (uint8_t)op, .token = token, .argument = argument};
+	struct sequence_order order = {
+	        .command = {.op = (uint8_t)op, .host = (uint16_t)host, .argument = argument},
+	        .hosts = &hosts,
+	        .capture_crc32 = 0xC0FFEE,
+	        .parameters_crc32 = SET,
+	        .dropout_us = 8000,
+	        .nonce = NONCE,
+	        .nonce_good = !no_nonce,
+	};
 	struct sequence_view view = look();
 
-	return sequence_command(&sequence, &view, &c, 0xC0FFEE);
+	sequence_plan(&sequence);
+	return sequence_command(&sequence, &view, &order);
+}
+
+static int command(unsigned op, uint32_t argument)
+{
+	return command_by(SESSION, op, argument);
+}
+
+static int arm(void)
+{
+	return command(WIRE_OP_ARM, wire_arm_key(SESSION, SET));
+}
+
+static int release(void)
+{
+	return command(WIRE_OP_RELEASE, wire_release_key(NONCE, sequence_next_drop(&sequence), SET));
+}
+
+static int clear(void)
+{
+	return command(WIRE_OP_CLEAR, 0);
 }
 
 static void boot(enum port_reset cause)
@@ -71,8 +100,10 @@ static void boot(enum port_reset cause)
 	parameters_init(&parameters);
 	now_ms = 0;
 	checks = 0;
-	clocks_good = true;
-	hash_differs = false;
+	known = UINT16_MAX;
+	no_nonce = false;
+	hosts_init(&hosts, &parameters, counters);
+	hosts_heard(&hosts, 0, SESSION, true);
 	sequence_init(&sequence, &parameters, counters, cause);
 }
 
@@ -80,31 +111,41 @@ static void to_ready(void)
 {
 	boot(PORT_RESET_POWER_ON);
 	ticks(102);
+	assert_int_equal(sequence.state, STATE(SAFE));
+	assert_int_equal(clear(), 0);
+	ticks(1001);
 	assert_int_equal(sequence.state, STATE(READY));
 }
 
 static void to_armed(void)
 {
 	to_ready();
-	assert_int_equal(command(WIRE_OP_ARM, TOKEN, 0), 0);
+	assert_int_equal(arm(), 0);
 	assert_int_equal(sequence.state, STATE(ARMED));
+}
+
+static void to_warned(void)
+{
+	to_armed();
+	ticks(1000);
 }
 
 static void to_falling(void)
 {
-	to_armed();
-	ticks(10);
-	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), 0);
+	to_warned();
+	assert_int_equal(release(), 0);
 	assert_int_equal(sequence.state, STATE(FALLING));
+	assert_false(sequence.acknowledged); /* even if the latch never opens */
 	checks |= WIRE_CHECK_LATCH;
 	ticks(20);
 	fake.inputs &= (uint16_t)~WIRE_IO_LATCH_CLOSED;
+	tick();
 }
 
 /* The gates pass as in free fall from the release. */
 static void to_separated(void)
 {
-	uint32_t start_us = (now_ms + 1) * 1000;
+	uint32_t start_us;
 
 	to_falling();
 	start_us = now_ms * 1000;
@@ -129,15 +170,25 @@ static void to_captured(void)
 {
 	to_braked();
 	sequence_triggered(&sequence);
+	fake.inputs |= WIRE_IO_FRAME_DOWN;
 	ticks(400);
 	sequence_full(&sequence);
 	assert_int_equal(sequence.state, STATE(CAPTURED));
 }
 
+static void to_keep_out(void)
+{
+	to_braked();
+	sequence_triggered(&sequence);
+	ticks(400);
+	sequence_full(&sequence);
+	assert_int_equal(sequence.state, STATE(KEEP_OUT));
+}
+
 static void to_uploaded(void)
 {
 	to_captured();
-	assert_int_equal(command(WIRE_OP_ACCEPT, 0, 0xC0FFEE), 0);
+	assert_int_equal(command(WIRE_OP_ACCEPT, 0xC0FFEE), 0);
 	assert_int_equal(sequence.state, STATE(UPLOADED));
 }
 
@@ -173,7 +224,7 @@ static void to_safe(void)
 
 static void (*const reach[WIRE_STATES])(void) = {
         to_boot,   to_safe,     to_ready,    to_armed,      to_falling,      to_separated,
-        to_braked, to_captured, to_uploaded, to_fault_held, to_fault_moving,
+        to_braked, to_captured, to_uploaded, to_fault_held, to_fault_moving, to_keep_out,
 };
 
 /* ---- the table in firmware/README.md ---- */
@@ -183,8 +234,8 @@ static char reason[WIRE_STATES][SEQUENCE_EVENTS];
 static bool explained[128];
 
 static const char *const event_names[SEQUENCE_EVENTS] = {
-        "TESTED",  "GREEN",   "RED",  "ARM",   "RELEASE", "ABORT", "CLEAR", "ACCEPT",
-        "DISCARD", "EXPIRED", "FREE", "BRAKE", "FULL",    "DONE",  "STILL", "FAULT",
+        "TESTED",  "GREEN", "RED",   "ARM",  "RELEASE", "ABORT", "CLEAR", "ACCEPT", "DISCARD",
+        "EXPIRED", "FREE",  "BRAKE", "FULL", "JAMMED",  "DOWN",  "DONE",  "STILL",  "FAULT",
 };
 
 static unsigned find_state(const char *name)
@@ -278,14 +329,16 @@ static void outputs_of_every_state(void **state)
 	        [STATE(BOOT)] = WIRE_IO_MAGNET_HOLD,
 	        [STATE(SAFE)] = WIRE_IO_MAGNET_HOLD,
 	        [STATE(READY)] = WIRE_IO_MAGNET_HOLD,
-	        [STATE(ARMED)] = WIRE_IO_MAGNET_HOLD,
-	        [STATE(FALLING)] = WIRE_IO_MAGNET_HOLD | WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE,
-	        [STATE(SEPARATED)] = WIRE_IO_DAMPERS_RELIEVE,
+	        [STATE(ARMED)] = WIRE_IO_MAGNET_HOLD | WIRE_IO_WARNING,
+	        [STATE(FALLING)] =
+	                WIRE_IO_MAGNET_HOLD | WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE | WIRE_IO_WARNING,
+	        [STATE(SEPARATED)] = WIRE_IO_DAMPERS_RELIEVE | WIRE_IO_WARNING,
 	        [STATE(BRAKED)] = 0,
 	        [STATE(CAPTURED)] = 0,
 	        [STATE(UPLOADED)] = 0,
 	        [STATE(FAULT_HELD)] = WIRE_IO_MAGNET_HOLD,
 	        [STATE(FAULT_MOVING)] = WIRE_IO_MAGNET_HOLD, /* from FALLING */
+	        [STATE(KEEP_OUT)] = 0,
 	};
 
 	(void)state;
@@ -293,7 +346,9 @@ static void outputs_of_every_state(void **state)
 		reach[s]();
 		if (fake.outputs != wanted[s])
 			fail_msg("state %u: outputs %#x, expected %#x", s, fake.outputs, wanted[s]);
-		assert_int_equal(sequence.token, s == STATE(ARMED) ? TOKEN : 0);
+		assert_int_equal(sequence.nonce, s == STATE(ARMED) ? NONCE : 0);
+		assert_int_equal(sequence.session, s == STATE(ARMED) ? SESSION : 0);
+		assert_int_equal(fake.kept, s); /* for the time after a reset */
 	}
 	to_uploaded();
 	ticks(200);
@@ -304,8 +359,8 @@ static void outputs_of_every_state(void **state)
 static void camera_has_a_pulse_of_ten_ms(void **state)
 {
 	(void)state;
-	to_armed();
-	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), 0);
+	to_warned();
+	assert_int_equal(release(), 0);
 	for (unsigned ms = 0; ms < 10; ms++) {
 		assert_true(fake.outputs & WIRE_IO_CAMERA);
 		tick();
@@ -320,15 +375,15 @@ static void boot_needs_the_self_test(void **state)
 	ticks(99);
 	assert_int_equal(sequence.state, STATE(BOOT));
 	tick();
-	assert_int_equal(sequence.state, STATE(READY));
+	assert_int_equal(sequence.state, STATE(SAFE));
 	boot(PORT_RESET_POWER_ON);
-	clocks_good = false;
+	checks = WIRE_CHECK_CLOCKS;
 	ticks(100);
 	assert_int_equal(sequence.state, STATE(FAULT_HELD));
 	assert_int_equal(sequence.fault, WIRE_FAULT_SELF_TEST);
-	assert_int_equal(command(WIRE_OP_CLEAR, 0, 0), DT_E_CHECKS);
-	clocks_good = true;
-	assert_int_equal(command(WIRE_OP_CLEAR, 0, 0), 0);
+	assert_int_equal(clear(), DT_E_CHECKS);
+	checks = 0;
+	assert_int_equal(clear(), 0);
 	assert_int_equal(sequence.state, STATE(SAFE));
 }
 
@@ -342,37 +397,198 @@ static void reset_causes_are_faults(void **state)
 	boot(PORT_RESET_BROWN_OUT);
 	assert_int_equal(sequence.fault, WIRE_FAULT_BROWN_OUT);
 	checks = WIRE_CHECK_SUPPLY;
-	assert_int_equal(command(WIRE_OP_CLEAR, 0, 0), DT_E_CHECKS);
+	assert_int_equal(clear(), DT_E_CHECKS);
 	checks = 0;
-	assert_int_equal(command(WIRE_OP_CLEAR, 0, 0), 0);
+	assert_int_equal(clear(), 0);
 	assert_int_equal(sequence.fault, WIRE_FAULT_NONE);
 	boot(PORT_RESET_COMMAND);
 	assert_int_equal(sequence.state, STATE(BOOT));
+}
+
+/* The frame is neither held nor down: it is on its way, whatever the reset was. */
+static void boot_looks_for_the_frame(void **state)
+{
+	(void)state;
+	for (unsigned cause = 0; cause < PORT_RESETS; cause++) {
+		boot((enum port_reset)cause);
+		fake.inputs &= (uint16_t)~WIRE_IO_LATCH_CLOSED;
+		known = (uint16_t)~WIRE_IO_FRAME_DOWN; /* not read yet */
+		ticks(3);
+		assert_int_not_equal(sequence.fault, WIRE_FAULT_RESET);
+		known = UINT16_MAX;
+		tick();
+		assert_int_equal(sequence.state, STATE(FAULT_HELD));
+		assert_int_equal(sequence.fault, cause == PORT_RESET_WATCHDOG    ? WIRE_FAULT_WATCHDOG
+		                                 : cause == PORT_RESET_BROWN_OUT ? WIRE_FAULT_BROWN_OUT
+		                                                                 : WIRE_FAULT_RESET);
+		assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
+		boot((enum port_reset)cause);
+		fake.inputs ^= WIRE_IO_LATCH_CLOSED | WIRE_IO_FRAME_DOWN; /* down is at rest */
+		ticks(3);
+		assert_int_not_equal(sequence.fault, WIRE_FAULT_RESET);
+	}
 }
 
 static void arm_and_release_are_guarded(void **state)
 {
 	(void)state;
 	to_safe();
-	assert_int_equal(command(WIRE_OP_ARM, TOKEN, 0), DT_E_CHECKS);
-	hash_differs = true;
-	assert_int_equal(command(WIRE_OP_ARM, TOKEN, 0), DT_E_HASH);
+	assert_int_equal(arm(), DT_E_CHECKS);
+	hosts_heard(&hosts, 0, SESSION, false);
+	assert_int_equal(arm(), DT_E_HASH);
 	to_ready();
-	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), DT_E_STATE);
-	assert_int_equal(command(WIRE_OP_ARM, 0, 0), DT_E_TOKEN);
+	assert_int_equal(release(), DT_E_STATE);
 	checks = WIRE_CHECK_DOOR; /* opened since the last tick */
-	assert_int_equal(command(WIRE_OP_ARM, TOKEN, 0), DT_E_CHECKS);
+	assert_int_equal(arm(), DT_E_CHECKS);
+	checks = 0;
+	assert_int_equal(command_by(SESSION + 1, WIRE_OP_ARM, wire_arm_key(SESSION + 1, SET)), DT_E_SESSION);
+	assert_int_equal(command(WIRE_OP_ARM, wire_arm_key(SESSION, SET + 1)), DT_E_PARAMETERS);
+	no_nonce = true;
+	assert_int_equal(arm(), DT_E_SYSTEM);
 	assert_int_equal(sequence.state, STATE(READY));
-	to_armed();
-	assert_int_equal(command(WIRE_OP_ARM, TOKEN, 0), DT_E_STATE);
-	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN + 1, 0), DT_E_TOKEN);
-	assert_int_equal(command(WIRE_OP_RELEASE, 0, 0), DT_E_TOKEN);
-	checks = WIRE_CHECK_DAMPERS;
-	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), DT_E_CHECKS);
-	assert_int_equal(sequence.state, STATE(ARMED));
 	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
+	to_armed();
+	assert_int_equal(command(WIRE_OP_ARM, wire_arm_key(SESSION, SET + 1)), DT_E_STATE);
+	assert_int_equal(command_by(SESSION + 1, WIRE_OP_ARM, wire_arm_key(SESSION + 1, SET)), DT_E_STATE);
+	assert_int_equal(command_by(SESSION + 1, WIRE_OP_RELEASE, wire_release_key(NONCE, 1, SET)),
+	                 DT_E_SESSION);
+	assert_int_equal(command(WIRE_OP_RELEASE, wire_release_key(NONCE + 1, 1, SET)), DT_E_TOKEN);
+	assert_int_equal(command(WIRE_OP_RELEASE, wire_release_key(NONCE, 2, SET)), DT_E_TOKEN);
+	assert_int_equal(command(WIRE_OP_RELEASE, wire_release_key(NONCE, 1, SET + 1)), DT_E_TOKEN);
+	assert_int_equal(command(WIRE_OP_RELEASE, 0), DT_E_TOKEN);
+	checks = WIRE_CHECK_DAMPERS;
+	assert_int_equal(release(), DT_E_EARLY);
+	checks = 0;
+	ticks(999);
+	assert_int_equal(release(), DT_E_EARLY);
+	tick();
+	checks = WIRE_CHECK_DAMPERS;
+	assert_int_equal(release(), DT_E_CHECKS);
+	assert_int_equal(sequence.state, STATE(ARMED));
+	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD | WIRE_IO_WARNING);
 	assert_int_equal(sequence.drop_id, 0);
-	assert_int_equal(command(77, TOKEN, 0), DT_E_UNKNOWN);
+	assert_int_equal(command(77, 0), DT_E_UNKNOWN);
+	checks = 0;
+	assert_int_equal(release(), 0);
+	assert_int_equal(sequence.drop_id, 1);
+}
+
+/* Each guard, in SAFE and in READY; the other checks only want their second. */
+/* Only the answer to the host that has armed, with what it armed with, may be said again. */
+static void nobody_else_is_told_that_it_has_armed(void **state)
+{
+	(void)state;
+	to_armed();
+	assert_int_equal(command_by(SESSION ^ 1, WIRE_OP_ARM, wire_arm_key(SESSION, SET)), DT_E_STATE);
+	assert_int_equal(command_by(SESSION, WIRE_OP_ARM, wire_arm_key(SESSION, SET) ^ 1), DT_E_STATE);
+	assert_int_equal(arm(), 0);
+	to_ready(); /* where session and key are 0 */
+	assert_int_equal(command_by(0, WIRE_OP_ARM, 0), DT_E_SESSION);
+	assert_int_equal(command_by(SESSION, WIRE_OP_ARM, 0), DT_E_PARAMETERS);
+	assert_int_equal(command_by(0, WIRE_OP_ARM, wire_arm_key(SESSION, SET)), DT_E_SESSION);
+	assert_int_equal(sequence.state, STATE(READY));
+}
+
+static void a_guard_wants_to_be_acknowledged(void **state)
+{
+	static const uint32_t guards[] = {WIRE_CHECK_ESTOP, WIRE_CHECK_DOOR, WIRE_CHECK_LATCH,
+	                                  WIRE_CHECK_PRODUCT};
+	uint32_t all = 0;
+
+	(void)state;
+	for (size_t i = 0; i < 4; i++) {
+		all |= guards[i];
+		to_ready();
+		checks = guards[i];
+		tick();
+		assert_int_equal(sequence.state, STATE(SAFE));
+		assert_int_equal(sequence_checks(&sequence, checks), guards[i] | WIRE_CHECK_ACKNOWLEDGE);
+		assert_int_equal(clear(), DT_E_CHECKS);
+		checks = 0;
+		ticks(5000);
+		assert_int_equal(sequence.state, STATE(SAFE));
+		assert_int_equal(sequence_checks(&sequence, 0), WIRE_CHECK_ACKNOWLEDGE);
+		assert_int_equal(clear(), 0);
+		assert_int_equal(sequence.state, STATE(SAFE));
+		assert_int_equal(sequence_checks(&sequence, 0), WIRE_CHECK_SETTLE);
+		ticks(1000);
+		assert_int_equal(sequence.state, STATE(SAFE));
+		tick();
+		assert_int_equal(sequence.state, STATE(READY));
+		assert_int_equal(clear(), DT_E_STATE);
+	}
+	for (unsigned i = 0; i < WIRE_CHECK_NUMBER_ACKNOWLEDGE; i++) {
+		if (all & 1u << i)
+			continue;
+		to_ready();
+		checks = 1u << i;
+		tick();
+		assert_int_equal(sequence.state, STATE(SAFE));
+		checks = 0;
+		ticks(1000);
+		assert_int_equal(sequence.state, STATE(SAFE));
+		tick();
+		assert_int_equal(sequence.state, STATE(READY));
+	}
+	to_ready();
+	parameters.value[WIRE_PARAMETER_settle_ms] = 3000;
+	checks = WIRE_CHECK_TRIGGER;
+	tick();
+	checks = 0;
+	ticks(3000);
+	assert_int_equal(sequence.state, STATE(SAFE));
+	tick();
+	assert_int_equal(sequence.state, STATE(READY));
+}
+
+/* Whoever has lifted the frame and put the product on before the upload was over has to say so too. */
+static void a_drop_wants_to_be_acknowledged(void **state)
+{
+	(void)state;
+	to_captured();
+	fake.inputs = FAKE_ALL_GOOD;
+	checks = 0;
+	ticks(100);
+	assert_int_equal(command(WIRE_OP_DISCARD, 1), 0);
+	ticks(5000);
+	assert_int_equal(sequence.state, STATE(SAFE));
+	assert_int_equal(sequence_checks(&sequence, 0), WIRE_CHECK_ACKNOWLEDGE);
+	assert_int_equal(clear(), 0);
+	ticks(1001);
+	assert_int_equal(sequence.state, STATE(READY));
+}
+
+/* CLEAR of a fault acknowledges, but only with all four guards closed. */
+static void clear_of_a_fault_acknowledges_if_it_may(void **state)
+{
+	(void)state;
+	to_fault_held();
+	ticks(2000);
+	assert_int_equal(clear(), 0);
+	ticks(1001);
+	assert_int_equal(sequence.state, STATE(READY));
+	to_fault_held();
+	checks = WIRE_CHECK_DOOR;
+	tick();
+	assert_int_equal(clear(), 0); /* the emergency stop was its cause */
+	checks = 0;
+	ticks(2000);
+	assert_int_equal(sequence.state, STATE(SAFE));
+	assert_int_equal(sequence_checks(&sequence, 0), WIRE_CHECK_ACKNOWLEDGE);
+}
+
+static void warning_may_be_longer(void **state)
+{
+	(void)state;
+	to_ready();
+	parameters.value[WIRE_PARAMETER_warning_ms] = 4000;
+	assert_int_equal(arm(), 0);
+	ticks(2000);
+	assert_int_equal(arm(), 0); /* again: no timer begins anew */
+	ticks(1999);
+	assert_int_equal(release(), DT_E_EARLY);
+	tick();
+	assert_int_equal(release(), 0);
 }
 
 static void armed_expires(void **state)
@@ -383,13 +599,14 @@ static void armed_expires(void **state)
 	assert_int_equal(sequence.state, STATE(ARMED));
 	tick();
 	assert_int_equal(sequence.state, STATE(READY));
-	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), DT_E_STATE);
+	assert_int_equal(release(), DT_E_STATE);
+	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
 }
 
 static void lost_check_while_armed(void **state)
 {
 	static const struct {
-		uint16_t check;
+		uint32_t check;
 		uint8_t fault;
 	} faults[] = {
 	        {WIRE_CHECK_LATCH, WIRE_FAULT_LATCH},     {WIRE_CHECK_PRODUCT, WIRE_FAULT_MAGNET},
@@ -419,12 +636,11 @@ static void clear_waits_until_the_cause_is_gone(void **state)
 	(void)state;
 	to_fault_held();
 	checks = WIRE_CHECK_ESTOP;
-	assert_int_equal(command(WIRE_OP_CLEAR, 0, 0), DT_E_CHECKS);
+	assert_int_equal(clear(), DT_E_CHECKS);
 	assert_int_equal(sequence.fault, WIRE_FAULT_ESTOP);
 	checks = WIRE_CHECK_HOST; /* another one does not matter */
-	assert_int_equal(command(WIRE_OP_CLEAR, 0, 0), 0);
+	assert_int_equal(clear(), 0);
 	assert_int_equal(sequence.state, STATE(SAFE));
-	assert_int_equal(command(WIRE_OP_CLEAR, 0, 0), DT_E_STATE);
 }
 
 static void abort_in_every_state(void **state)
@@ -434,11 +650,11 @@ static void abort_in_every_state(void **state)
 		unsigned to = expect(s, EVENT(ABORT));
 
 		reach[s]();
-		assert_int_equal(command(WIRE_OP_ABORT, 0, 0), 0);
+		assert_int_equal(command(WIRE_OP_ABORT, 0), 0);
 		assert_int_equal(sequence.state, to == SEQUENCE_STAY ? s : to);
 		assert_int_equal(fake.outputs & (WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE), 0);
 		assert_int_equal(fake.planned, 0);
-		if (to == STATE(FAULT_MOVING)) {
+		if (to == STATE(FAULT_MOVING) && s != to) {
 			assert_int_equal(sequence.fault, WIRE_FAULT_ABORTED);
 			assert_true(sequence.marks & WIRE_MARK_FAULT);
 		}
@@ -489,31 +705,85 @@ static void edges_follow_the_fall(void **state)
 
 static void edges_in_numbers_by_hand(void **state)
 {
+	uint32_t start_us;
+
 	(void)state;
 	/* t1 = 200 ms, t2 = 375 ms: sqrt .78 - sqrt .7 over sqrt .7 - sqrt .2 = .0465165 / .3894464 =
 	 * .1194427, 175 ms of it is 20.902 ms; for .80 m .0577671 / .3894464 = .1483313, 25.958 ms */
 	to_falling();
-	sequence_gate(&sequence, 0, 1000000 + 200000);
-	sequence_gate(&sequence, 1, 1000000 + 375000);
-	assert_in_range(fake.off_us[1], 1387901, 1387904); /* 8 ms before 1 395 902 */
-	assert_in_range(fake.off_us[2], 1400957, 1400960);
+	start_us = fake.now_us;
+	sequence_gate(&sequence, 0, start_us + 200000);
+	sequence_gate(&sequence, 1, start_us + 375000);
+	assert_in_range(fake.off_us[1] - start_us, 387901, 387904); /* 8 ms before 395 902 */
+	assert_in_range(fake.off_us[2] - start_us, 400957, 400960);
 	assert_int_equal(sequence.frame_speed_mm_s, 2857);
 }
 
 static void late_edge_is_made_at_once(void **state)
 {
 	(void)state;
-	boot(PORT_RESET_POWER_ON);
-	parameters.value[WIRE_PARAMETER_dropout_us] = 50000;
-	sequence_plan(&sequence);
-	ticks(102);
-	assert_int_equal(command(WIRE_OP_ARM, TOKEN, 0), 0);
-	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), 0);
-	fake_time(500000);
-	fall_with(9.81, 500000 - 378000);
+	to_falling();
+	sequence.times.dropout_us = 50000; /* as ARM may bring it */
+	fake_time(sequence.times.released_us + 380000);
+	fall_with(9.81, sequence.times.released_us + 2000);
 	assert_int_equal(counters[WIRE_COUNTER_edges_late], 1);
 	assert_false(fake.outputs & WIRE_IO_MAGNET_HOLD);
 	assert_true(fake.outputs & WIRE_IO_DAMPERS_RELIEVE);
+	assert_int_equal(sequence.times.magnet_off_us, fake.now_us);
+}
+
+/* Free fall, 9.80665 m/s2: 0.2 m in 201.962 ms, 0.7 m in 377.837 ms; the dampers at 0.8 m, with 9.84, in
+ * 403.239 ms. */
+static void the_relief_ends_in_time(void **state)
+{
+	(void)state;
+	to_falling(); /* no gate says anything */
+	assert_int_equal(fake.planned, WIRE_IO_DAMPERS_RELIEVE);
+	assert_in_range(fake.off_us[2] - sequence.times.released_us, 403237, 403239);
+	while (now_ms * 1000 < sequence.times.released_us + 404000)
+		tick();
+	assert_false(fake.outputs & WIRE_IO_DAMPERS_RELIEVE);
+	to_falling(); /* the lower gate comes after it: nothing brings the relief back */
+	sequence_gate(&sequence, 0, sequence.times.released_us + 230000);
+	fake_time(sequence.times.released_us + 430000);
+	sequence_gate(&sequence, 1, sequence.times.released_us + 430000);
+	assert_false(fake.outputs & WIRE_IO_DAMPERS_RELIEVE);
+	assert_int_equal(fake.planned, WIRE_IO_MAGNET_HOLD);
+}
+
+static void a_gate_must_be_plausible(void **state)
+{
+	uint32_t released_us;
+
+	(void)state;
+	to_falling();
+	released_us = sequence.times.released_us;
+	sequence_gate(&sequence, 0, released_us + 5000);   /* the latch's shock */
+	sequence_gate(&sequence, 0, released_us + 176710); /* 7/8 of 201 962 is 176 716 */
+	sequence_gate(&sequence, 1, released_us + 330600); /* 7/8 of 377 837 is 330 607 */
+	assert_int_equal(sequence.times.gates, 0);
+	assert_int_equal(counters[WIRE_COUNTER_gates_ignored], 3);
+	sequence_gate(&sequence, 0, released_us + 176720); /* the last one before the lower gate counts */
+	sequence_gate(&sequence, 0, released_us + 200000);
+	sequence_gate(&sequence, 1, released_us + 330600);
+	sequence_gate(&sequence, 1, released_us + 375000);
+	assert_in_range(fake.off_us[1] - released_us, 387901, 387904);
+	assert_int_equal(counters[WIRE_COUNTER_gates_ignored], 4);
+	sequence_gate(&sequence, 0, released_us + 376000); /* the beam again */
+	sequence_gate(&sequence, 1, released_us + 376000);
+	assert_in_range(fake.off_us[1] - released_us, 387901, 387904);
+	assert_int_equal(counters[WIRE_COUNTER_gates_ignored], 6);
+	assert_int_equal(sequence.fault, WIRE_FAULT_NONE);
+	to_falling(); /* a latch whose switch is closed holds the frame */
+	fake.inputs |= WIRE_IO_LATCH_CLOSED;
+	tick();
+	sequence_gate(&sequence, 0, sequence.times.released_us + 200000);
+	sequence_gate(&sequence, 1, sequence.times.released_us + 375000);
+	assert_int_equal(fake.planned, WIRE_IO_DAMPERS_RELIEVE);
+	assert_int_equal(counters[WIRE_COUNTER_gates_ignored], 2);
+	to_ready(); /* somebody lifts a frame through them */
+	sequence_gate(&sequence, 1, fake.now_us);
+	assert_int_equal(counters[WIRE_COUNTER_gates_ignored], 1);
 }
 
 static void gates_out_of_order_or_missing(void **state)
@@ -522,7 +792,7 @@ static void gates_out_of_order_or_missing(void **state)
 
 	(void)state;
 	to_falling();
-	sequence_gate(&sequence, 1, fake.now_us);
+	sequence_gate(&sequence, 1, fake.now_us + 377773);
 	assert_int_equal(sequence.fault, WIRE_FAULT_GATES);
 	assert_int_equal(counters[WIRE_COUNTER_gates_missed], 1);
 	to_falling(); /* no upper gate: at twice 201.93 ms after the release */
@@ -533,34 +803,125 @@ static void gates_out_of_order_or_missing(void **state)
 	assert_int_equal(now_ms - start_ms, 404);
 	to_falling(); /* no lower gate: 755.55 ms */
 	start_ms = sequence.released_ms;
-	sequence_gate(&sequence, 0, fake.now_us);
+	sequence_gate(&sequence, 0, fake.now_us + 201928);
 	while (sequence.state == STATE(FALLING))
 		tick();
 	assert_int_equal(sequence.fault, WIRE_FAULT_GATES);
 	assert_int_equal(now_ms - start_ms, 756);
 	to_falling(); /* frame down without it */
-	sequence_gate(&sequence, 0, fake.now_us);
+	sequence_gate(&sequence, 0, fake.now_us + 201928);
 	fake.inputs |= WIRE_IO_FRAME_DOWN;
 	tick();
 	assert_int_equal(sequence.fault, WIRE_FAULT_GATES);
 	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
 	to_falling(); /* faster than any fall: not the frame */
-	sequence_gate(&sequence, 0, fake.now_us);
-	sequence_gate(&sequence, 1, fake.now_us + 100000);
+	sequence_gate(&sequence, 0, fake.now_us + 300000);
+	sequence_gate(&sequence, 1, fake.now_us + 400000);
 	assert_int_equal(sequence.fault, WIRE_FAULT_GATES);
-	to_falling(); /* a beam broken again is the same gate */
-	sequence_gate(&sequence, 0, 1200000);
-	sequence_gate(&sequence, 0, 1203000);
-	sequence_gate(&sequence, 1, 1375000);
-	assert_in_range(fake.off_us[1], 1387901, 1387904);
+}
+
+/* Gates 10 mm apart and a frame that crawls: the magnet's edge would come seconds later. Twice the free fall
+ * to the dampers, 2.4 m in 699.50 ms, ends it. */
+static void falling_ends_by_time(void **state)
+{
+	uint32_t start_ms;
+
+	(void)state;
+	to_ready();
+	parameters.value[WIRE_PARAMETER_dampers_um] = 2400000;
+	parameters.value[WIRE_PARAMETER_separation_um] = 2390000;
+	parameters.value[WIRE_PARAMETER_gate_lower_um] = 1010000;
+	parameters.value[WIRE_PARAMETER_gate_upper_um] = 1000000;
+	sequence_replan(&sequence);
+	assert_int_equal(arm(), 0);
+	ticks(1000);
+	assert_int_equal(release(), 0);
+	fake.inputs &= (uint16_t)~WIRE_IO_LATCH_CLOSED;
+	ticks(450);
+	start_ms = sequence.released_ms;
+	sequence_gate(&sequence, 0, fake.now_us);
+	ticks(430);
+	sequence_gate(&sequence, 1, fake.now_us);
+	assert_true(fake.planned & WIRE_IO_MAGNET_HOLD);
+	while (sequence.state == STATE(FALLING))
+		tick();
+	assert_int_equal(sequence.fault, WIRE_FAULT_GATES);
+	assert_int_equal(now_ms - start_ms, 1400); /* twice 699.617 ms */
+	assert_int_equal(fake.planned, 0);
+	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
+}
+
+static void the_plan_is_made_at_arm_only(void **state)
+{
+	uint32_t relief_us;
+
+	(void)state;
+	to_ready();
+	assert_int_equal(arm(), 0);
+	relief_us = sequence.plan.relief_us;
+	parameters.value[WIRE_PARAMETER_dampers_um] = 1000000;
+	sequence_plan(&sequence); /* nothing was said to have changed */
+	assert_int_equal(sequence.plan.relief_us, relief_us);
+	sequence_replan(&sequence);
+	assert_int_equal(sequence.plan.relief_us, relief_us);
+	sequence_plan(&sequence);
+	assert_in_range(sequence.plan.relief_us, 450833, 450836); /* sqrt(2 / 9.84) s */
+}
+
+static void motion_ends_by_a_switch(void **state)
+{
+	static const uint16_t switches[] = {WIRE_IO_FRAME_DOWN, WIRE_IO_LATCH_CLOSED};
+
+	(void)state;
+	for (size_t i = 0; i < 2; i++) {
+		to_keep_out();
+		assert_true(sequence.marks & WIRE_MARK_FRAME_NOT_DOWN);
+		ticks(60000);
+		assert_int_equal(sequence.state, STATE(KEEP_OUT));
+		for (unsigned op = WIRE_OP_ARM; op <= WIRE_OP_DISCARD; op++)
+			assert_int_equal(command(op, op == WIRE_OP_DISCARD ? 1 : 0xC0FFEE),
+			                 op == WIRE_OP_ABORT ? 0 : DT_E_STATE);
+		checks |= WIRE_CHECK_DOOR | WIRE_CHECK_ESTOP; /* somebody goes in to help it down */
+		tick();
+		assert_int_equal(sequence.state, STATE(KEEP_OUT));
+		assert_int_equal(sequence.fault, WIRE_FAULT_NONE);
+		fake.inputs |= switches[i];
+		tick();
+		assert_int_equal(sequence.state, STATE(CAPTURED));
+		assert_true(sequence.marks & WIRE_MARK_FRAME_NOT_DOWN);
+	}
+	to_fault_moving();
+	fake.inputs &= (uint16_t)~WIRE_IO_FRAME_DOWN;
+	sequence_full(&sequence);
+	assert_int_equal(sequence.state, STATE(KEEP_OUT));
+	assert_int_equal(sequence.fault, WIRE_FAULT_ABORTED);
+	to_captured();
+	assert_false(sequence.marks & WIRE_MARK_FRAME_NOT_DOWN);
+}
+
+/* The keeper current counts once, and only behind the edge. */
+static void the_keeper_tells_when_the_product_left(void **state)
+{
+	(void)state;
+	to_falling();
+	fall_with(9.81, fake.now_us);
+	sequence_keeper(&sequence, fake.off_us[1] + 100); /* a magnet that is still on */
+	assert_false(sequence.times.keeper_fell);
+	fake_time(fake.off_us[1] + 9000);
+	sequence_keeper(&sequence, fake.off_us[1] - 1);
+	assert_false(sequence.times.keeper_fell);
+	sequence_keeper(&sequence, fake.off_us[1] + 7300);
+	sequence_keeper(&sequence, fake.off_us[1] + 8800);
+	assert_true(sequence.times.keeper_fell);
+	assert_int_equal(sequence.times.keeper_us, fake.off_us[1] + 7300);
 }
 
 /* Twice the free fall to the lower gate, 0.7 m: 755.55 ms. */
 static void latch_must_open(void **state)
 {
 	(void)state;
-	to_armed();
-	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), 0);
+	to_warned();
+	assert_int_equal(release(), 0);
 	ticks(100);
 	assert_int_equal(sequence.state, STATE(FALLING));
 	tick();
@@ -574,16 +935,16 @@ static void latch_must_open(void **state)
 	assert_int_equal(sequence.state, STATE(FAULT_HELD));
 	assert_int_equal(sequence.fault, WIRE_FAULT_LATCH);
 	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
-	assert_int_equal(command(WIRE_OP_CLEAR, 0, 0), 0);
+	assert_int_equal(clear(), 0);
 }
 
 static void abort_before_the_latch_opens_holds(void **state)
 {
 	(void)state;
-	to_armed();
-	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), 0);
+	to_warned();
+	assert_int_equal(release(), 0);
 	ticks(5);
-	assert_int_equal(command(WIRE_OP_ABORT, 0, 0), 0);
+	assert_int_equal(command(WIRE_OP_ABORT, 0), 0);
 	ticks(750);
 	assert_int_equal(sequence.state, STATE(FAULT_MOVING));
 	tick();
@@ -606,8 +967,8 @@ static void frame_that_moved_is_recorded(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof(witnesses) / sizeof(witnesses[0]); i++) {
-		to_armed();
-		assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), 0);
+		to_warned();
+		assert_int_equal(release(), 0);
 		ticks(101);
 		assert_int_equal(sequence.state, STATE(FAULT_MOVING));
 		ticks(640); /* beyond the time for an impact: 600 ms */
@@ -621,8 +982,8 @@ static void frame_that_moved_is_recorded(void **state)
 		ticks(200);
 		assert_int_equal(sequence.state, STATE(FAULT_MOVING));
 	}
-	to_armed(); /* and so is a window that is open already */
-	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), 0);
+	to_warned(); /* and so is a window that is open already */
+	assert_int_equal(release(), 0);
 	ticks(200);
 	sequence_triggered(&sequence);
 	ticks(800);
@@ -656,7 +1017,7 @@ static void frame_down_ends_the_relief(void **state)
 static void fault_in_motion_brakes_and_keeps_holding(void **state)
 {
 	static const struct {
-		uint16_t check;
+		uint32_t check;
 		uint8_t fault;
 	} faults[] = {
 	        {WIRE_CHECK_ESTOP, WIRE_FAULT_ESTOP},      {WIRE_CHECK_DOOR, WIRE_FAULT_DOOR},
@@ -685,7 +1046,7 @@ static void fault_in_motion_brakes_and_keeps_holding(void **state)
 static void loss_in_every_state(void **state)
 {
 	static const struct {
-		uint16_t check;
+		uint32_t check;
 		uint8_t armed, moving; /* fault */
 	} losses[] = {
 	        {WIRE_CHECK_ESTOP, WIRE_FAULT_ESTOP, WIRE_FAULT_ESTOP},
@@ -739,17 +1100,54 @@ static void reset_in_every_state(void **state)
 			reach[s]();
 			fake.outputs = WIRE_IO_MAGNET_HOLD; /* as the drivers hold it in reset */
 			fake.planned = 0;
+			fake.inputs = FAKE_ALL_GOOD;
+			checks = 0;
 			now_ms = 0;
 			sequence_init(&sequence, &parameters, counters, causes[i]);
 			ticks(200);
 			assert_int_equal(sequence.state, STATE(FAULT_HELD));
 			assert_int_equal(sequence.fault, faults[i]);
 			assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
-			assert_int_equal(command(WIRE_OP_ARM, TOKEN, 0), DT_E_STATE);
-			assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), DT_E_STATE);
-			assert_int_equal(command(WIRE_OP_CLEAR, 0, 0), 0);
+			assert_int_equal(arm(), DT_E_STATE);
+			assert_int_equal(release(), DT_E_STATE);
+			assert_int_equal(clear(), 0);
 			assert_int_equal(sequence.state, STATE(SAFE));
 		}
+}
+
+/* Any other reset: known by the state that was kept. */
+static void reset_in_motion_is_a_fault(void **state)
+{
+	static const enum port_reset causes[] = {PORT_RESET_POWER_ON, PORT_RESET_COMMAND, PORT_RESET_PIN};
+
+	(void)state;
+	for (unsigned s = 0; s < WIRE_STATES; s++)
+		for (size_t i = 0; i < 3; i++) {
+			bool moving = (s >= STATE(FALLING) && s <= STATE(BRAKED)) ||
+			              s == STATE(FAULT_MOVING) || s == STATE(KEEP_OUT);
+
+			reach[s]();
+			fake.outputs = WIRE_IO_MAGNET_HOLD;
+			fake.planned = 0;
+			fake.inputs = FAKE_ALL_GOOD;
+			checks = 0;
+			now_ms = 0;
+			sequence_init(&sequence, &parameters, counters, causes[i]);
+			assert_int_equal(sequence.fault, moving ? WIRE_FAULT_RESET : WIRE_FAULT_NONE);
+			assert_int_equal(sequence.state, moving ? STATE(FAULT_HELD) : STATE(BOOT));
+			ticks(200);
+			assert_int_equal(sequence.state, moving ? STATE(FAULT_HELD) : STATE(SAFE));
+			assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
+			assert_int_equal(clear(), 0);
+			sequence_init(&sequence, &parameters, counters, causes[i]);
+			assert_int_equal(sequence.fault, WIRE_FAULT_NONE); /* it was told */
+		}
+	reach[STATE(FALLING)](); /* the supply flutters: a second reset within BOOT */
+	fake.kept = STATE(FALLING);
+	sequence_init(&sequence, &parameters, counters, PORT_RESET_PIN);
+	fake.kept = UINT8_MAX; /* nothing that makes sense */
+	sequence_init(&sequence, &parameters, counters, PORT_RESET_POWER_ON);
+	assert_int_equal(sequence.state, STATE(BOOT));
 }
 
 static void no_impact_is_forced_after_600_ms(void **state)
@@ -783,22 +1181,27 @@ static void accept_needs_the_crc(void **state)
 {
 	(void)state;
 	to_captured();
-	assert_int_equal(command(WIRE_OP_ACCEPT, 0, 0xC0FFED), DT_E_CORRUPT);
+	assert_int_equal(command(WIRE_OP_ACCEPT, 0xC0FFED), DT_E_CORRUPT);
 	assert_int_equal(sequence.state, STATE(CAPTURED));
-	assert_int_equal(command(WIRE_OP_DISCARD, 0, 0), 0);
+	assert_int_equal(command(WIRE_OP_DISCARD, 0), DT_E_CORRUPT); /* not this drop */
+	assert_int_equal(command(WIRE_OP_DISCARD, 2), DT_E_CORRUPT);
+	assert_int_equal(sequence.state, STATE(CAPTURED));
+	assert_int_equal(command(WIRE_OP_DISCARD, 1), 0);
 	assert_int_equal(sequence.state, STATE(UPLOADED));
 	to_ready();
-	assert_int_equal(command(WIRE_OP_ACCEPT, 0, 0xC0FFEE), DT_E_STATE);
-	assert_int_equal(command(WIRE_OP_DISCARD, 0, 0), DT_E_STATE);
+	assert_int_equal(command(WIRE_OP_ACCEPT, 0xC0FFEE), DT_E_STATE);
+	assert_int_equal(command(WIRE_OP_DISCARD, 0), DT_E_STATE);
 }
 
 static void fault_in_motion_ends_in_fault_held(void **state)
 {
 	(void)state;
 	to_fault_moving();
+	fake.inputs |= WIRE_IO_FRAME_DOWN;
+	tick();
 	sequence_full(&sequence);
 	assert_int_equal(sequence.state, STATE(CAPTURED));
-	assert_int_equal(command(WIRE_OP_DISCARD, 0, 0), 0);
+	assert_int_equal(command(WIRE_OP_DISCARD, 1), 0);
 	ticks(199);
 	assert_int_equal(sequence.state, STATE(UPLOADED));
 	tick();
@@ -812,191 +1215,10 @@ static void drop_id_counts_releases_and_skips_zero(void **state)
 	(void)state;
 	to_falling();
 	assert_int_equal(sequence.drop_id, 1);
-	to_armed();
+	to_warned();
 	sequence.drop_id = 65535;
-	assert_int_equal(command(WIRE_OP_RELEASE, TOKEN, 0), 0);
+	assert_int_equal(release(), 0);
 	assert_int_equal(sequence.drop_id, 1);
-}
-
-/* ---- random walks ---- */
-
-/* What the invariants need to know is kept here, from inputs, commands and outputs alone. */
-struct walk {
-	uint32_t seed, start_seed, step;
-	bool released;        /* since the magnet was last seen on at rest */
-	uint16_t armed_token; /* of the last ARM that was taken; 0 once it cannot count any more */
-	uint16_t release_token;
-	uint32_t moving_ms; /* how long it has been in motion */
-	unsigned visited[WIRE_STATES];
-	unsigned opened, let_go, still;
-};
-
-static struct health health;
-
-static void complain(const struct walk *walk, const char *wrong)
-{
-	fail_msg("%s: seed %u step %u state %s outputs %#x inputs %#x", wrong, walk->start_seed, walk->step,
-	         wire_state_name(sequence.state), fake.outputs, fake.inputs);
-}
-
-static void check_outputs(struct walk *walk, uint16_t before)
-{
-	bool moving = sequence_moving(sequence.state);
-
-	if (!(fake.outputs & WIRE_IO_MAGNET_HOLD) && !walk->released)
-		complain(walk, "magnet off without a release");
-	if (!(fake.outputs & ~before & WIRE_IO_LATCH_OPEN))
-		return;
-	walk->opened++;
-	if (walk->armed_token == 0 || walk->release_token != walk->armed_token)
-		complain(walk, "latch opened without an armed token");
-	if (!(fake.inputs & WIRE_IO_DAMPERS_ENGAGED) || !(fake.inputs & WIRE_IO_DOOR_CLOSED) ||
-	    !(fake.inputs & WIRE_IO_ESTOP_CLEAR) || !(fake.inputs & WIRE_IO_PRODUCT_HELD))
-		complain(walk, "latch opened without dampers, door, emergency stop or product");
-	if (!moving)
-		complain(walk, "latch opened at rest");
-}
-
-static void check_state(struct walk *walk)
-{
-	uint8_t s = sequence.state;
-	bool driven = s >= STATE(FALLING) && s <= STATE(BRAKED), faulty = sequence.fault != 0;
-
-	if ((fake.outputs & (WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE)) && !driven)
-		complain(walk, "latch open or dampers relieved at rest or in a fault");
-	if (s == STATE(BRAKED) && (fake.outputs & WIRE_IO_DAMPERS_RELIEVE))
-		complain(walk, "braked with dampers relieved");
-	if (fake.planned != 0 && s != STATE(FALLING) && s != STATE(SEPARATED))
-		complain(walk, "an edge is left to come");
-	if ((s == STATE(FAULT_HELD) || s == STATE(FAULT_MOVING)) != faulty && s < STATE(CAPTURED))
-		complain(walk, "fault and state disagree");
-	if ((sequence.token != 0) != (s == STATE(ARMED)))
-		complain(walk, "a token outlives ARMED");
-	if (walk->moving_ms > 5000) /* the walk fills a window 600 ms after the last impact */
-		complain(walk, "motion does not end");
-}
-
-/* One of the inputs is wrong now and then, for a while. */
-static void random_inputs(struct walk *walk)
-{
-	uint32_t r = fake_random(&walk->seed);
-	uint16_t wrong = r % 16 ? 0 : (uint16_t)(1u << (4 + (r >> 8) % 11));
-	bool held = sequence.state < STATE(FALLING) || (r >> 13) % 2048 == 0;
-
-	fake.inputs = FAKE_ALL_GOOD ^ wrong;
-	if (!held && walk->still == 0)
-		fake.inputs &= (uint16_t)~WIRE_IO_LATCH_CLOSED;
-	clocks_good = (r >> 4) % 64 != 0;
-	health.sensor_checks = (r >> 24) % 32 ? 0 : (uint16_t)(WIRE_CHECK_SENSOR_S1 << (r >> 20) % 3);
-	health.host_here = (r >> 16) % 32 != 0;
-	checks = health_checks(&health, fake.inputs, 0);
-}
-
-static void random_gate(struct walk *walk, uint32_t r)
-{
-	if (r % 8 == 0)
-		sequence_gate(&sequence, r >> 8 & 1, fake.now_us - (r >> 9) % 1000);
-	else if (walk->still == 0)
-		sequence_gate(&sequence, sequence.gates_seen,
-		              sequence.released_us + (sequence.gates_seen ? 377773 : 201928));
-}
-
-static void random_command(struct walk *walk, uint32_t r)
-{
-	unsigned op = 1 + r % 6;
-	uint16_t token = (r >> 8) % 4 ? TOKEN : (uint16_t)(r >> 16);
-	int result;
-
-	result = command(op, token, (r >> 12) % 2 ? 0xC0FFEE : 0);
-	if (op == WIRE_OP_ARM && result == 0)
-		walk->armed_token = token;
-	if (op == WIRE_OP_RELEASE && result == 0) {
-		walk->release_token = token;
-		walk->released = true;
-		walk->still = (r >> 23) % 16 == 0; /* this latch is stuck */
-	}
-}
-
-/* Ticks until the planned edges are made, or as many as told. */
-static void random_ticks(struct walk *walk, uint32_t r)
-{
-	unsigned count = r % 4 ? 1 : r >> 8 & 0xFF;
-
-	if (fake.planned && r % 2)
-		count = (fake.off_us[1] - fake.now_us) / 1000 % 1000;
-	for (; count > 0; count--) {
-		bool was_moving = sequence_moving(sequence.state);
-
-		tick();
-		walk->moving_ms = was_moving ? walk->moving_ms + 1 : 0;
-		if (sequence_separated(sequence.state) && walk->moving_ms > 2000)
-			sequence_full(&sequence);
-	}
-}
-
-static void random_event(struct walk *walk)
-{
-	uint32_t r = fake_random(&walk->seed), kind = r % 24, more = r >> 5;
-
-	if (kind < 6)
-		random_command(walk, more);
-	else if (kind == 6 && more % 2)
-		sequence_fault(&sequence, (enum wire_fault)(1 + more / 2 % (WIRE_FAULTS - 1)));
-	else if (kind == 7 && more % 4 == 0)
-		sequence_triggered(&sequence);
-	else if (kind == 8 && sequence_separated(sequence.state) && sequence.triggered)
-		sequence_full(&sequence);
-	else if (kind < 14 && sequence.state == STATE(FALLING))
-		random_gate(walk, more);
-	else
-		random_ticks(walk, more);
-}
-
-static void random_reset(struct walk *walk)
-{
-	static const enum port_reset causes[] = {PORT_RESET_POWER_ON, PORT_RESET_WATCHDOG,
-	                                         PORT_RESET_BROWN_OUT};
-
-	fake.outputs = WIRE_IO_MAGNET_HOLD;
-	fake.planned = 0;
-	sequence_init(&sequence, &parameters, counters, causes[fake_random(&walk->seed) % 3]);
-	sequence.tick_ms = sequence.entered_ms = now_ms;
-	walk->armed_token = 0;
-	walk->moving_ms = 0;
-}
-
-static void random_walks_stay_safe(void **state)
-{
-	struct walk walk = {.seed = 20261121, .start_seed = 20261121};
-	unsigned mask = WIRE_IO_MAGNET_HOLD;
-
-	(void)state;
-	boot(PORT_RESET_POWER_ON);
-	health_init(&health, &parameters, counters);
-	health.host_hash_good = true;
-	for (walk.step = 0; walk.step < 1000000; walk.step++) {
-		uint16_t before = fake.outputs;
-		uint8_t state_before = sequence.state;
-
-		random_inputs(&walk);
-		if (fake_random(&walk.seed) % 2000 == 0)
-			random_reset(&walk);
-		random_event(&walk);
-		check_outputs(&walk, before);
-		check_state(&walk);
-		walk.let_go += (before & ~fake.outputs & mask) != 0;
-		walk.released &= sequence_moving(sequence.state) || !(fake.outputs & mask);
-		if (state_before == STATE(ARMED) && sequence.state != STATE(ARMED))
-			walk.armed_token = 0;
-		walk.visited[sequence.state]++;
-	}
-	for (unsigned s = 0; s < WIRE_STATES; s++)
-		if (walk.visited[s] < 200)
-			fail_msg("state %s visited %u times only, seed %u", wire_state_name(s),
-			         walk.visited[s], walk.start_seed);
-	if (walk.opened < 1000 || walk.let_go < 200)
-		fail_msg("%u times opened, %u let go only, seed %u", walk.opened, walk.let_go,
-		         walk.start_seed);
 }
 
 int main(void)
@@ -1008,7 +1230,13 @@ int main(void)
 	        cmocka_unit_test(camera_has_a_pulse_of_ten_ms),
 	        cmocka_unit_test(boot_needs_the_self_test),
 	        cmocka_unit_test(reset_causes_are_faults),
+	        cmocka_unit_test(boot_looks_for_the_frame),
 	        cmocka_unit_test(arm_and_release_are_guarded),
+	        cmocka_unit_test(nobody_else_is_told_that_it_has_armed),
+	        cmocka_unit_test(a_guard_wants_to_be_acknowledged),
+	        cmocka_unit_test(a_drop_wants_to_be_acknowledged),
+	        cmocka_unit_test(clear_of_a_fault_acknowledges_if_it_may),
+	        cmocka_unit_test(warning_may_be_longer),
 	        cmocka_unit_test(armed_expires),
 	        cmocka_unit_test(lost_check_while_armed),
 	        cmocka_unit_test(clear_waits_until_the_cause_is_gone),
@@ -1016,7 +1244,13 @@ int main(void)
 	        cmocka_unit_test(edges_follow_the_fall),
 	        cmocka_unit_test(edges_in_numbers_by_hand),
 	        cmocka_unit_test(late_edge_is_made_at_once),
+	        cmocka_unit_test(the_relief_ends_in_time),
+	        cmocka_unit_test(a_gate_must_be_plausible),
 	        cmocka_unit_test(gates_out_of_order_or_missing),
+	        cmocka_unit_test(falling_ends_by_time),
+	        cmocka_unit_test(the_plan_is_made_at_arm_only),
+	        cmocka_unit_test(motion_ends_by_a_switch),
+	        cmocka_unit_test(the_keeper_tells_when_the_product_left),
 	        cmocka_unit_test(latch_must_open),
 	        cmocka_unit_test(abort_before_the_latch_opens_holds),
 	        cmocka_unit_test(frame_that_moved_is_recorded),
@@ -1025,11 +1259,11 @@ int main(void)
 	        cmocka_unit_test(fault_in_motion_brakes_and_keeps_holding),
 	        cmocka_unit_test(loss_in_every_state),
 	        cmocka_unit_test(reset_in_every_state),
+	        cmocka_unit_test(reset_in_motion_is_a_fault),
 	        cmocka_unit_test(no_impact_is_forced_after_600_ms),
 	        cmocka_unit_test(accept_needs_the_crc),
 	        cmocka_unit_test(fault_in_motion_ends_in_fault_held),
 	        cmocka_unit_test(drop_id_counts_releases_and_skips_zero),
-	        cmocka_unit_test(random_walks_stay_safe),
 	};
 
 	return cmocka_run_group_tests(tests, read_readme, NULL);

@@ -19,7 +19,7 @@
 #include "tests/unit/synth.h"
 
 #define PI 3.14159265358979323846
-#define G 9.81
+#define G 9.80665
 
 static const struct srs_options q10 = {.damping = 0.05};
 

@@ -359,6 +359,7 @@ static uint16_t bias_of(uint32_t word, unsigned axis)
 	for (unsigned i = 0; i < 3; i++)
 		transfer(ADC_GROUP_YZ, i == axis ? word : good);
 	assert_true(adc_read(ADC_GROUP_YZ, 0, code));
+	adc_judge_bias();
 	return adc_bias();
 }
 
@@ -366,7 +367,6 @@ static void bias(void **state)
 {
 	const uint16_t both = WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2;
 	const double per_volt = 65520 / 3.3 / 10; /* sum for a volt at the sensor */
-	int16_t code[ADC_CODES];
 
 	(void)state;
 	for (unsigned axis = 0; axis < 3; axis++) {
@@ -387,8 +387,7 @@ static void bias(void **state)
 	}
 	assert_int_equal(bias_of(pair(20000, 20000), 0), both);
 	assert_int_equal(adc_bias_high(), 0);
-	assert_false(
-	        adc_read(ADC_GROUP_YZ, 1, code)); /* a scan that is not there says nothing of the cable */
+	adc_judge_bias(); /* a scan that is not there says nothing of the cable: the last one counts */
 	assert_int_equal(adc_bias(), both);
 	set_up();
 	assert_int_equal(adc_bias(), 0); /* nothing converted yet is not good */

@@ -53,6 +53,7 @@ static uint32_t on_write(uint32_t address, uint32_t written, uint32_t kept)
 		return write_cccr(written, kept);
 	if (is_protected(address)) {
 		assert_int_equal(model_get(FDCAN_CCCR) & 3, 3);
+		assert_int_equal(model.masked, 0x80);
 		hardware.protected_writes++;
 	}
 	if (address == FDCAN_TXBAR)
@@ -92,6 +93,8 @@ static void set_up(void)
 {
 	reset_hardware();
 	assert_int_equal(can_setup(40000000, false, 5000), 0);
+	assert_int_equal(model.masks, 2); /* control is kept out meanwhile, samples are not */
+	assert_int_equal(model.masked, 0);
 	assert_int_equal(model.held, 0);
 }
 
@@ -205,6 +208,57 @@ static void silence(void **state)
 	hardware.never_leaves = true;
 	assert_int_equal(can_setup(40000000, false, 5000), DT_E_TIMEOUT);
 	assert_int_equal(model.held, 0);
+}
+
+/* ---- filters ---- */
+
+/* Standard filter elements and their list, RM0440 44.3.10, 44.4.20: the hardware's decision, played. */
+static bool passes(uint32_t id)
+{
+	uint32_t global = model_get(FDCAN_RXGFC);
+
+	for (unsigned i = 0; i < (global >> 16 & 31); i++) {
+		uint32_t element = model_get(0x4000A400u + 4 * i);
+		uint32_t first = element >> 16 & 0x7FF, second = element & 0x7FF;
+		bool match = false;
+
+		switch (element >> 30) {
+		case 0:
+			match = id >= first && id <= second;
+			break;
+		case 1:
+			match = id == first || id == second;
+			break;
+		case 2:
+			match = (id & second) == (first & second);
+			break;
+		default:
+			break;
+		}
+		if (match)
+			return (element >> 27 & 7) == 1;
+	}
+	return (global >> 4 & 3) == 0;
+}
+
+static void filters(void **state)
+{
+	unsigned passed = 0;
+
+	(void)state;
+	for (unsigned classic = 0; classic < 2; classic++) {
+		reset_hardware();
+		assert_int_equal(can_setup(40000000, classic, 5000), 0);
+		passed = 0;
+		for (uint32_t id = 0; id < 0x800; id++)
+			passed += passes(id);
+		assert_int_equal(passed, 5); /* NMT, command, resend, parameter, host heartbeat */
+		assert_true(passes(0x000) && passes(0x201) && passes(0x301) && passes(0x601) &&
+		            passes(0x77F));
+		assert_true((model_get(FDCAN_RXGFC) >> 2 & 3) >= 2);    /* no extended identifier */
+		assert_int_equal(model_get(FDCAN_RXGFC) >> 24 & 15, 0); /* by no filter */
+		assert_int_equal(model_get(FDCAN_RXGFC) & 3, 3);        /* no remote frame */
+	}
 }
 
 /* ---- sending ---- */
@@ -335,24 +389,24 @@ static void receive(void **state)
 static void losses(void **state)
 {
 	struct frame frame;
-	bool bus_off;
+	enum port_bus bus;
 	uint32_t before;
 	unsigned kept = 0;
 
 	(void)state;
 	set_up();
-	before = can_errors(&bus_off);
+	before = can_errors(&bus);
 	for (unsigned i = 0; i < 20; i++) {
 		put_received(i << 18, 0, 0, 0);
 		can_interrupt();
 	}
 	while (can_receive(&frame) == 1)
 		assert_int_equal(frame.id, kept++);
-	assert_int_equal(can_errors(&bus_off) - before, 20 - kept);
+	assert_int_equal(can_errors(&bus) - before, 20 - kept);
 	assert_true(kept >= 16);
 	model_put(FDCAN_IR, 1u << 2); /* RF0L: the FIFO itself was full */
 	can_interrupt();
-	assert_int_equal(can_errors(&bus_off) - before, 21 - kept);
+	assert_int_equal(can_errors(&bus) - before, 21 - kept);
 }
 
 /* ---- errors ---- */
@@ -360,41 +414,59 @@ static void losses(void **state)
 static void bus_off(void **state)
 {
 	uint32_t before;
-	bool off = true;
+	enum port_bus bus = PORT_BUS_OFF;
 	int writes;
 
 	(void)state;
 	set_up();
-	before = can_errors(&off);
-	assert_false(off);
+	before = can_errors(&bus);
+	assert_int_equal(bus, PORT_BUS_ACTIVE);
 	model_put(FDCAN_ECR, 5u << 16 | 0x40);
-	assert_int_equal(can_errors(&off) - before, 5);
-	assert_int_equal(can_errors(&off) - before, 5); /* cleared by reading */
+	assert_int_equal(can_errors(&bus) - before, 5);
+	assert_int_equal(can_errors(&bus) - before, 5); /* cleared by reading */
 	model_put(FDCAN_CCCR, 0x301);                   /* bus-off sets INIT */
 	model_put(FDCAN_PSR, 1u << 7);
 	model_put(FDCAN_ECR, 32u << 16);
-	assert_int_equal(can_errors(&off) - before, 37);
-	assert_true(off);
+	assert_int_equal(can_errors(&bus) - before, 37);
+	assert_int_equal(bus, PORT_BUS_OFF);
 	assert_int_equal(model_get(FDCAN_CCCR), 0x300); /* recovery begins, the mode is kept */
 	writes = model.writes;
-	(void)can_errors(&off);
-	assert_true(off); /* it lasts 129 x 11 bits */
+	(void)can_errors(&bus);
+	assert_int_equal(bus, PORT_BUS_OFF); /* it lasts 129 x 11 bits */
 	assert_int_equal(model.writes, writes);
 	model_put(FDCAN_PSR, 0);
-	(void)can_errors(&off);
-	assert_false(off);
+	(void)can_errors(&bus);
+	assert_int_equal(bus, PORT_BUS_ACTIVE);
+}
+
+static void passive(void **state)
+{
+	enum port_bus bus = PORT_BUS_OFF;
+
+	(void)state;
+	set_up();
+	model_put(FDCAN_PSR, 1u << 6); /* a warning is none */
+	(void)can_errors(&bus);
+	assert_int_equal(bus, PORT_BUS_ACTIVE);
+	model_put(FDCAN_PSR, 1u << 5 | 1u << 6);
+	(void)can_errors(&bus);
+	assert_int_equal(bus, PORT_BUS_PASSIVE);
+	assert_int_equal(model_get(FDCAN_CCCR), 0x300); /* it goes on */
+	model_put(FDCAN_PSR, 1u << 7 | 1u << 5 | 1u << 6);
+	(void)can_errors(&bus);
+	assert_int_equal(bus, PORT_BUS_OFF);
 }
 
 static void restricted(void **state)
 {
 	uint32_t before;
-	bool off;
+	enum port_bus bus;
 
 	(void)state;
 	set_up();
-	before = can_errors(&off);
+	before = can_errors(&bus);
 	model_put(FDCAN_CCCR, 0x304);
-	assert_int_equal(can_errors(&off) - before, 1);
+	assert_int_equal(can_errors(&bus) - before, 1);
 	assert_int_equal(model_get(FDCAN_CCCR), 0x300);
 }
 
@@ -405,6 +477,7 @@ int main(void)
 	        cmocka_unit_test(order),      cmocka_unit_test(silence), cmocka_unit_test(send_long),
 	        cmocka_unit_test(send_short), cmocka_unit_test(no_room), cmocka_unit_test(receive),
 	        cmocka_unit_test(losses),     cmocka_unit_test(bus_off), cmocka_unit_test(restricted),
+	        cmocka_unit_test(filters),    cmocka_unit_test(passive),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -101,7 +101,7 @@ static void frequencies(void **state)
 static void order(void **state)
 {
 	uint32_t can_hz;
-	int hse, factors, on, outputs, half, boost, flash, on_pll, whole;
+	int hse, factors, on, outputs, half, boost, flash, on_pll, whole, security;
 
 	(void)state;
 	assert_int_equal(run(24e6, 16e6, NOTHING, &can_hz), 0);
@@ -114,9 +114,13 @@ static void order(void **state)
 	flash = model_find(FLASH_ACR, 15, 4, 0);
 	on_pll = model_find(RCC_CFGR, 0xF3, 0x83, 0);
 	whole = model_find(RCC_CFGR, 0xF3, 0x03, 0);
+	security = model_find(RCC_CR, 1u << 19, 1u << 19, 0); /* 7.2.8: with the crystal running */
 	assert_true(0 <= hse && hse < factors && factors < on && on < outputs); /* 7.2.4 */
 	assert_true(outputs < half && half < boost && boost < flash && flash < on_pll &&
 	            on_pll < whole); /* 6.1.5 */
+	assert_true(security > whole);
+	assert_int_equal(model_get(RCC_CR) & (1u << 24 | 1u << 19 | 1u << 16),
+	                 1u << 24 | 1u << 19 | 1u << 16);
 	assert_int_equal(model_get(FLASH_ACR), 0x00040704);
 	assert_int_equal(model_count(RCC_PLLCFGR), 2);
 	assert_int_equal(model_count(RCC_CFGR), 3);
@@ -150,6 +154,7 @@ static void silence(void **state)
 		assert_int_equal(run(24e6, 16e6, dead, &can_hz), DT_E_TIMEOUT);
 		if (dead != SWITCH) /* stays on HSI16 */
 			assert_int_equal(model_find(RCC_CFGR, 3, 3, 0), -1);
+		assert_int_equal(model_find(RCC_CR, 1u << 19, 1u << 19, 0), -1);
 	}
 	assert_int_equal(can_hz, 7);
 }

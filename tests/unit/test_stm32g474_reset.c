@@ -20,6 +20,7 @@
 #define SOFTWARE (1u << 28)
 #define BOR (1u << 27)
 #define PIN (1u << 26)
+#define OPTION_BYTES (1u << 25)
 
 static void causes(void **state)
 {
@@ -31,18 +32,21 @@ static void causes(void **state)
 	        {BOR | PIN, false, PORT_RESET_POWER_ON},
 	        {BOR | PIN, true, PORT_RESET_BROWN_OUT},
 	        {BOR, true, PORT_RESET_BROWN_OUT},
-	        {PIN, true, PORT_RESET_POWER_ON},
+	        {PIN, true, PORT_RESET_PIN},
+	        {PIN, false, PORT_RESET_POWER_ON},
 	        {IWDG | PIN, true, PORT_RESET_WATCHDOG},
 	        {IWDG | BOR | PIN, false, PORT_RESET_WATCHDOG},
 	        {SOFTWARE | PIN, true, PORT_RESET_COMMAND},
 	        {SOFTWARE | PIN, false, PORT_RESET_COMMAND},
-	        {LOW_POWER | PIN, true, PORT_RESET_POWER_ON},
+	        {LOW_POWER | PIN, true, PORT_RESET_PIN},
+	        {OPTION_BYTES | PIN, true, PORT_RESET_PIN},
+	        {0, true, PORT_RESET_PIN},
 	        {0, false, PORT_RESET_POWER_ON},
 	};
 
 	(void)state;
 	for (unsigned i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
-		struct reset_mark mark = {0xDEADBEEF, 0x12345678};
+		struct reset_mark mark = {0xDEADBEEF, 0x12345678, 0xC35AF00F};
 
 		model_init();
 		if (cases[i].ran)
@@ -56,7 +60,7 @@ static void causes(void **state)
 
 static void crash(void **state)
 {
-	struct reset_mark mark = {0, 0};
+	struct reset_mark mark = {0, 0, 0};
 
 	(void)state;
 	model_init();
@@ -71,6 +75,54 @@ static void crash(void **state)
 	reset_by_crash(&mark);
 	model_put(RCC_CSR, BOR | PIN);
 	assert_int_equal(reset_cause(&mark), PORT_RESET_BROWN_OUT);
+}
+
+static void restart(struct reset_mark *mark, uint32_t flags)
+{
+	model_init();
+	model_put(RCC_CSR, flags);
+	(void)reset_cause(mark);
+}
+
+static void kept(void **state)
+{
+	static const uint32_t resets[] = {PIN, IWDG | PIN, SOFTWARE | PIN, BOR | PIN, LOW_POWER | PIN};
+	struct reset_mark mark = {0xDEADBEEF, 0x12345678, 0xC35AF00F}; /* a byte kept in RAM that is noise */
+
+	(void)state;
+	restart(&mark, BOR | PIN);
+	assert_int_equal(reset_kept(&mark), 0);
+	for (unsigned byte = 0; byte < 256; byte++)
+		for (unsigned i = 0; i < sizeof(resets) / sizeof(resets[0]); i++) {
+			reset_keep(&mark, (uint8_t)byte);
+			assert_int_equal(reset_kept(&mark), byte);
+			restart(&mark, resets[i]);
+			assert_int_equal(reset_kept(&mark), byte);
+		}
+	reset_keep(&mark, 5);
+	reset_by_crash(&mark);
+	restart(&mark, SOFTWARE | PIN);
+	assert_int_equal(reset_kept(&mark), 5);
+	for (unsigned bit = 0; bit < 32; bit++) { /* one that a dip has changed is none */
+		reset_keep(&mark, 5);
+		mark.kept ^= 1u << bit;
+		assert_int_equal(reset_kept(&mark), 0);
+	}
+	reset_keep(&mark, 5);
+	mark.inverse ^= 1; /* the power was away */
+	restart(&mark, BOR | PIN);
+	assert_int_equal(reset_kept(&mark), 0);
+}
+
+static void brown_out_level(void **state)
+{
+	(void)state;
+	for (uint32_t level = 0; level < 8; level++) {
+		model_init();
+		model_put(0x40022020, 0xFFEFF8AAu | level << 8); /* the option bytes as delivered, 3.7.8 */
+		assert_int_equal(brown_out_set(), level == 4);
+		assert_int_equal(model.writes, 0);
+	}
 }
 
 static void watchdog(void **state)
@@ -114,10 +166,8 @@ static void supply(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(causes),
-	        cmocka_unit_test(crash),
-	        cmocka_unit_test(watchdog),
-	        cmocka_unit_test(supply),
+	        cmocka_unit_test(causes),          cmocka_unit_test(crash),    cmocka_unit_test(kept),
+	        cmocka_unit_test(brown_out_level), cmocka_unit_test(watchdog), cmocka_unit_test(supply),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

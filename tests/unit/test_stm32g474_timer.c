@@ -46,9 +46,24 @@ static unsigned mode_of(unsigned i)
 	return (field >> 4 & 7) | (field >> 13 & 8);
 }
 
+/* 30.4.15: a reference that may be cleared is, by a high tim_etrf, but not while its level is forced. TIM5
+ * has no pin of its own for it: its source 8 is TIM2's. */
+static bool cleared(unsigned i)
+{
+	uint32_t smcr = model_get(channels[i].timer + TIM_SMCR);
+	bool pin = model_get(GPIO_A + GPIO_IDR) >> 15 & 1, inverted = smcr >> 15 & 1;
+
+	if (channels[i].timer == TIM5 && (model_get(TIM5 + 0x60) >> 14 & 15) != 8)
+		return false;
+	return (smcr >> 3 & 1) && (smcr >> 12 & 3) == 0 && pin != inverted &&
+	       (model_get(channels[i].mode) >> channels[i].shift >> 7 & 1) && (mode_of(i) & ~1u) != 4;
+}
+
 static void match(unsigned i)
 {
 	if (mode_of(i) == 2 && model_get(channels[i].timer + TIM_CNT) == model_get(channels[i].ccr))
+		hardware.level[i] = false;
+	if (cleared(i))
 		hardware.level[i] = false;
 }
 
@@ -65,15 +80,18 @@ static void advance(uint32_t us)
 static uint32_t on_write(uint32_t address, uint32_t written, uint32_t kept)
 {
 	if (address == TIM1 + TIM_SR || address == TIM2 + TIM_SR || address == TIM3 + TIM_SR ||
-	    address == TIM4 + TIM_SR)
+	    address == TIM4 + TIM_SR || address == TIM5 + TIM_SR)
 		return kept & written; /* cleared by 0 */
 	model_put(address, written);
 	for (unsigned i = 0; i < CHANNELS; i++)
 		if (mode_of(i) == 4 || mode_of(i) == 5)
 			hardware.level[i] = mode_of(i) == 5;
-	if (address == GPIO_B + GPIO_BSRR)
-		model_put(GPIO_B + GPIO_IDR,
-		          (model_get(GPIO_B + GPIO_IDR) | (written & 0xFFFF)) & ~(written >> 16));
+		else if (cleared(i))
+			hardware.level[i] = false;
+	for (uint32_t port = GPIO_B; port <= GPIO_C; port += 0x400)
+		if (address == port + GPIO_BSRR)
+			model_put(port + GPIO_IDR,
+			          (model_get(port + GPIO_IDR) | (written & 0xFFFF)) & ~(written >> 16));
 	return written;
 }
 
@@ -87,6 +105,8 @@ static uint32_t on_read(uint32_t address, uint32_t kept)
 	    address == TIM2 + TIM_CCR(1)) /* reading a capture clears its flag */
 		model_put(TIM2 + TIM_SR,
 		          model_get(TIM2 + TIM_SR) & ~(address == TIM2 + TIM_CCR(0) ? 2u : 4u));
+	if (address == TIM5 + TIM_CCR(1))
+		model_put(TIM5 + TIM_SR, model_get(TIM5 + TIM_SR) & ~4u);
 	if (address == GPIO_B + GPIO_IDR)
 		for (unsigned i = 0; i < CHANNELS; i++)
 			kept = (kept & ~(1u << channels[i].pin)) | (uint32_t)hardware.level[i]
@@ -101,6 +121,8 @@ static void reset_hardware(void)
 	model_put(GPIO_A + GPIO_MODER, 0xABFFFFFF); /* 9.4.1 */
 	model_put(GPIO_B + GPIO_MODER, 0xFFFFFEBF);
 	model_put(GPIO_C + GPIO_MODER, 0xFFFFFFFF);
+	model_put(GPIO_A + GPIO_IDR, 0x8003);  /* emergency stop clear, both beams there */
+	model_put(GPIO_C + GPIO_IDR, 1u << 7); /* the frame is up */
 	model.on_read = on_read;
 	model.on_write = on_write;
 }
@@ -166,7 +188,9 @@ static void start_together(void **state)
 	reset_hardware();
 	timer_setup();
 	for (uint32_t timer = TIM2; timer <= TIM4; timer += 0x400) {
-		assert_int_equal(model_get(timer + TIM_SMCR), 6); /* trigger mode, tim_itr0 = tim1_trgo */
+		/* trigger mode, tim_itr0 = tim1_trgo; TIM2 also: clear by ETR, filtered, active low */
+		assert_int_equal(model_get(timer + TIM_SMCR),
+		                 timer == TIM2 ? 6 | 1 << 3 | 15 << 8 | 1 << 15 : 6);
 		assert_int_equal(model_count(timer + TIM_CR1), 0);
 	}
 	assert_int_equal(model_get(TIM1 + TIM_CR2) >> 4 & 7, 1); /* its trigger output: that it is enabled */
@@ -208,7 +232,7 @@ static void gates(void **state)
 		assert_int_equal(model_get(TIM2 + TIM_CCMR1) >> (shift + 2) & 3, 0); /* every edge */
 		assert_int_equal(model_get(TIM2 + TIM_CCMR1) >> (shift + 4) & 15, 15); /* longest filter */
 	}
-	assert_int_equal(model_get(TIM2 + TIM_CCER) & 0xBB, 0x11); /* rising */
+	assert_int_equal(model_get(TIM2 + TIM_CCER) & 0xBB, 0x33); /* falling: normally closed */
 	assert_int_equal(model_get(TIM2 + TIM_DIER), 6);
 	assert_false(timer_gate(0, &time_us));
 	assert_int_equal(time_us, 7);
@@ -221,6 +245,35 @@ static void gates(void **state)
 	assert_true(timer_gate(1, &time_us));
 	assert_int_equal(time_us, 0xFFFFFFF0);
 	assert_int_equal(model_get(TIM2 + TIM_SR), 0);
+}
+
+static void keeper(void **state)
+{
+	uint32_t time_us = 7;
+
+	(void)state;
+	set_up();
+	assert_int_equal(model_get(TIM5 + TIM_CCMR1) >> 8 & 3, 1);    /* TIM5_CH2: capture, own input */
+	assert_int_equal(model_get(TIM5 + TIM_CCMR1) >> 10 & 3, 0);   /* every edge */
+	assert_int_equal(model_get(TIM5 + TIM_CCMR1) >> 12 & 15, 15); /* as long as the gates' filter */
+	assert_int_equal(model_get(TIM5 + TIM_CCER) & 0xBB, 0x31);    /* falling; the latch as it was */
+	assert_false(timer_keeper(&time_us));
+	assert_int_equal(time_us, 7);
+	model_put(TIM5 + TIM_CNT, 500); /* both wrap at a time of their own */
+	model_put(TIM2 + TIM_CNT, 0xFFFFFF00);
+	model_put(TIM5 + TIM_CCR(1), 400);
+	model_put(TIM5 + TIM_SR, 1u << 2 | 1u << 10);
+	assert_true(timer_keeper(&time_us));
+	assert_int_equal(time_us, 0xFFFFFF00 - 100);
+	assert_int_equal(model_get(TIM5 + TIM_SR), 0);
+	assert_false(timer_keeper(&time_us));
+	model_put(TIM5 + TIM_CNT, 10);
+	model_put(TIM2 + TIM_CNT, 20);
+	model_put(TIM5 + TIM_CCR(1), 0xFFFFFFF0);
+	model_put(TIM5 + TIM_SR, 1u << 2);
+	assert_true(timer_keeper(&time_us));
+	assert_int_equal(time_us, 0xFFFFFFFA); /* 26 us before 20 */
+	assert_int_equal(model.held, 0);
 }
 
 static void clearing(void **state)
@@ -271,8 +324,8 @@ static void reset_states(void **state)
 	assert_true(hardware.level[MAGNET]);
 	assert_false(hardware.level[LATCH]);
 	assert_false(hardware.level[DAMPERS]);
-	assert_int_equal(model_get(TIM2 + TIM_CCER), 0x1111);
-	assert_int_equal(model_get(TIM5 + TIM_CCER), 0x0001);
+	assert_int_equal(model_get(TIM2 + TIM_CCER), 0x1133);
+	assert_int_equal(model_get(TIM5 + TIM_CCER), 0x0031);
 	assert_int_equal(model_count(GPIO_B + GPIO_MODER), 0); /* pins open: the resistors decide */
 	pin_setup();
 	moder = model_find(GPIO_B + GPIO_MODER, 3u << 20, 2u << 20, 0);
@@ -288,14 +341,15 @@ static void on_and_off(void **state)
 	(void)state;
 	set_up();
 	output_set(WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE, WIRE_IO_MAGNET_HOLD);
-	pin_camera(WIRE_IO_CAMERA, WIRE_IO_MAGNET_HOLD);
+	pin_outputs(WIRE_IO_CAMERA, WIRE_IO_MAGNET_HOLD | WIRE_IO_WARNING);
 	assert_int_equal(pin_io() & WIRE_IO_OUTPUTS,
 	                 WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE | WIRE_IO_CAMERA);
 	output_set(WIRE_IO_MAGNET_HOLD, 0); /* the others alone */
-	pin_camera(WIRE_IO_MAGNET_HOLD, 0);
+	pin_outputs(WIRE_IO_MAGNET_HOLD | WIRE_IO_WARNING, 0);
 	assert_int_equal(pin_io() & WIRE_IO_OUTPUTS, WIRE_IO_OUTPUTS);
+	assert_int_equal(model_get(GPIO_C + GPIO_IDR) >> 10 & 1, 1);
 	output_set(0, WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE);
-	pin_camera(0, WIRE_IO_CAMERA);
+	pin_outputs(0, WIRE_IO_CAMERA | WIRE_IO_WARNING);
 	assert_int_equal(pin_io() & WIRE_IO_OUTPUTS, WIRE_IO_MAGNET_HOLD);
 	assert_int_equal(model.held, 0);
 }
@@ -370,17 +424,50 @@ static void latch_pulse(void **state)
 	(void)state;
 	set_up();
 	output_set(WIRE_IO_LATCH_OPEN, 0);
-	advance(OUTPUT_LATCH_US - 1);
-	assert_true(level(WIRE_IO_LATCH_OPEN));
+	output_set(WIRE_IO_DAMPERS_RELIEVE, 0);
+	advance(OUTPUT_PULSE_US - 1);
+	assert_true(level(WIRE_IO_LATCH_OPEN) && level(WIRE_IO_DAMPERS_RELIEVE));
 	advance(1);
-	assert_false(level(WIRE_IO_LATCH_OPEN));
+	assert_false(level(WIRE_IO_LATCH_OPEN) || level(WIRE_IO_DAMPERS_RELIEVE));
+	assert_true(level(WIRE_IO_MAGNET_HOLD));
 	output_set(WIRE_IO_LATCH_OPEN, 0);
 	advance(10);
 	output_set(0, WIRE_IO_LATCH_OPEN);
 	assert_false(level(WIRE_IO_LATCH_OPEN));
 	/* Longer than the core waits for the upper gate: twice the fall to the lowest one allowed, 2.4 m. */
-	assert_true(OUTPUT_LATCH_US > 2 * 700000);
+	assert_true(OUTPUT_PULSE_US > 2 * 700000);
 	assert_int_equal(output_off_at(WIRE_IO_LATCH_OPEN, 5), 0); /* no such edge */
+}
+
+static void press(bool pressed)
+{
+	model_put(GPIO_A + GPIO_IDR, pressed ? 0x0003 : 0x8003);
+	advance(1);
+}
+
+/* Without the processor: nothing is called between pressing and looking. */
+static void emergency_stop(void **state)
+{
+	(void)state;
+	set_up();
+	output_set(WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE, 0);
+	assert_int_equal(output_off_at(WIRE_IO_DAMPERS_RELIEVE, model_get(TIM2 + TIM_CNT) + 400000), 0);
+	assert_int_equal(output_off_at(WIRE_IO_MAGNET_HOLD, model_get(TIM2 + TIM_CNT) + 390000), 0);
+	advance(1000);
+	assert_true(level(WIRE_IO_LATCH_OPEN) && level(WIRE_IO_DAMPERS_RELIEVE));
+	press(true);
+	assert_false(level(WIRE_IO_LATCH_OPEN) || level(WIRE_IO_DAMPERS_RELIEVE));
+	assert_true(level(WIRE_IO_MAGNET_HOLD)); /* off is the release */
+	assert_int_equal(pin_io() & WIRE_IO_ESTOP_CLEAR, 0);
+	press(false);
+	advance(10); /* and closing it again switches nothing on */
+	assert_false(level(WIRE_IO_LATCH_OPEN) || level(WIRE_IO_DAMPERS_RELIEVE));
+	advance(400000);
+	assert_false(level(WIRE_IO_MAGNET_HOLD)); /* planned: as it was */
+	press(true);
+	output_set(WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE | WIRE_IO_MAGNET_HOLD, 0);
+	assert_false(level(WIRE_IO_LATCH_OPEN) || level(WIRE_IO_DAMPERS_RELIEVE));
+	assert_true(level(WIRE_IO_MAGNET_HOLD));
 }
 
 /* ---- pins ---- */
@@ -391,10 +478,11 @@ static void pin_table(void **state)
 		uint32_t port, number, mode, alternate, pull;
 	} expected[] = {
 	        /* alternate functions: STM32G474 data sheet, table 13 */
-	        {GPIO_A, 0, 2, 1, 2},  {GPIO_A, 1, 2, 1, 2},  {GPIO_A, 8, 2, 6, 0},  {GPIO_A, 11, 2, 9, 1},
-	        {GPIO_A, 12, 2, 9, 0}, {GPIO_B, 2, 2, 2, 0},  {GPIO_B, 5, 1, 0, 0},  {GPIO_B, 10, 2, 1, 0},
-	        {GPIO_B, 11, 2, 1, 0}, {GPIO_C, 6, 0, 0, 2},  {GPIO_C, 7, 0, 0, 2},  {GPIO_C, 8, 0, 0, 2},
-	        {GPIO_C, 9, 0, 0, 2},  {GPIO_C, 10, 0, 0, 2}, {GPIO_C, 11, 0, 0, 2}, {GPIO_C, 12, 0, 0, 2},
+	        {GPIO_A, 0, 2, 1, 2},  {GPIO_A, 1, 2, 1, 2},   {GPIO_A, 8, 2, 6, 0},  {GPIO_A, 11, 2, 9, 1},
+	        {GPIO_A, 12, 2, 9, 0}, {GPIO_A, 15, 2, 14, 2}, {GPIO_B, 2, 2, 2, 0},  {GPIO_B, 5, 1, 0, 0},
+	        {GPIO_B, 10, 2, 1, 0}, {GPIO_B, 11, 2, 1, 0},  {GPIO_C, 6, 0, 0, 2},  {GPIO_C, 7, 0, 0, 2},
+	        {GPIO_C, 8, 0, 0, 2},  {GPIO_C, 9, 0, 0, 2},   {GPIO_C, 10, 1, 0, 0}, {GPIO_C, 11, 0, 0, 2},
+	        {GPIO_C, 12, 2, 1, 2},
 	};
 	static const uint32_t ports[] = {GPIO_A, GPIO_B, GPIO_C},
 	                      reset[] = {0xABFFFFFF, 0xFFFFFEBF, 0xFFFFFFFF};
@@ -416,52 +504,53 @@ static void pin_table(void **state)
 		assert_int_equal(model_get(ports[p] + GPIO_MODER) & ~touched[p], reset[p] & ~touched[p]);
 }
 
+/* Every input alone: which pin, and which of its levels sets the bit. */
 static void inputs(void **state)
 {
-	static const uint16_t bits[] = {WIRE_IO_LATCH_CLOSED, WIRE_IO_PRODUCT_HELD, WIRE_IO_DAMPERS_ENGAGED,
-	                                WIRE_IO_DOOR_CLOSED,  WIRE_IO_ESTOP_CLEAR,  WIRE_IO_SUPPLY_GOOD,
-	                                WIRE_IO_FRAME_DOWN};
+	static const struct {
+		uint32_t port, number, high;
+		uint16_t bit;
+	} expected[] = {
+	        {GPIO_A, 0, 0, WIRE_IO_GATE_UPPER},    {GPIO_A, 1, 0, WIRE_IO_GATE_LOWER},
+	        {GPIO_A, 15, 1, WIRE_IO_ESTOP_CLEAR},  {GPIO_C, 6, 1, WIRE_IO_LATCH_CLOSED},
+	        {GPIO_C, 7, 0, WIRE_IO_FRAME_DOWN},    {GPIO_C, 8, 1, WIRE_IO_DAMPERS_ENGAGED},
+	        {GPIO_C, 9, 1, WIRE_IO_DOOR_CLOSED},   {GPIO_C, 11, 1, WIRE_IO_SUPPLY_GOOD},
+	        {GPIO_C, 12, 1, WIRE_IO_PRODUCT_HELD},
+	};
+	const uint16_t all = 0x3FE0; /* inputs but the IEPE bits */
 
 	(void)state;
 	set_up();
-	assert_int_equal(pin_io(), WIRE_IO_MAGNET_HOLD); /* nothing is good before it has been seen */
-	for (unsigned i = 0; i < 7; i++) {               /* PC6 to PC12 */
-		model_put(GPIO_C + GPIO_IDR, 1u << (6 + i));
-		pin_tick();
-		pin_tick();
-		assert_int_equal(pin_io() & bits[i], 0);
-		pin_tick();
-		assert_int_equal(pin_io() & ~WIRE_IO_OUTPUTS, bits[i]);
+	for (unsigned i = 0; i < sizeof(expected) / sizeof(expected[0]); i++) {
+		uint32_t idr = expected[i].port + GPIO_IDR, bit = 1u << expected[i].number;
+		uint32_t before = model_get(idr);
+		uint16_t high, low;
+
+		model_put(idr, before | bit);
+		high = pin_io();
+		model_put(idr, before & ~bit);
+		low = pin_io();
+		model_put(idr, before);
+		assert_int_equal((high ^ low) & all, expected[i].bit);
+		assert_int_equal(((expected[i].high ? high : low) & expected[i].bit), expected[i].bit);
 	}
-	model_put(PWR_SR2, 1u << 11);
-	model_put(GPIO_C + GPIO_IDR, 1u << 11);
-	for (unsigned i = 0; i < 3; i++)
-		pin_tick();
-	assert_int_equal(pin_io() & ~WIRE_IO_OUTPUTS, 0); /* its own supply is failing */
+	model_put(GPIO_C + GPIO_IDR, 1u << 7 | 1u << 11);
+	assert_int_equal(pin_io() & WIRE_IO_SUPPLY_GOOD, WIRE_IO_SUPPLY_GOOD);
+	model_put(PWR_SR2, 1u << 11); /* its own supply is failing */
+	assert_int_equal(pin_io() & all, WIRE_IO_ESTOP_CLEAR);
 }
 
-static void bounce(void **state)
+/* All wires off: every one reads as what is not safe to go on with, or as what ends the relief. */
+static void broken_wires(void **state)
 {
 	(void)state;
 	set_up();
-	for (unsigned i = 0; i < 20; i++) {
-		model_put(GPIO_C + GPIO_IDR, i % 3 == 2 ? 0 : 1u << 9);
-		pin_tick();
-		assert_int_equal(pin_io() & WIRE_IO_DOOR_CLOSED, 0);
-	}
-	model_put(GPIO_C + GPIO_IDR, 1u << 9);
-	for (unsigned i = 0; i < 3; i++)
-		pin_tick();
-	for (unsigned i = 0; i < 20; i++) {
-		model_put(GPIO_C + GPIO_IDR, i % 3 == 2 ? 1u << 9 : 0);
-		pin_tick();
-		assert_true(pin_io() & WIRE_IO_DOOR_CLOSED);
-	}
-	model_put(GPIO_A + GPIO_IDR, 3); /* the gates as they are */
-	assert_int_equal(pin_io() & (WIRE_IO_GATE_UPPER | WIRE_IO_GATE_LOWER),
-	                 WIRE_IO_GATE_UPPER | WIRE_IO_GATE_LOWER);
-	model_put(GPIO_A + GPIO_IDR, 2);
-	assert_int_equal(pin_io() & (WIRE_IO_GATE_UPPER | WIRE_IO_GATE_LOWER), WIRE_IO_GATE_LOWER);
+	model_put(GPIO_A + GPIO_IDR, 0);
+	model_put(GPIO_C + GPIO_IDR, 0);
+	assert_int_equal(pin_io() & 0x3FE0, WIRE_IO_GATE_UPPER | WIRE_IO_GATE_LOWER | WIRE_IO_FRAME_DOWN);
+	for (unsigned n = 6; n <= 12; n++) /* pulled down, all but the output */
+		assert_int_equal(model_get(GPIO_C + GPIO_PUPDR) >> (2 * n) & 3, n == 10 ? 0 : 2);
+	assert_int_equal(model_get(GPIO_A + GPIO_PUPDR) & (3u << 30 | 15), 2u << 30 | 10);
 }
 
 int main(void)
@@ -469,12 +558,13 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(periods),        cmocka_unit_test(phases),
 	        cmocka_unit_test(start_together), cmocka_unit_test(frame_sync),
-	        cmocka_unit_test(gates),          cmocka_unit_test(clearing),
-	        cmocka_unit_test(pauses),         cmocka_unit_test(reset_states),
-	        cmocka_unit_test(on_and_off),     cmocka_unit_test(planned_edge),
-	        cmocka_unit_test(past_edge),      cmocka_unit_test(cancelled_edge),
-	        cmocka_unit_test(latch_pulse),    cmocka_unit_test(pin_table),
-	        cmocka_unit_test(inputs),         cmocka_unit_test(bounce),
+	        cmocka_unit_test(gates),          cmocka_unit_test(keeper),
+	        cmocka_unit_test(clearing),       cmocka_unit_test(pauses),
+	        cmocka_unit_test(reset_states),   cmocka_unit_test(on_and_off),
+	        cmocka_unit_test(planned_edge),   cmocka_unit_test(past_edge),
+	        cmocka_unit_test(cancelled_edge), cmocka_unit_test(latch_pulse),
+	        cmocka_unit_test(emergency_stop), cmocka_unit_test(pin_table),
+	        cmocka_unit_test(inputs),         cmocka_unit_test(broken_wires),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

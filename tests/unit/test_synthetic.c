@@ -71,7 +71,8 @@ static void bounds_agree_with_closed_forms(void **state)
 	assert_near_part(bound.peak_g, sqrt(2.466 / n), 0.005);
 	assert_near_part(bound.peak_s, sqrt(2 / n) / PI / scene.peak_g[0] * scene.contact_s, 0.005);
 	assert_near_part(bound.contact_s, sqrt(1.865 / n) / scene.peak_g[0] * scene.contact_s, 0.01);
-	assert_near_part(bound.velocity_m_s, 9.81 * sqrt(0.9995 * scene.contact_s / scene.rate_hz[0]), 0.005);
+	assert_near_part(bound.velocity_m_s, 9.80665 * sqrt(0.9995 * scene.contact_s / scene.rate_hz[0]),
+	                 0.005);
 	assert_near_part(bound.damped_hz, 2 / PI * sqrt(a * a * a / scene.rate_hz[0]) / 312, 0.06);
 	assert_true(bound.pair_hz < bound.damped_hz && bound.pair_hz > 0.8 * bound.damped_hz);
 	synthetic_close(&synthetic);

@@ -20,8 +20,10 @@
 #include "tests/unit/near.h"
 
 enum { LATCH, MAGNET, RELIEVE, CAMERA };
+enum { KEEPER = 2 }; /* the capture behind those of the gates */
 
-#define G 9.81
+#define G 9.81 /* at the site; of a reading it is G_M_S2 */
+#define G_M_S2 9.80665
 #define HEIGHT_M 0.894
 #define ALL_M_S2 (G - 0.3 / 3.183) /* frame and product together */
 #define FRAME_M_S2 (G - 0.3 / 3.0)
@@ -35,6 +37,7 @@ static struct scene test_scene(void)
 	if (scene_read(&scene, "common/scenes/geometry-2A.ini", message) != 0)
 		fail_msg("%s", message);
 	scene.drop_height_m = HEIGHT_M;
+	scene.drop_gravity_m_s2 = G;
 	scene.tower_frame_mass_kg = 3.0;
 	scene.tower_frame_friction_n = 0.3;
 	scene.tower_latch_delay_s = 0.012;
@@ -81,7 +84,8 @@ static double fall_time(double travel_m)
 static void pin_holds_until_the_magnet_does(void **state)
 {
 	const unsigned quiet = WIRE_IO_LATCH_CLOSED | WIRE_IO_DAMPERS_ENGAGED | WIRE_IO_DOOR_CLOSED |
-	                       WIRE_IO_ESTOP_CLEAR | WIRE_IO_SUPPLY_GOOD | WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2;
+	                       WIRE_IO_ESTOP_CLEAR | WIRE_IO_SUPPLY_GOOD | WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2 |
+	                       WIRE_IO_PRODUCT_HELD;
 	struct tower *tower = make_ideal();
 
 	(void)state;
@@ -90,7 +94,10 @@ static void pin_holds_until_the_magnet_does(void **state)
 	assert_int_equal(tower_inputs(tower), quiet);
 	assert_true(isnan(tower_truth(tower)->separation_s));
 	tower_output(tower, MAGNET, true, 3.0);
-	assert_int_equal(tower_inputs(tower), quiet | WIRE_IO_PRODUCT_HELD);
+	assert_int_equal(tower_inputs(tower), quiet);
+	tower_output(tower, MAGNET, false, 3.1); /* the pin is gone */
+	tower_advance(tower, 3.2);
+	assert_int_equal(tower_inputs(tower), quiet - WIRE_IO_PRODUCT_HELD);
 	tower_destroy(tower);
 }
 
@@ -119,7 +126,8 @@ static void gates_see_the_frame_at_its_time(void **state)
 		assert_int_equal(tower_inputs(tower) & input[gate], 0);
 	}
 	assert_near(tower_truth(tower)->latch_open_s, 0.112, 1e-12);
-	assert_false(tower_capture(tower, 2, &us));
+	assert_false(tower_capture(tower, KEEPER, &us));
+	assert_false(tower_capture(tower, KEEPER + 1, &us));
 	tower_destroy(tower);
 }
 
@@ -130,13 +138,22 @@ static void product_separates_where_planned(void **state)
 	const double down_m_s = sqrt(speed * speed + 2 * FRAME_M_S2 * 0.02);
 	struct tower *tower = falling();
 	const struct tower_truth *truth = tower_truth(tower);
+	uint32_t us = 0;
 
 	(void)state;
 	tower_output(tower, MAGNET, false, separates_s - 0.008);
-	assert_int_equal(tower_inputs(tower) & WIRE_IO_PRODUCT_HELD, 0);
 	tower_advance(tower, separates_s - 1e-6);
+	assert_int_equal(tower_inputs(tower) & WIRE_IO_PRODUCT_HELD, WIRE_IO_PRODUCT_HELD);
 	assert_true(isnan(truth->separation_s));
+	assert_false(tower_capture(tower, KEEPER, &us));
+	assert_true(truth->frame_away);
+	tower_advance(tower, separates_s + 1e-6);
+	assert_int_equal(tower_inputs(tower) & WIRE_IO_PRODUCT_HELD, 0);
+	assert_true(tower_capture(tower, KEEPER, &us));
+	assert_near(us, separates_s * 1e6 - 0.5, 0.5 + 1e-3); /* rounded down */
+	assert_false(tower_capture(tower, KEEPER, &us));
 	tower_advance(tower, 1);
+	assert_false(truth->frame_away);
 	assert_near(truth->magnet_off_s, separates_s - 0.008, 1e-12);
 	assert_near(truth->separation_s, separates_s, 1e-12);
 	assert_near(truth->separation_travel_m, 0.78, 1e-11);
@@ -196,7 +213,7 @@ static void codes_are_the_products_readings(void **state)
 		const double place = (time_s[i] - truth->impact_s) * 1e6;
 
 		for (int c = 0; c < 4 && place < STEPS - 1; c++) {
-			const double g = place < 0 ? 0 : between(r, place, part[c]) / G;
+			const double g = place < 0 ? 0 : between(r, place, part[c]) / G_M_S2;
 
 			if (time_s[i] > truth->separation_s)
 				assert_near(codes[i][channel[c]], g * 32, 0.6);
@@ -317,10 +334,10 @@ static void frame_brakes_and_stands(void **state)
 	tower_output(tower, LATCH, true, 0.1);
 	tower_advance(tower, down_s + 1e-3);
 	tower_sample(tower, SENSORBUS_X, codes);
-	assert_near(codes[3], 32 * (G + BRAKE_M_S2) / G * cos(UNITS_RAD(25)), 0.51);
+	assert_near(codes[3], 32 * (G + BRAKE_M_S2) / G_M_S2 * cos(UNITS_RAD(25)), 0.51);
 	tower_advance(tower, down_s + down_m_s / BRAKE_M_S2 - 1e-4);
 	tower_sample(tower, SENSORBUS_X, codes);
-	assert_near(codes[3], 32 * (G + BRAKE_M_S2) / G * cos(UNITS_RAD(25)), 0.51);
+	assert_near(codes[3], 32 * (G + BRAKE_M_S2) / G_M_S2 * cos(UNITS_RAD(25)), 0.51);
 	tower_advance(tower, down_s + down_m_s / BRAKE_M_S2 + 1e-4);
 	tower_sample(tower, SENSORBUS_X, codes);
 	assert_int_equal(codes[3], 29);
@@ -367,6 +384,163 @@ static void stuck_latch_and_weak_magnet(void **state)
 	tower_destroy(tower);
 }
 
+/* Switched off it lets go when the fault does, and its drop-out is as long as it was set to. */
+static void magnet_lets_go_late_or_not(void **state)
+{
+	struct tower *tower = make_ideal();
+	uint32_t us = 0;
+
+	(void)state;
+	tower_output(tower, MAGNET, true, 0.01);
+	tower_fault(tower, TOWER_MAGNET_STUCK, true);
+	tower_output(tower, MAGNET, false, 0.1);
+	tower_advance(tower, 5);
+	assert_int_equal(tower_inputs(tower) & WIRE_IO_PRODUCT_HELD, WIRE_IO_PRODUCT_HELD);
+	tower_set_dropout(tower, 0.05);
+	tower_fault(tower, TOWER_MAGNET_STUCK, false);
+	tower_advance(tower, 6);
+	assert_near(tower_truth(tower)->separation_s, 5.05, 1e-12);
+	assert_true(tower_capture(tower, KEEPER, &us));
+	assert_int_equal(us, 5050000);
+	tower_destroy(tower);
+	tower = make_ideal();
+	tower_output(tower, MAGNET, true, 0.01);
+	tower_output(tower, MAGNET, false, 1);
+	tower_set_dropout(tower, 0.002); /* too late for this one */
+	tower_advance(tower, 2);
+	assert_near(tower_truth(tower)->separation_s, 1.008, 1e-12);
+	tower_lift(tower);
+	tower_output(tower, MAGNET, true, 2.01);
+	tower_output(tower, MAGNET, false, 3);
+	tower_advance(tower, 4);
+	assert_near(tower_truth(tower)->separation_s, 3.002, 1e-12);
+	tower_destroy(tower);
+}
+
+/* Jammed after 0.3 m it comes to rest within 3 g's way with the product on it, and falls on when it is freed.
+ */
+static void frame_jams_and_is_freed(void **state)
+{
+	const double jam_s = fall_time(0.3), speed = sqrt(2 * ALL_M_S2 * 0.3);
+	const double rest_m = 0.3 + speed * speed / (2 * 3 * UNITS_G_M_S2);
+	struct tower *tower = falling();
+	const struct tower_truth *truth = tower_truth(tower);
+
+	(void)state;
+	tower_advance(tower, jam_s);
+	tower_fault(tower, TOWER_FRAME_JAMMED, true);
+	tower_advance(tower, 5);
+	assert_true(truth->frame_away);
+	assert_true(isnan(truth->frame_down_s) && isnan(truth->separation_s));
+	assert_int_equal(tower_inputs(tower) &
+	                         (WIRE_IO_FRAME_DOWN | WIRE_IO_LATCH_CLOSED | WIRE_IO_PRODUCT_HELD),
+	                 WIRE_IO_PRODUCT_HELD);
+	tower_fault(tower, TOWER_FRAME_JAMMED, false);
+	tower_advance(tower, 6);
+	assert_false(truth->frame_away);
+	assert_near(truth->frame_down_s, 5 + sqrt(2 * (0.8 - rest_m) / ALL_M_S2), 1e-9);
+	tower_destroy(tower);
+}
+
+/* Door and emergency stop lie in series with the coils, whatever the outputs say; never with the magnet. */
+static void open_contacts_cut_latch_and_relief(void **state)
+{
+	static const enum tower_fault contacts[2] = {TOWER_DOOR_OPEN, TOWER_ESTOP};
+	const double down_m_s = sqrt(2 * ALL_M_S2 * 0.8);
+
+	(void)state;
+	for (int i = 0; i < 2; i++) {
+		struct tower *tower = make_ideal();
+
+		tower_output(tower, MAGNET, true, 0.01);
+		tower_output(tower, LATCH, true, 0.1);
+		tower_advance(tower, 0.111);
+		tower_fault(tower, contacts[i], true); /* a ms before it would have opened */
+		tower_advance(tower, 1);
+		assert_true(isnan(tower_truth(tower)->latch_open_s));
+		tower_output(tower, LATCH, false, 1);
+		tower_output(tower, LATCH, true, 1.1);
+		tower_advance(tower, 2);
+		assert_true(isnan(tower_truth(tower)->latch_open_s));
+		assert_int_equal(tower_inputs(tower) & WIRE_IO_PRODUCT_HELD, WIRE_IO_PRODUCT_HELD);
+		tower_fault(tower, contacts[i], false);
+		tower_advance(tower, 3);
+		assert_near(tower_truth(tower)->latch_open_s, 2.012, 1e-12);
+		tower_destroy(tower);
+		tower = falling();
+		tower_output(tower, RELIEVE, true, 0.2);
+		tower_advance(tower, 0.3);
+		tower_fault(tower, contacts[i], true);
+		tower_advance(tower, 1); /* full braking tears the product off */
+		assert_near(tower_truth(tower)->separation_travel_m, 0.8, 1e-11);
+		assert_near(tower_truth(tower)->frame_speed_at_separation_m_s, down_m_s, 1e-11);
+		tower_destroy(tower);
+	}
+}
+
+/* Each for itself while the frame falls, and what then remains true. */
+static void switches_lie_and_wires_break(void **state)
+{
+	static const struct {
+		enum tower_fault fault;
+		unsigned always, never;
+	} known[] = {
+	        {TOWER_GATE_UPPER_WIRE, WIRE_IO_GATE_UPPER, 0},
+	        {TOWER_GATE_LOWER_WIRE, WIRE_IO_GATE_LOWER, 0},
+	        {TOWER_FRAME_DOWN_WIRE, WIRE_IO_FRAME_DOWN, 0},
+	        {TOWER_FRAME_READS_UP, 0, WIRE_IO_FRAME_DOWN},
+	        {TOWER_LATCH_READS_CLOSED, WIRE_IO_LATCH_CLOSED, 0},
+	        {TOWER_LATCH_READS_OPEN, 0, WIRE_IO_LATCH_CLOSED},
+	        {TOWER_GATE_UPPER_DEAD, 0, WIRE_IO_GATE_UPPER},
+	        {TOWER_GATE_LOWER_DEAD, 0, WIRE_IO_GATE_LOWER},
+	};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(known) / sizeof(known[0]); i++) {
+		struct tower *tower = falling();
+		uint32_t us = 0;
+
+		tower_fault(tower, known[i].fault, true);
+		for (unsigned gate = 0; gate < 2;
+		     gate++) /* a wire that breaks is an edge, then nothing more */
+			assert_int_equal(tower_capture(tower, gate, &us),
+			                 known[i].always == (gate ? WIRE_IO_GATE_LOWER : WIRE_IO_GATE_UPPER));
+		for (double at = 0.1; at < 1; at += 0.001) {
+			tower_advance(tower, at);
+			assert_int_equal(tower_inputs(tower) & known[i].always, known[i].always);
+			assert_int_equal(tower_inputs(tower) & known[i].never, 0);
+		}
+		assert_int_equal(tower_capture(tower, 0, &us),
+		                 known[i].fault != TOWER_GATE_UPPER_WIRE &&
+		                         known[i].fault != TOWER_GATE_UPPER_DEAD);
+		assert_int_equal(tower_capture(tower, 1, &us),
+		                 known[i].fault != TOWER_GATE_LOWER_WIRE &&
+		                         known[i].fault != TOWER_GATE_LOWER_DEAD);
+		assert_near(tower_truth(tower)->frame_down_s, fall_time(0.8), 1e-11);
+		tower_destroy(tower);
+	}
+}
+
+static void gates_glitch(void **state)
+{
+	struct tower *tower = make_ideal();
+	uint32_t us = 0;
+
+	(void)state;
+	tower_glitch(tower, 1, 2);
+	tower_glitch(tower, 7, 2);
+	tower_advance(tower, 0.5);
+	assert_false(tower_capture(tower, 0, &us));
+	assert_true(tower_capture(tower, 1, &us));
+	assert_int_equal(us, 500000);
+	tower_advance(tower, 0.625);
+	assert_true(tower_capture(tower, 1, &us));
+	assert_int_equal(us, 625000);
+	assert_false(tower_capture(tower, 1, &us));
+	assert_int_equal(tower_inputs(tower) & WIRE_IO_GATE_LOWER, 0);
+	tower_destroy(tower);
+}
+
 static void friction_can_hold_the_frame(void **state)
 {
 	struct scene scene = test_scene();
@@ -390,20 +564,28 @@ static void each_fault_shows_on_its_input(void **state)
 	static const struct {
 		enum tower_fault fault;
 		const char *name;
-		unsigned clears;
+		unsigned clears, sets;
 	} known[] = {
-	        {TOWER_DOOR_OPEN, "door_open", WIRE_IO_DOOR_CLOSED},
-	        {TOWER_ESTOP, "estop", WIRE_IO_ESTOP_CLEAR},
-	        {TOWER_SUPPLY_LOW, "supply_low", WIRE_IO_SUPPLY_GOOD},
-	        {TOWER_DAMPERS_OUT, "dampers_out", WIRE_IO_DAMPERS_ENGAGED},
-	        {TOWER_GATE_UPPER_DEAD, "gate_upper_dead", 0},
-	        {TOWER_GATE_LOWER_DEAD, "gate_lower_dead", 0},
-	        {TOWER_LATCH_STUCK, "latch_stuck", 0},
-	        {TOWER_MAGNET_WEAK, "magnet_weak", 0},
-	        {TOWER_CABLE_S1, "cable_s1", WIRE_IO_IEPE_S1},
-	        {TOWER_CABLE_S2, "cable_s2", WIRE_IO_IEPE_S2},
-	        {TOWER_SHORT_S1, "short_s1", WIRE_IO_IEPE_S1},
-	        {TOWER_SHORT_S2, "short_s2", WIRE_IO_IEPE_S2},
+	        {TOWER_DOOR_OPEN, "door_open", WIRE_IO_DOOR_CLOSED, 0},
+	        {TOWER_ESTOP, "estop", WIRE_IO_ESTOP_CLEAR, 0},
+	        {TOWER_SUPPLY_LOW, "supply_low", WIRE_IO_SUPPLY_GOOD, 0},
+	        {TOWER_DAMPERS_OUT, "dampers_out", WIRE_IO_DAMPERS_ENGAGED, 0},
+	        {TOWER_GATE_UPPER_DEAD, "gate_upper_dead", 0, 0},
+	        {TOWER_GATE_LOWER_DEAD, "gate_lower_dead", 0, 0},
+	        {TOWER_GATE_UPPER_WIRE, "gate_upper_wire", 0, WIRE_IO_GATE_UPPER},
+	        {TOWER_GATE_LOWER_WIRE, "gate_lower_wire", 0, WIRE_IO_GATE_LOWER},
+	        {TOWER_FRAME_DOWN_WIRE, "frame_down_wire", 0, WIRE_IO_FRAME_DOWN},
+	        {TOWER_FRAME_READS_UP, "frame_reads_up", 0, 0},
+	        {TOWER_LATCH_READS_CLOSED, "latch_reads_closed", 0, 0},
+	        {TOWER_LATCH_READS_OPEN, "latch_reads_open", WIRE_IO_LATCH_CLOSED, 0},
+	        {TOWER_FRAME_JAMMED, "frame_jammed", 0, 0},
+	        {TOWER_LATCH_STUCK, "latch_stuck", 0, 0},
+	        {TOWER_MAGNET_WEAK, "magnet_weak", 0, 0},
+	        {TOWER_MAGNET_STUCK, "magnet_stuck", 0, 0},
+	        {TOWER_CABLE_S1, "cable_s1", WIRE_IO_IEPE_S1, 0},
+	        {TOWER_CABLE_S2, "cable_s2", WIRE_IO_IEPE_S2, 0},
+	        {TOWER_SHORT_S1, "short_s1", WIRE_IO_IEPE_S1, 0},
+	        {TOWER_SHORT_S2, "short_s2", WIRE_IO_IEPE_S2, 0},
 	};
 	struct tower *tower = make_ideal();
 	const unsigned quiet = tower_inputs(tower);
@@ -412,7 +594,7 @@ static void each_fault_shows_on_its_input(void **state)
 	assert_int_equal(sizeof(known) / sizeof(known[0]), TOWER_FAULTS);
 	for (size_t i = 0; i < TOWER_FAULTS; i++) {
 		tower_fault(tower, known[i].fault, true);
-		assert_int_equal(tower_inputs(tower), quiet & ~known[i].clears);
+		assert_int_equal(tower_inputs(tower), (quiet & ~known[i].clears) | known[i].sets);
 		assert_int_equal(tower_bias_high(tower), known[i].fault == TOWER_CABLE_S1   ? 1
 		                                         : known[i].fault == TOWER_CABLE_S2 ? 2
 		                                                                            : 0);
@@ -548,7 +730,7 @@ static void second_drop_is_like_the_first(void **state)
 	assert_true(isnan(tower_truth(tower)->impact_s) && isnan(tower_truth(tower)->latch_open_s));
 	assert_int_equal(tower_inputs(tower) &
 	                         (WIRE_IO_LATCH_CLOSED | WIRE_IO_PRODUCT_HELD | WIRE_IO_FRAME_DOWN),
-	                 WIRE_IO_LATCH_CLOSED);
+	                 WIRE_IO_LATCH_CLOSED | WIRE_IO_PRODUCT_HELD);
 	tower_output(tower, MAGNET, true, 2.01);
 	tower_output(tower, LATCH, true, 2.1);
 	tower_output(tower, MAGNET, false, 2 + fall_time(0.78) - 0.008);
@@ -615,6 +797,11 @@ int main(void)
 	        cmocka_unit_test(braking_tears_the_product_off),
 	        cmocka_unit_test(frame_brakes_and_stands),
 	        cmocka_unit_test(stuck_latch_and_weak_magnet),
+	        cmocka_unit_test(magnet_lets_go_late_or_not),
+	        cmocka_unit_test(frame_jams_and_is_freed),
+	        cmocka_unit_test(open_contacts_cut_latch_and_relief),
+	        cmocka_unit_test(switches_lie_and_wires_break),
+	        cmocka_unit_test(gates_glitch),
 	        cmocka_unit_test(friction_can_hold_the_frame),
 	        cmocka_unit_test(each_fault_shows_on_its_input),
 	        cmocka_unit_test(dead_gates_and_open_cables_say_nothing),

@@ -17,7 +17,7 @@
 static void command_has_the_bytes_of_the_design(void **state)
 {
 	static const uint8_t bytes[8] = {2, 7, 0x34, 0x12, 0xEF, 0xBE, 0xAD, 0xDE};
-	struct wire_command command = {.op = 2, .sequence = 7, .token = 0x1234, .argument = 0xDEADBEEF};
+	struct wire_command command = {.op = 2, .sequence = 7, .host = 0x1234, .argument = 0xDEADBEEF};
 	struct wire_command back = {0};
 	struct frame frame = {.time_us = 99};
 
@@ -30,7 +30,108 @@ static void command_has_the_bytes_of_the_design(void **state)
 	assert_memory_equal(frame.data, bytes, 8);
 	assert_int_equal(wire_unpack_command(&frame, &back), 0);
 	assert_int_equal(back.argument, 0xDEADBEEF);
-	assert_int_equal(back.token, 0x1234);
+	assert_int_equal(back.host, 0x1234);
+}
+
+/* Bytes and checksums worked out apart, with Python's struct and zlib. */
+static void capture_end_is_sealed(void **state)
+{
+	static const uint8_t bytes[32] = {0x02, 0x01, 0x03, 0x10, 0x14, 0x13, 0x12, 0x11, 0x24, 0x23, 0x22,
+	                                  0x21, 0x1B, 0x87, 0x01, 0x00, 0xEF, 0xBE, 0xAD, 0xDE, 0x1B, 0x0B,
+	                                  0xF9, 0xFF, 0xF0, 0xDE, 0xBC, 0x9A, 0xCA, 0xCB, 0xFE, 0x94};
+	struct wire_capture_end end = {.drop_id = 0x0102,
+	                               .marks = WIRE_MARK_CALIBRATED | WIRE_MARK_SLOW_FRAME |
+	                                        WIRE_MARK_NO_IMPACT,
+	                               .first_tick_ms = 0x11121314,
+	                               .last_tick_ms = 0x21222324,
+	                               .trigger_us = 100123,
+	                               .crc32 = 0xDEADBEEF,
+	                               .frame_speed_mm_s = 2843,
+	                               .camera_frame = -7,
+	                               .parameters_crc32 = 0x9ABCDEF0};
+	struct frame frame = {0};
+
+	(void)state;
+	wire_pack_capture_end(&frame, WIRE_ID_CAPTURE_END, &end);
+	assert_int_equal(wire_check_capture_end(&frame), DT_E_CORRUPT);
+	wire_seal_capture_end(&frame);
+	assert_int_equal(frame.id, 0x681);
+	assert_int_equal(frame.length, 32);
+	assert_memory_equal(frame.data, bytes, 32);
+	assert_int_equal(wire_check_capture_end(&frame), 0);
+	for (unsigned bit = 0; bit < 32 * 8; bit++) {
+		frame.data[bit / 8] ^= (uint8_t)(1u << (bit % 8));
+		assert_int_equal(wire_check_capture_end(&frame), DT_E_CORRUPT);
+		frame.data[bit / 8] ^= (uint8_t)(1u << (bit % 8));
+	}
+	frame.length = 24;
+	assert_int_equal(wire_check_capture_end(&frame), DT_E_LENGTH);
+}
+
+static void measured_carries_its_checksum(void **state)
+{
+	static const uint8_t bytes[24] = {0x03, 0x00, 0xBB, 0x1F, 0x40, 0x1F, 0x41, 0x0F,
+	                                  0x58, 0xE7, 0x0B, 0x00, 0x4E, 0x26, 0x82, 0x3B,
+	                                  0xFD, 0xFF, 0x9C, 0x01, 0xB9, 0xEA, 0xA9, 0x2D};
+	struct wire_measured measured = {.drop_id = 3,
+	                                 .dropout_us = 8123,
+	                                 .dropout_used_us = 8000,
+	                                 .separation_mm_s = 3905,
+	                                 .separation_um = 780120,
+	                                 .acceleration_mm_s2 = 9806,
+	                                 .latch_delay_us = 15234,
+	                                 .clock_ppm = -3,
+	                                 .trigger_latency_us = 412};
+	struct frame frame = {0};
+
+	(void)state;
+	wire_pack_measured(&frame, WIRE_ID_MEASURED, &measured);
+	wire_seal_measured(&frame);
+	assert_int_equal(frame.id, 0x686);
+	assert_int_equal(frame.length, 24);
+	assert_memory_equal(frame.data, bytes, 24);
+	assert_int_equal(wire_check_measured(&frame), 0);
+	frame.data[9] ^= 4;
+	assert_int_equal(wire_check_measured(&frame), DT_E_CORRUPT);
+}
+
+static void armed_and_heartbeat_have_their_bytes(void **state)
+{
+	static const uint8_t armed_bytes[8] = {0x07, 0x00, 0xD3, 0xA0, 0x0D, 0xF0, 0xFE, 0xCA};
+	static const uint8_t beat_bytes[7] = {5, 0xD3, 0xA0, 0xE7, 0x51, 0x22, 0x11};
+	static const uint8_t parameter_bytes[8] = {0x07, 0x00, 0x04, 0x20, 0x40, 0x1F, 0x00, 0x00};
+	struct frame frame = {0};
+
+	(void)state;
+	wire_pack_armed(&frame, WIRE_ID_ARMED,
+	                &(struct wire_armed){.drop_id = 7, .host = 0xA0D3, .nonce = 0xCAFEF00D});
+	assert_int_equal(frame.id, 0x685);
+	assert_int_equal(frame.length, 8);
+	assert_memory_equal(frame.data, armed_bytes, 8);
+	wire_pack_host_heartbeat(&frame, WIRE_ID_HEARTBEAT_HOST,
+	                         &(struct wire_host_heartbeat){
+	                                 .nmt_state = 5, .session = 0x51E7A0D3, .wire_hash_low = 0x1122});
+	assert_int_equal(frame.id, 0x77F);
+	assert_int_equal(frame.length, 7);
+	assert_memory_equal(frame.data, beat_bytes, 7);
+	wire_pack_parameter(&frame, WIRE_ID_PARAMETER,
+	                    &(struct wire_parameter){.drop_id = 7, .index = 0x2004, .value = 8000});
+	assert_int_equal(frame.id, 0x687);
+	assert_memory_equal(frame.data, parameter_bytes, 8);
+}
+
+static void keys_of_arm_and_release(void **state)
+{
+	uint32_t value[WIRE_PARAMETERS];
+
+	(void)state;
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
+		value[i] = wire_parameters[i].initial;
+	assert_int_equal(wire_parameters_crc32(value), 0xA7DEE12E);
+	assert_int_equal(wire_arm_key(0x51E7A0D3, 0xA7DEE12E), 0x1BED0CF9);
+	assert_int_equal(wire_arm_key(0x12345678, 0x9ABCDEF0), 0x86829DEB);
+	assert_int_equal(wire_release_key(0xCAFEF00D, 7, 0xA7DEE12E), 0xFAD42048);
+	assert_int_equal(wire_release_key(0x11223344, 0xFFFF, 0x9ABCDEF0), 0xE48D3B87);
 }
 
 static void block_has_the_bytes_of_the_design(void **state)
@@ -161,8 +262,9 @@ static void identifiers_are_those_of_cia_301_for_node_1(void **state)
 {
 	/* CiA 301 table: NMT 0, SYNC 80, EMCY 81, TIME 100, TPDO1-4 181 281 381 481, RPDO1-2 201 301,
 	 * SDO 581 601, heartbeat 701 */
-	static const uint32_t expected[] = {0x000, 0x080, 0x081, 0x100, 0x181, 0x281, 0x381, 0x481, 0x201,
-	                                    0x301, 0x581, 0x601, 0x681, 0x682, 0x683, 0x684, 0x701, 0x77F};
+	static const uint32_t expected[] = {0x000, 0x080, 0x081, 0x100, 0x181, 0x281, 0x381,
+	                                    0x481, 0x201, 0x301, 0x581, 0x601, 0x681, 0x682,
+	                                    0x683, 0x684, 0x685, 0x686, 0x687, 0x701, 0x77F};
 
 	(void)state;
 	assert_int_equal(wire_message_count, sizeof(expected) / sizeof(expected[0]));
@@ -178,7 +280,8 @@ static void names_of_numbers_that_are_none(void **state)
 	(void)state;
 	assert_string_equal(wire_state_name(0), "BOOT");
 	assert_string_equal(wire_state_name(10), "FAULT_MOVING");
-	assert_string_equal(wire_state_name(11), "?");
+	assert_string_equal(wire_state_name(11), "KEEP_OUT");
+	assert_string_equal(wire_state_name(12), "?");
 	assert_string_equal(wire_fault_name(1), "ESTOP");
 	assert_string_equal(wire_fault_name(200), "?");
 	assert_string_equal(wire_op_name(3), "ABORT");
@@ -190,7 +293,7 @@ static void names_of_numbers_that_are_none(void **state)
 	assert_int_equal(wire_state_moving(WIRE_STATE_FALLING), 1);
 	assert_int_equal(wire_state_moving(WIRE_STATE_ARMED), 0);
 	assert_string_equal(error_text(0), "done");
-	assert_string_equal(error_text(-9), "wrong token");
+	assert_string_equal(error_text(-9), "not the answer to this ARM");
 	assert_string_equal(error_text(-100), "unknown error");
 }
 
@@ -219,6 +322,10 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(command_has_the_bytes_of_the_design),
+	        cmocka_unit_test(capture_end_is_sealed),
+	        cmocka_unit_test(measured_carries_its_checksum),
+	        cmocka_unit_test(armed_and_heartbeat_have_their_bytes),
+	        cmocka_unit_test(keys_of_arm_and_release),
 	        cmocka_unit_test(block_has_the_bytes_of_the_design),
 	        cmocka_unit_test(any_flipped_bit_of_a_block_is_seen),
 	        cmocka_unit_test(every_layout_there_and_back),

@@ -23,13 +23,23 @@ static const char usage[] =
         "  --realtime         keep to the clock, a millisecond for a millisecond; without it time stands "
         "still\n"
         "                     until the other end has answered\n"
-        "  --reset-cause N    boot as after 0 power-on (the default), 1 command, 2 watchdog, 3 brown-out\n"
+        "  --reset-cause N    boot as after 0 power-on (the default), 1 command, 2 watchdog, 3 brown-out,\n"
+        "                     4 reset pin\n"
+        "  --kept N           what the firmware before the reset kept over it, 0 to 255\n"
         "  --help             this text\n"
         "\n"
         "Ends with 0 when the other end closes its pipe or says stop, 2 wrong arguments, 4 link or bus "
         "fault.\n";
 
-enum { OPTION_BUS = 1, OPTION_CAN, OPTION_CLASSIC, OPTION_REALTIME, OPTION_RESET_CAUSE, OPTION_HELP };
+enum {
+	OPTION_BUS = 1,
+	OPTION_CAN,
+	OPTION_CLASSIC,
+	OPTION_REALTIME,
+	OPTION_RESET_CAUSE,
+	OPTION_KEPT,
+	OPTION_HELP
+};
 
 static const struct option options[] = {
         {"bus", required_argument, NULL, OPTION_BUS},
@@ -37,6 +47,7 @@ static const struct option options[] = {
         {"classic", no_argument, NULL, OPTION_CLASSIC},
         {"realtime", no_argument, NULL, OPTION_REALTIME},
         {"reset-cause", required_argument, NULL, OPTION_RESET_CAUSE},
+        {"kept", required_argument, NULL, OPTION_KEPT},
         {"help", no_argument, NULL, OPTION_HELP},
         {NULL, 0, NULL, 0},
 };
@@ -47,20 +58,21 @@ static int refuse(const char *what, const char *value)
 	return POSIX_EXIT_USAGE;
 }
 
-static int parse_cause(const char *text, enum port_reset *cause)
+static int parse_number(const char *text, unsigned long max, unsigned long *number)
 {
 	char *end;
 	unsigned long value = strtoul(text, &end, 10);
 
-	if (*text < '0' || *text > '9' || *end != '\0' || value >= PORT_RESETS)
+	if (*text < '0' || *text > '9' || *end != '\0' || value > max)
 		return DT_E_ARGUMENT;
-	*cause = (enum port_reset)value;
+	*number = value;
 	return 0;
 }
 
 int main(int argc, char **argv)
 {
 	struct posix_options wanted = {.cause = PORT_RESET_POWER_ON};
+	unsigned long number;
 	int option;
 
 	while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {
@@ -78,8 +90,14 @@ int main(int argc, char **argv)
 			wanted.realtime = true;
 			break;
 		case OPTION_RESET_CAUSE:
-			if (parse_cause(optarg, &wanted.cause) != 0)
-				return refuse("--reset-cause takes 0 to 3, not ", optarg);
+			if (parse_number(optarg, PORT_RESETS - 1, &number) != 0)
+				return refuse("--reset-cause takes 0 to 4, not ", optarg);
+			wanted.cause = (enum port_reset)number;
+			break;
+		case OPTION_KEPT:
+			if (parse_number(optarg, UINT8_MAX, &number) != 0)
+				return refuse("--kept takes 0 to 255, not ", optarg);
+			wanted.kept = (uint8_t)number;
 			break;
 		case OPTION_HELP:
 			fputs(usage, stdout);

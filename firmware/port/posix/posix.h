@@ -20,6 +20,7 @@ struct posix_options {
 	bool realtime;
 	bool classic; /* the bus carries no CAN FD */
 	enum port_reset cause;
+	uint8_t kept; /* by the firmware before the reset */
 };
 
 /* Runs until the other end is gone or says stop. Returns the exit code; what is wrong goes to stderr. */

@@ -4,7 +4,8 @@
  * and the sensor bus on two FIFOs of the host. Source: Arm, Cortex-M System Design Kit TRM (DDI 0479), AN386.
  *
  * The YZ timer has a period of exactly 2 500 cycles. 25 MHz / 7 000 is no whole number, so the X timer is put
- * in phase with the YZ timer at every tick and makes six periods of 3 571 cycles.
+ * in phase with the YZ timer at every tick and makes periods of 3 571 cycles. The timers wake; which sample
+ * is due, and when, the dual timer says.
  */
 #include "common/sensorbus.h"
 #include "firmware/app.h"
@@ -30,6 +31,7 @@ struct watchdog {
 #define WATCHDOG ((struct watchdog *)0x40008000u)
 #define NVIC_ENABLE (*(volatile uint32_t *)0xE000E100u)
 #define NVIC_DISABLE (*(volatile uint32_t *)0xE000E180u)
+#define NVIC_PEND (*(volatile uint32_t *)0xE000E200u)
 #define NVIC_PRIORITY ((volatile uint8_t *)0xE000E400u)
 #define ICSR (*(volatile uint32_t *)0xE000ED04u)
 #define SHPR3 (*(volatile uint32_t *)0xE000ED20u)
@@ -52,8 +54,10 @@ enum {
 	CYCLES_PER_MS = 25000,
 	CYCLES_YZ = CYCLES_PER_MS / WIRE_YZ_PER_TICK,
 	CYCLES_X = CYCLES_PER_MS / WIRE_X_PER_TICK,
-	CYCLES_WATCHDOG = LOCKSTEP_WATCHDOG_MS * CYCLES_PER_MS,
-	CLOCK_ERROR_MAX = 25, /* cycles between a tick and the dual timer: reading takes a few */
+	CYCLES_WATCHDOG =
+	        (LOCKSTEP_WATCHDOG_MS + 2) * CYCLES_PER_MS, /* later than main, of a hang it was asked for */
+	CYCLES_PER_US = CYCLES_PER_MS / 1000,
+	CLOCK_ERROR_MAX = 25, /* cycles between a sample timer and the dual timer: reading takes a few */
 	LINE_BYTES = 256,
 	LAST_X = LOCKSTEP_INSTANTS - 2, /* instant of a tick's last X sample */
 	EXIT_USAGE = 2,
@@ -65,19 +69,23 @@ enum {
 static struct {
 	bool restarted;
 	enum port_reset cause;
+	uint8_t byte; /* port_keep */
 	int request, answer;
 } kept __attribute__((section(".kept")));
 
 static struct {
 	const char *bus;
 	enum port_reset cause;
+	uint8_t kept;
 	bool preempt, report, classic;
 } options;
 
 static volatile bool poll_due;
 static unsigned next_instant;
-static uint32_t ticks, first_cycle;
-static int32_t clock_error_max; /* cycles */
+static uint32_t kicked_us;          /* the watchdog, in lockstep's time */
+static uint32_t ticks, first_cycle; /* ticks begun; the dual timer at the first */
+static int32_t clock_error_max;     /* cycles */
+static uint32_t late_max;           /* cycles from when a sample was due to its interrupt */
 
 /* ---- interrupts held ---- */
 
@@ -118,9 +126,16 @@ void port_unlock(void)
 	set_base_priority(0);
 }
 
+int port_random(uint32_t *value)
+{
+	*value = lockstep_random();
+	return 0;
+}
+
 void port_watchdog_kick(void)
 {
 	WATCHDOG->interrupt_clear = 1;
+	kicked_us = port_time_us();
 }
 
 /* ---- the sensor bus ---- */
@@ -191,7 +206,9 @@ static _Noreturn void end_run(int result)
 		semihost_say_number("droptower-firmware-qemu: ", ticks, 10);
 		semihost_say(" ticks of 7 and 10 samples, sample clocks 0 ticks off");
 		semihost_say_number(" (at most ", (uint32_t)clock_error_max, 10);
-		semihost_say(" of 25000 cycles)\n");
+		semihost_say_number(" of 25000 cycles), a sample late by at most ", late_max / CYCLES_PER_US,
+		                    10);
+		semihost_say(" us\n");
 	}
 	semihost_exit(0);
 }
@@ -211,22 +228,48 @@ static void start_timer(struct timer *timer, uint32_t period, uint32_t gone)
 	timer->control = TIMER_ENABLE | TIMER_INTERRUPT;
 }
 
-/* The tick against the timer that nobody touches: a period lost or invented shows here. */
-static void check_clock(void)
+/* Cycles since the present tick began, by the timer that nobody touches. */
+static uint32_t cycles_of_tick(void)
 {
-	uint32_t cycle = ~DUAL_TIMER->value - cycles_since_yz();
-	int32_t error;
+	return ~DUAL_TIMER->value - first_cycle - (ticks - 1) * CYCLES_PER_MS;
+}
 
-	if (ticks == 0)
-		first_cycle = cycle;
-	error = (int32_t)(cycle - first_cycle - ticks * CYCLES_PER_MS);
+/* A tick begins. The YZ timer against the dual timer: a period lost or invented shows here. */
+static void begin_tick(void)
+{
+	uint32_t phase = cycles_since_yz();
+	int32_t gone, error;
+
+	if (ticks++ == 0)
+		first_cycle = ~DUAL_TIMER->value - phase;
+	gone = (int32_t)cycles_of_tick();
+	error = (gone - (int32_t)phase) % CYCLES_YZ;
+	if (error > CYCLES_YZ / 2)
+		error -= CYCLES_YZ;
+	if (error < -CYCLES_YZ / 2)
+		error += CYCLES_YZ;
 	if (error < 0)
 		error = -error;
 	if (error > clock_error_max)
 		clock_error_max = error;
 	if (error > CLOCK_ERROR_MAX)
-		end(EXIT_CLOCKS, "a tick differs from the dual timer", "");
-	ticks++;
+		end(EXIT_CLOCKS, "the sample timer differs from the dual timer", "");
+	start_timer(TIMER_X, CYCLES_X, gone > 0 ? (uint32_t)gone % CYCLES_X : 0);
+}
+
+/* Whether the next sample's time has come; the first of all is due with its interrupt. */
+static bool is_due(void)
+{
+	uint32_t due =
+	        lockstep_instant_us(next_instant) * CYCLES_PER_US + (next_instant == 0 ? CYCLES_PER_MS : 0);
+	uint32_t now;
+
+	if (ticks == 0)
+		return true;
+	now = cycles_of_tick() + CLOCK_ERROR_MAX;
+	if (now >= due && now - due > late_max)
+		late_max = now - due;
+	return now >= due;
 }
 
 /* What follows the core's part of an interrupt; where it begins the counting of instructions stops. The
@@ -240,36 +283,38 @@ __attribute__((noinline)) void board_delivered(bool control)
 		NVIC_DISABLE = IRQS;
 }
 
-static void sample(unsigned group)
+/* A sample whose time has come; the timers' interrupts only wake. Of what came while control or app_poll took
+ * long nothing is lost: one interrupt takes all that is due with --preempt, else each asks for the next. */
+static void sample(void)
 {
-	unsigned instant = next_instant;
-	int result;
+	while (is_due()) {
+		unsigned instant = next_instant;
+		int result;
 
-	if (!(lockstep_group(instant) & group))
-		end(EXIT_CLOCKS, "sample interrupts out of step", "");
-	next_instant = (instant + 1) % LOCKSTEP_INSTANTS;
-	result = lockstep_exchange(instant);
-	if (result != 0)
-		end_run(result);
-	board_delivered(lockstep_deliver());
+		if (instant == 0)
+			begin_tick();
+		next_instant = (instant + 1) % LOCKSTEP_INSTANTS;
+		result = lockstep_exchange(instant);
+		if (result != 0)
+			end_run(result);
+		board_delivered(lockstep_deliver());
+		if (!options.preempt)
+			return;
+	}
 }
 
 void board_irq_x(void)
 {
 	TIMER_X->interrupt_clear = 1;
-	if (next_instant == LAST_X)
+	if (next_instant >= LAST_X)
 		TIMER_X->control = 0; /* the next is the tick's */
-	sample(SENSORBUS_X);
+	sample();
 }
 
 void board_irq_yz(void)
 {
 	TIMER_YZ->interrupt_clear = 1;
-	if (next_instant == 0) {
-		start_timer(TIMER_X, CYCLES_X, cycles_since_yz());
-		check_clock();
-	}
-	sample(SENSORBUS_YZ);
+	sample();
 }
 
 /* As board_delivered. */
@@ -313,8 +358,22 @@ static const char *next_word(char **rest)
 static void take_cause(const char *word)
 {
 	if (word == NULL || *word < '0' || *word >= '0' + PORT_RESETS || word[1] != '\0')
-		end(EXIT_USAGE, "--reset-cause takes 0 to 3", "");
+		end(EXIT_USAGE, "--reset-cause takes 0 to 4", "");
 	options.cause = (enum port_reset)(*word - '0');
+}
+
+static void take_kept(const char *word)
+{
+	unsigned value = 0;
+
+	for (const char *p = word; p != NULL && *p >= '0' && *p <= '9' && value <= UINT8_MAX; p++) {
+		value = 10 * value + (unsigned)(*p - '0');
+		if (p[1] == '\0' && value <= UINT8_MAX) {
+			options.kept = (uint8_t)value;
+			return;
+		}
+	}
+	end(EXIT_USAGE, "--kept takes 0 to 255", "");
 }
 
 static void read_options(void)
@@ -331,6 +390,8 @@ static void read_options(void)
 			options.bus = next_word(&rest);
 		else if (equal(word, "--reset-cause"))
 			take_cause(next_word(&rest));
+		else if (equal(word, "--kept"))
+			take_kept(next_word(&rest));
 		else if (equal(word, "--preempt"))
 			options.preempt = true;
 		else if (equal(word, "--report"))
@@ -361,6 +422,7 @@ static _Noreturn void restart(enum port_reset cause)
 	set_base_priority(PRIORITY_SAMPLES);
 	kept.restarted = true;
 	kept.cause = cause;
+	kept.byte = lockstep_kept();
 	AIRCR = AIRCR_RESET;
 	for (;;) {
 	}
@@ -377,6 +439,8 @@ __attribute__((noinline)) void board_polled(void)
 {
 	if (lockstep_reset_wanted())
 		restart(PORT_RESET_COMMAND);
+	if (!options.preempt && is_due())
+		NVIC_PEND = 1 << IRQ_YZ;
 	NVIC_ENABLE = IRQS;
 }
 
@@ -391,21 +455,22 @@ static void wait_for_sample(void)
  * that comes meanwhile waits. With --preempt it does not. */
 _Noreturn void board_main(void)
 {
-	enum port_reset cause = kept.cause;
-
 	read_options();
 	if (!kept.restarted) {
 		kept.request = open_pipe(".request", SEMIHOST_WRITE);
 		kept.answer = open_pipe(".answer", SEMIHOST_READ);
-		cause = options.cause;
+		kept.cause = options.cause;
+		kept.byte = options.kept;
 	}
-	lockstep_boot(cause, options.classic);
+	lockstep_boot(kept.cause, kept.byte, options.classic);
 	start_clocks();
 	for (;;) {
 		wait_for_sample();
 		poll_due = false;
 		if (!lockstep_hung())
 			app_poll();
+		else if (port_time_us() - kicked_us >= LOCKSTEP_WATCHDOG_MS * 1000)
+			restart(PORT_RESET_WATCHDOG);
 		board_polled();
 	}
 }

@@ -65,7 +65,7 @@ static const struct pair {
                           ADC_YZ_WORDS},
 };
 
-static uint16_t bias, bias_high; /* WIRE_IO_IEPE_* */
+static volatile uint16_t bias, bias_high; /* WIRE_IO_IEPE_* */
 
 /* ---- start ---- */
 
@@ -130,7 +130,8 @@ int adc_setup(void)
 	register_set(RCC_AHB1ENR, RCC_AHB1ENR_DMA1 | RCC_AHB1ENR_DMAMUX);
 	register_set(RCC_AHB2ENR, RCC_AHB2ENR_ADC12 | RCC_AHB2ENR_ADC345);
 	(void)RD(RCC_AHB2ENR);
-	bias = bias_high = 0;
+	bias = 0;
+	bias_high = 0;
 	result = set_up(&pairs[ADC_GROUP_X]);
 	return result == 0 ? set_up(&pairs[ADC_GROUP_YZ]) : result;
 }
@@ -187,8 +188,10 @@ static int16_t code_of(uint32_t word, unsigned sensor, enum axis axis)
 	return to_code(sensor == 0 ? word & 0xFFFFu : word >> 16, &calibration[sensor][axis]);
 }
 
-static void judge_bias(const volatile uint32_t *words)
+/* Of the first scan, this millisecond's or the last one's. */
+void adc_judge_bias(void)
 {
+	const volatile uint32_t *words = yz_words + BIAS_FIRST;
 	static const uint16_t bits[SENSORS] = {WIRE_IO_IEPE_S1, WIRE_IO_IEPE_S2};
 	uint16_t good = WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2, high = 0;
 
@@ -222,8 +225,6 @@ bool adc_read(enum adc_group group, unsigned index, int16_t code[ADC_CODES])
 			code[2 * sensor] = code_of(words[0], sensor, Y);
 			code[2 * sensor + 1] = code_of(words[1], sensor, Z);
 		}
-	if (group == ADC_GROUP_YZ)
-		judge_bias(words + BIAS_FIRST);
 	return true;
 }
 

@@ -19,7 +19,8 @@
  * sum is 1/64 g; the table in adc.c holds offset and gain of each channel. A sum at its limit becomes full
  * scale.
  *
- * Context: setup and start at start-up, adc_bias and adc_bias_high any, the rest the sample interrupts'.
+ * Context: setup and start at start-up, adc_judge_bias control, adc_bias and adc_bias_high any, the rest the
+ * sample interrupts'.
  * Source: RM0440 21.4.6, 21.4.8 to 21.4.11, 21.4.29, 21.4.30, 12.4, 13.4.3.
  */
 #include <stdbool.h>
@@ -52,7 +53,10 @@ int adc_align(enum adc_group group);
 /* At the tick, when the millisecond before has been read. */
 void adc_begin(enum adc_group group);
 
-/* WIRE_IO_IEPE_*: bias voltages inside their window, as last converted; and the sensors with one above it. */
+/* Judges the bias voltages anew; once a millisecond. */
+void adc_judge_bias(void);
+
+/* WIRE_IO_IEPE_*: bias voltages inside their window, as last judged; and the sensors with one above it. */
 uint16_t adc_bias(void);
 uint16_t adc_bias_high(void);
 

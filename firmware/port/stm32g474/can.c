@@ -2,6 +2,7 @@
 #include "firmware/port/stm32g474/can.h"
 
 #include "common/ring.h"
+#include "firmware/port/stm32g474/interrupt.h"
 #include "firmware/port/stm32g474/registers.h"
 
 enum {
@@ -19,6 +20,15 @@ static const struct timing {
         {40000000, NOMINAL, 31, 8},  {40000000, 2000, 15, 4}, {40000000, 5000, 5, 2}, {40000000, 8000, 3, 1},
         {56000000, NOMINAL, 44, 11}, {56000000, 2000, 21, 6}, {56000000, 8000, 4, 2},
 };
+
+#define SENDER_host(id) (id),
+#define SENDER_tower(id)
+static const uint16_t host_ids[] = {
+#define WIRE_ID(NAME, id, layout, sender, doc) SENDER_##sender(id)
+#include "common/wire.def"
+};
+
+#define HOST_IDS (sizeof(host_ids) / sizeof(host_ids[0]))
 
 static struct {
 	struct ring received;
@@ -51,10 +61,11 @@ static void configure(const struct timing *nominal, const struct timing *data)
 	WR(FDCAN_NBTP, (nominal->after - 1u) << 25 | (nominal->before - 1u) << 8 | (nominal->after - 1u));
 	if (data != NULL)
 		set_data_timing(data);
-	WR(FDCAN_RXGFC, 0); /* no filters, all that matches none to FIFO 0, which keeps the oldest */
-	WR(FDCAN_TXBC, 0);  /* a FIFO, not a queue */
-	for (uint32_t offset = 0; offset < FDCAN_RAM_BYTES; offset += 4)
-		WR(FDCAN_RAM + offset, 0);
+	WR(FDCAN_RXGFC, FDCAN_RXGFC_LSS(HOST_IDS) | FDCAN_RXGFC_ANFS_REJECT | FDCAN_RXGFC_ANFE_REJECT |
+	                        FDCAN_RXGFC_RRFS | FDCAN_RXGFC_RRFE); /* FIFO 0 keeps the oldest */
+	WR(FDCAN_TXBC, 0);                                            /* a FIFO, not a queue */
+	for (uint32_t i = 0; i < FDCAN_RAM_BYTES / 4; i++)
+		WR(FDCAN_RAM_FILTER(i), i < HOST_IDS ? FDCAN_FILTER_DUAL(host_ids[i], host_ids[i]) : 0);
 	WR(FDCAN_IR, FDCAN_IR_ALL);
 	WR(FDCAN_ILS, 0);
 	WR(FDCAN_IE, FDCAN_IR_RF0N | FDCAN_IR_RF0L);
@@ -85,15 +96,14 @@ int can_setup(uint32_t kernel_hz, bool classic, uint32_t data_kbit_s)
 {
 	const struct timing *nominal = find(kernel_hz, NOMINAL);
 	const struct timing *data = data_kbit_s == NOMINAL ? NULL : find(kernel_hz, data_kbit_s);
-	uint32_t held;
 	int result;
 
 	if (nominal == NULL || (!classic && data == NULL))
 		return DT_E_ARGUMENT;
-	held = register_hold();
+	register_mask(INTERRUPT_CONTROL);
 	can.received = (struct ring)RING_OVER(can.storage);
 	result = set_up(nominal, classic ? NULL : data);
-	register_release(held);
+	register_mask(0);
 	return result;
 }
 
@@ -195,13 +205,16 @@ void can_interrupt(void)
 	}
 }
 
-uint32_t can_errors(bool *bus_off)
+uint32_t can_errors(enum port_bus *state)
 {
-	uint32_t stuck;
+	uint32_t status, stuck;
 
 	can.errors += RD(FDCAN_ECR) >> 16 & 0xFFu; /* reading clears it */
-	*bus_off = RD(FDCAN_PSR) & FDCAN_PSR_BO;
-	stuck = RD(FDCAN_CCCR) & (*bus_off ? FDCAN_CCCR_INIT | FDCAN_CCCR_ASM : FDCAN_CCCR_ASM);
+	status = RD(FDCAN_PSR);
+	*state = status & FDCAN_PSR_BO   ? PORT_BUS_OFF
+	         : status & FDCAN_PSR_EP ? PORT_BUS_PASSIVE
+	                                 : PORT_BUS_ACTIVE;
+	stuck = RD(FDCAN_CCCR) & (*state == PORT_BUS_OFF ? FDCAN_CCCR_INIT | FDCAN_CCCR_ASM : FDCAN_CCCR_ASM);
 	if (stuck != 0)
 		register_change(FDCAN_CCCR, stuck, 0);
 	if (stuck & FDCAN_CCCR_ASM) /* it came too late to the message RAM and only listens since */

@@ -122,6 +122,7 @@ int clock_setup(uint32_t *can_hz)
 		result = switch_to_pll();
 	if (result != 0)
 		return result;
+	register_set(RCC_CR, RCC_CR_CSSON);
 	register_change(RCC_CCIPR, RCC_CCIPR_FDCAN, crystal->can_source);
 	*can_hz = crystal->can_hz;
 	return 0;

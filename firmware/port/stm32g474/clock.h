@@ -11,7 +11,11 @@
  * 4, 6 or 8, and 7 would have to divide it as well as 80 MHz. So CAN is clocked by HSE itself when that is 40
  * MHz (1, 2, 5, 8 Mbit/s exact), else by the PLL's Q at 56 MHz (1, 2, 8 exact, 5 not).
  *
- * Context: before interrupts, on the reset clock of 16 MHz. Source: RM0440 6.1.5, 7.2.4, 7.2.7, 7.2.16.
+ * From then on the clock security system watches the crystal: when it stops an NMI comes, on the internal
+ * oscillator, and an NMI is a crash (start.c).
+ *
+ * Context: before interrupts, on the reset clock of 16 MHz. Source:
+ * RM0440 6.1.5, 7.2.4, 7.2.7, 7.2.8, 7.2.16.
  */
 #include <stdint.h>
 

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "firmware/port/stm32g474/output.h"
 
+#include <stdbool.h>
+
 #include "common/wire.h"
 #include "firmware/port/stm32g474/registers.h"
 
@@ -8,20 +10,26 @@ static const struct channel {
 	uint16_t output;
 	uint32_t timer;
 	uint8_t number; /* from 0 */
+	bool pulse;     /* which the emergency stop ends */
 } channels[] = {
-        {WIRE_IO_LATCH_OPEN, TIM5, 0},
-        {WIRE_IO_MAGNET_HOLD, TIM2, 2},
-        {WIRE_IO_DAMPERS_RELIEVE, TIM2, 3},
+        {WIRE_IO_LATCH_OPEN, TIM5, 0, true},
+        {WIRE_IO_MAGNET_HOLD, TIM2, 2, false},
+        {WIRE_IO_DAMPERS_RELIEVE, TIM2, 3, true},
 };
 
 #define CHANNELS (sizeof(channels) / sizeof(channels[0]))
 
-static void set_mode(const struct channel *channel, uint32_t mode)
+static void change_mode(const struct channel *channel, uint32_t mask, uint32_t bits)
 {
 	unsigned shift = 8u * (channel->number % 2u);
 
-	register_change(channel->timer + (channel->number < 2 ? TIM_CCMR1 : TIM_CCMR2),
-	                TIM_CCMR_MODE << shift, mode << shift);
+	register_change(channel->timer + (channel->number < 2 ? TIM_CCMR1 : TIM_CCMR2), mask << shift,
+	                bits << shift);
+}
+
+static void set_mode(const struct channel *channel, uint32_t mode)
+{
+	change_mode(channel, TIM_CCMR_MODE, mode);
 }
 
 /* The time first, then the mode that heeds it. A time that is reached in between is made up for. */
@@ -38,11 +46,12 @@ static int off_at(const struct channel *channel, uint32_t time_us)
 	return 0;
 }
 
+/* A forced level is not cleared by the emergency stop, one that waits for its end is. */
 static void set_on(const struct channel *channel)
 {
 	set_mode(channel, TIM_CCMR_MODE_ON);
-	if (channel->output == WIRE_IO_LATCH_OPEN)
-		off_at(channel, RD(channel->timer + TIM_CNT) + OUTPUT_LATCH_US);
+	if (channel->pulse)
+		off_at(channel, RD(channel->timer + TIM_CNT) + OUTPUT_PULSE_US);
 }
 
 void output_setup(void)
@@ -50,8 +59,8 @@ void output_setup(void)
 	for (unsigned i = 0; i < CHANNELS; i++) {
 		const struct channel *channel = &channels[i];
 
-		set_mode(channel,
-		         channel->output == WIRE_IO_MAGNET_HOLD ? TIM_CCMR_MODE_ON : TIM_CCMR_MODE_OFF);
+		set_mode(channel, channel->pulse ? TIM_CCMR_MODE_OFF : TIM_CCMR_MODE_ON);
+		change_mode(channel, TIM_CCMR_CLEAR, channel->pulse ? TIM_CCMR_CLEAR : 0);
 		register_set(channel->timer + TIM_CCER, TIM_CCER_CCE(channel->number));
 	}
 }

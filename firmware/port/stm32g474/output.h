@@ -7,19 +7,21 @@
  * then. Taking one back freezes the channel at the level it has, so there is no moment in which that could go
  * wrong.
  *
- * The latch is a pulse: each time it is energised its channel will end that by itself OUTPUT_LATCH_US later,
- * which is longer than any fall and not for ever.
+ * Latch and dampers are pulses: each time one is energised its channel will end that by itself
+ * OUTPUT_PULSE_US later, unless an edge is planned, which is longer than any fall and not for ever. While the
+ * emergency stop is open the timers hold both off, within 2 us and without the processor, and they stay off
+ * when it closes again. The magnet is not cut by it: de-energising the magnet is the release.
  *
  * While the controller is in reset its pins are open: a pull-up at the magnet's driver, pull-downs at the
  * others.
  *
  * Context: output_setup at start-up, after timer_setup; the rest both. Source: RM0440 30.4.8
- * to 30.4.10, 30.5.8.
+ * to 30.4.10, 30.4.15 (clearing a reference), 30.5.8.
  */
 #include <stdint.h>
 
 enum {
-	OUTPUT_LATCH_US = 2000000,
+	OUTPUT_PULSE_US = 2000000,
 };
 
 /* Magnet on, latch and dampers off. The pins are not connected yet. */

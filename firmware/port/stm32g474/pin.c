@@ -13,38 +13,33 @@ enum { NO_PULL, PULL_UP, PULL_DOWN };
 
 enum { SLOW, MEDIUM, FAST };
 
-enum {
-	CAMERA_PIN = 5, /* of port B */
-};
+enum { OPEN, CLOSED };
 
 static const struct pin {
 	uint8_t port, number, mode, alternate, pull, speed;
-	uint16_t io; /* the bit it shows in the io word */
+	uint8_t contact; /* CLOSED: the bit is set while the pin is low: contact open, or wire broken */
+	uint16_t io;     /* the bit it shows in the io word */
 } pins[] = {
-        {A, 0, ALTERNATE, 1, PULL_DOWN, SLOW, WIRE_IO_GATE_UPPER}, /* TIM2_CH1 */
-        {A, 1, ALTERNATE, 1, PULL_DOWN, SLOW, WIRE_IO_GATE_LOWER}, /* TIM2_CH2 */
-        {A, 8, ALTERNATE, 6, NO_PULL, MEDIUM, 0},                  /* TIM1_CH1, frame sync */
-        {A, 11, ALTERNATE, 9, PULL_UP, SLOW, 0}, /* FDCAN1_RX, recessive without a transceiver */
-        {A, 12, ALTERNATE, 9, NO_PULL, FAST, 0}, /* FDCAN1_TX */
-        {B, 2, ALTERNATE, 2, NO_PULL, SLOW, WIRE_IO_LATCH_OPEN}, /* TIM5_CH1 */
-        {B, CAMERA_PIN, OUTPUT, 0, NO_PULL, MEDIUM, WIRE_IO_CAMERA},
-        {B, 10, ALTERNATE, 1, NO_PULL, SLOW, WIRE_IO_MAGNET_HOLD},     /* TIM2_CH3 */
-        {B, 11, ALTERNATE, 1, NO_PULL, SLOW, WIRE_IO_DAMPERS_RELIEVE}, /* TIM2_CH4 */
-        {C, 6, INPUT, 0, PULL_DOWN, SLOW, WIRE_IO_LATCH_CLOSED},
-        {C, 7, INPUT, 0, PULL_DOWN, SLOW, WIRE_IO_PRODUCT_HELD},
-        {C, 8, INPUT, 0, PULL_DOWN, SLOW, WIRE_IO_DAMPERS_ENGAGED},
-        {C, 9, INPUT, 0, PULL_DOWN, SLOW, WIRE_IO_DOOR_CLOSED},
-        {C, 10, INPUT, 0, PULL_DOWN, SLOW, WIRE_IO_ESTOP_CLEAR},
-        {C, 11, INPUT, 0, PULL_DOWN, SLOW, WIRE_IO_SUPPLY_GOOD},
-        {C, 12, INPUT, 0, PULL_DOWN, SLOW, WIRE_IO_FRAME_DOWN},
+        {A, 0, ALTERNATE, 1, PULL_DOWN, SLOW, CLOSED, WIRE_IO_GATE_UPPER}, /* TIM2_CH1 */
+        {A, 1, ALTERNATE, 1, PULL_DOWN, SLOW, CLOSED, WIRE_IO_GATE_LOWER}, /* TIM2_CH2 */
+        {A, 8, ALTERNATE, 6, NO_PULL, MEDIUM, OPEN, 0},                    /* TIM1_CH1, frame sync */
+        {A, 11, ALTERNATE, 9, PULL_UP, SLOW, OPEN, 0}, /* FDCAN1_RX, recessive without a transceiver */
+        {A, 12, ALTERNATE, 9, NO_PULL, FAST, OPEN, 0}, /* FDCAN1_TX */
+        {A, 15, ALTERNATE, 14, PULL_DOWN, SLOW, OPEN, WIRE_IO_ESTOP_CLEAR}, /* TIM2_ETR */
+        {B, 2, ALTERNATE, 2, NO_PULL, SLOW, OPEN, WIRE_IO_LATCH_OPEN},      /* TIM5_CH1 */
+        {B, 5, OUTPUT, 0, NO_PULL, MEDIUM, OPEN, WIRE_IO_CAMERA},
+        {B, 10, ALTERNATE, 1, NO_PULL, SLOW, OPEN, WIRE_IO_MAGNET_HOLD},     /* TIM2_CH3 */
+        {B, 11, ALTERNATE, 1, NO_PULL, SLOW, OPEN, WIRE_IO_DAMPERS_RELIEVE}, /* TIM2_CH4 */
+        {C, 6, INPUT, 0, PULL_DOWN, SLOW, OPEN, WIRE_IO_LATCH_CLOSED},
+        {C, 7, INPUT, 0, PULL_DOWN, SLOW, CLOSED, WIRE_IO_FRAME_DOWN},
+        {C, 8, INPUT, 0, PULL_DOWN, SLOW, OPEN, WIRE_IO_DAMPERS_ENGAGED},
+        {C, 9, INPUT, 0, PULL_DOWN, SLOW, OPEN, WIRE_IO_DOOR_CLOSED},
+        {C, 10, OUTPUT, 0, NO_PULL, SLOW, OPEN, WIRE_IO_WARNING},
+        {C, 11, INPUT, 0, PULL_DOWN, SLOW, OPEN, WIRE_IO_SUPPLY_GOOD},
+        {C, 12, ALTERNATE, 1, PULL_DOWN, SLOW, OPEN, WIRE_IO_PRODUCT_HELD}, /* TIM5_CH2 */
 };
 
 #define PINS (sizeof(pins) / sizeof(pins[0]))
-
-static struct {
-	uint16_t last, before; /* as read in the last two ticks */
-	volatile uint16_t inputs;
-} state;
 
 static void two_bits(uint32_t address, unsigned number, uint32_t value)
 {
@@ -68,15 +63,11 @@ void pin_setup(void)
 {
 	register_set(RCC_AHB2ENR, RCC_AHB2ENR_GPIOABC);
 	(void)RD(RCC_AHB2ENR);
-	state.last = 0;
-	state.before = 0;
-	state.inputs = 0;
 	for (unsigned i = 0; i < PINS; i++)
 		set_up(&pins[i]);
 }
 
-/* The io bits of the pins of this mode, as they stand. */
-static uint16_t levels(bool inputs)
+uint16_t pin_io(void)
 {
 	uint32_t read[3];
 	uint16_t io = 0;
@@ -84,32 +75,21 @@ static uint16_t levels(bool inputs)
 	for (unsigned port = A; port <= C; port++)
 		read[port] = RD(GPIO(port) + GPIO_IDR);
 	for (unsigned i = 0; i < PINS; i++)
-		if ((pins[i].mode == INPUT) == inputs && (read[pins[i].port] & 1u << pins[i].number))
+		if ((read[pins[i].port] >> pins[i].number & 1u) != pins[i].contact)
 			io |= pins[i].io;
-	return io;
-}
-
-void pin_tick(void)
-{
-	uint16_t now = levels(true);
-	uint16_t steady = (uint16_t)(~(now ^ state.last) & ~(state.last ^ state.before));
-
-	state.inputs = (uint16_t)((state.inputs & ~steady) | (now & steady));
-	state.before = state.last;
-	state.last = now;
-}
-
-uint16_t pin_io(void)
-{
-	uint16_t io = state.inputs | levels(false);
-
 	return supply_good() ? io : (uint16_t)(io & ~WIRE_IO_SUPPLY_GOOD);
 }
 
-void pin_camera(uint16_t on, uint16_t off)
+void pin_outputs(uint16_t on, uint16_t off)
 {
-	if (on & WIRE_IO_CAMERA)
-		WR(GPIO(B) + GPIO_BSRR, 1u << CAMERA_PIN);
-	else if (off & WIRE_IO_CAMERA)
-		WR(GPIO(B) + GPIO_BSRR, 0x10000u << CAMERA_PIN);
+	for (unsigned i = 0; i < PINS; i++) {
+		uint32_t bsrr = GPIO(pins[i].port) + GPIO_BSRR, bit = 1u << pins[i].number;
+
+		if (pins[i].mode != OUTPUT)
+			continue;
+		if (on & pins[i].io)
+			WR(bsrr, bit);
+		else if (off & pins[i].io)
+			WR(bsrr, bit << 16);
+	}
 }

@@ -7,6 +7,7 @@
 #include "firmware/port/stm32g474/interrupt.h"
 #include "firmware/port/stm32g474/output.h"
 #include "firmware/port/stm32g474/pin.h"
+#include "firmware/port/stm32g474/random.h"
 #include "firmware/port/stm32g474/registers.h"
 #include "firmware/port/stm32g474/timer.h"
 
@@ -21,6 +22,26 @@ static struct {
 } port;
 
 /* ---- what the core calls ---- */
+
+void port_keep(uint8_t byte)
+{
+	reset_keep(&board_mark, byte);
+}
+
+uint8_t port_kept(void)
+{
+	return reset_kept(&board_mark);
+}
+
+int port_random(uint32_t *value)
+{
+	return random_number(value);
+}
+
+bool port_brown_out_set(void)
+{
+	return brown_out_set();
+}
 
 uint32_t port_time_us(void)
 {
@@ -40,7 +61,7 @@ uint16_t port_bias_high(void)
 void port_outputs(uint16_t on, uint16_t off)
 {
 	output_set(on, off);
-	pin_camera(on, off);
+	pin_outputs(on, off);
 }
 
 int port_off_at(uint16_t output, uint32_t time_us)
@@ -68,9 +89,9 @@ int port_can_receive(struct frame *frame)
 	return can_receive(frame);
 }
 
-uint32_t port_can_errors(bool *bus_off)
+uint32_t port_can_errors(enum port_bus *state)
 {
-	return can_errors(bus_off);
+	return can_errors(state);
 }
 
 void port_watchdog_kick(void)
@@ -164,8 +185,12 @@ void board_on_gate(void)
 
 void board_on_control(void)
 {
+	uint32_t time_us;
+
 	board_on_gate();
-	pin_tick();
+	if (timer_keeper(&time_us))
+		app_on_keeper(time_us);
+	adc_judge_bias();
 	app_on_tick();
 }
 

@@ -6,7 +6,7 @@
  * accesses on the target; on any other machine a register model defines them.
  *
  * Source: RM0440 (STM32G4 reference manual), the section stands at each block; base addresses 2.2.2. NVIC,
- * SCB: PM0214 4.3, 4.4. Everything unlisted keeps its reset value.
+ * SCB, MPU: PM0214 4.2, 4.3, 4.4. Everything unlisted keeps its reset value.
  */
 #include <stdint.h>
 
@@ -42,12 +42,19 @@ static inline void register_mask(uint32_t priority)
 {
 	__asm__ volatile("msr basepri, %0\n\tisb" : : "r"(priority) : "memory");
 }
+
+/* What was written holds for all that follows. */
+static inline void register_barrier(void)
+{
+	__asm__ volatile("dsb\n\tisb" : : : "memory");
+}
 #else
 uint32_t RD(uint32_t address);
 void WR(uint32_t address, uint32_t value);
 uint32_t register_hold(void);
 void register_release(uint32_t mask);
 void register_mask(uint32_t priority);
+void register_barrier(void);
 #endif
 
 static inline void register_change(uint32_t address, uint32_t mask, uint32_t bits)
@@ -69,6 +76,9 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define FLASH_ACR_PRFTEN (1u << 8)
 #define FLASH_ACR_ICEN (1u << 9)
 #define FLASH_ACR_DCEN (1u << 10)
+#define FLASH_OPTR 0x40022020u
+#define FLASH_OPTR_BOR_LEV (7u << 8)
+#define FLASH_OPTR_BOR_LEV_4 (4u << 8)
 
 /* ---- PWR, 6.4 ---- */
 #define PWR_CR2 0x40007004u
@@ -84,6 +94,7 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define RCC_CR (RCC + 0x00u)
 #define RCC_CR_HSEON (1u << 16)
 #define RCC_CR_HSERDY (1u << 17)
+#define RCC_CR_CSSON (1u << 19)
 #define RCC_CR_PLLON (1u << 24)
 #define RCC_CR_PLLRDY (1u << 25)
 #define RCC_CFGR (RCC + 0x08u)
@@ -108,6 +119,7 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define RCC_AHB2ENR_GPIOABC (7u << 0)
 #define RCC_AHB2ENR_ADC12 (1u << 13)
 #define RCC_AHB2ENR_ADC345 (1u << 14)
+#define RCC_AHB2ENR_RNG (1u << 26)
 #define RCC_APB1ENR1 (RCC + 0x58u)
 #define RCC_APB1ENR1_TIM2345 (0xFu << 0)
 #define RCC_APB1ENR1_FDCAN (1u << 25)
@@ -119,11 +131,15 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define RCC_CCIPR_FDCAN (3u << 24)
 #define RCC_CCIPR_FDCAN_HSE (0u << 24)
 #define RCC_CCIPR_FDCAN_PLLQ (1u << 24)
+#define RCC_CCIPR_CLK48 (3u << 26) /* 0: HSI48 */
 #define RCC_CSR (RCC + 0x94u)
 #define RCC_CSR_RMVF (1u << 23)
 #define RCC_CSR_BORRSTF (1u << 27)
 #define RCC_CSR_SFTRSTF (1u << 28)
 #define RCC_CSR_IWDGRSTF (1u << 29)
+#define RCC_CRRCR (RCC + 0x98u)
+#define RCC_CRRCR_HSI48ON (1u << 0)
+#define RCC_CRRCR_HSI48RDY (1u << 1)
 
 /* ---- GPIO, 9.4; port 0 is A ---- */
 #define GPIO(port) (0x48000000u + 0x400u * (port))
@@ -204,7 +220,10 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define TIM_CR2_MMS_ENABLE (1u << 4)
 #define TIM_CR2_MMS_UPDATE (2u << 4)
 #define TIM_SMCR 0x08u
-#define TIM_SMCR_TRIGGER_ITR0 6u /* starts with tim_itr0, which is TIM1's trigger output (table 291) */
+#define TIM_SMCR_TRIGGER_ITR0 6u     /* starts with tim_itr0, which is TIM1's trigger output (table 291) */
+#define TIM_SMCR_OCCS_ETRF (1u << 3) /* tim_etrf clears the references that TIM_CCMR_CLEAR lets it */
+#define TIM_SMCR_ETF_32_8 (15u << 8)
+#define TIM_SMCR_ETP_LOW (1u << 15) /* tim_etrf is active while the input is low */
 #define TIM_DIER 0x0Cu
 #define TIM_SR 0x10u
 #define TIM_UIF (1u << 0)
@@ -217,6 +236,7 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define TIM_CCMR_CAPTURE 1u /* on the channel's own input */
 #define TIM_CCMR_CAPTURE_PSC_8 (3u << 2)
 #define TIM_CCMR_FILTER_32_8 (15u << 4) /* 8 samples, 32 timer clocks apart */
+#define TIM_CCMR_CLEAR (1u << 7)        /* OCxCE; not heeded while a mode forces the level */
 #define TIM_CCMR_MODE 0x00010070u       /* mask */
 #define TIM_CCMR_MODE_FROZEN (0u << 4)
 #define TIM_CCMR_MODE_OFF_AT_MATCH (2u << 4)
@@ -225,6 +245,7 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define TIM_CCMR_MODE_PWM1 (6u << 4)
 #define TIM_CCER 0x20u
 #define TIM_CCER_CCE(channel) (1u << (4u * (channel)))
+#define TIM_CCER_FALLING(channel) (2u << (4u * (channel))) /* of a capture */
 #define TIM_CNT 0x24u
 #define TIM_PSC 0x28u
 #define TIM_ARR 0x2Cu
@@ -232,9 +253,22 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define TIM_BDTR 0x44u
 #define TIM_BDTR_MOE (1u << 15)
 #define TIM_TISEL 0x5Cu
+#define TIM_AF1 0x60u
+#define TIM5_AF1_ETRSEL_TIM2_ETR (8u << 14)
 #define TIM17_TISEL_HSE_32 3u
 #define TIM_OR1 0x68u
 #define TIM17_OR1_HSE32EN (1u << 0)
+
+/* ---- RNG, 26.7 ---- */
+#define RNG_CR 0x50060800u
+#define RNG_CR_RNGEN (1u << 2)
+#define RNG_SR 0x50060804u
+#define RNG_SR_DRDY (1u << 0)
+#define RNG_SR_CECS (1u << 1) /* the clock is too slow, now */
+#define RNG_SR_SECS (1u << 2) /* the noise is none, now */
+#define RNG_SR_CEIS (1u << 5) /* the same, since it was last cleared by 0 */
+#define RNG_SR_SEIS (1u << 6)
+#define RNG_DR 0x50060808u
 
 /* ---- IWDG, 35.4 ---- */
 #define IWDG_KR 0x40003000u
@@ -260,6 +294,7 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define FDCAN_NBTP (FDCAN1 + 0x1Cu)
 #define FDCAN_ECR (FDCAN1 + 0x40u)
 #define FDCAN_PSR (FDCAN1 + 0x44u)
+#define FDCAN_PSR_EP (1u << 5)
 #define FDCAN_PSR_BO (1u << 7)
 #define FDCAN_TDCR (FDCAN1 + 0x48u)
 #define FDCAN_IR (FDCAN1 + 0x50u)
@@ -270,6 +305,11 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define FDCAN_ILS (FDCAN1 + 0x58u)
 #define FDCAN_ILE (FDCAN1 + 0x5Cu)
 #define FDCAN_RXGFC (FDCAN1 + 0x80u)
+#define FDCAN_RXGFC_RRFE (1u << 0) /* remote frames, extended and standard, are rejected */
+#define FDCAN_RXGFC_RRFS (1u << 1)
+#define FDCAN_RXGFC_ANFE_REJECT (2u << 2) /* what matches no filter */
+#define FDCAN_RXGFC_ANFS_REJECT (2u << 4)
+#define FDCAN_RXGFC_LSS(count) ((uint32_t)(count) << 16) /* standard filters */
 #define FDCAN_RXF0S (FDCAN1 + 0x90u)
 #define FDCAN_RXF0A (FDCAN1 + 0x94u)
 #define FDCAN_TXBC (FDCAN1 + 0xC0u)
@@ -279,6 +319,9 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define FDCAN_CKDIV (FDCAN1 + 0x100u)
 #define FDCAN_RAM 0x4000A400u
 #define FDCAN_RAM_BYTES 0x350u
+#define FDCAN_RAM_FILTER(number) (FDCAN_RAM + 4u * (number))
+#define FDCAN_FILTER_DUAL(id1, id2) \
+	(1u << 30 | 1u << 27 | (uint32_t)(id1) << 16 | (id2)) /* either, to FIFO 0 */
 #define FDCAN_RAM_RX0 (FDCAN_RAM + 0xB0u)
 #define FDCAN_RAM_TX (FDCAN_RAM + 0x278u)
 #define FDCAN_ELEMENT_BYTES 72u
@@ -297,7 +340,22 @@ DT_MUST_USE int register_wait(uint32_t address, uint32_t mask, uint32_t value, u
 #define SCB_VTOR 0xE000ED08u
 #define SCB_AIRCR 0xE000ED0Cu
 #define SCB_SHPR3 0xE000ED20u
+#define SCB_SHCSR 0xE000ED24u
+#define SCB_SHCSR_FAULTS (7u << 16) /* memory, bus, usage: each its own exception */
 #define SCB_SHPR3_PENDSV(priority) ((uint32_t)(priority) << 16)
 #define SCB_AIRCR_SYSRESETREQ 0x05FA0004u /* with the key */
+#define MPU_CTRL 0xE000ED94u
+#define MPU_CTRL_ENABLE 1u /* and no default map behind it */
+#define MPU_RBAR 0xE000ED9Cu
+#define MPU_RBAR_VALID (1u << 4) /* the region's number comes along */
+#define MPU_RASR 0xE000EDA0u
+#define MPU_RASR_ENABLE(log2_size) (((log2_size)-1u) << 1 | 1u)
+#define MPU_RASR_WITHOUT_EIGHTHS(mask) ((uint32_t)(mask) << 8)
+#define MPU_RASR_FLASH (2u << 16) /* normal memory, not shared */
+#define MPU_RASR_SRAM (6u << 16)  /* normal memory, shared with the DMA */
+#define MPU_RASR_DEVICE (5u << 16)
+#define MPU_RASR_READ_WRITE (3u << 24)
+#define MPU_RASR_READ_ONLY (6u << 24)
+#define MPU_RASR_NO_EXECUTE (1u << 28)
 
 #endif

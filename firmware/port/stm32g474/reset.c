@@ -10,6 +10,7 @@ enum {
 
 #define MARK_RUNNING 0x52554E21u
 #define MARK_CRASHED 0x43525348u
+#define KEPT 0xC35A0000u
 
 static void set_mark(struct reset_mark *mark, uint32_t word)
 {
@@ -30,13 +31,29 @@ enum port_reset reset_cause(struct reset_mark *mark)
 
 	WR(RCC_CSR, flags | RCC_CSR_RMVF);
 	set_mark(mark, MARK_RUNNING);
+	if (!survived)
+		mark->kept = 0;
 	if (flags & RCC_CSR_IWDGRSTF)
 		return PORT_RESET_WATCHDOG;
 	if (flags & RCC_CSR_SFTRSTF)
 		return crashed ? PORT_RESET_WATCHDOG : PORT_RESET_COMMAND;
-	if ((flags & RCC_CSR_BORRSTF) && survived)
-		return PORT_RESET_BROWN_OUT;
-	return PORT_RESET_POWER_ON; /* or the reset button */
+	if (!survived)
+		return PORT_RESET_POWER_ON;
+	return flags & RCC_CSR_BORRSTF ? PORT_RESET_BROWN_OUT : PORT_RESET_PIN;
+}
+
+/* One store: a reset finds either this byte or the one before. */
+void reset_keep(struct reset_mark *mark, uint8_t byte)
+{
+	mark->kept = KEPT | (uint32_t)(uint8_t)~byte << 8 | byte;
+}
+
+uint8_t reset_kept(const struct reset_mark *mark)
+{
+	uint32_t kept = mark->kept;
+	uint8_t byte = (uint8_t)kept;
+
+	return kept == (KEPT | (uint32_t)(uint8_t)~byte << 8 | byte) ? byte : 0;
 }
 
 void reset_by_command(void)
@@ -76,4 +93,9 @@ void supply_watch(void)
 bool supply_good(void)
 {
 	return (RD(PWR_SR2) & PWR_SR2_PVDO) == 0;
+}
+
+bool brown_out_set(void)
+{
+	return (RD(FLASH_OPTR) & FLASH_OPTR_BOR_LEV) == FLASH_OPTR_BOR_LEV_4;
 }

@@ -9,6 +9,7 @@
 #include "common/memory.h"
 #include "firmware/port/stm32g474/board.h"
 #include "firmware/port/stm32g474/can.h"
+#include "firmware/port/stm32g474/protect.h"
 #include "firmware/port/stm32g474/registers.h"
 
 extern uint32_t link_stack_end[], link_data_begin[], link_data_end[], link_data_image[], link_bss_begin[],
@@ -29,7 +30,7 @@ extern const uintptr_t start_vectors[EXCEPTIONS + INTERRUPTS];
 __attribute__((section(".vectors"), used)) const uintptr_t start_vectors[EXCEPTIONS + INTERRUPTS] = {
         (uintptr_t)link_stack_end,
         (uintptr_t)start_reset,
-        (uintptr_t)board_crash, /* NMI */
+        (uintptr_t)board_crash, /* NMI: the crystal has stopped */
         (uintptr_t)board_crash, /* HardFault */
         (uintptr_t)board_crash, /* MemManage */
         (uintptr_t)board_crash, /* BusFault */
@@ -55,6 +56,7 @@ _Noreturn void start_reset(void)
 {
 	(void)register_hold();
 	WR(SCB_VTOR, (uint32_t)(uintptr_t)start_vectors);
+	protect_setup();
 	memcpy(link_data_begin, link_data_image, BYTES(link_data_begin, link_data_end));
 	memset(link_bss_begin, 0, BYTES(link_bss_begin, link_bss_end));
 	board_main();

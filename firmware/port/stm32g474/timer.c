@@ -7,7 +7,12 @@ enum {
 	TICK_PRESCALER = 7,
 	US_PRESCALER = 168,
 	BEFORE_TICK_US = TIMER_LEAD / US_PRESCALER,
+	KEEPER = 1, /* channel of TIM5 */
 };
+
+/* 8 samples 32 clocks apart delay an edge by 1.5 us. */
+#define CAPTURE (TIM_CCMR_CAPTURE | TIM_CCMR_FILTER_32_8)
+#define ESTOP_CLEARS (TIM_SMCR_OCCS_ETRF | TIM_SMCR_ETF_32_8 | TIM_SMCR_ETP_LOW)
 
 static void set_up_tick(void)
 {
@@ -24,20 +29,17 @@ static void set_up_tick(void)
 	WR(TIM1 + TIM_CR2, TIM_CR2_MMS_ENABLE);
 }
 
-/* Rising edge, filtered: 8 samples 32 clocks apart delay it by 1.5 us. */
 static void set_up_time(void)
 {
-	uint32_t capture = TIM_CCMR_CAPTURE | TIM_CCMR_FILTER_32_8;
-
 	WR(TIM2 + TIM_PSC, US_PRESCALER - 1);
 	WR(TIM2 + TIM_ARR, UINT32_MAX);
-	WR(TIM2 + TIM_CCMR1, capture | capture << 8);
-	WR(TIM2 + TIM_CCER, TIM_CCER_CCE(0) | TIM_CCER_CCE(1));
+	WR(TIM2 + TIM_CCMR1, CAPTURE | CAPTURE << 8);
+	WR(TIM2 + TIM_CCER, TIM_CCER_FALLING(0) | TIM_CCER_CCE(0) | TIM_CCER_FALLING(1) | TIM_CCER_CCE(1));
 	WR(TIM2 + TIM_EGR, TIM_EGR_UG);
 	WR(TIM2 + TIM_CNT, 0u - BEFORE_TICK_US);
 	WR(TIM2 + TIM_SR, 0);
 	WR(TIM2 + TIM_DIER, TIM_CCIF(0) | TIM_CCIF(1));
-	WR(TIM2 + TIM_SMCR, TIM_SMCR_TRIGGER_ITR0);
+	WR(TIM2 + TIM_SMCR, ESTOP_CLEARS | TIM_SMCR_TRIGGER_ITR0);
 }
 
 /* One clock before its first trigger. */
@@ -56,6 +58,10 @@ static void set_up_pulse(void)
 {
 	WR(TIM5 + TIM_PSC, US_PRESCALER - 1);
 	WR(TIM5 + TIM_ARR, UINT32_MAX);
+	WR(TIM5 + TIM_CCMR1, CAPTURE << 8 * KEEPER);
+	WR(TIM5 + TIM_CCER, TIM_CCER_FALLING(KEEPER) | TIM_CCER_CCE(KEEPER));
+	WR(TIM5 + TIM_AF1, TIM5_AF1_ETRSEL_TIM2_ETR);
+	WR(TIM5 + TIM_SMCR, ESTOP_CLEARS);
 	WR(TIM5 + TIM_EGR, TIM_EGR_UG);
 	WR(TIM5 + TIM_CR1, TIM_CR1_CEN);
 }
@@ -102,6 +108,21 @@ bool timer_gate(unsigned gate, uint32_t *time_us)
 		return false;
 	*time_us = RD(TIM2 + TIM_CCR(gate)); /* clears the flag */
 	WR(TIM2 + TIM_SR, ~TIM_CCOF(gate));
+	return true;
+}
+
+bool timer_keeper(uint32_t *time_us)
+{
+	uint32_t captured, held, ago;
+
+	if ((RD(TIM5 + TIM_SR) & TIM_CCIF(KEEPER)) == 0)
+		return false;
+	captured = RD(TIM5 + TIM_CCR(KEEPER)); /* clears the flag */
+	WR(TIM5 + TIM_SR, ~TIM_CCOF(KEEPER));
+	held = register_hold();
+	ago = RD(TIM5 + TIM_CNT) - captured;
+	*time_us = RD(TIM2 + TIM_CNT) - ago;
+	register_release(held);
 	return true;
 }
 

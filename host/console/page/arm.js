@@ -2,14 +2,18 @@
 /* Arming, the countdown, releasing. Arming is asked for twice, at two places; the token that releases lives in this
  * page only, is used once, and is gone when the page is loaded again. */
 import { post } from "./api.js";
-import { attempt, byId, setText, show } from "./dom.js";
+import { attempt, byId, setData, setText, show } from "./dom.js";
 import { holding } from "./hold.js";
 import { degrees, number } from "./words.js";
 
+const EARLY = 425;
 let token = null; /* of our own arming, while it can be used */
 let wasArmed = false;
 let until = 0; /* performance.now() at which the tower disarms by itself */
 let whole = 10;
+let warned = 0; /* performance.now() at which horn and lamp have warned for long enough */
+
+export const warns = () => performance.now() < warned;
 
 const under = (node, { clientX: x, clientY: y }) => {
 	const { left, right, top, bottom } = node.getBoundingClientRect();
@@ -39,18 +43,40 @@ async function arm() {
 		wasArmed = false;
 		whole = answer.expires_s;
 		until = performance.now() + 1000 * answer.expires_s;
+		warned = performance.now() + 1000 * answer.warning_s;
 	});
 }
 
 async function release() {
 	const used = token;
 	token = null;
-	if (used !== null) await attempt(() => post("/api/release", { token: used }));
+	if (used === null) return;
+	await attempt(async () => {
+		try {
+			await post("/api/release", { token: used });
+		} catch (error) {
+			if (error.status === EARLY) token = used; /* still armed */
+			throw error;
+		}
+	});
+}
+
+function releaseWords() {
+	if (byId("release").hidden)
+		return "Another page armed the tower, or this one was loaded again. It disarms by itself; ABORT disarms now.";
+	return warns()
+		? `Horn and lamp warn: ${Math.ceil((warned - performance.now()) / 1000)} s. Nobody near the tower?`
+		: "Nobody near the tower? Then release. Without a release the tower disarms by itself.";
 }
 
 function tick() {
 	if (byId("step-release").hidden) return;
 	const left = Math.max(0, (until - performance.now()) / 1000);
+	const release = byId("release");
+	/* the state that enables it comes four times a second */
+	if (release.dataset.warns === "yes" && !warns()) release.disabled = !document.documentElement.matches("[data-connected=yes]");
+	setData(release, "warns", warns() ? "yes" : "no");
+	if (!byId("release-say").hidden) setText(byId("release-say"), releaseWords());
 	setText(byId("countdown"), String(Math.ceil(left)));
 	byId("countdown-bar").style.width = `${Math.min(100, (100 * left) / whole)}%`;
 }
@@ -60,18 +86,13 @@ export function follow(state) {
 	const armed = state.tower.state === "ARMED";
 	if (armed) {
 		until = performance.now() + 1000 * state.tower.armed_s;
+		warned = performance.now() + 1000 * state.tower.warning_s;
 		wasArmed = true;
 	} else if (wasArmed) {
 		wasArmed = false;
 		token = null;
 	}
 	show(byId("release"), armed && token !== null && state.hold.mine);
-	setText(
-		byId("release-say"),
-		byId("release").hidden
-			? "Another page armed the tower, or this one was loaded again. It disarms by itself; ABORT disarms now."
-			: "Nobody near the tower? Then release. Without a release the tower disarms by itself.",
-	);
 	show(byId("release-say"), armed);
 	tick();
 }
@@ -97,7 +118,7 @@ export function showArm(state) {
 	setText(
 		byId("arm-what"),
 		`Frame and product are at ${number(series.height_m, 3)} m, ${degrees(series.angle_deg)}°. ` +
-			"After arming there are 10 s to release. Keep hands and heads out of the tower.",
+			"Horn and lamp warn first, then there are some seconds to release. Keep hands and heads out of the tower.",
 	);
 	byId("arm-confirm").dataset.tower = tower.url;
 }

@@ -238,7 +238,8 @@ function listen() {
 	for (const view of ["drop", "history"]) byId(`view-${view}`).addEventListener("click", () => openView(view));
 	for (const id of ["change-series", "next-series"]) byId(id).addEventListener("click", () => openSetup(true));
 	byId("setup-back").addEventListener("click", () => openSetup(false));
-	byId("clear").addEventListener("click", () => attempt(() => holding(() => post("/api/clear"))));
+	for (const id of ["clear", "acknowledge"])
+		byId(id).addEventListener("click", () => attempt(() => holding(() => post("/api/clear"))));
 	byId("hold-take").addEventListener("click", () => attempt(take));
 	byId("hold-give").addEventListener("click", () => attempt(give));
 	document.addEventListener("written", reload);

@@ -44,7 +44,7 @@ function seriesRow(one) {
 		`${one.accepted} of ${one.planned}`,
 		String(one.rejected),
 		String(one.recorded - one.accepted - one.rejected),
-		String(one.partial),
+		[one.partial, one.faulty && `${one.faulty} altered or missing`].filter((text) => text !== 0).join(", ") || "0",
 		one.last ? time(one.last) : "–",
 	];
 	const name = button(one.name, () => unfold(one.name), { class: "link" });

@@ -4,22 +4,18 @@
 import { byId } from "./dom.js";
 
 const KEYS = { A: "arm", Y: "arm-confirm", R: "release", K: "accept", X: "reject", C: "clear" };
+const ALSO = { C: "acknowledge" }; /* never both can be seen */
 
 const isText = (node) => node instanceof Element && node.matches("input, select, textarea");
 
 export function listen() {
 	addEventListener("keydown", (event) => {
-		const id =
-			event.shiftKey &&
-			!event.ctrlKey &&
-			!event.altKey &&
-			!event.metaKey &&
-			!event.repeat &&
-			KEYS[event.key.toUpperCase()];
-		if (!id || isText(event.target)) return;
-		const button = byId(id);
-		if (button.disabled || button.offsetParent === null) return;
+		const { shiftKey, ctrlKey, altKey, metaKey, repeat, key, target } = event;
+		const name = key.toUpperCase();
+		if (!shiftKey || ctrlKey || altKey || metaKey || repeat || !KEYS[name] || isText(target)) return;
+		const seen = [KEYS[name], ALSO[name]].map((id) => id && byId(id)).find((node) => node && node.offsetParent !== null);
+		if (!seen || seen.disabled) return;
 		event.preventDefault();
-		button.click();
+		seen.click();
 	});
 }

@@ -28,6 +28,7 @@ export function showHead(series, underWay) {
 		series.rejected && `${series.rejected} rejected`,
 		open > 0 && `${open} undecided`,
 		partial > 0 && `${partial} broken off`,
+		series.faulty > 0 && `${series.faulty} altered or missing`,
 	]
 		.filter(Boolean)
 		.join(", ");

@@ -50,17 +50,36 @@ function change(step) {
 	title.focus({ preventScroll: true });
 }
 
+/* What, once open, must be acknowledged by a person who has looked. */
+const GUARDS = ["ESTOP", "DOOR", "LATCH", "PRODUCT"];
+
+function checksWords(red, acknowledge) {
+	if (acknowledge) return "A guard was open, or the tower was off. Nobody in it, nothing in its way? Then acknowledge.";
+	return red.length
+		? "Do what is marked. When all is green, the tower is ready."
+		: "All is green. The tower makes itself ready.";
+}
+
+function moving({ state }) {
+	const stuck = state === "KEEP_OUT";
+	setText(byId("moving-head"), stuck ? "Keep out" : "Drop under way");
+	setText(
+		byId("moving-say"),
+		stuck
+			? "The frame is neither down nor latched and may still fall. Do not reach in; bring it down from outside."
+			: "Stay clear. The tower brakes the frame and records.",
+	);
+}
+
 function checks(list) {
 	const red = list.filter(({ green }) => !green);
 	setText(byId("checks-summary"), red.length ? `${red.length} to do` : "all green");
 	setData(byId("checks-summary"), "level", red.length ? "bad" : "good");
 	setData(byId("checks-card"), "level", red.length ? "bad" : "good");
-	setText(
-		byId("checks-say"),
-		red.length
-			? "Do what is marked. When all is green, the tower is ready."
-			: "All is green. The tower makes itself ready.",
-	);
+	const names = new Set(red.map(({ name }) => name));
+	const acknowledge = names.has("ACKNOWLEDGE") && !GUARDS.some((name) => names.has(name));
+	show(byId("acknowledge"), acknowledge);
+	setText(byId("checks-say"), checksWords(red, acknowledge));
 	const text = JSON.stringify(list);
 	if (byId("checks").dataset.shown === text) return;
 	byId("checks").dataset.shown = text;
@@ -89,11 +108,15 @@ function holdNotice({ mine, taken }) {
 	show(byId("hold-give"), mine);
 }
 
+function setDisabled(button, disabled) {
+	if (button.disabled !== disabled) button.disabled = disabled;
+}
+
 function enable(model) {
 	const { hold, tower } = model.state;
 	const may = model.connected && !(hold.taken && !hold.mine);
 	for (const button of document.querySelectorAll("[data-command]"))
-		if (button.disabled === may) button.disabled = !may;
+		setDisabled(button, !may || (button.id === "release" && arm.warns()));
 	byId("hold-give").disabled = !model.connected;
 	for (const id of ["change-series", "next-series"]) byId(id).disabled = !model.connected || !atRest(tower);
 	for (const id of ["setup-go", "continue-go"]) byId(id).disabled = !may || !atRest(tower) || !tower.open;
@@ -117,6 +140,7 @@ export function render(model) {
 	if (step !== current) change(step);
 	checks(state.checks);
 	show(byId("checks-card"), atRest(state.tower) || state.tower.state === "ARMED");
+	moving(state.tower);
 	holdNotice(state.hold);
 	arm.showArm(state);
 	arm.follow(state);

@@ -62,8 +62,9 @@ function buttons(drop) {
 	const refuse = (row) =>
 		ask(row, `Why is ${name} rejected?`, true, "", (text) => decide(name, "rejected", text));
 	const all = [act("note", "Note", write)];
-	if (drop.state !== "recorded") return all;
-	if (drop.decision !== "accepted")
+	const faulty = Boolean(drop.fault);
+	if (drop.state !== "recorded" && !faulty) return all;
+	if (drop.decision !== "accepted" && !faulty)
 		all.push(act("accept", "Accept", () => attempt(() => decide(name, "accepted"))));
 	if (drop.decision !== "rejected") all.push(act("reject", "Reject…", refuse));
 	return all;
@@ -74,7 +75,7 @@ function decisionCell(drop) {
 	const text = partial ? drop.state : drop.decision === "open" ? "undecided" : drop.decision;
 	const sign = partial ? { recording: "… " }[drop.state] ?? "⚠ " : { accepted: "✓ ", rejected: "✗ ", open: "? " }[drop.decision];
 	const cell = el("td", { class: "decision", "data-label": "decision" }, el("b", {}, sign + text));
-	for (const line of [drop.simulated && "simulated tower", drop.reason, drop.note && `“${drop.note}”`])
+	for (const line of [drop.fault, drop.simulated && "simulated tower", drop.reason, drop.note && `“${drop.note}”`])
 		if (line) cell.append(el("div", { class: "soft" }, line));
 	return cell;
 }

@@ -16,6 +16,7 @@ const SIGNS = {
 	UPLOADED: "wait",
 	FAULT_HELD: "bad",
 	FAULT_MOVING: "bad",
+	KEEP_OUT: "bad",
 };
 
 function fact(id, text, level = "good") {

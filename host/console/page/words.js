@@ -14,11 +14,10 @@ const INPUTS = {
 	FRAME_DOWN: ["frame down", "frame up", false],
 	IEPE_S1: ["S1 cables good", "S1 cable bad", true],
 	IEPE_S2: ["S2 cables good", "S2 cable bad", true],
-	OVERRUN: ["samples missed", "no sample missed", false],
 };
 
-/* What the tower says of a state, where that is not a technician's word. */
-export const STATES = { ARMED: "ready to drop: 10 s to release" };
+/* What the tower says of a state, where that is not a technician's word or has no room. */
+export const STATES = { SAFE: "at rest: see the checks", ARMED: "ready to drop: horn and lamp warn" };
 
 /* A check that is green, in words; what to do for one that is not comes from the tower. */
 export const GREEN = {
@@ -37,6 +36,10 @@ export const GREEN = {
 	OPEN_S2: "S2 plugged in",
 	SHORT_S1: "S1 not shorted",
 	SHORT_S2: "S2 not shorted",
+	CLOCKS: "sample clocks 7 to 10",
+	BROWN_OUT_LEVEL: "brown-out level set",
+	ACKNOWLEDGE: "guards acknowledged",
+	SETTLE: "green for a second",
 };
 
 export const plain = (name) =>
@@ -61,7 +64,7 @@ export const FLAGS = {
 	slow_frame: "the frame fell slower than free fall: check rails and bearings",
 	no_impact: "no impact was seen: the capture was ended by time",
 	fault: "a fault was latched during the drop",
-	uneven_sampling: "the samples are not evenly spaced",
+	uneven_sampling: "the time column is not evenly spaced; the even grid next to it was used",
 	full_scale: "at the converter's limit: the true value is unknown",
 	overrun: "the controller missed samples; they are marked and left out",
 	zero_shift: "the offset after the drop is not the one before: the sensor may have been overloaded",
@@ -74,7 +77,14 @@ export const FLAGS = {
 	hum: "mains or another hum shows before the pulse; it was taken off: check screen and earth",
 	too_short: "the record begins or ends inside its pulse",
 	zero_unsure: "more than noise before the pulse: zero is unsure",
+	altered: "the capture end is not what the tower sealed: trust no number of this drop",
+	separated_late: "the product left the frame later than planned",
+	dropout_changed: "the magnet let go earlier or later than in the drops before: check it",
+	frame_not_down: "the frame did not reach the dampers' end",
 	unfiltered: "sampled too slowly for the low-pass asked for: left as it was",
+	settling: "zero decays from the record's beginning on; that was taken off: let the supply settle first",
+	no_line_end: "the file ends without a line end: its last row may be cut",
+	same_names: "two columns have the same name in the file: check which is which",
 };
 
 const STATUS = {
@@ -94,8 +104,16 @@ export const FAULTS = {
 	dampers_out: "Dampers out",
 	gate_upper_dead: "Upper gate dead",
 	gate_lower_dead: "Lower gate dead",
+	gate_upper_wire: "Upper gate wire broken",
+	gate_lower_wire: "Lower gate wire broken",
+	frame_down_wire: "Frame-down wire broken",
+	frame_reads_up: "Frame reads up",
+	latch_reads_closed: "Latch reads closed",
+	latch_reads_open: "Latch reads open",
+	frame_jammed: "Frame jams",
 	latch_stuck: "Latch stuck",
 	magnet_weak: "Magnet weak",
+	magnet_stuck: "Magnet sticks",
 	cable_s1: "S1 cable open",
 	cable_s2: "S2 cable open",
 	short_s1: "S1 cable shorted",

@@ -2,7 +2,7 @@
 /* Which step of a drop it is. Follows from what the tower is and what the operator has left open; the page never goes
  * on by itself. */
 
-export const MOVING = new Set(["FALLING", "SEPARATED", "BRAKED", "FAULT_MOVING"]);
+export const MOVING = new Set(["FALLING", "SEPARATED", "BRAKED", "FAULT_MOVING", "KEEP_OUT"]);
 const FETCHING = new Set(["CAPTURED", "UPLOADED"]);
 
 /* A drop that the tower still holds and nobody is fetching: it is, once the series that it belongs to is selected. */

@@ -1,0 +1,471 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/archive/proof.h"
+
+#include <errno.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+int proof_open(struct archive *archive, struct proof *proof)
+{
+	*proof = (struct proof){.archive = archive, .copy = -1};
+	return chain_load(archive, &proof->chain);
+}
+
+void proof_close(struct proof *proof)
+{
+	chain_free(&proof->chain);
+}
+
+void proof_fault(struct proof *proof, enum proof_part part, bool missing, const char *format, ...)
+{
+	char text[ARCHIVE_MESSAGE_MAX];
+	va_list arguments;
+
+	va_start(arguments, format);
+	vsnprintf(text, sizeof(text), format, arguments);
+	va_end(arguments);
+	if (proof->wrong != NULL)
+		proof->wrong(proof->context, text);
+	proof->told++;
+	if (proof->fault[0] == '\0')
+		memcpy(proof->fault, text, sizeof(text));
+	proof->log_or_sidecar |= part != PROOF_RESULT;
+	proof->missing |= missing;
+	proof->altered |= !missing;
+}
+
+/* ---- a file ---- */
+
+/* The first text that a statement finds for two values, into to; "" when there is none. */
+static void find_text(struct archive *archive, const char *statement, const char *value, int64_t drop,
+                      char to[ARCHIVE_NAME_MAX + 16])
+{
+	sqlite3_stmt *s;
+
+	to[0] = '\0';
+	if (sql_query(archive, &s, statement, "si", value, drop) != 0)
+		return;
+	if (sql_step(archive, s) > 0)
+		snprintf(to, ARCHIVE_NAME_MAX + 16, "%s", sql_text(s, 0));
+	sqlite3_finalize(s);
+}
+
+/* What else of this archive has these bytes; "" nothing. */
+static void elsewhere(struct proof *proof, enum proof_part part, const char *path, const char *hash,
+                      char text[ARCHIVE_NAME_MAX + 128])
+{
+	const struct chain_entry *entry = chain_find_hash(&proof->chain, hash);
+	char name[ARCHIVE_NAME_MAX + 16], *json;
+
+	text[0] = '\0';
+	find_text(proof->archive,
+	          "SELECT s.name || '/' || d.number FROM drops d JOIN series s ON s.id = d.series_id"
+	          " WHERE d.sha256 = ? AND d.id <> ?",
+	          hash, proof->drop, name);
+	if (name[0] != '\0')
+		snprintf(text, ARCHIVE_NAME_MAX + 128, "the log of %s", name);
+	else if (entry != NULL)
+		snprintf(text, ARCHIVE_NAME_MAX + 128, "%s as of entry %lld", entry->path,
+		         (long long)entry->number);
+	if (part != PROOF_RESULT || text[0] != '\0' || (json = durable_read(path, NULL)) == NULL)
+		return;
+	find_text(proof->archive,
+	          "SELECT s.name || '/' || d.number || ' by ' || v.name FROM texts t"
+	          " JOIN results r ON r.id = t.result_id JOIN versions v ON v.id = r.version_id"
+	          " JOIN drops d ON d.id = r.drop_id JOIN series s ON s.id = d.series_id"
+	          " WHERE t.json = ?1 AND d.id <> ?2"
+	          " AND d.series_id = (SELECT series_id FROM drops WHERE id = ?2)",
+	          json, proof->drop, name);
+	free(json);
+	if (name[0] != '\0')
+		snprintf(text, ARCHIVE_NAME_MAX + 128, "the result of %s", name);
+}
+
+static void tell_kind(struct proof *proof, enum proof_part part, const char *file, const char *path,
+                      int64_t found_bytes, const char *found, int64_t bytes, const char *hash)
+{
+	char other[ARCHIVE_NAME_MAX + 128] = "";
+
+	if (found_bytes > 0)
+		elsewhere(proof, part, path, found, other);
+	if (found_bytes == 0)
+		proof_fault(proof, part, false, "%.200s: emptied: expected %lld bytes", file,
+		            (long long)bytes);
+	else if (other[0] != '\0')
+		proof_fault(proof, part, false, "%.200s: exchanged: it is %s, expected SHA-256 %s", file,
+		            other, hash);
+	else if (found_bytes < bytes)
+		proof_fault(proof, part, false, "%.200s: cut: %lld bytes, expected %lld", file,
+		            (long long)found_bytes, (long long)bytes);
+	else
+		proof_fault(proof, part, false, "%.200s: altered: its SHA-256 is %s, expected %s", file,
+		            found, hash);
+}
+
+bool proof_of_file(struct proof *proof, enum proof_part part, const char *file, int64_t bytes,
+                   const char *hash, int copy)
+{
+	char path[ARCHIVE_PATH_MAX], found[DIGEST_CHARS];
+	int64_t found_bytes = 0;
+
+	snprintf(path, sizeof(path), "%s/%.200s", proof->archive->folder, file);
+	if (durable_hash(path, found, &found_bytes, copy) != 0) {
+		if (errno == ENOENT || errno == ENOTDIR)
+			proof_fault(proof, part, true, "%.200s: missing", file);
+		else
+			proof_fault(proof, part, false, "%.200s: cannot be read: %s", file, strerror(errno));
+		return false;
+	}
+	if (strcmp(found, hash) == 0)
+		return true;
+	tell_kind(proof, part, file, path, found_bytes, found, bytes, hash);
+	return false;
+}
+
+/* ---- the sidecar ---- */
+
+/* The text of a file that has this hash; NULL. */
+static char *text_with(const char *path, const char *hash)
+{
+	char found[DIGEST_CHARS], *text;
+	size_t size;
+
+	text = durable_read(path, &size);
+	if (text == NULL)
+		return NULL;
+	digest_of(text, size, found);
+	if (strcmp(found, hash) == 0)
+		return text;
+	free(text);
+	return NULL;
+}
+
+char *proof_text(const struct proof *proof, const struct chain_entry *entry)
+{
+	char path[ARCHIVE_PATH_MAX], part[ARCHIVE_PATH_MAX + 8], *text;
+
+	snprintf(path, sizeof(path), "%s/%.200s", proof->archive->folder, entry->path);
+	snprintf(part, sizeof(part), "%s.part", path);
+	text = text_with(path, entry->hash);
+	return text != NULL ? text : text_with(part, entry->hash);
+}
+
+/* Somebody else may have written since the chain was read. */
+static const struct chain_entry *entry_now(struct proof *proof, const struct chain_entry *entry)
+{
+	char path[ARCHIVE_PATH_MAX];
+	struct chain fresh;
+	struct stat now;
+
+	snprintf(path, sizeof(path), "%s/" CHAIN_FILE, proof->archive->folder);
+	if (stat(path, &now) != 0 || (size_t)now.st_size == proof->chain.size ||
+	    chain_load(proof->archive, &fresh) != 0)
+		return entry;
+	chain_free(&proof->chain);
+	proof->chain = fresh;
+	return chain_find(&proof->chain, proof->file);
+}
+
+/* NULL when it is not what was entered, which is told. */
+static char *sealed_text(struct proof *proof, const struct chain_entry *entry)
+{
+	char *text;
+
+	if (strcmp(entry->hash, CHAIN_REMOVED) == 0) {
+		proof_fault(proof, PROOF_CHAIN, false, CHAIN_FILE ": entry %lld took %s away",
+		            (long long)entry->number, proof->file);
+		return NULL;
+	}
+	text = proof_text(proof, entry);
+	if (text == NULL) {
+		entry = entry_now(proof, entry);
+		text = proof_text(proof, entry);
+	}
+	if (text == NULL && proof_of_file(proof, PROOF_SIDECAR, proof->file, entry->bytes, entry->hash, -1))
+		proof_fault(proof, PROOF_SIDECAR, false, "%s: cannot be read", proof->file);
+	if (!entry->sound)
+		proof_fault(proof, PROOF_CHAIN, false, CHAIN_FILE ": broken at entry %lld, of %s",
+		            (long long)entry->number, proof->file);
+	if (entry->number < proof->entry)
+		proof_fault(proof, PROOF_CHAIN, false, CHAIN_FILE ": cut: no entry %lld, of %s",
+		            (long long)proof->entry, proof->file);
+	return text;
+}
+
+/* From before there was a chain: it is there and says what it should. */
+static char *unsealed_text(struct proof *proof)
+{
+	char path[ARCHIVE_PATH_MAX], *text;
+	size_t size = 0;
+
+	snprintf(path, sizeof(path), "%s/%.200s", proof->archive->folder, proof->file);
+	text = durable_read(path, &size);
+	if (text == NULL)
+		proof_fault(proof, PROOF_SIDECAR, errno == ENOENT, "%s: %s", proof->file,
+		            errno == ENOENT ? "missing" : strerror(errno));
+	else if (size == 0)
+		proof_fault(proof, PROOF_SIDECAR, false, "%s: emptied", proof->file);
+	if (proof->entry != 0)
+		proof_fault(proof, PROOF_CHAIN, true, CHAIN_FILE ": missing: no entry %lld, of %s",
+		            (long long)proof->entry, proof->file);
+	if (size > 0)
+		return text;
+	free(text);
+	return NULL;
+}
+
+/* ---- a drop ---- */
+
+/* The index has the log's hash and each result's text, too. */
+static void hold_index(struct proof *proof, const struct sidecar *sidecar)
+{
+	const char *hash = sidecar_value(sidecar, "sha256");
+
+	if (strcmp(hash, proof->hash) == 0)
+		return;
+	if (!proof->sealed) {
+		proof_fault(proof, PROOF_SIDECAR, false, "%s: altered: sha256 = %.64s, expected %s",
+		            proof->file, hash, proof->hash);
+		return;
+	}
+	proof_fault(proof, PROOF_INDEX, false,
+	            "index.sqlite: altered: SHA-256 %s for the log of %s, expected %.64s", proof->hash,
+	            proof->name, hash);
+	snprintf(proof->hash, sizeof(proof->hash), "%.64s", hash);
+	proof->bytes = strtoll(sidecar_value(sidecar, "bytes"), NULL, 10);
+}
+
+/* What the index has of a result: 1 with bytes and hash, 0 without any, DT_E_*. */
+static int result_of_index(struct proof *proof, const char *version, int64_t *bytes, char hash[DIGEST_CHARS])
+{
+	sqlite3_stmt *s;
+	int result = sql_query(proof->archive, &s,
+	                       "SELECT t.json FROM results r JOIN versions v ON v.id = r.version_id"
+	                       " JOIN texts t ON t.result_id = r.id WHERE r.drop_id = ? AND v.name = ?",
+	                       "is", proof->drop, version);
+
+	if (result != 0)
+		return result;
+	result = sql_step(proof->archive, s);
+	if (result > 0) {
+		*bytes = (int64_t)strlen(sql_text(s, 0));
+		digest_of(sql_text(s, 0), (size_t)*bytes, hash);
+	}
+	sqlite3_finalize(s);
+	return result;
+}
+
+static int hold_result(struct proof *proof, const char *text)
+{
+	char hash[DIGEST_CHARS], path[ARCHIVE_PATH_MAX];
+	struct sidecar_result r;
+	int64_t bytes = 0;
+	int known;
+
+	if (!sidecar_result(text, &r) || archive_check_name(proof->archive, "version", r.version) != 0) {
+		proof_fault(proof, PROOF_SIDECAR, false, "%s: damaged: result = %.100s", proof->file, text);
+		return 0;
+	}
+	known = result_of_index(proof, r.version, &bytes, hash);
+	if (known < 0)
+		return known;
+	if (known > 0 && r.bytes >= 0 && strcmp(hash, r.hash) != 0)
+		proof_fault(proof, PROOF_RESULT, false,
+		            "index.sqlite: altered: the result of %s by %s is not the one recorded",
+		            proof->name, r.version);
+	if (known == 0 && r.bytes < 0)
+		return 0;
+	sidecar_json_path(proof->archive, proof->file, r.version, path);
+	proof_of_file(proof, PROOF_RESULT, path + strlen(proof->archive->folder) + 1,
+	              r.bytes >= 0 ? r.bytes : bytes, r.bytes >= 0 ? r.hash : hash, -1);
+	return 0;
+}
+
+/* Takes text. */
+static int hold_text(struct proof *proof, char *text)
+{
+	struct sidecar sidecar = {.file = proof->file};
+	const char *at, *line;
+	int result = 0;
+
+	if (sidecar_split(proof->archive, &sidecar, text) != 0) {
+		proof_fault(proof, PROOF_SIDECAR, false, "%s", archive_message(proof->archive));
+	} else {
+		hold_index(proof, &sidecar);
+		at = sidecar.line;
+		while (result == 0 && *(line = sidecar_next(&sidecar, "result", &at)) != '\0')
+			result = hold_result(proof, line);
+	}
+	free(text);
+	return result;
+}
+
+static int read_row(struct proof *proof, int64_t drop)
+{
+	sqlite3_stmt *s;
+	int result =
+	        sql_query(proof->archive, &s,
+	                  "SELECT s.name || '/' || d.number, d.raw, d.sha256, d.bytes, d.entry FROM drops d"
+	                  " JOIN series s ON s.id = d.series_id WHERE d.id = ?",
+	                  "i", drop);
+
+	if (result != 0)
+		return result;
+	result = sql_step(proof->archive, s);
+	proof->drop = drop;
+	snprintf(proof->name, sizeof(proof->name), "%s", sql_text(s, 0));
+	snprintf(proof->raw, sizeof(proof->raw), "%s", sql_text(s, 1));
+	snprintf(proof->hash, sizeof(proof->hash), "%s", sql_text(s, 2));
+	proof->bytes = sqlite3_column_int64(s, 3);
+	proof->entry = sqlite3_column_int64(s, 4);
+	sqlite3_finalize(s);
+	if (result == 0)
+		return archive_refuse(proof->archive, DT_E_UNKNOWN, "no such drop");
+	if (result > 0)
+		sidecar_name(proof->raw, proof->file);
+	return result < 0 ? result : 0;
+}
+
+/* A folder that cannot be written is verified, too: its marks live as long as it is open. */
+static void remember(struct proof *proof)
+{
+	struct archive *archive = proof->archive;
+	struct archive_mark *mark = archive->mark, *more;
+
+	while (mark < archive->mark + archive->marks && mark->drop != proof->drop)
+		mark++;
+	if (mark == archive->mark + archive->marks) {
+		more = realloc(archive->mark, (archive->marks + 1) * sizeof(*more));
+		if (more == NULL)
+			return;
+		archive->mark = more;
+		mark = &more[archive->marks++];
+		mark->fault[0] = '\0';
+	}
+	archive->marked += strcmp(mark->fault, proof->fault) != 0;
+	*mark = (struct archive_mark){.drop = proof->drop, .missing = !proof->altered};
+	memcpy(mark->fault, proof->fault, sizeof(mark->fault));
+}
+
+static void mark(struct proof *proof)
+{
+	char before[ARCHIVE_MESSAGE_MAX];
+
+	memcpy(before, proof->archive->message, sizeof(before));
+	if (sql_run(proof->archive,
+	            "UPDATE drops SET proof = ?1, fault = ?2 WHERE id = ?3 AND (proof <> ?1 OR fault <> ?2)",
+	            "ssi",
+	            proof->altered   ? "altered"
+	            : proof->missing ? "missing"
+	                             : "",
+	            proof->fault, proof->drop) == 0) {
+		proof->archive->marked += sqlite3_changes(proof->archive->index) > 0;
+		return;
+	}
+	memcpy(proof->archive->message, before, sizeof(before));
+	if (proof->fault[0] != '\0')
+		remember(proof);
+}
+
+int proof_of_drop(struct proof *proof, int64_t drop)
+{
+	const struct chain_entry *entry;
+	char *text;
+	int result = read_row(proof, drop);
+
+	if (result != 0)
+		return result;
+	proof->log_or_sidecar = proof->missing = proof->altered = false;
+	proof->fault[0] = '\0';
+	entry = chain_find(&proof->chain, proof->file);
+	proof->sealed = entry != NULL;
+	text = entry != NULL ? sealed_text(proof, entry) : unsealed_text(proof);
+	if (text != NULL)
+		result = hold_text(proof, text);
+	if (result == 0) {
+		proof_of_file(proof, PROOF_LOG, proof->raw, proof->bytes, proof->hash, proof->copy);
+		mark(proof);
+	}
+	return result;
+}
+
+/* ---- before a change ---- */
+
+int proof_look(struct archive *archive, const char *drop, char fault[ARCHIVE_MESSAGE_MAX])
+{
+	struct archive_place place;
+	struct proof proof;
+	int result = archive_locate(archive, drop, &place);
+
+	fault[0] = '\0';
+	if (result != 0 || !place.recorded)
+		return result;
+	result = proof_open(archive, &proof);
+	if (result != 0)
+		return result;
+	result = proof_of_drop(&proof, place.drop);
+	if (result == 0)
+		snprintf(fault, ARCHIVE_MESSAGE_MAX, "%s", proof.fault);
+	proof_close(&proof);
+	return result;
+}
+
+int proof_log(struct archive *archive, int64_t drop, const char *fault)
+{
+	return fault[0] != '\0' ? event_insert(archive, drop, "fault", "droptower", fault) : 0;
+}
+
+/* ---- a log, opened ---- */
+
+static int open_log(struct archive *archive, const struct archive_place *place, struct archive_log *log)
+{
+	struct proof proof;
+	int result = proof_open(archive, &proof);
+
+	if (result != 0)
+		return result;
+	proof.copy = log->copy;
+	result = proof_of_drop(&proof, place->drop);
+	if (result == 0 && proof.log_or_sidecar)
+		result = archive_refuse(archive, DT_E_CORRUPT, "%s: %.500s", proof.name, proof.fault);
+	if (result == 0 && lseek(log->copy, 0, SEEK_SET) != 0)
+		result = archive_refuse(archive, DT_E_SYSTEM, "%s: %s", proof.name, strerror(errno));
+	snprintf(log->fault, sizeof(log->fault), "%s", proof.fault);
+	proof_close(&proof);
+	return result;
+}
+
+int archive_open_log(struct archive *archive, const char *drop, struct archive_log *log)
+{
+	struct archive_log opened = {.copy = -1};
+	struct archive_place place;
+	int result = archive_locate(archive, drop, &place);
+
+	if (result == 0 && !place.recorded)
+		result = archive_refuse(archive, DT_E_STATE, "%s was never completely recorded", drop);
+	if (result != 0)
+		return result;
+	opened.copy = memfd_create("log", MFD_CLOEXEC);
+	if (opened.copy < 0)
+		return archive_refuse(archive, DT_E_SYSTEM, "%s: %s", drop, strerror(errno));
+	strcpy(opened.series, place.name);
+	strcpy(opened.raw, place.raw);
+	opened.number = place.number;
+	snprintf(opened.file, sizeof(opened.file), "/proc/self/fd/%d", opened.copy);
+	result = open_log(archive, &place, &opened);
+	if (result == 0)
+		*log = opened;
+	else
+		close(opened.copy);
+	return result;
+}
+
+void archive_close_log(struct archive_log *log)
+{
+	close(log->copy);
+	log->copy = -1;
+}

@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Many drops at once, and what is not a drop's: the chain itself, the sidecars of series and calibrations.
+ */
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/archive/proof.h"
+
+int proof_of_all(struct proof *proof, const char *series, unsigned number)
+{
+	sqlite3_stmt *s;
+	int result = sql_query(proof->archive, &s,
+	                       "SELECT d.id FROM drops d JOIN series s ON s.id = d.series_id"
+	                       " WHERE d.state <> 'recording' AND (?1 IS NULL OR s.name = ?1)"
+	                       " AND (?2 = 0 OR d.number = ?2) ORDER BY d.raw",
+	                       "si", series, (int64_t)number);
+
+	if (result != 0)
+		return result;
+	while ((result = sql_step(proof->archive, s)) > 0) {
+		result = proof_of_drop(proof, sqlite3_column_int64(s, 0));
+		if (result != 0)
+			break;
+	}
+	sqlite3_finalize(s);
+	return result;
+}
+
+/* A recorder that died before its drop was in the index: nothing was acknowledged. */
+static bool was_begun_only(struct proof *proof, const struct chain_entry *entry)
+{
+	struct sidecar sidecar = {.file = entry->path};
+	char *text = proof_text(proof, entry);
+	bool begun = text != NULL && sidecar_split(proof->archive, &sidecar, text) == 0 &&
+	             strcmp(sidecar_value(&sidecar, "state"), "recording") == 0;
+
+	free(text);
+	return begun;
+}
+
+/* A sidecar that the chain has and the index has not. */
+static int hold_unknown(struct proof *proof, const struct chain_entry *entry)
+{
+	char stem[ARCHIVE_NAME_MAX + 64];
+	int64_t row;
+	int result;
+
+	snprintf(stem, sizeof(stem), "%.*s.", (int)(strrchr(entry->path, '.') - entry->path), entry->path);
+	result = sql_number(proof->archive, &row, "SELECT id FROM drops WHERE raw >= ?1 AND raw < ?1 || '~'",
+	                    "s", stem);
+	if (result != DT_E_EMPTY)
+		return result;
+	if (!was_begun_only(proof, entry))
+		proof_fault(proof, PROOF_INDEX, true, "index.sqlite: missing: the drop of %s", entry->path);
+	return 0;
+}
+
+int proof_of_rest(struct proof *proof, bool drops)
+{
+	const struct chain *chain = &proof->chain;
+	int result = 0;
+
+	for (size_t i = 0; i < chain->count && result == 0; i++) {
+		const struct chain_entry *entry = &chain->entry[chain->by_path[i]];
+
+		if (entry != chain_find(chain, entry->path) || strcmp(entry->hash, CHAIN_REMOVED) == 0)
+			continue;
+		if (sidecar_is_of_drop(entry->path))
+			result = !drops ? 0 : hold_unknown(proof, entry);
+		else
+			proof_of_file(proof, PROOF_SIDECAR, entry->path, entry->bytes, entry->hash, -1);
+	}
+	return result;
+}
+
+static int hold_chain(struct proof *proof)
+{
+	int reaches = chain_reaches(proof->archive, &proof->chain);
+
+	if (reaches < 0)
+		return reaches;
+	if (reaches == 0)
+		proof_fault(proof, PROOF_CHAIN, proof->chain.count == 0, "%s",
+		            archive_message(proof->archive));
+	if (proof->chain.broken != 0)
+		proof_fault(proof, PROOF_CHAIN, false, CHAIN_FILE ": broken at entry %lld",
+		            (long long)proof->chain.broken);
+	return 0;
+}
+
+int archive_verify(struct archive *archive, const char *series, unsigned number,
+                   void (*wrong)(void *context, const char *text), void *context)
+{
+	struct proof proof;
+	int result = proof_open(archive, &proof), told;
+
+	if (result != 0)
+		return result;
+	proof.wrong = wrong;
+	proof.context = context;
+	if (series == NULL)
+		result = hold_chain(&proof);
+	if (result == 0)
+		result = proof_of_all(&proof, series, number);
+	if (result == 0 && series == NULL)
+		result = proof_of_rest(&proof, true);
+	told = (int)proof.told;
+	proof_close(&proof);
+	return result != 0 ? result : told;
+}
+
+int archive_seal(struct archive *archive, struct archive_seal *seal)
+{
+	struct archive_seal found = {.entry = 0};
+	sqlite3_stmt *s;
+	int result = sql_query(archive, &s,
+	                       "SELECT COALESCE((SELECT entries FROM chain), 0), (SELECT head FROM chain),"
+	                       " (SELECT COUNT(*) FROM drops WHERE state = 'recorded'),"
+	                       " (SELECT COUNT(*) FROM drops WHERE state = 'recorded' AND entry = 0)",
+	                       "");
+
+	if (result != 0)
+		return result;
+	result = sql_step(archive, s);
+	if (result > 0) {
+		found.entry = sqlite3_column_int64(s, 0);
+		snprintf(found.head, sizeof(found.head), "%.64s", sql_text(s, 1));
+		found.drops = sqlite3_column_int64(s, 2);
+		found.not_sealed = sqlite3_column_int64(s, 3);
+		*seal = found;
+	}
+	sqlite3_finalize(s);
+	return result < 0 ? result : 0;
+}
+
+int archive_reaches(struct archive *archive, int64_t entry, const char *head)
+{
+	struct chain chain;
+	int result = chain_load(archive, &chain), found = 0;
+
+	if (result != 0)
+		return result;
+	for (size_t i = 0; i < chain.count && !found; i++)
+		found = chain.entry[i].number == entry && chain.entry[i].sound &&
+		        strcmp(chain.entry[i].head, head) == 0;
+	chain_free(&chain);
+	return found;
+}

@@ -1,0 +1,244 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Commands and parameters: sent again until they are answered.
+ */
+#include "common/wire_table.h"
+#include "host/command/session_can.h"
+
+enum {
+	REPLY_MS = 300, /* a reply takes a millisecond; then it or the command was lost */
+	TRIES = 10,
+};
+
+/* CiA 301, expedited transfer of four bytes: the first byte of a request and of its answer. */
+enum { SDO_WRITE = 0x23, SDO_WRITTEN = 0x60, SDO_READ = 0x40, SDO_VALUE = 0x43, SDO_ABORT = 0x80 };
+
+int can_send_op(struct session *session, enum wire_op op, uint32_t argument)
+{
+	struct can_way *way = session->way;
+	struct wire_command command = {.op = (uint8_t)op,
+	                               .sequence = way->sequence,
+	                               .host = (uint16_t)session->view.session,
+	                               .argument = argument};
+	struct frame frame;
+
+	wire_pack_command(&frame, WIRE_ID_COMMAND, &command);
+	return can_way_send(session, &frame);
+}
+
+/* Another host on the bus may ask for the same. */
+static bool is_answer(const struct wire_sdo *answer, const struct wire_sdo *request)
+{
+	unsigned wanted = request->specifier == SDO_READ ? SDO_VALUE : SDO_WRITTEN;
+
+	return answer->index == request->index &&
+	       (answer->specifier == wanted || answer->specifier == SDO_ABORT);
+}
+
+/* The answer to our ARM, or to another host's. */
+static void hear_armed(struct session *session, const struct wire_armed *armed)
+{
+	struct can_way *way = session->way;
+	struct session_view *view = &session->view;
+
+	if (!way->armed_awaited || armed->host != (uint16_t)view->session)
+		return;
+	way->armed_awaited = false;
+	view->armed = true;
+	view->nonce = armed->nonce;
+	view->armed_drop_id = armed->drop_id;
+	view->release_from_ms = session_now_ms() + view->parameters[WIRE_PARAMETER_warning_ms];
+}
+
+void can_hear_answer(struct session *session, const struct frame *frame)
+{
+	struct can_way *way = session->way;
+	struct wire_armed armed;
+	struct wire_reply reply;
+	struct wire_sdo sdo;
+
+	if (frame->id == WIRE_ID_ARMED && wire_unpack_armed(frame, &armed) == 0) {
+		hear_armed(session, &armed);
+	} else if (frame->id == WIRE_ID_REPLY && wire_unpack_reply(frame, &reply) == 0) {
+		if (way->reply_awaited && reply.sequence == way->sequence) {
+			way->reply = reply;
+			way->reply_awaited = false;
+		}
+	} else if (frame->id == WIRE_ID_SDO_REPLY && wire_unpack_sdo(frame, &sdo) == 0) {
+		if (way->sdo_awaited && is_answer(&sdo, &way->sdo)) {
+			way->sdo = sdo;
+			way->sdo_awaited = false;
+		}
+	}
+}
+
+/* A command that was lost and sent again may be refused only because the first one worked. */
+static bool worked(enum wire_op op, unsigned state)
+{
+	switch (op) {
+	case WIRE_OP_ARM: /* repeated it is answered as the first time */
+		return false;
+	case WIRE_OP_RELEASE:
+		return session_drops(state);
+	case WIRE_OP_ABORT:
+		return true;
+	case WIRE_OP_CLEAR:
+		return state == WIRE_STATE_SAFE || state == WIRE_STATE_READY;
+	case WIRE_OP_ACCEPT:
+	case WIRE_OP_DISCARD:
+		return state != WIRE_STATE_CAPTURED;
+	}
+	return false;
+}
+
+static int await(struct session *session, const bool *awaited, bool always)
+{
+	int64_t deadline_ms = session_now_ms() + REPLY_MS;
+
+	while (*awaited && session_now_ms() < deadline_ms && (always || !session_cancelled(session))) {
+		int result = can_poll(session, 10);
+
+		if (result != 0)
+			return result;
+	}
+	return *awaited ? DT_E_TIMEOUT : 0;
+}
+
+static int send_stop(struct session *session)
+{
+	struct wire_nmt stop = {.command = 2, .node = 1};
+	struct frame frame;
+
+	wire_pack_nmt(&frame, WIRE_ID_NMT, &stop);
+	return can_way_send(session, &frame);
+}
+
+/* Once: 0 when it was carried out, DT_E_TIMEOUT when the reply, or what goes before that of ARM, was lost. */
+static int try_op(struct session *session, enum wire_op op, uint32_t argument)
+{
+	struct can_way *way = session->way;
+	int result = op == WIRE_OP_ABORT ? send_stop(session) : 0; /* any tool's, besides ours with a reply */
+
+	way->reply_awaited = true;
+	if (result == 0)
+		result = can_send_op(session, op, argument);
+	if (result == 0)
+		result = await(session, &way->reply_awaited, op == WIRE_OP_ABORT);
+	if (result == 0)
+		result = way->reply.result;
+	return result == 0 && way->armed_awaited ? DT_E_TIMEOUT : result;
+}
+
+static int ask_op(struct session *session, enum wire_op op, uint32_t argument)
+{
+	struct can_way *way = session->way;
+	bool always = op == WIRE_OP_ABORT;
+	int result = DT_E_TIMEOUT;
+
+	way->sequence++;
+	for (int attempt = 0;
+	     attempt < TRIES && result == DT_E_TIMEOUT && (always || !session_cancelled(session));
+	     attempt++) {
+		result = try_op(session, op, argument);
+		if (attempt > 0 && !way->reply_awaited && result == DT_E_STATE &&
+		    worked(op, way->reply.state))
+			result = 0;
+	}
+	way->reply_awaited = false;
+	return result;
+}
+
+static int arm(struct session *session)
+{
+	struct can_way *way = session->way;
+	struct session_view *view = &session->view;
+	int result = view->parameters_known ? 0 : session_read_parameters(session);
+
+	if (result != 0)
+		return result;
+	view->armed = false;
+	view->armed_until_ms = session_now_ms() + view->parameters[WIRE_PARAMETER_arm_timeout_ms];
+	way->armed_awaited = true;
+	result = ask_op(session, WIRE_OP_ARM,
+	                wire_arm_key(view->session, wire_parameters_crc32(view->parameters)));
+	way->armed_awaited = false;
+	return result;
+}
+
+static int release(struct session *session)
+{
+	struct session_view *view = &session->view;
+	int result = DT_E_TOKEN;
+
+	if (view->armed)
+		result = ask_op(session, WIRE_OP_RELEASE,
+		                wire_release_key(view->nonce, view->armed_drop_id,
+		                                 wire_parameters_crc32(view->parameters)));
+	if (result == 0)
+		view->armed = false;
+	return result;
+}
+
+int can_command(struct session *session, enum wire_op op)
+{
+	switch (op) {
+	case WIRE_OP_ARM:
+		return arm(session);
+	case WIRE_OP_RELEASE:
+		return release(session);
+	case WIRE_OP_ABORT: /* before a state says so: nothing is released after it */
+		session->view.armed = false;
+		return ask_op(session, op, 0);
+	case WIRE_OP_CLEAR:
+		return ask_op(session, op, 0);
+	case WIRE_OP_ACCEPT:
+	case WIRE_OP_DISCARD:
+		break; /* the collection's */
+	}
+	return DT_E_ARGUMENT;
+}
+
+/* Sends request until it is answered; 0 with the answer in way->sdo. */
+static int ask_sdo(struct session *session, const struct wire_sdo *request)
+{
+	struct can_way *way = session->way;
+	struct frame frame;
+	int result = DT_E_TIMEOUT;
+
+	wire_pack_sdo(&frame, WIRE_ID_SDO_REQUEST, request);
+	for (int attempt = 0; attempt < TRIES && result == DT_E_TIMEOUT && !session_cancelled(session);
+	     attempt++) {
+		way->sdo = *request;
+		way->sdo_awaited = true;
+		result = can_way_send(session, &frame);
+		if (result == 0)
+			result = await(session, &way->sdo_awaited, false);
+	}
+	way->sdo_awaited = false;
+	return result;
+}
+
+int can_set_parameter(struct session *session, enum wire_parameter_number number, uint32_t value)
+{
+	const struct can_way *way = session->way;
+	struct wire_sdo write = {
+	        .specifier = SDO_WRITE, .index = wire_parameters[number].index, .value = value};
+	int result = ask_sdo(session, &write);
+
+	if (result == 0 && way->sdo.specifier != SDO_WRITTEN)
+		result = way->sdo.value == 0x08000022u ? DT_E_STATE : DT_E_RANGE; /* CiA 301 abort codes */
+	return result;
+}
+
+int can_get_parameter(struct session *session, enum wire_parameter_number number, uint32_t *value)
+{
+	const struct can_way *way = session->way;
+	struct wire_sdo read = {.specifier = SDO_READ, .index = wire_parameters[number].index};
+	int result = ask_sdo(session, &read);
+
+	if (result == 0 && way->sdo.specifier != SDO_VALUE)
+		result = DT_E_EMPTY;
+	if (result == 0)
+		*value = way->sdo.value;
+	return result;
+}

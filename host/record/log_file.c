@@ -1,0 +1,211 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/log_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { WINDOW_BYTES = 1 << 20 };
+
+static int refuse(const struct log_file *log, int code, const char *why, char *message)
+{
+	return source_refuse(message, code, log->file, 0, "%s, expected %s", why, log->expected);
+}
+
+static int open_regular(struct log_file *log, char *message)
+{
+	struct stat status;
+
+	log->descriptor = open(log->file, O_RDONLY | O_CLOEXEC);
+	if (log->descriptor < 0 || fstat(log->descriptor, &status) != 0)
+		return refuse(log, DT_E_SYSTEM, strerror(errno), message);
+	if (status.st_size == 0)
+		return refuse(log, DT_E_EMPTY, "empty file", message);
+	log->size = (uint64_t)status.st_size;
+	log->room = WINDOW_BYTES;
+	log->window = malloc(log->room);
+	if (log->window == NULL)
+		return refuse(log, DT_E_MEMORY, error_text(DT_E_MEMORY), message);
+	return 0;
+}
+
+/* Spreadsheets put a byte order mark in front of UTF-8; source_load has taken it away. */
+static void skip_mark(struct log_file *log)
+{
+	size_t held;
+	const char *head = log_file_get(log, 0, 3, &held);
+
+	if (held > 3 && memcmp(head, "\xEF\xBB\xBF", 3) == 0)
+		log->begin = 3;
+}
+
+int log_file_open(struct log_file *log, const char *file, const char *expected,
+                  char message[READ_MESSAGE_MAX])
+{
+	struct log_file opened = {.file = file, .expected = expected, .descriptor = -1};
+	struct stat status;
+	int error;
+
+	if (stat(file, &status) == 0 && S_ISREG(status.st_mode))
+		error = open_regular(&opened, message);
+	else
+		error = source_load(&opened.whole, file, expected, message);
+	if (opened.whole.bytes != NULL)
+		opened.size = opened.whole.size;
+	else if (!error)
+		skip_mark(&opened);
+	if (error)
+		log_file_close(&opened);
+	else
+		*log = opened;
+	return error;
+}
+
+void log_file_close(struct log_file *log)
+{
+	source_free(&log->whole);
+	free(log->window);
+	log->window = NULL;
+	if (log->descriptor >= 0)
+		close(log->descriptor);
+	log->descriptor = -1;
+}
+
+/* Room for so many bytes from the window's beginning on. */
+static bool make_room(struct log_file *log, size_t want)
+{
+	size_t room = log->room;
+	char *window;
+
+	while (room < want)
+		room *= 2;
+	if (room == log->room)
+		return true;
+	window = realloc(log->window, room);
+	if (window == NULL) {
+		log->failed = ENOMEM;
+		return false;
+	}
+	log->window = window;
+	log->room = room;
+	return true;
+}
+
+/* Reads on until the window is full or the file ends. */
+static void fill(struct log_file *log)
+{
+	while (log->held < log->room && log->failed == 0) {
+		uint64_t place = log->at + log->held;
+		size_t want = log->room - log->held;
+		ssize_t count;
+
+		if (place >= log->size)
+			return;
+		if (want > log->size - place)
+			want = (size_t)(log->size - place);
+		count = pread(log->descriptor, log->window + log->held, want, (off_t)place);
+		if (count > 0)
+			log->held += (size_t)count;
+		else if (count == 0)
+			log->failed = ENODATA;
+		else if (errno != EINTR)
+			log->failed = errno;
+	}
+}
+
+/* Moves the window so that it begins at offset; what is held of that stays. */
+static void slide(struct log_file *log, uint64_t offset)
+{
+	size_t kept = 0;
+
+	if (offset >= log->at && offset - log->at < log->held) {
+		kept = log->held - (size_t)(offset - log->at);
+		memmove(log->window, log->window + (offset - log->at), kept);
+	}
+	log->at = offset;
+	log->held = kept;
+}
+
+const char *log_file_get(struct log_file *log, uint64_t offset, size_t want, size_t *held)
+{
+	*held = 0;
+	if (offset >= log->size)
+		return log->window;
+	if (want > LOG_FILE_MOST)
+		want = LOG_FILE_MOST;
+	if (want > log->size - offset)
+		want = (size_t)(log->size - offset);
+	if (log->whole.bytes != NULL) {
+		*held = (size_t)(log->size - offset);
+		return log->whole.bytes + offset;
+	}
+	if (offset < log->at || offset - log->at > log->held ||
+	    log->held - (size_t)(offset - log->at) < want) {
+		slide(log, offset);
+		if (make_room(log, want))
+			fill(log);
+	}
+	*held = log->held - (size_t)(offset - log->at);
+	return log->window + (offset - log->at);
+}
+
+int log_file_error(const struct log_file *log, char message[READ_MESSAGE_MAX])
+{
+	if (log->failed == 0)
+		return 0;
+	return refuse(log, DT_E_SYSTEM,
+	              log->failed == ENODATA ? "cut while it was read" : strerror(log->failed), message);
+}
+
+/* Where the line that begins at `at` ends, looked for beyond what a line may have. */
+static uint64_t end_of_long_line(struct log_file *log, uint64_t at, uint64_t end)
+{
+	for (;;) {
+		size_t held;
+		const char *text = log_file_get(log, at, LOG_LINE_MAX, &held), *found;
+
+		if (held > end - at)
+			held = (size_t)(end - at);
+		found = held > 0 ? memchr(text, '\n', held) : NULL;
+		if (found != NULL)
+			return at + (uint64_t)(found - text) + 1;
+		at += held;
+		if (held == 0 || at >= end)
+			return at;
+	}
+}
+
+bool log_file_next_line(struct log_file *log, uint64_t end, struct log_line *line)
+{
+	size_t held;
+	const char *found;
+
+	if (end > log->size)
+		end = log->size;
+	if (line->next >= end)
+		return false;
+	line->at = line->next;
+	line->text = log_file_get(log, line->at, LOG_LINE_MAX, &held);
+	if (held > end - line->at)
+		held = (size_t)(end - line->at);
+	if (held == 0)
+		return false;
+	line->length = held < LOG_LINE_MAX ? held : LOG_LINE_MAX;
+	found = memchr(line->text, '\n', line->length);
+	if (found != NULL)
+		line->length = (size_t)(found - line->text);
+	line->next = line->at + line->length + (found != NULL);
+	if (found == NULL && line->next < end) {
+		line->next = end_of_long_line(log, line->next, end);
+		line->text = log_file_get(log, line->at, line->length, &held);
+		if (held < line->length)
+			line->length = held;
+	}
+	line->number++;
+	while (line->length > 0 && line->text[line->length - 1] == '\r')
+		line->length--;
+	return true;
+}

@@ -1,0 +1,319 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/log_index.h"
+
+#include <droptower_version.h>
+#include <inttypes.h>
+#include <nettle/sha2.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "common/wire_table.h"
+#include "host/record/whole.h"
+
+#define HEAD "# droptower index "
+
+enum { FORMAT = 2, ENDS_BYTES = 1 << 16, LINE_MAX_BYTES = 4096, DIGEST_CHARS = 2 * SHA256_DIGEST_SIZE + 1 };
+
+/* ---- whose index ---- */
+
+static void digest_text(struct sha256_ctx *hash, char text[DIGEST_CHARS])
+{
+	uint8_t digest[SHA256_DIGEST_SIZE];
+
+	sha256_digest(hash, SHA256_DIGEST_SIZE, digest);
+	for (unsigned i = 0; i < SHA256_DIGEST_SIZE; i++)
+		sprintf(text + 2 * (size_t)i, "%02x", digest[i]);
+}
+
+static void hash_part(struct log_file *log, uint64_t at, struct sha256_ctx *hash)
+{
+	size_t held;
+	const char *bytes = log_file_get(log, at, ENDS_BYTES, &held);
+
+	sha256_update(hash, held < ENDS_BYTES ? held : ENDS_BYTES, (const uint8_t *)bytes);
+}
+
+/* The two lines that an index of this log begins with, by this program; false when it cannot have one. */
+static bool describe(struct log_file *log, char lines[LINE_MAX_BYTES])
+{
+	char ends[DIGEST_CHARS];
+	struct sha256_ctx hash;
+	struct stat status;
+
+	if (log->descriptor < 0 || log->size < LOG_INDEX_LEAST || fstat(log->descriptor, &status) != 0 ||
+	    (uint64_t)status.st_size != log->size)
+		return false;
+	sha256_init(&hash);
+	hash_part(log, 0, &hash);
+	hash_part(log, log->size - ENDS_BYTES, &hash);
+	digest_text(&hash, ends);
+	snprintf(lines, LINE_MAX_BYTES, HEAD "%d, %s, wire %08" PRIx32 "\nlog %" PRIu64 " %lld.%09ld %s\n",
+	         FORMAT, DT_VERSION, wire_hash(), log->size, (long long)status.st_mtim.tv_sec,
+	         status.st_mtim.tv_nsec, ends);
+	return log->failed == 0;
+}
+
+static char *index_name(const struct log_file *log)
+{
+	char *name;
+
+	return asprintf(&name, "%s.index", log->file) < 0 ? NULL : name;
+}
+
+/* ---- reading ---- */
+
+/* Whether all of it is there, by its last line. */
+static bool is_whole(FILE *index)
+{
+	char line[LINE_MAX_BYTES], wanted[LINE_MAX_BYTES], digest[DIGEST_CHARS];
+	struct sha256_ctx hash, copy;
+	uint64_t lines = 0;
+
+	sha256_init(&hash);
+	while (fgets(line, sizeof(line), index) != NULL) {
+		if (strncmp(line, "end ", 4) == 0) {
+			copy = hash;
+			digest_text(&copy, digest);
+			snprintf(wanted, sizeof(wanted), "end %" PRIu64 " %s\n", lines, digest);
+			return strcmp(line, wanted) == 0 && fgetc(index) == EOF;
+		}
+		sha256_update(&hash, strlen(line), (const uint8_t *)line);
+		lines++;
+	}
+	return false;
+}
+
+static bool is_of(FILE *index, struct log_file *log)
+{
+	char wanted[LINE_MAX_BYTES], found[LINE_MAX_BYTES];
+	size_t length;
+
+	if (!describe(log, wanted))
+		return false;
+	length = strlen(wanted);
+	return fread(found, 1, length, index) == length && memcmp(found, wanted, length) == 0;
+}
+
+FILE *log_index_open(struct log_file *log)
+{
+	char *name = index_name(log);
+	struct stat status;
+	FILE *index = NULL;
+
+	if (name != NULL && stat(name, &status) == 0 && S_ISREG(status.st_mode))
+		index = fopen(name, "re");
+	free(name);
+	if (index == NULL)
+		return NULL;
+	if (is_of(index, log)) {
+		rewind(index);
+		if (is_whole(index))
+			return index;
+	}
+	fclose(index);
+	return NULL;
+}
+
+static bool read_parameters(char *text, struct log_capture_parameters *parameters)
+{
+	for (char *word = strtok(text, " \n"); word != NULL; word = strtok(NULL, " \n")) {
+		unsigned index, value, i = 0;
+
+		if (sscanf(word, "%x=%u", &index, &value) != 2)
+			return false;
+		while (i < WIRE_PARAMETERS && wire_parameters[i].index != index)
+			i++;
+		if (i == WIRE_PARAMETERS)
+			return false;
+		parameters->known[i] = true;
+		parameters->value[i] = value;
+	}
+	return true;
+}
+
+static bool read_capture(char *line, uint64_t size, struct log_capture *c)
+{
+	struct record_counters *n = &c->counters;
+	unsigned alone, ended, agrees, sealed, seal_agrees;
+	int used = 0, fields;
+
+	*c = (struct log_capture){0};
+	fields = sscanf(line,
+	                "capture %u %u %" SCNu64 " %" SCNu64 " %" SCNd64 " %u %" SCNu16 " %" SCNu16
+	                " %" SCNu32 " %" SCNu32 " %" SCNx32 " %" SCNu16 " %u %u %u %" SCNx32 " %" SCNu64
+	                " %" SCNu64 " %" SCNu64 " %" SCNu64 " %" SCNu64 " %" SCNu64 " %" SCNu64 "%n",
+	                &c->number, &alone, &c->from, &c->to, &c->time_us, &ended, &c->drop_id, &c->marks,
+	                &c->first_tick_ms, &c->last_tick_ms, &c->crc32, &c->frame_speed_mm_s, &agrees,
+	                &sealed, &seal_agrees, &c->seal, &n->blocks, &n->repeated, &n->reordered, &n->corrupt,
+	                &n->gaps, &n->resent, &n->conflicting, &used);
+	c->alone = alone != 0;
+	c->ended = ended != 0;
+	c->crc_agrees = agrees != 0;
+	c->seal_known = sealed != 0;
+	c->seal_agrees = seal_agrees != 0;
+	return fields == 23 && c->from <= c->to && c->to <= size &&
+	       read_parameters(line + used, &c->parameters);
+}
+
+static bool read_event(const char *line, struct log_event *e)
+{
+	*e = (struct log_event){.kind = LOG_START};
+	if (sscanf(line, "start %" SCNu64 " %" SCNd64, &e->at, &e->time_us) == 2)
+		return true;
+	e->kind = LOG_FAULT;
+	if (sscanf(line, "fault %" SCNu64 " %" SCNd64 " %u %x %" SCNu32, &e->at, &e->time_us, &e->fault,
+	           &e->emcy, &e->tick_ms) == 5)
+		return true;
+	e->kind = LOG_HEARTBEATS;
+	return sscanf(line, "heartbeats %" SCNu64 " %" SCNd64 " %" SCNu64 " %" SCNd64 " %" SCNd64, &e->at,
+	              &e->time_us, &e->count, &e->first_us, &e->longest_us) == 5;
+}
+
+int log_index_visit(FILE *index, const struct log_file *log, const struct log_visitor *visitor)
+{
+	char line[LINE_MAX_BYTES];
+	int result = 0;
+
+	rewind(index);
+	while (result == 0 && fgets(line, sizeof(line), index) != NULL) {
+		struct log_capture capture;
+		struct log_event event;
+
+		if (line[0] == '#' || strncmp(line, "log ", 4) == 0)
+			continue;
+		if (strncmp(line, "end ", 4) == 0)
+			return 0;
+		if (read_capture(line, log->size, &capture))
+			result = visitor->capture(visitor->context, &capture, NULL);
+		else if (!read_event(line, &event))
+			result = DT_E_FORMAT;
+		else if (visitor->event != NULL)
+			result = visitor->event(visitor->context, &event);
+	}
+	return result != 0 ? result : DT_E_FORMAT;
+}
+
+/* ---- making ---- */
+
+struct making {
+	struct log_visitor *to;
+	struct whole whole;
+	bool open;
+	struct sha256_ctx hash;
+	uint64_t lines;
+};
+
+__attribute__((format(printf, 2, 3))) static void put(struct making *making, const char *format, ...)
+{
+	char text[LINE_MAX_BYTES];
+	va_list list;
+
+	if (!making->open)
+		return;
+	va_start(list, format);
+	vsnprintf(text, sizeof(text), format, list);
+	va_end(list);
+	fputs(text, making->whole.out); /* whole_close says whether all was written */
+	sha256_update(&making->hash, strlen(text), (const uint8_t *)text);
+	for (const char *p = text; *p != '\0'; p++)
+		making->lines += *p == '\n';
+}
+
+static int put_capture(void *context, const struct log_capture *c, struct record *record)
+{
+	struct making *making = context;
+	const struct record_counters *n = &c->counters;
+
+	put(making,
+	    "capture %u %u %" PRIu64 " %" PRIu64 " %" PRId64 " %u %u %u %" PRIu32 " %" PRIu32 " %08" PRIx32
+	    " %u %u %u %u %08" PRIx32 " %" PRIu64 " %" PRIu64 " %" PRIu64 " %" PRIu64 " %" PRIu64 " %" PRIu64
+	    " %" PRIu64,
+	    c->number, c->alone, c->from, c->to, c->time_us, c->ended, c->drop_id, c->marks, c->first_tick_ms,
+	    c->last_tick_ms, c->crc32, c->frame_speed_mm_s, c->crc_agrees, c->seal_known, c->seal_agrees,
+	    c->seal, n->blocks, n->repeated, n->reordered, n->corrupt, n->gaps, n->resent, n->conflicting);
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
+		if (c->parameters.known[i])
+			put(making, " %x=%u", wire_parameters[i].index, (unsigned)c->parameters.value[i]);
+	put(making, "\n");
+	return making->to->capture(making->to->context, c, record);
+}
+
+static int put_event(void *context, const struct log_event *e)
+{
+	struct making *making = context;
+
+	if (e->kind == LOG_START)
+		put(making, "start %" PRIu64 " %" PRId64 "\n", e->at, e->time_us);
+	else if (e->kind == LOG_FAULT)
+		put(making, "fault %" PRIu64 " %" PRId64 " %u %x %" PRIu32 "\n", e->at, e->time_us, e->fault,
+		    e->emcy, e->tick_ms);
+	else
+		put(making, "heartbeats %" PRIu64 " %" PRId64 " %" PRIu64 " %" PRId64 " %" PRId64 "\n", e->at,
+		    e->time_us, e->count, e->first_us, e->longest_us);
+	return making->to->event != NULL ? making->to->event(making->to->context, e) : 0;
+}
+
+/* Nothing is there, or an index, whatever of: another file of that name stays. */
+static bool may_write(const char *name)
+{
+	char head[sizeof(HEAD)] = "";
+	struct stat status;
+	FILE *file;
+	bool ours;
+
+	if (stat(name, &status) != 0)
+		return true;
+	file = S_ISREG(status.st_mode) ? fopen(name, "re") : NULL;
+	if (file == NULL)
+		return false;
+	ours = status.st_size == 0 || (fgets(head, sizeof(head), file) != NULL && strcmp(head, HEAD) == 0);
+	fclose(file);
+	return ours;
+}
+
+static void begin(struct making *making, const char *name, const char *lines)
+{
+	char message[READ_MESSAGE_MAX];
+
+	sha256_init(&making->hash);
+	if (name != NULL && may_write(name))
+		making->open = whole_open(&making->whole, name, message, sizeof(message)) == 0;
+	put(making, "%s", lines);
+}
+
+/* Kept if the log was walked to its end and is still the one that was opened. */
+static void end(struct making *making, struct log_file *log, int result, const char *lines)
+{
+	char now[LINE_MAX_BYTES], message[READ_MESSAGE_MAX], digest[DIGEST_CHARS];
+	struct sha256_ctx hash = making->hash;
+
+	if (!making->open)
+		return;
+	digest_text(&hash, digest);
+	fprintf(making->whole.out, "end %" PRIu64 " %s\n", making->lines, digest);
+	if (result == 0 && (!describe(log, now) || strcmp(now, lines) != 0 || ferror(making->whole.out)))
+		result = DT_E_STATE;
+	if (whole_close(&making->whole, result, message, sizeof(message)) != 0)
+		making->open = false; /* there is none then, as in a folder that cannot be written */
+}
+
+int log_index_walk(struct log_file *log, struct log_visitor *visitor, struct log_contents *contents,
+                   char message[READ_MESSAGE_MAX])
+{
+	struct making making = {.to = visitor};
+	struct log_visitor put_first = {
+	        .context = &making, .wanted = visitor->wanted, .capture = put_capture, .event = put_event};
+	char lines[LINE_MAX_BYTES], *name;
+	int result;
+
+	if (!describe(log, lines))
+		return log_walk(log, 0, log->size, visitor, contents, message);
+	name = index_name(log);
+	begin(&making, name, lines);
+	result = log_walk(log, 0, log->size, &put_first, contents, message);
+	end(&making, log, result == 0 && contents->captures == 0 ? DT_E_EMPTY : result, lines);
+	free(name);
+	return result;
+}

@@ -1,0 +1,179 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/unit.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "common/units.h"
+
+enum { CHARS_MAX = 24 };
+
+#define G UNITS_G_M_S2
+
+/* Without what does not count. A kg beside accelerations is a kilo-g. */
+static const struct {
+	const char *spelling;
+	struct unit unit;
+} table[] = {
+        {"s", {"s", UNIT_TIME, 1}},
+        {"sec", {"s", UNIT_TIME, 1}},
+        {"secs", {"s", UNIT_TIME, 1}},
+        {"second", {"s", UNIT_TIME, 1}},
+        {"seconds", {"s", UNIT_TIME, 1}},
+        {"ms", {"ms", UNIT_TIME, 1e3}},
+        {"msec", {"ms", UNIT_TIME, 1e3}},
+        {"millisecond", {"ms", UNIT_TIME, 1e3}},
+        {"milliseconds", {"ms", UNIT_TIME, 1e3}},
+        {"us", {"us", UNIT_TIME, 1e6}},
+        {"usec", {"us", UNIT_TIME, 1e6}},
+        {"microsecond", {"us", UNIT_TIME, 1e6}},
+        {"microseconds", {"us", UNIT_TIME, 1e6}},
+        {"ns", {"ns", UNIT_TIME, 1e9}},
+        {"nsec", {"ns", UNIT_TIME, 1e9}},
+        {"nanoseconds", {"ns", UNIT_TIME, 1e9}},
+        {"min", {"min", UNIT_TIME, 1 / 60.0}},
+        {"minutes", {"min", UNIT_TIME, 1 / 60.0}},
+        {"g", {"g", UNIT_ACCELERATION, 1}},
+        {"gs", {"g", UNIT_ACCELERATION, 1}},
+        {"gn", {"g", UNIT_ACCELERATION, 1}},
+        {"g_n", {"g", UNIT_ACCELERATION, 1}},
+        {"gee", {"g", UNIT_ACCELERATION, 1}},
+        {"gees", {"g", UNIT_ACCELERATION, 1}},
+        {"gpk", {"g", UNIT_ACCELERATION, 1}},
+        {"mg", {"mg", UNIT_ACCELERATION, 1e3}},
+        {"mgn", {"mg", UNIT_ACCELERATION, 1e3}},
+        {"ug", {"ug", UNIT_ACCELERATION, 1e6}},
+        {"kg", {"kilo-g", UNIT_ACCELERATION, 1e-3}},
+        {"kgn", {"kilo-g", UNIT_ACCELERATION, 1e-3}},
+        {"m/s2", {"m/s2", UNIT_ACCELERATION, G}},
+        {"m/s/s", {"m/s2", UNIT_ACCELERATION, G}},
+        {"m/sec2", {"m/s2", UNIT_ACCELERATION, G}},
+        {"m/sec/sec", {"m/s2", UNIT_ACCELERATION, G}},
+        {"ms-2", {"m/s2", UNIT_ACCELERATION, G}},
+        {"mps2", {"m/s2", UNIT_ACCELERATION, G}},
+        {"mm/s2", {"mm/s2", UNIT_ACCELERATION, G * 1e3}},
+        {"cm/s2", {"cm/s2", UNIT_ACCELERATION, G * 1e2}},
+        {"gal", {"cm/s2", UNIT_ACCELERATION, G * 1e2}},
+        {"ft/s2", {"ft/s2", UNIT_ACCELERATION, G / 0.3048}},
+        {"ft/sec2", {"ft/s2", UNIT_ACCELERATION, G / 0.3048}},
+        {"in/s2", {"in/s2", UNIT_ACCELERATION, G / 0.0254}},
+        {"in/sec2", {"in/s2", UNIT_ACCELERATION, G / 0.0254}},
+        {"v", {"V", UNIT_OTHER, 0}},
+        {"volt", {"V", UNIT_OTHER, 0}},
+        {"volts", {"V", UNIT_OTHER, 0}},
+        {"mv", {"mV", UNIT_OTHER, 0}},
+        {"uv", {"uV", UNIT_OTHER, 0}},
+        {"ma", {"mA", UNIT_OTHER, 0}},
+        {"pc", {"pC", UNIT_OTHER, 0}},
+        {"newton", {"N", UNIT_OTHER, 0}},
+        {"kn", {"kN", UNIT_OTHER, 0}},
+        {"lbf", {"lbf", UNIT_OTHER, 0}},
+        {"pa", {"Pa", UNIT_OTHER, 0}},
+        {"kpa", {"kPa", UNIT_OTHER, 0}},
+        {"mpa", {"MPa", UNIT_OTHER, 0}},
+        {"psi", {"psi", UNIT_OTHER, 0}},
+        {"hz", {"Hz", UNIT_OTHER, 0}},
+        {"khz", {"kHz", UNIT_OTHER, 0}},
+        {"deg", {"deg", UNIT_OTHER, 0}},
+        {"rad", {"rad", UNIT_OTHER, 0}},
+        {"deg/s", {"deg/s", UNIT_OTHER, 0}},
+        {"rad/s", {"rad/s", UNIT_OTHER, 0}},
+        {"mm", {"mm", UNIT_OTHER, 0}},
+        {"um", {"um", UNIT_OTHER, 0}},
+        {"m/s", {"m/s", UNIT_OTHER, 0}},
+        {"mm/s", {"mm/s", UNIT_OTHER, 0}},
+        {"ft/s", {"ft/s", UNIT_OTHER, 0}},
+        {"in/s", {"in/s", UNIT_OTHER, 0}},
+        {"km/h", {"km/h", UNIT_OTHER, 0}},
+        {"strain", {"strain", UNIT_OTHER, 0}},
+        {"ustrain", {"ustrain", UNIT_OTHER, 0}},
+        {"degc", {"degC", UNIT_OTHER, 0}},
+        {"lsb", {"LSB", UNIT_OTHER, 0}},
+        {"count", {"counts", UNIT_OTHER, 0}},
+        {"counts", {"counts", UNIT_OTHER, 0}},
+};
+
+/* The bytes that stand for one plain character, which *as is then; 0 for one that stands for itself. */
+static size_t sign_at(const char *text, size_t length, char *as)
+{
+	static const struct {
+		const char *bytes;
+		char as;
+	} signs[] = {{"\302\265", 'u'}, {"\316\274", 'u'}, {"\302\262", '2'}, {"\302\267", ' '}};
+
+	for (size_t i = 0; length >= 2 && i < sizeof(signs) / sizeof(signs[0]); i++)
+		if (memcmp(text, signs[i].bytes, 2) == 0) {
+			*as = signs[i].as;
+			return 2;
+		}
+	*as = *text >= 'A' && *text <= 'Z' ? (char)(*text - 'A' + 'a') : *text;
+	return 1;
+}
+
+const struct unit *unit_find(const char *text, size_t length)
+{
+	char plain[CHARS_MAX + 1];
+	size_t used = 0;
+
+	for (size_t at = 0; at < length;) {
+		char c;
+
+		at += sign_at(text + at, length - at, &c);
+		if (c == '\0' || strchr(" \t^*()[]'", c))
+			continue;
+		if (used == CHARS_MAX)
+			return NULL;
+		plain[used++] = c;
+	}
+	plain[used] = '\0';
+	for (size_t i = 0; i < sizeof(table) / sizeof(table[0]); i++)
+		if (strcmp(table[i].spelling, plain) == 0)
+			return &table[i].unit;
+	return NULL;
+}
+
+/* The last bracket of that kind that holds a unit. */
+static const struct unit *in_brackets(const char *name, size_t length, char open, char close)
+{
+	const struct unit *found = NULL;
+
+	for (size_t from = 0; from < length; from++) {
+		size_t to = from + 1, deep = 1;
+
+		if (name[from] != open)
+			continue;
+		for (; to < length; to++) {
+			deep += name[to] == open;
+			deep -= name[to] == close;
+			if (deep == 0)
+				break;
+		}
+		if (to < length) {
+			const struct unit *unit = unit_find(name + from + 1, to - from - 1);
+
+			found = unit ? unit : found;
+			from = to;
+		}
+	}
+	return found;
+}
+
+const struct unit *unit_of_name(const char *name, size_t length, enum unit_kind wanted)
+{
+	const struct unit *unit = in_brackets(name, length, '[', ']');
+	size_t from = length;
+
+	if (!unit)
+		unit = in_brackets(name, length, '(', ')');
+	if (unit)
+		return unit;
+	while (from > 0 && !strchr(" \t,_", name[from - 1]))
+		from--;
+	unit = unit_find(name + from, length - from);
+	return unit && unit->kind == wanted ? unit : NULL;
+}
+
+bool unit_same(const struct unit *a, const struct unit *b)
+{
+	return a->kind == b->kind && fabs(a->divisor - b->divisor) <= 1e-9 * fabs(a->divisor);
+}

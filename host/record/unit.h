@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_UNIT_H
+#define DT_HOST_RECORD_UNIT_H
+/*
+ * Units as files and users spell them. Case, blanks, '^', '*', brackets within and apostrophes do not count;
+ * a micro sign and a raised 2 in UTF-8 do as u and 2. Any context, no state, no memory.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+
+enum unit_kind {
+	UNIT_TIME,
+	UNIT_ACCELERATION,
+	UNIT_OTHER, /* of something else: volt, newton, metre */
+};
+
+struct unit {
+	const char *name;
+	enum unit_kind kind;
+	double divisor; /* number / divisor = s or g; 0 for others */
+};
+
+/* The unit that is the whole text; NULL for one that is not known. */
+const struct unit *unit_find(const char *text, size_t length);
+
+/* What the name of a column says of its unit: one in the last brackets, "Accel (g)" and "t [ms]"; of the kind
+ * that is wanted one behind the last blank, comma or underscore, or the name itself. NULL where it says
+ * nothing.
+ */
+const struct unit *unit_of_name(const char *name, size_t length, enum unit_kind wanted);
+
+/* Whether both make the same number of the same thing. */
+bool unit_same(const struct unit *a, const struct unit *b);
+
+#endif

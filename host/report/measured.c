@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/report/measured.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+/* All ones say that it was not measured. */
+static double u16(uint16_t value, double scale)
+{
+	return value == UINT16_MAX ? (double)NAN : value * scale;
+}
+
+struct measured measured_of(const struct record *record)
+{
+	const struct wire_measured *m = &record->measured;
+	struct measured none = {NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+
+	if (!record->measured_known)
+		return none;
+	return (struct measured){
+	        .dropout_s = u16(m->dropout_us, 1e-6),
+	        .dropout_used_s = u16(m->dropout_used_us, 1e-6),
+	        .separation_m = m->separation_um == UINT32_MAX ? (double)NAN : m->separation_um * 1e-6,
+	        .separation_speed_m_s = u16(m->separation_mm_s, 1e-3),
+	        .acceleration_m_s2 = u16(m->acceleration_mm_s2, 1e-3),
+	        .latch_delay_s = u16(m->latch_delay_us, 1e-6),
+	        .clock_ratio_ppm = m->clock_ppm == INT16_MAX ? (double)NAN : m->clock_ppm,
+	        .trigger_latency_s = u16(m->trigger_latency_us, 1e-6),
+	};
+}
+
+/* Behind what stands there, and only with a value. */
+static void __attribute__((format(printf, 4, 0)))
+add(char *text, size_t size, double value, const char *format, ...)
+{
+	size_t length = strlen(text);
+	va_list arguments;
+
+	if (!isfinite(value))
+		return;
+	va_start(arguments, format);
+	snprintf(text + length, size - length, "%s", length > 0 ? ", " : "");
+	length = strlen(text);
+	vsnprintf(text + length, size - length, format, arguments);
+	va_end(arguments);
+}
+
+void measured_text(const struct record *record, char *text, size_t size)
+{
+	struct measured m = measured_of(record);
+
+	text[0] = '\0';
+	add(text, size, m.dropout_s, "magnet drop-out %.2f ms (planned with %.2f ms%s)", m.dropout_s * 1e3,
+	    m.dropout_used_s * 1e3, record->marks & WIRE_MARK_CALIBRATED ? ", calibrated" : "");
+	add(text, size, m.separation_m, "separated at %.1f mm", m.separation_m * 1e3);
+	add(text, size, m.separation_speed_m_s, "%.3f m/s", m.separation_speed_m_s);
+	add(text, size, m.acceleration_m_s2, "frame %.3f m/s2", m.acceleration_m_s2);
+	add(text, size, m.latch_delay_s, "latch %.1f ms", m.latch_delay_s * 1e3);
+	add(text, size, m.clock_ratio_ppm, "clock ratio %+.0f ppm", m.clock_ratio_ppm);
+	add(text, size, m.trigger_latency_s, "trigger after %.2f ms", m.trigger_latency_s * 1e3);
+	if (record->crc_known && record->seal_known)
+		add(text, size, 0.0, "parameters %08" PRIx32, record->parameters_crc32);
+}
+
+void measured_put(struct builder *b, cJSON *root, const struct record *record)
+{
+	struct measured m = measured_of(record);
+	cJSON *tower;
+
+	if (!record->is_drop) {
+		put_item(b, root, "tower", cJSON_CreateNull());
+		return;
+	}
+	tower = put_object(b, root, "tower");
+	put_bool(b, tower, "seal_agrees", record->seal_agrees);
+	put_bool(b, tower, "calibrated", (record->marks & WIRE_MARK_CALIBRATED) != 0);
+	put_number(b, tower, "dropout_s", m.dropout_s);
+	put_number(b, tower, "dropout_used_s", m.dropout_used_s);
+	put_number(b, tower, "separation_m", m.separation_m);
+	put_number(b, tower, "separation_speed_m_s", m.separation_speed_m_s);
+	put_number(b, tower, "acceleration_m_s2", m.acceleration_m_s2);
+	put_number(b, tower, "latch_delay_s", m.latch_delay_s);
+	put_number(b, tower, "clock_ratio_ppm", m.clock_ratio_ppm);
+	put_number(b, tower, "trigger_latency_s", m.trigger_latency_s);
+	put_number(b, tower, "parameters_crc32",
+	           record->crc_known && record->seal_known ? (double)record->parameters_crc32 : (double)NAN);
+}

@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * An archive with one drop: the first byte says whether the rest is its result, its sidecar or the series'.
+ * The index is made again from what is there; the archive opens, and each file that was not used is told in
+ * one line.
+ */
+#include <fcntl.h>
+#include <ftw.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "host/archive/archive.h"
+#include "tests/fuzz/fuzz.h"
+
+static char folder[64], series_file[200], drop_file[200], *series_text, *drop_text;
+
+static int remove_one(const char *path, const struct stat *status, int type, struct FTW *walk)
+{
+	(void)status;
+	(void)type;
+	(void)walk;
+	return remove(path);
+}
+
+static void clean(void)
+{
+	nftw(folder, remove_one, 8, FTW_DEPTH | FTW_PHYS);
+}
+
+static char *load(const char *file)
+{
+	char *text = calloc(1, 65536);
+	int fd = open(file, O_RDONLY);
+
+	if (text == NULL || fd < 0 || read(fd, text, 65535) <= 0)
+		fuzz_fail("%s", file);
+	close(fd);
+	return text;
+}
+
+static void store(const char *file, const void *bytes, size_t size)
+{
+	int fd = open(file, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+
+	if (fd < 0 || write(fd, bytes, size) != (ssize_t)size)
+		fuzz_fail("%s", file);
+	close(fd);
+}
+
+static struct archive *open_archive(void)
+{
+	char message[ARCHIVE_MESSAGE_MAX];
+	struct archive *archive = archive_open(folder, ARCHIVE_CREATE, message);
+
+	if (archive == NULL)
+		fuzz_fail("%s", message);
+	return archive;
+}
+
+static void begin(void)
+{
+	static const char log[] = "(1.000000) can0 701#05\n";
+	struct archive *archive;
+	struct archive_recording r;
+
+	snprintf(folder, sizeof(folder), "/dev/shm/droptower-fuzz-XXXXXX");
+	if (mkdtemp(folder) == NULL)
+		fuzz_fail("no folder");
+	atexit(clean);
+	archive = open_archive();
+	if (archive_new_series(archive, "one", "default", "common/scenes/geometry-2A.ini", 25, 0.894, 5) !=
+	            0 ||
+	    archive_begin(archive, "one", "Ann", ".log", false, &r) != 0)
+		fuzz_fail("%s", archive_message(archive));
+	store(r.log, log, sizeof(log) - 1);
+	snprintf(drop_file, sizeof(drop_file), "%.190s", r.log);
+	strcpy(strrchr(drop_file, '.'), ".ini");
+	snprintf(series_file, sizeof(series_file), "%.*s/series.ini",
+	         (int)(strrchr(drop_file, '/') - drop_file), drop_file);
+	if (archive_finish(archive, &r, 1, "") != 0)
+		fuzz_fail("%s", archive_message(archive));
+	archive_close(archive);
+	series_text = load(series_file);
+	drop_text = load(drop_file);
+}
+
+static void told(void *context, const char *text)
+{
+	(void)context;
+	if (text[0] == '\0' || strchr(text, '\n') != NULL)
+		fuzz_fail("no line: \"%s\"", text);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
+{
+	static unsigned times;
+	struct archive *archive;
+	char json[4096], message[ARCHIVE_MESSAGE_MAX];
+
+	if (folder[0] == '\0')
+		begin();
+	if (size < 1 || size > sizeof(json))
+		return 0;
+	if (bytes[0] % 3 == 0) {
+		memcpy(json, bytes + 1, size - 1);
+		json[size - 1] = '\0';
+		archive = open_archive();
+		if (archive_result(archive, "one/1", "fuzz", json) != 0)
+			told(NULL, archive_message(archive));
+		archive_close(archive);
+		return 0;
+	}
+	store(bytes[0] % 3 == 1 ? drop_file : series_file, bytes + 1, size - 1);
+	if (archive_rebuild(folder, true, told, NULL, message) == 0) {
+		archive = open_archive();
+		(void)!archive_verify(archive, NULL, 0, told, NULL);
+		archive_close(archive);
+	}
+	store(drop_file, drop_text, strlen(drop_text));
+	store(series_file, series_text, strlen(series_text));
+	if (++times % 50 == 0) { /* rebuilding keeps what it replaces */
+		clean();
+		free(series_text);
+		free(drop_text);
+		begin();
+	}
+	return 0;
+}

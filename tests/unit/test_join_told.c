@@ -1,0 +1,112 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * The join and what follows a capture end: a log's capture is whole when all of it has come, and is taken
+ * before the next one replaces it.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <string.h>
+
+#include "host/record/join.h"
+#include "tests/unit/join_by_hand.h"
+
+enum { TICKS = 6, FOLLOW = 1 + WIRE_PARAMETERS };
+
+static void begin_capture(void)
+{
+	hand_fill(&drop, 1000, TICKS, 5);
+	join_by_hand_feed_both(0, TICKS - 1);
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	assert_true(join_complete(join));
+}
+
+static void told_when_all_has_come(void **state)
+{
+	struct record record;
+	struct frame frame;
+
+	(void)state;
+	for (unsigned i = 0; i < FOLLOW; i++) { /* before its capture end it is of no capture */
+		hand_told(&drop, i, &frame);
+		assert_int_equal(join_feed(join, &frame), 0);
+	}
+	assert_false(join_told(join));
+	begin_capture();
+	for (unsigned i = 0; i < FOLLOW; i++) {
+		hand_told(&drop, i, &frame);
+		assert_int_equal(join_feed(join, &frame), 0);
+	}
+	assert_true(join_told(join));
+	assert_int_equal(join_take(join, &record), 0);
+	assert_true(record.measured_known);
+	assert_true(record.parameters_known);
+	assert_true(record.seal_known);
+	assert_int_equal(record.counters.corrupt, 0);
+	record_free(&record);
+	assert_false(join_told(join));
+}
+
+static void damage_is_counted(void **state)
+{
+	struct record record;
+	struct frame frame;
+
+	(void)state;
+	begin_capture();
+	hand_told(&drop, 0, &frame);
+	frame.data[2] ^= 1;
+	assert_int_equal(join_feed(join, &frame), 0);
+	for (unsigned i = 1; i < FOLLOW; i++) {
+		hand_told(&drop, i, &frame);
+		assert_int_equal(join_feed(join, &frame), 0);
+	}
+	assert_false(join_told(join));
+	hand_capture_end(&drop, &frame); /* and a capture end whose seal does not agree */
+	frame.data[4] ^= 1;
+	assert_int_equal(join_feed(join, &frame), 0);
+	hand_capture_end(&drop, &frame); /* and one of more ticks than any drop has, under its seal */
+	frame.data[11] ^= 0x40;
+	hand_seal(&frame);
+	assert_int_equal(join_feed(join, &frame), 0);
+	assert_int_equal(join_take(join, &record), 0);
+	assert_false(record.measured_known);
+	assert_int_equal(record.counters.corrupt, 3);
+	record_free(&record);
+}
+
+static void only_another_capture_is_news(void **state)
+{
+	struct frame end, other;
+
+	(void)state;
+	begin_capture();
+	hand_capture_end(&drop, &end);
+	assert_false(join_is_news(join, &end));
+	other = end;
+	other.data[0] ^= 1; /* another drop, under its seal */
+	hand_seal(&other);
+	assert_true(join_is_news(join, &other));
+	other.data[1] ^= 1; /* altered */
+	assert_false(join_is_news(join, &other));
+	hand_seal(&other);
+	other.id = 0x680;
+	assert_false(join_is_news(join, &other));
+	other.id = 0x682;
+	assert_false(join_is_news(join, &other));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test_setup_teardown(told_when_all_has_come, join_by_hand_begin, join_by_hand_end),
+	        cmocka_unit_test_setup_teardown(damage_is_counted, join_by_hand_begin, join_by_hand_end),
+	        cmocka_unit_test_setup_teardown(only_another_capture_is_news, join_by_hand_begin,
+	                                        join_by_hand_end),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,148 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "host/record/log_file.h"
+#include "tests/unit/drop_by_hand.h"
+
+enum { BYTES = 5 << 20 };
+
+static char *bytes;
+
+/* Lines of 0 to 300 bytes, one of 200 000, one of 3 000 000; what is in a byte tells where it is. */
+static int begin(void **state)
+{
+	uint32_t random = 7;
+
+	(void)state;
+	bytes = malloc(BYTES);
+	if (bytes == NULL)
+		return -1;
+	for (size_t i = 0; i < BYTES; i++)
+		bytes[i] = (char)(32 + (i * 2654435761u >> 13) % 90);
+	for (size_t at = 0; at < BYTES; at += random >> 8) {
+		bytes[at] = '\n';
+		random = random * 1664525u + 1013904223u;
+		random = (random & ~0xFFFFFFu) | (random & 0xFFFFFFu) % (300u << 8);
+		random = ((random & 0xFFFFFFu) | 256u);
+		if (at > BYTES / 8 && at < BYTES / 8 + 400)
+			random = 200000u << 8;
+		if (at > BYTES / 4 && at < BYTES / 4 + 400)
+			random = 3000000u << 8;
+	}
+	return 0;
+}
+
+static int end(void **state)
+{
+	(void)state;
+	free(bytes);
+	return 0;
+}
+
+static struct log_file open_log(const char *file)
+{
+	char message[READ_MESSAGE_MAX] = "";
+	struct log_file log;
+
+	if (log_file_open(&log, file, "a recording", message) != 0)
+		fail_msg("%s", message);
+	return log;
+}
+
+static void test_bytes_by_their_place(void **state)
+{
+	char *file = hand_file("", bytes, BYTES), message[READ_MESSAGE_MAX];
+	struct log_file log = open_log(file);
+	uint32_t random = 1;
+
+	(void)state;
+	print_message("# seed 1\n");
+	assert_int_equal(log.size, BYTES);
+	for (unsigned i = 0; i < 3000; i++) {
+		size_t at, want, held;
+		const char *got;
+
+		random = random * 1664525u + 1013904223u;
+		at = i % 3 ? (size_t)i * (BYTES / 3000) : random % (BYTES + 100);
+		want = i % 7 == 0 ? random % (2u << 20) : random % 1000;
+		got = log_file_get(&log, at, want, &held);
+		if (at < BYTES)
+			assert_true(held >= (want < BYTES - at ? want : BYTES - at));
+		assert_true(held <= (at < BYTES ? BYTES - at : 0));
+		if (held > 0)
+			assert_memory_equal(got, bytes + at, held);
+	}
+	assert_true(log.room <= 4u << 20); /* what was asked for, not what is there */
+	assert_int_equal(log_file_error(&log, message), 0);
+	log_file_close(&log);
+	hand_unlink(file);
+}
+
+static void test_lines(void **state)
+{
+	char *file = hand_file("", bytes, BYTES);
+	struct log_file log = open_log(file);
+	struct log_line line = {0};
+	size_t at = 0, longest = 0;
+	uint64_t number = 0;
+
+	(void)state;
+	while (log_file_next_line(&log, log.size, &line)) {
+		const char *found = memchr(bytes + at, '\n', BYTES - at);
+		size_t length = (size_t)((found != NULL ? found : bytes + BYTES) - (bytes + at));
+
+		assert_int_equal(line.at, at);
+		assert_int_equal(line.number, ++number);
+		assert_int_equal(line.length, length < LOG_LINE_MAX ? length : LOG_LINE_MAX);
+		assert_memory_equal(line.text, bytes + at, line.length);
+		at += length + (found != NULL);
+		assert_int_equal(line.next, at);
+		longest = length > longest ? length : longest;
+	}
+	assert_int_equal(at, BYTES);
+	assert_true(longest > 2000000);
+	assert_true(log.room <= 1u << 20);
+	log_file_close(&log);
+	hand_unlink(file);
+}
+
+/* A log that becomes shorter while it is read is not taken for one that ends there. */
+static void test_a_log_that_is_cut_meanwhile(void **state)
+{
+	char *file = hand_file("", bytes, BYTES), message[READ_MESSAGE_MAX] = "";
+	struct log_file log = open_log(file);
+	struct log_line line = {0};
+
+	(void)state;
+	assert_true(log_file_next_line(&log, log.size, &line));
+	assert_int_equal(truncate(file, 2 << 20), 0);
+	while (log_file_next_line(&log, log.size, &line))
+		continue;
+	assert_true(line.next <= 2 << 20);
+	assert_int_equal(log_file_error(&log, message), DT_E_SYSTEM);
+	assert_non_null(strstr(message, "cut while it was read"));
+	log_file_close(&log);
+	hand_unlink(file);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        TEST(test_bytes_by_their_place),
+	        TEST(test_lines),
+	        TEST(test_a_log_that_is_cut_meanwhile),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
