@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "host/record/whole.h"
-#include "host/report/measured.h"
+#include "host/result/measured.h"
 #include "host/report/page.h"
 #include "host/report/shock.h"
 

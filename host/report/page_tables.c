@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "host/report/page.h"
+#include "host/result/quantity.h"
 
 enum { GAPS_MAX = 20 }; /* listed */
 
@@ -60,12 +61,22 @@ static void results(struct page *page)
 	      out);
 }
 
-static void joint_row(FILE *out, const char *label, const char *unit, int decimals, double value,
-                      double sigma, enum estimate_status status)
+/* A row for each value that has a label; "?" in front of it: none without a value. */
+static void joint_rows(FILE *out, enum quantity_object which, const void *object)
 {
-	fprintf(out, "<tr><td>%s</td><td>", label);
-	page_with_sigma(out, decimals, value, sigma);
-	fprintf(out, " %s</td><td class=\"text\">%s</td></tr>\n", unit, estimate_status_name(status));
+	const struct quantity *q = NULL;
+
+	while ((q = quantity_next(which, q))) {
+		bool optional = q->label[0] == '?';
+		double value = quantity_number(q, object), scale = quantity_scale(q);
+
+		if (!q->label[0] || (optional && !isfinite(value)))
+			continue;
+		fprintf(out, "<tr><td>%s</td><td>", q->label + optional);
+		page_with_sigma(out, q->digits, value * scale, quantity_sigma(q, object) * scale);
+		fprintf(out, " %s</td><td class=\"text\">%s</td></tr>\n", q->shown,
+		        estimate_status_name(quantity_status(q, object)));
+	}
 }
 
 static void joint(struct page *page)
@@ -79,46 +90,14 @@ static void joint(struct page *page)
 	      "class=\"small\"><tr><th>quantity</th><th>value</th>"
 	      "<th class=\"text\">status</th></tr>\n",
 	      out);
-	if (a->has_lag) {
-		const struct estimate_lag *l = &a->lag;
-
-		if (report_driven(page->report))
-			joint_row(out, "S1 after S2, driven oscillator", "ms", 4, l->driven_s * 1e3,
-			          l->sigma_driven_s * 1e3, l->driven.status);
-		joint_row(out, "S1 after S2, first peaks", "ms", 3, l->first_peak_s * 1e3, (double)NAN,
-		          l->status);
-		joint_row(out, "S1 after S2, largest peaks", "ms", 4, l->largest_peak_s * 1e3,
-		          l->sigma_s * 1e3, l->status);
-		joint_row(out, "S1 after S2, cross-correlation", "ms", 3, l->cross_correlation_s * 1e3,
-		          (double)NAN, l->status);
-		joint_row(out, "spread of the three", "ms", 3, l->spread_s * 1e3, (double)NAN, l->status);
-	}
-	if (a->has_plate) {
-		const struct estimate_ringdown *p = &a->plate;
-
-		joint_row(out, "plate frequency, damped", "Hz", 2, p->frequency_hz, p->sigma_hz,
-		          p->how.status);
-		joint_row(out, "plate frequency, undamped", "Hz", 2, p->natural_frequency_hz,
-		          p->sigma_natural_hz, p->how.status);
-		joint_row(out, "plate frequency, counted over three cycles", "Hz", 2,
-		          p->three_cycle_frequency_hz, (double)NAN, p->how.status);
-		if (isfinite(p->small_swing_hz))
-			joint_row(out, "plate frequency as the swing vanishes", "Hz", 2, p->small_swing_hz,
-			          (double)NAN, p->how.status);
-		joint_row(out, "plate damping ratio", "", 4, p->damping_ratio, p->sigma_damping,
-		          p->how.status);
-		if (isfinite(p->second_frequency_hz))
-			joint_row(out, "second mode", "Hz", 2, p->second_frequency_hz, (double)NAN,
-			          p->how.status);
-	}
-	if (a->has_rebound) {
-		const struct estimate_rebound *r = &a->rebound;
-
-		joint_row(out, "rebound by velocity change", "", 3, r->velocity_ratio,
-		          r->sigma_velocity_ratio, r->status);
-		joint_row(out, "rebound by time of flight", "", 4, r->flight_ratio, r->sigma_flight_ratio,
-		          isfinite(r->flight_ratio) ? r->status : ESTIMATE_SHORT);
-	}
+	if (a->has_lag && report_driven(page->report))
+		joint_rows(out, QUANTITY_DRIVEN, &a->lag);
+	if (a->has_lag)
+		joint_rows(out, QUANTITY_LAG, &a->lag);
+	if (a->has_plate)
+		joint_rows(out, QUANTITY_RINGDOWN, &a->plate);
+	if (a->has_rebound)
+		joint_rows(out, QUANTITY_REBOUND, &a->rebound);
 	fputs("</table></div>\n", out);
 }
 

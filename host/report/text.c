@@ -4,8 +4,9 @@
 #include <string.h>
 
 #include "host/report/facts.h"
-#include "host/report/measured.h"
+#include "host/result/measured.h"
 #include "host/report/shock.h"
+#include "host/result/quantity.h"
 
 enum { TEXT_GAPS_MAX = 8, TEXT_WIDTH = 90 };
 
@@ -163,58 +164,51 @@ static void with_sigma(FILE *out, int decimals, double value, double sigma)
 	}
 }
 
+/* A value among the words that the table has around it; "?" in front: nothing without a value. */
+static void write_quantity(const struct quantity *q, const void *object, FILE *out)
+{
+	bool optional = q->text[0] == '?';
+	const char *before = q->text + optional, *behind = strchr(before, '%');
+	double value = quantity_number(q, object), scale = quantity_scale(q);
+
+	if (!behind || (optional && !isfinite(value)))
+		return;
+	fprintf(out, "%.*s", (int)(behind - before), before);
+	with_sigma(out, q->digits, value * scale, quantity_sigma(q, object) * scale);
+	fputs(behind + 1, out);
+}
+
+static void write_all(enum quantity_object which, const void *object, FILE *out)
+{
+	const struct quantity *q = NULL;
+
+	while ((q = quantity_next(which, q)))
+		write_quantity(q, object, out);
+}
+
 static void write_lag(const struct report *report, FILE *out)
 {
 	const struct estimate_lag *lag = &report->analysis->lag;
 
-	fprintf(out, "S1 after S2: ");
-	if (report_driven(report)) {
-		fprintf(out, "driven oscillator");
-		with_sigma(out, 4, lag->driven_s * 1e3, lag->sigma_driven_s * 1e3);
-		fprintf(out, " ms\n  by peaks: ");
-	}
-	fprintf(out, "first");
-	cell(out, 1, 3, lag->first_peak_s * 1e3);
-	fprintf(out, ", largest");
-	with_sigma(out, 4, lag->largest_peak_s * 1e3, lag->sigma_s * 1e3);
-	fprintf(out, ", correlation");
-	cell(out, 1, 3, lag->cross_correlation_s * 1e3);
-	fprintf(out, "; spread");
-	cell(out, 1, 3, lag->spread_s * 1e3);
-	fprintf(out, " ms  %s\n", estimate_status_name(lag->status));
+	fprintf(out, "S1 after S2:");
+	if (report_driven(report))
+		write_all(QUANTITY_DRIVEN, lag, out);
+	write_all(QUANTITY_LAG, lag, out);
+	fprintf(out, "  %s\n", estimate_status_name(lag->status));
 }
 
 static void write_plate(const struct estimate_ringdown *plate, FILE *out)
 {
 	fprintf(out, "plate:");
-	with_sigma(out, 2, plate->frequency_hz, plate->sigma_hz);
-	fprintf(out, " Hz damped,");
-	with_sigma(out, 2, plate->natural_frequency_hz, plate->sigma_natural_hz);
-	fprintf(out, " undamped,");
-	cell(out, 1, 2, plate->three_cycle_frequency_hz);
-	fprintf(out, " counted over three cycles\n  damping");
-	with_sigma(out, 4, plate->damping_ratio, plate->sigma_damping);
-	if (isfinite(plate->small_swing_hz)) {
-		fprintf(out, ";");
-		cell(out, 1, 2, plate->small_swing_hz);
-		fprintf(out, " Hz as the swing vanishes");
-	}
-	if (isfinite(plate->second_frequency_hz)) {
-		fprintf(out, "; second mode");
-		cell(out, 1, 2, plate->second_frequency_hz);
-		fprintf(out, " Hz, damping");
-		cell(out, 1, 4, plate->second_damping_ratio);
-	}
+	write_all(QUANTITY_RINGDOWN, plate, out);
 	fprintf(out, "  (%s) %s\n", plate->how.method, estimate_status_name(plate->how.status));
 }
 
 static void write_rebound(const struct estimate_rebound *rebound, FILE *out)
 {
 	fprintf(out, "rebound:");
-	with_sigma(out, 3, rebound->velocity_ratio, rebound->sigma_velocity_ratio);
-	fprintf(out, " by velocity change,");
-	with_sigma(out, 4, rebound->flight_ratio, rebound->sigma_flight_ratio);
-	fprintf(out, " by time of flight  %s\n", estimate_status_name(rebound->status));
+	write_all(QUANTITY_REBOUND, rebound, out);
+	fprintf(out, "  %s\n", estimate_status_name(rebound->status));
 }
 
 static void write_joint(const struct report *report, FILE *out)

@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_REPORT_MEASURED_H
-#define DT_HOST_REPORT_MEASURED_H
+#ifndef DT_HOST_RESULT_MEASURED_H
+#define DT_HOST_RESULT_MEASURED_H
 /*
- * What a drop has measured of its tower, in SI units: from the record to text and JSON.
+ * What a drop has measured of its tower, in SI units: of the record.
  */
 #include <stdbool.h>
 #include <stddef.h>
 
 #include "host/record/record.h"
-#include "host/report/put.h"
 
 /* NAN: not measured. */
 struct measured {
@@ -20,6 +19,8 @@ struct measured {
 	double latch_delay_s;     /* from RELEASE to the start of the motion */
 	double clock_ratio_ppm;   /* sample clock of X against that of Y and Z */
 	double trigger_latency_s;
+	double parameters_crc32;
+	bool seal_agrees, calibrated;
 };
 
 /* All NAN when the record has none. */
@@ -27,8 +28,5 @@ struct measured measured_of(const struct record *record);
 
 /* "magnet drop-out 8.02 ms (planned with 8.00), ..."; "" when there is none. */
 void measured_text(const struct record *record, char *text, size_t size);
-
-/* "tower" in root: an object, or null when the record is no drop of ours. */
-void measured_put(struct builder *b, cJSON *root, const struct record *record);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/report/measured.h"
+#include "host/result/measured.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -16,11 +16,18 @@ static double u16(uint16_t value, double scale)
 struct measured measured_of(const struct record *record)
 {
 	const struct wire_measured *m = &record->measured;
-	struct measured none = {NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+	struct measured all = {NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, false, false};
 
+	all.seal_agrees = record->seal_agrees;
+	all.calibrated = (record->marks & WIRE_MARK_CALIBRATED) != 0;
+	if (record->crc_known && record->seal_known)
+		all.parameters_crc32 = record->parameters_crc32;
 	if (!record->measured_known)
-		return none;
+		return all;
 	return (struct measured){
+	        .seal_agrees = all.seal_agrees,
+	        .calibrated = all.calibrated,
+	        .parameters_crc32 = all.parameters_crc32,
 	        .dropout_s = u16(m->dropout_us, 1e-6),
 	        .dropout_used_s = u16(m->dropout_used_us, 1e-6),
 	        .separation_m = m->separation_um == UINT32_MAX ? (double)NAN : m->separation_um * 1e-6,
@@ -54,7 +61,7 @@ void measured_text(const struct record *record, char *text, size_t size)
 
 	text[0] = '\0';
 	add(text, size, m.dropout_s, "magnet drop-out %.2f ms (planned with %.2f ms%s)", m.dropout_s * 1e3,
-	    m.dropout_used_s * 1e3, record->marks & WIRE_MARK_CALIBRATED ? ", calibrated" : "");
+	    m.dropout_used_s * 1e3, m.calibrated ? ", calibrated" : "");
 	add(text, size, m.separation_m, "separated at %.1f mm", m.separation_m * 1e3);
 	add(text, size, m.separation_speed_m_s, "%.3f m/s", m.separation_speed_m_s);
 	add(text, size, m.acceleration_m_s2, "frame %.3f m/s2", m.acceleration_m_s2);
@@ -63,28 +70,4 @@ void measured_text(const struct record *record, char *text, size_t size)
 	add(text, size, m.trigger_latency_s, "trigger after %.2f ms", m.trigger_latency_s * 1e3);
 	if (record->crc_known && record->seal_known)
 		add(text, size, 0.0, "parameters %08" PRIx32, record->parameters_crc32);
-}
-
-void measured_put(struct builder *b, cJSON *root, const struct record *record)
-{
-	struct measured m = measured_of(record);
-	cJSON *tower;
-
-	if (!record->is_drop) {
-		put_item(b, root, "tower", cJSON_CreateNull());
-		return;
-	}
-	tower = put_object(b, root, "tower");
-	put_bool(b, tower, "seal_agrees", record->seal_agrees);
-	put_bool(b, tower, "calibrated", (record->marks & WIRE_MARK_CALIBRATED) != 0);
-	put_number(b, tower, "dropout_s", m.dropout_s);
-	put_number(b, tower, "dropout_used_s", m.dropout_used_s);
-	put_number(b, tower, "separation_m", m.separation_m);
-	put_number(b, tower, "separation_speed_m_s", m.separation_speed_m_s);
-	put_number(b, tower, "acceleration_m_s2", m.acceleration_m_s2);
-	put_number(b, tower, "latch_delay_s", m.latch_delay_s);
-	put_number(b, tower, "clock_ratio_ppm", m.clock_ratio_ppm);
-	put_number(b, tower, "trigger_latency_s", m.trigger_latency_s);
-	put_number(b, tower, "parameters_crc32",
-	           record->crc_known && record->seal_known ? (double)record->parameters_crc32 : (double)NAN);
 }
