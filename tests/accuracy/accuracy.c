@@ -11,14 +11,14 @@
 
 #include "tests/accuracy/cells.h"
 
-static int judge(const struct cells *cells, bool quiet)
+static int judge(const struct cells *cells, enum cells_print print)
 {
 	unsigned failed = 0, judged = 0;
 
 	for (int group = 0; group < GROUPS; group++) {
 		unsigned more;
 
-		failed += cells_judge(cells, (enum group)group, 0, quiet, &more);
+		failed += cells_judge(cells, (enum group)group, 0, print, &more);
 		judged += more;
 	}
 	printf("%u cells, %u out of their limits\n", judged, failed);
@@ -29,13 +29,13 @@ int main(int argc, char **argv)
 {
 	struct cells_options options = {.drops = 10000, .all = true};
 	struct cells cells;
-	bool quiet = false;
+	enum cells_print print = CELLS_ALL;
 	long processors = sysconf(_SC_NPROCESSORS_ONLN);
 	int code;
 
 	for (int i = 1; i < argc; i++) {
 		if (strcmp(argv[i], "--quiet") == 0)
-			quiet = true;
+			print = CELLS_FAILURES;
 		else if (strcmp(argv[i], "--drops") == 0 && i + 1 < argc)
 			options.drops = (unsigned)strtoul(argv[++i], NULL, 10);
 		else if (strcmp(argv[i], "--only") == 0 && i + 1 < argc)
@@ -50,7 +50,7 @@ int main(int argc, char **argv)
 	       options.drops);
 	fflush(stdout);
 	cells_run(&options, &cells);
-	code = judge(&cells, quiet);
+	code = judge(&cells, print);
 	cells_free(&cells);
 	return code;
 }

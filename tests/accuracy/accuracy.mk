@@ -3,7 +3,8 @@
 # Estimates against their Cramer-Rao bounds: a short set for `make test`, the long one for `make accuracy`.
 
 ACCURACY_C = $(wildcard tests/accuracy/*.c)
-ACCURACY_O = $(call obj,$(filter-out %/accuracy.c %/test_accuracy.c,$(ACCURACY_C))) $(BUILD)/obj/tests/unit/synth.o
+KNOCKOUT_C = $(wildcard tests/accuracy/knockout*.c)
+ACCURACY_O = $(call obj,$(filter-out %/accuracy.c %/test_accuracy.c $(KNOCKOUT_C),$(ACCURACY_C))) $(BUILD)/obj/tests/unit/synth.o
 ALL_O += $(call obj,$(ACCURACY_C))
 $(call obj,$(ACCURACY_C)): CPPFLAGS += $(LINUX)
 
@@ -13,6 +14,15 @@ $(BUILD)/tests/accuracy $(BUILD)/tests/test_accuracy: $(BUILD)/tests/%: $(BUILD)
 	$(Q)mkdir -p $(@D) && $(CC) $(LDFLAGS) $(filter %.o,$^) -Wl,--start-group $(filter %.a,$^) -Wl,--end-group \
 		$(LIBRARIES) -lcmocka -o $@
 
+# The same library: what a mechanism is reached by is led through knockout_wrap.c by the linker.
+KNOCKOUT_WRAPS = $(shell sed -n 's/^WRAP.[a-z _]*, \([a-z_]*\),.*/\1/p; s/^.* __wrap_\([a-z_]*\)(.*);$$/\1/p' \
+	tests/accuracy/knockout_wrap.c)
+
+$(BUILD)/tests/knockout: $(call obj,$(KNOCKOUT_C)) $(ACCURACY_O) $(foreach l,host link common,$(call lib,$l))
+	$(call say,LINK,$@)
+	$(Q)mkdir -p $(@D) && $(CC) $(LDFLAGS) $(KNOCKOUT_WRAPS:%=-Wl,--wrap=%) $(filter %.o,$^) \
+		-Wl,--start-group $(filter %.a,$^) -Wl,--end-group $(LIBRARIES) -o $@
+
 # Only the plain build measures.
 ifeq ($(SANITIZE)$(COVERAGE),)
 tests: $(BUILD)/tests/test_accuracy
@@ -20,10 +30,25 @@ endif
 
 DROPS ?= 10000
 
-.PHONY: accuracy chart
+.PHONY: accuracy knockout chart
 accuracy: setup ## every estimate against its Cramer-Rao bound, thousands of drops of known truth (DROPS=)
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(BUILD)/tests/accuracy
 	@$(BUILD)/tests/accuracy --drops $(DROPS)
+
+# Drops of our own tower, in virtual time; recordings where somebody has put them.
+KNOCKOUT_DROPS = $(foreach s,geometry-1 geometry-2A geometry-2B,$(foreach a,15 20 25 30 35,$(BUILD)/knockout/$s-$a.log))
+KNOCKOUT_DATA = $(patsubst %,%=time:ms$(,)a:g$(,)-$(,)-$(,)-$(,)-,$(wildcard ../shared/data/afrl_in_situ/*.txt)) \
+	$(patsubst %,%=time:s$(,)a:g,$(wildcard ../shared/data/repeated_impacts/acc_*.txt)) \
+	$(patsubst %,%=time:s$(,)x:m/s2$(,)y:m/s2$(,)z:m/s2$(,)-,$(wildcard ../shared/data/phone_fall/*.csv))
+, = ,
+
+$(BUILD)/knockout/%.log: $(BUILD)/droptower-bench $(BUILD)/droptower-firmware
+	$(Q)mkdir -p $(@D)
+	$(Q)drop=$*; $(BUILD)/droptower-bench --operate --pace max --quiet --seed 1 --log $@ \
+		--scene common/scenes/$${drop%-*}.ini --angle $${drop##*-}
+
+knockout: all $(BUILD)/tests/knockout $(KNOCKOUT_DROPS) ## what each special mechanism of the estimators is worth
+	@$(BUILD)/tests/knockout $(KNOCKOUT_DROPS) $(KNOCKOUT_DATA)
 
 # What README.md and host/chart/README.md show; the other pictures stay in the build folder.
 SHOWN = accuracy-peak accuracy-plate-peak accuracy-frequency stability-peak stability-frequency \

@@ -346,7 +346,7 @@ static void find_bounds(const struct cell_scene *cell, double *bound)
 }
 
 /* Of every scene, each signal once. */
-static void take_bounds(struct cells *cells)
+static void compute_bounds(struct cells *cells)
 {
 	for (unsigned i = 0; i < cells->count; i++) {
 		struct cell_scene *cell = &cells->scene[i];
@@ -366,6 +366,15 @@ static void take_bounds(struct cells *cells)
 			                               : as * noise / stage_noise(&cells->scene[like].scene);
 		}
 	}
+}
+
+static void take_bounds(struct cells *cells, const struct cells *from)
+{
+	for (unsigned i = 0; from && i < cells->count; i++)
+		for (int q = 0; q < QUANTITIES; q++)
+			cells->scene[i].tally[q].bound = from->scene[i].tally[q].bound;
+	if (!from)
+		compute_bounds(cells);
 }
 
 static void run_scene(struct cell_scene *cell, unsigned drops)
@@ -420,7 +429,7 @@ void cells_run(const struct cells_options *options, struct cells *cells)
 	if (cells->scene == MAP_FAILED)
 		abort();
 	cells->count = spread(options, cells->scene);
-	take_bounds(cells);
+	take_bounds(cells, options->bounds);
 	for (unsigned job = 0; job < options->jobs; job++) {
 		pid_t child = fork();
 

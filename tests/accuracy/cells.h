@@ -85,10 +85,11 @@ struct cells {
 };
 
 struct cells_options {
-	unsigned drops;   /* of each scene */
-	bool all;         /* else the short set: sigma 1 g and what must never fail */
-	unsigned jobs;    /* processes */
-	const char *only; /* part of a scene's name; NULL: all of them */
+	unsigned drops;             /* of each scene */
+	bool all;                   /* else the short set: sigma 1 g and what must never fail */
+	unsigned jobs;              /* processes */
+	const char *only;           /* part of a scene's name; NULL: all of them */
+	const struct cells *bounds; /* of the same scenes, to take the bounds from; NULL: they are computed */
 };
 
 /* Runs every scene. Ends the program when it cannot. Free with cells_free. */
@@ -97,8 +98,11 @@ void cells_free(struct cells *cells);
 
 const char *group_name(enum group group);
 
+enum cells_print { CELLS_ALL, CELLS_FAILURES, CELLS_NOTHING };
+
 /* Prints a line for every cell of the group that has a limit; returns how many fail. slack: standard
- * deviations of the Monte Carlo's own scatter that the limits are widened by. quiet: failures only. */
-unsigned cells_judge(const struct cells *cells, enum group group, double slack, bool quiet, unsigned *judged);
+ * deviations of the Monte Carlo's own scatter that the limits are widened by. */
+unsigned cells_judge(const struct cells *cells, enum group group, double slack, enum cells_print print,
+                     unsigned *judged);
 
 #endif

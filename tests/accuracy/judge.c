@@ -101,7 +101,7 @@ static const char *const quantity_names[QUANTITIES] = {
 struct judgement {
 	const struct cells *cells;
 	double slack;
-	bool quiet;
+	enum cells_print print;
 	unsigned judged, failed;
 };
 
@@ -110,7 +110,7 @@ static void say(struct judgement *j, const struct cell_scene *cell, const char *
 {
 	j->judged++;
 	j->failed += !ok;
-	if (j->quiet && ok)
+	if (j->print == CELLS_NOTHING || (j->print == CELLS_FAILURES && ok))
 		return;
 	printf("# %-17s %-26s %s %5.1f g  %-12s %s  %s\n", group_name(cell->group), cell->scene.name,
 	       cell->scene.geometry == STAGE_2A ? "2A" : "2B", cell->scene.noise_g, what, figures,
@@ -201,9 +201,10 @@ static void judge_scene(struct judgement *j, const struct cell_scene *cell)
 		               QUANTITY_PEAK_X);
 }
 
-unsigned cells_judge(const struct cells *cells, enum group group, double slack, bool quiet, unsigned *judged)
+unsigned cells_judge(const struct cells *cells, enum group group, double slack, enum cells_print print,
+                     unsigned *judged)
 {
-	struct judgement j = {cells, slack, quiet, 0, 0};
+	struct judgement j = {cells, slack, print, 0, 0};
 
 	for (unsigned i = 0; i < cells->count; i++)
 		if (cells->scene[i].group == group)
