@@ -2,18 +2,24 @@
 #ifndef DT_HOST_ESTIMATE_BRIDGE_H
 #define DT_HOST_ESTIMATE_BRIDGE_H
 /*
- * A trace as a function of time where one is needed between the samples: the cubic through the four around,
- * holes of up to BRIDGE_MAX samples bridged by straight lines, longer ones and what lies outside taken as 0.
- * Leaving holes out instead would favour the shift at which the hole costs least.
+ * What stands in for missing samples, and a trace as a function of time where one is needed between samples.
+ *
+ * A hole of up to BRIDGE_CUBIC samples is the cubic through the two good samples on either side, a longer one
+ * or one beside another hole the straight line. As a function of time a trace is the cubic through the four
+ * samples around; holes of more than BRIDGE_MAX samples and what lies outside are 0 there. Leaving holes out
+ * instead would favour the shift at which the hole costs least.
  */
 #include <stddef.h>
 #include <string.h>
 
 #include "host/estimate/trace.h"
 
-enum { BRIDGE_MAX = 64 };
+enum { BRIDGE_CUBIC = 10, BRIDGE_MAX = 64 };
 
-/* Sample k where it is missing or outside: the straight line across the hole it lies in. */
+/* Sample k of the hole [from, until), between good samples. */
+double bridge_over(const struct trace *trace, size_t from, size_t until, size_t k);
+
+/* Sample k where it is missing or outside. */
 double bridge_hole(const struct trace *trace, ptrdiff_t k);
 
 static inline double bridge_sample(const struct trace *trace, ptrdiff_t k)

@@ -6,49 +6,24 @@
 #include <string.h>
 
 #include "common/units.h"
-#include "host/estimate/baseline.h"
 #include "host/estimate/cfc.h"
-#include "host/estimate/clip.h"
-#include "host/estimate/dropout.h"
+#include "host/estimate/clean.h"
 #include "host/estimate/estimate_private.h"
 #include "host/estimate/filter.h"
 #include "host/estimate/iepe.h"
 #include "host/estimate/pulse.h"
 #include "host/estimate/rebound.h"
-#include "host/estimate/settle.h"
-#include "host/estimate/spike.h"
 
 /* Around the trigger, what belongs to the impact that fired it: the product comes back for another. */
 #define EVENT_BEFORE_S 0.02
 #define EVENT_AFTER_S 0.1
-
-/* What is wrong with single samples, and where zero is without them. */
-static void clean(struct trace *trace, double *scratch, struct estimate_baseline *baseline)
-{
-	struct settle settle = {0};
-	bool marked;
-
-	if (settle_find(trace, &settle))
-		settle_remove(trace, &settle);
-	baseline_find(trace, scratch, baseline);
-	marked = spike_mark(trace, baseline->noise_g);
-	marked |= dropout_mark(trace, baseline->noise_g);
-	if (marked) {
-		trace_marked(trace);
-		if (!baseline_holds(trace, baseline))
-			baseline_find(trace, scratch, baseline);
-	}
-	baseline->doubtful |= settle.extrapolated || settle.inexact;
-	baseline->unsettled |= settle.inexact;
-	clip_judge_twins(trace, baseline->noise_g);
-}
 
 static int prepare(const struct desk *desk, size_t i, struct estimate_baseline *baseline)
 {
 	const struct estimate_options *options = desk->options;
 	struct trace *trace = &desk->work[i].trace;
 
-	clean(trace, desk->scratch, baseline);
+	clean_find(trace, desk->scratch, baseline);
 	baseline_remove(trace, baseline);
 	if (options->iepe_time_constant_s > 0)
 		iepe_undo(trace, baseline->from_s, options->iepe_time_constant_s);

@@ -5,22 +5,20 @@
  * A channel as a spectrum needs it: without holes and without offset, so that one bad sample cannot spoil all
  * of it. What was done is told; the record stays as it is.
  *
- * Holes (lost, bad, spike) of ten samples and less are bridged by the cubic through the two good samples on
- * either side, longer ones by a straight line where it is quiet: below a twentieth of the largest on both
- * sides. Missing samples at the ends are cut off.
+ * Holes (lost, bad, spike) of ten samples and less are bridged as the estimates bridge them (bridge.h),
+ * longer ones by a straight line where it is quiet: below a twentieth of the largest on both sides. Missing
+ * samples at the ends are cut off.
  *
- * The offset is the mean of what comes before the first sample beyond a twentieth of the largest, when that
- * is 64 samples or more and the mean is beyond four of its standard errors, taken from eight parts of it.
+ * Zero is the estimates' (clean.h, baseline.h): offset, drift and hum before the pulse, flagged as there.
  */
 #include "host/estimate/trace.h"
 
 enum {
 	SIGNAL_BRIDGED = 1u << 0,   /* "bridged": the spectrum rests on interpolated samples */
-	SIGNAL_OFFSET = 1u << 1,    /* "offset": there was one of a hundredth of the largest or more */
-	SIGNAL_NO_OFFSET = 1u << 2, /* "offset_unknown": the record starts inside its event */
-	SIGNAL_NOT_ENDED = 1u << 3, /* "not_ended": the last samples are beyond a twentieth of the largest */
-	SIGNAL_REFUSED = 1u << 4,   /* "refused": by spectra, for the holes or for want of samples */
-	SIGNAL_HALF_RATE = 1u << 5, /* "above_half_rate": by spectra whose frequencies go higher */
+	SIGNAL_NO_OFFSET = 1u << 1, /* "offset_unknown": the record starts inside its event */
+	SIGNAL_NOT_ENDED = 1u << 2, /* "not_ended": the last samples are beyond a twentieth of the largest */
+	SIGNAL_REFUSED = 1u << 3,   /* "refused": by spectra, for the holes or for want of samples */
+	SIGNAL_HALF_RATE = 1u << 4, /* "above_half_rate": by spectra whose frequencies go higher */
 };
 
 struct signal {
@@ -28,7 +26,8 @@ struct signal {
 	size_t count;
 	double rate_hz, start_s;
 	double offset_g;     /* taken off, or found and kept; 0 when there is none */
-	double noise_g;      /* per sample, before the event; NAN when that is not known */
+	double noise_g;      /* per sample, before the event; of all of it when it starts inside; NAN when not
+	                        known */
 	size_t bridged;      /* samples */
 	unsigned flags;      /* SIGNAL_* */
 	unsigned data_flags; /* RECORD_FLAG_* of the channel as analysed */
