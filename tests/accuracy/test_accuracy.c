@@ -39,7 +39,8 @@ static int teardown(void **state)
 
 static void judge(void **state)
 {
-	unsigned judged, failed = cells_judge(&cells, *(const enum group *)*state, SLACK, CELLS_FAILURES, &judged);
+	unsigned judged,
+	        failed = cells_judge(&cells, *(const enum group *)*state, SLACK, CELLS_FAILURES, &judged);
 
 	assert_true(judged > 0);
 	assert_int_equal(failed, 0);
