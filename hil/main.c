@@ -2,330 +2,186 @@
 /*
  * droptower-bench: reads the command line, see usage below and hil/README.md.
  */
-#include <errno.h>
-#include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
 #include <signal.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/number.h"
+#include "common/base/option.h"
 #include "common/wire_table.h"
 #include "hil/bench.h"
 #include "hil/scenario.h"
 #include "hil/verdict.h"
 
-static const char usage[] =
-        "droptower-bench --scene FILE (--link URL | --operate) [OPTION]...\n"
-        "droptower-bench --scenario FILE [--firmware COMMAND] [--timeline FILE] [--log FILE] [--truth FILE]\n"
-        "Runs a firmware against the simulated tower. The second form makes one scenario\n"
-        "(hil/scenarios/README.md) and says what was measured and expected.\n"
-        "\n"
-        "  --scene FILE         what is dropped (common/scenes/*.ini)\n"
-        "  --angle DEG          contact angle instead of the scene's\n"
-        "  --link URL           the host's CAN: unix:PATH, can:IF, ...; until SIGINT or SIGTERM\n"
-        "  --operate            no host: a scripted operator in virtual time\n"
-        "  --drops N            as many drops of the operator (1)\n"
-        "  --firmware COMMAND   instead of droptower-firmware beside this program\n"
-        "  --pace max|1         as fast as it goes (with --operate), by the clock (with --link)\n"
-        "  --seed N             of the tower's scatter and noise and of the bus (1)\n"
-        "  --ideal              no noise, no scatter, no high-pass\n"
-        "  --loss P             frames lost, probability, both ways\n"
-        "  --burst N@+SECONDS   N live blocks in a row lost, so long after each impact\n"
-        "  --duplicate P        frames that come twice\n"
-        "  --reorder P          frames held back behind the next 1 to 3\n"
-        "  --cut-resend         no resent block passes\n"
-        "  --fault NAME@SECONDS of the tower, at a virtual time; may be repeated:\n"
-        "                      ";
-
-enum {
-	OPTION_SCENARIO = 1,
-	OPTION_TIMELINE,
-	OPTION_SCENE,
-	OPTION_ANGLE,
-	OPTION_LINK,
-	OPTION_OPERATE,
-	OPTION_DROPS,
-	OPTION_FIRMWARE,
-	OPTION_PACE,
-	OPTION_SEED,
-	OPTION_IDEAL,
-	OPTION_LOSS,
-	OPTION_BURST,
-	OPTION_DUPLICATE,
-	OPTION_REORDER,
-	OPTION_CUT_RESEND,
-	OPTION_FAULT,
-	OPTION_CONTROL,
-	OPTION_LOG,
-	OPTION_TRUTH,
-	OPTION_READY_FD,
-	OPTION_QUIET,
-	OPTION_HELP,
-};
-
-static const struct option options_long[] = {
-        {"scenario", required_argument, NULL, OPTION_SCENARIO},
-        {"timeline", required_argument, NULL, OPTION_TIMELINE},
-        {"scene", required_argument, NULL, OPTION_SCENE},
-        {"angle", required_argument, NULL, OPTION_ANGLE},
-        {"link", required_argument, NULL, OPTION_LINK},
-        {"operate", no_argument, NULL, OPTION_OPERATE},
-        {"drops", required_argument, NULL, OPTION_DROPS},
-        {"firmware", required_argument, NULL, OPTION_FIRMWARE},
-        {"pace", required_argument, NULL, OPTION_PACE},
-        {"seed", required_argument, NULL, OPTION_SEED},
-        {"ideal", no_argument, NULL, OPTION_IDEAL},
-        {"loss", required_argument, NULL, OPTION_LOSS},
-        {"burst", required_argument, NULL, OPTION_BURST},
-        {"duplicate", required_argument, NULL, OPTION_DUPLICATE},
-        {"reorder", required_argument, NULL, OPTION_REORDER},
-        {"cut-resend", no_argument, NULL, OPTION_CUT_RESEND},
-        {"fault", required_argument, NULL, OPTION_FAULT},
-        {"control", required_argument, NULL, OPTION_CONTROL},
-        {"log", required_argument, NULL, OPTION_LOG},
-        {"truth", required_argument, NULL, OPTION_TRUTH},
-        {"ready-fd", required_argument, NULL, OPTION_READY_FD},
-        {"quiet", no_argument, NULL, OPTION_QUIET},
-        {"help", no_argument, NULL, OPTION_HELP},
-        {0},
-};
+enum { NO_FD = 1 << 20 };
 
 /* What is read besides the bench's own options. */
 struct line {
 	struct bench_options bench;
 	const char *scene_file, *scenario_file, *timeline_file;
-	double angle_deg;                      /* NAN: the scene's */
-	bool operate, drops_given, run_option; /* the last: one that a scenario has its own key for */
+	double angle_deg;  /* NAN: the scene's */
+	unsigned ready_fd; /* or NO_FD */
+	bool operate;
 	const char *pace;
 };
 
-__attribute__((format(printf, 1, 2), noreturn)) static void refuse(const char *format, ...)
-{
-	char text[400];
-	va_list arguments;
-
-	va_start(arguments, format);
-	vsnprintf(text, sizeof(text), format, arguments);
-	va_end(arguments);
-	bench_say("%s (--help lists the options)", text);
-	exit(BENCH_USAGE);
-}
-
-static void help(void)
-{
-	fputs(usage, stdout);
-	for (int i = 0; i < TOWER_FAULTS; i++)
-		printf(" %s%s", tower_fault_name((enum tower_fault)i),
-		       i == TOWER_FAULTS / 2 ? "\n                      " : "");
-	fputs("\n"
-	      "  --control PATH       unix datagram socket that takes events as they come, a line each:\n"
-	      "                       fault estop, repair estop, bus burst 20, ... as in a scenario's [at],\n"
-	      "                       and faults, which is answered (hil/README.md)\n"
-	      "  --timeline FILE      picture of a scenario's run, SVG by gnuplot\n"
-	      "  --log FILE           frames on the host's side, candump text in virtual time\n"
-	      "  --truth FILE         converter codes: tick sensor x0..x6 y0..y9 z0..z9\n"
-	      "  --ready-fd N         gets one byte when the firmware runs\n"
-	      "  --quiet              says only what is wrong\n"
-	      "\n"
-	      "Exit: 0 done, 1 a drop of the operator did not end complete and SAFE, or the scenario\n"
-	      "not as expected, 2 usage, 3 scene or scenario unusable, 4 link or firmware\n",
-	      stdout);
-	exit(BENCH_DONE);
-}
-
-static double number(const char *name, const char *text, double min, double max)
-{
-	char *end;
-	double value = strtod(text, &end);
-
-	if (end == text || *end != '\0' || !(value >= min && value <= max))
-		refuse("--%s %s: expected a number from %g to %g", name, text, min, max);
-	return value;
-}
-
-static unsigned long long whole(const char *name, const char *text, unsigned long long min,
-                                unsigned long long max)
-{
-	char *end;
-	unsigned long long value;
-
-	errno = 0;
-	value = strtoull(text, &end, 10);
-	if (*text < '0' || *text > '9' || *end != '\0' || errno != 0 || value < min || value > max)
-		refuse("--%s %s: expected a whole number from %llu to %llu", name, text, min, max);
-	return value;
-}
-
-/* "LEFT@SECONDS" or "LEFT@+SECONDS": copies LEFT and returns the seconds. */
-static double split_at(const char *name, const char *text, char *left, size_t size)
+/* "LEFT@SECONDS" or "LEFT@+SECONDS": copies LEFT and finds the seconds. */
+static bool split_at(const char *text, char *left, size_t size, double *time_s)
 {
 	const char *at = strchr(text, '@');
 
-	if (at == NULL || (size_t)(at - text) >= size)
-		refuse("--%s %s: expected %sSECONDS", name, text,
-		       strcmp(name, "burst") == 0 ? "N@+" : "NAME@");
+	if (at == NULL || (size_t)(at - text) >= size || !number_read(at + 1, 0.0, 1e6, time_s))
+		return false;
 	memcpy(left, text, (size_t)(at - text));
 	left[at - text] = '\0';
-	return number(name, at + 1, 0.0, 1e6);
+	return true;
 }
 
-static void add_fault(struct bench_options *bench, const char *text)
+static int take_fault(const struct option_table *table, const char *name, const char *text, void *into)
 {
-	char name[32];
-	double time_s = split_at("fault", text, name, sizeof(name));
+	struct bench_options *bench = into;
+	struct event event = {.action = EVENT_FAULT, .state = EVENT_AT_TIME};
+	char fault[32];
 
+	if (!split_at(text, fault, sizeof(fault), &event.time_s))
+		return option_wrong(table, "--%s is '%s', expected NAME@SECONDS, from 0 to 1e+06 s", name,
+		                    text);
 	if (bench->event_count == EVENTS_MAX)
-		refuse("--fault %s: only %d faults in a run", text, EVENTS_MAX);
-	for (int i = 0; i < TOWER_FAULTS; i++) {
-		if (strcmp(name, tower_fault_name((enum tower_fault)i)) == 0) {
-			bench->events[bench->event_count++] = (struct event){.action = EVENT_FAULT,
-			                                                     .number = (unsigned)i,
-			                                                     .state = EVENT_AT_TIME,
-			                                                     .time_s = time_s};
-			return;
+		return option_wrong(table, "--%s %s: only %d faults in a run", name, text, EVENTS_MAX);
+	for (; event.number < TOWER_FAULTS; event.number++)
+		if (strcmp(fault, tower_fault_name((enum tower_fault)event.number)) == 0) {
+			bench->events[bench->event_count++] = event;
+			return OPTIONS_READ;
 		}
-	}
-	refuse("--fault %s: the tower has no such fault", text);
+	return option_wrong(table, "--%s %s: the tower has no such fault", name, text);
 }
 
-static void set_burst(struct bench_options *bench, const char *text)
+static int take_burst(const struct option_table *table, const char *name, const char *text, void *into)
 {
+	struct bench_options *bench = into;
 	char count[16];
+	uint64_t burst;
 
-	bench->burst_after_s = split_at("burst", text, count, sizeof(count));
-	bench->burst = (unsigned)whole("burst", count, 1, 1000000);
+	if (!split_at(text, count, sizeof(count), &bench->burst_after_s) ||
+	    !number_whole(count, 1, 1000000, &burst))
+		return option_wrong(table, "--%s is '%s', expected N@+SECONDS, N from 1 to 1000000", name,
+		                    text);
+	bench->burst = (unsigned)burst;
+	return OPTIONS_READ;
 }
 
-/* The options of the bus; false for another one. */
-static bool take_bus_option(struct bench_options *bench, int option, const char *text)
+static const struct option_row rows[] = {
+        OPTION_TEXT("scenario", "FILE", struct line, scenario_file,
+                    "makes a scenario instead of a scene; only --firmware, --timeline, --log and --truth go "
+                    "with it"),
+        OPTION_TEXT("scene", "FILE", struct line, scene_file, "what is dropped (common/scenes/*.ini)"),
+        OPTION_NUMBER("angle", "DEG", struct line, angle_deg, -360, 360,
+                      "contact angle instead of the scene's"), /* which knows the true limits */
+        OPTION_TEXT("link", "URL", struct line, bench.link,
+                    "the host's CAN: unix:PATH, can:IF, ...; until SIGINT or SIGTERM"),
+        OPTION_FLAG("operate", struct line, operate, "no host: a scripted operator in virtual time"),
+        OPTION_UNSIGNED("drops", "N", struct line, bench.script.drops, 1, 1000000,
+                        "as many drops of the operator (1)"),
+        OPTION_TEXT("firmware", "COMMAND", struct line, bench.firmware,
+                    "instead of droptower-firmware beside this program"),
+        OPTION_TEXT("pace", "max|1", struct line, pace,
+                    "as fast as it goes (with --operate), by the clock (with --link)"),
+        OPTION_UINT64("seed", "N", struct line, bench.seed, 0, 0x1p64,
+                      "of the tower's scatter and noise and of the bus (1)"),
+        OPTION_FLAG("ideal", struct line, bench.ideal, "no noise, no scatter, no high-pass"),
+        OPTION_NUMBER("loss", "P", struct line, bench.bus.loss, 0, 1, "frames lost, probability, both ways"),
+        OPTION_TAKEN("burst", "N@+SECONDS", struct line, bench, take_burst,
+                     "N live blocks in a row lost, so long after each impact"),
+        OPTION_NUMBER("duplicate", "P", struct line, bench.bus.duplicate, 0, 1, "frames that come twice"),
+        OPTION_NUMBER("reorder", "P", struct line, bench.bus.reorder, 0, 1,
+                      "frames held back behind the next 1 to 3"),
+        OPTION_FLAG("cut-resend", struct line, bench.bus.cut_resend, "no resent block passes"),
+        OPTION_TAKEN("fault", "NAME@SECONDS", struct line, bench, take_fault,
+                     "of the tower, at a virtual time; may be repeated; the names are below"),
+        OPTION_TEXT("control", "PATH", struct line, bench.control,
+                    "unix datagram socket that takes events as they come, a line each: fault estop, repair "
+                    "estop, bus burst 20, ... as in a scenario's [at], and faults, which is answered "
+                    "(hil/README.md)"),
+        OPTION_TEXT("timeline", "FILE", struct line, timeline_file,
+                    "picture of a scenario's run, SVG by gnuplot"),
+        OPTION_TEXT("log", "FILE", struct line, bench.log,
+                    "frames on the host's side, candump text in virtual time"),
+        OPTION_TEXT("truth", "FILE", struct line, bench.truth,
+                    "converter codes: tick sensor x0..x6 y0..y9 z0..z9"),
+        OPTION_UNSIGNED("ready-fd", "N", struct line, ready_fd, 0, 1023,
+                        "gets one byte when the firmware runs"),
+        OPTION_FLAG("quiet", struct line, bench.quiet, "says only what is wrong"),
+};
+
+static const struct option_table known_options = {
+        .program = "droptower-bench",
+        .head = "droptower-bench --scene FILE (--link URL | --operate) [OPTION]...\n"
+                "droptower-bench --scenario FILE [--firmware COMMAND] [--timeline FILE] [--log FILE] "
+                "[--truth FILE]\n"
+                "Runs a firmware against the simulated tower. The second form makes one scenario\n"
+                "(hil/scenarios/README.md) and says what was measured and expected.\n"
+                "\n",
+        OPTION_ROWS(rows),
+};
+
+/* Behind the options: every fault there is. */
+static const char *tail(void)
 {
-	switch (option) {
-	case OPTION_LOSS:
-		bench->bus.loss = number("loss", text, 0.0, 1.0);
-		return true;
-	case OPTION_BURST:
-		set_burst(bench, text);
-		return true;
-	case OPTION_DUPLICATE:
-		bench->bus.duplicate = number("duplicate", text, 0.0, 1.0);
-		return true;
-	case OPTION_REORDER:
-		bench->bus.reorder = number("reorder", text, 0.0, 1.0);
-		return true;
-	case OPTION_CUT_RESEND:
-		bench->bus.cut_resend = true;
-		return true;
-	default:
-		return false;
-	}
+	static char text[1000] = "\nFaults:";
+	size_t length = strlen(text);
+
+	for (unsigned i = 0; i < TOWER_FAULTS; i++)
+		length += (size_t)snprintf(text + length, sizeof(text) - length, " %s%s",
+		                           tower_fault_name((enum tower_fault)i), i % 7 == 6 ? "\n  " : "");
+	snprintf(text + length, sizeof(text) - length,
+	         "\n\nExit: 0 done, 1 a drop of the operator did not end complete and SAFE, or the scenario\n"
+	         "not as expected, 2 usage, 3 scene or scenario unusable, 4 link or firmware\n");
+	return text;
 }
 
-/* Those that go with a scenario too; false for another one. */
-static bool take_file_option(struct line *line, int option, const char *text)
-{
-	struct bench_options *bench = &line->bench;
+static const struct line nothing_given = {
+        .angle_deg = NAN,
+        .ready_fd = NO_FD,
+        .bench = {.seed = 1, .script = {.drops = 1, .release_ms = SCRIPT_RELEASE_MS}, .ready_fd = -1},
+};
 
-	switch (option) {
-	case OPTION_SCENARIO:
-		line->scenario_file = text;
-		return true;
-	case OPTION_TIMELINE:
-		line->timeline_file = text;
-		return true;
-	case OPTION_FIRMWARE:
-		bench->firmware = text;
-		return true;
-	case OPTION_LOG:
-		bench->log = text;
-		return true;
-	case OPTION_TRUTH:
-		bench->truth = text;
-		return true;
-	default:
-		return false;
-	}
+/* Whether an option says of the run what a scenario has its own key for. */
+static bool says_run(const struct line *line)
+{
+	struct line rest;
+
+	memcpy(&rest, line, sizeof(rest)); /* with what lies between the fields */
+	rest.scenario_file = rest.timeline_file = NULL;
+	rest.bench.firmware = rest.bench.log = rest.bench.truth = NULL;
+	return memcmp(&rest, &nothing_given, sizeof(rest)) != 0;
 }
 
-static bool take_link_option(struct line *line, int option, const char *text)
+/* What does not go together. */
+static int check(const struct line *line)
 {
-	struct bench_options *bench = &line->bench;
+	const struct option_table *table = &known_options;
 
-	switch (option) {
-	case OPTION_SCENE:
-		line->scene_file = text;
-		return true;
-	case OPTION_LINK:
-		bench->link = text;
-		return true;
-	case OPTION_CONTROL:
-		bench->control = text;
-		return true;
-	case OPTION_QUIET:
-		bench->quiet = true;
-		return true;
-	case OPTION_READY_FD:
-		bench->ready_fd = (int)whole("ready-fd", text, 0, 1023);
-		return true;
-	default:
-		return false;
-	}
-}
-
-static void take_option(struct line *line, int option, const char *text)
-{
-	struct bench_options *bench = &line->bench;
-
-	switch (option) {
-	case OPTION_ANGLE:
-		line->angle_deg = number("angle", text, -360.0, 360.0); /* the scene knows the true limits */
-		break;
-	case OPTION_OPERATE:
-		line->operate = true;
-		break;
-	case OPTION_DROPS:
-		bench->script.drops = (unsigned)whole("drops", text, 1, 1000000);
-		line->drops_given = true;
-		break;
-	case OPTION_PACE:
-		line->pace = text;
-		break;
-	case OPTION_SEED:
-		bench->seed = whole("seed", text, 0, UINT64_MAX);
-		break;
-	case OPTION_IDEAL:
-		bench->ideal = true;
-		break;
-	case OPTION_FAULT:
-		add_fault(bench, text);
-		break;
-	default:
-		help();
-	}
-}
-
-static void check(struct line *line)
-{
-	struct bench_options *bench = &line->bench;
-
-	if (line->scenario_file != NULL && line->run_option)
-		refuse("--scenario says all about the run; only --firmware, --timeline, --log and --truth go "
-		       "with it");
+	if (line->scenario_file != NULL && says_run(line))
+		return option_wrong(table, "--scenario says all about the run; only --firmware, --timeline, "
+		                           "--log and --truth go "
+		                           "with it");
 	if (line->scenario_file != NULL)
-		return;
+		return OPTIONS_READ;
 	if (line->timeline_file != NULL)
-		refuse("--timeline shows a --scenario");
+		return option_wrong(table, "--timeline shows a --scenario");
 	if (line->scene_file == NULL)
-		refuse("--scene FILE is missing");
-	if (line->operate == (bench->link != NULL))
-		refuse("expected either --link URL or --operate");
-	if (line->drops_given && !line->operate)
-		refuse("--drops counts the drops of --operate; with --link the host decides");
+		return option_wrong(table, "--scene FILE is missing");
+	if (line->operate == (line->bench.link != NULL))
+		return option_wrong(table, "expected either --link URL or --operate");
+	if (line->bench.script.drops > 1 && !line->operate)
+		return option_wrong(table,
+		                    "--drops counts the drops of --operate; with --link the host decides");
 	if (line->pace != NULL && strcmp(line->pace, "max") != 0 && strcmp(line->pace, "1") != 0)
-		refuse("--pace %s: expected max or 1", line->pace);
-	bench->realtime = line->pace ? strcmp(line->pace, "1") == 0 : !line->operate;
+		return option_wrong(table, "--pace is '%s', expected max or 1", line->pace);
+	return OPTIONS_READ;
 }
 
 static int run_scene(struct line *line)
@@ -440,27 +296,20 @@ static int run_scenario(struct line *line)
 
 int main(int argc, char **argv)
 {
-	struct line line = {.angle_deg = NAN,
-	                    .bench = {.seed = 1,
-	                              .script = {.drops = 1, .release_ms = SCRIPT_RELEASE_MS},
-	                              .ready_fd = -1}};
-	int option;
+	struct option_table told = known_options;
+	static struct line line;
+	int code;
 
 	signal(SIGPIPE, SIG_IGN); /* a broken pipe is an error code, not an end */
-	opterr = 0;
-	while ((option = getopt_long(argc, argv, ":", options_long, NULL)) != -1) {
-		if (option == ':')
-			refuse("%s: an argument is missing", argv[optind - 1]);
-		if (option == '?')
-			refuse("%s: no such option", argv[optind - 1]);
-		if (take_file_option(&line, option, optarg))
-			continue;
-		line.run_option = true;
-		if (!take_bus_option(&line.bench, option, optarg) && !take_link_option(&line, option, optarg))
-			take_option(&line, option, optarg);
-	}
-	if (optind < argc)
-		refuse("%s: expected an option", argv[optind]);
-	check(&line);
+	memcpy(&line, &nothing_given, sizeof(line));
+	told.tail = tail();
+	code = option_read(&told, &line, argc, argv);
+	if (code == OPTIONS_READ)
+		code = check(&line);
+	if (code != OPTIONS_READ)
+		return code;
+	if (line.ready_fd != NO_FD)
+		line.bench.ready_fd = (int)line.ready_fd;
+	line.bench.realtime = line.pace != NULL ? strcmp(line.pace, "1") == 0 : !line.operate;
 	return line.scenario_file != NULL ? run_scenario(&line) : run_scene(&line);
 }

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <droptower_command.h>
-#include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -17,23 +16,6 @@
 #include "host/command/session.h"
 #include "host/command/tower_setup.h"
 
-static const char help[] =
-        "usage: droptower bridge --link URL [--lcm URL] [--commands KEYFILE] [--scene FILE [--angle DEG]]\n"
-        "\n"
-        "CAN to LCM: publishes DT_BLOCK, DT_STATE, DT_DROP and DT_RESULT, keeps the host's heartbeat going,\n"
-        "collects every drop until its CRC-32 agrees, accepts and analyses it. Takes ABORT from anybody on "
-        "this\n"
-        "machine, and other commands only with --commands.\n"
-        "\n"
-        "  --link URL          unix:PATH, can:IF or slcan:DEV\n"
-        "  --lcm URL           default " PUBLISH_URL ";\n"
-        "                      with ttl=1 or more it sends to, and takes from, other machines\n"
-        "  --commands KEYFILE  takes DT_COMMAND from whoever has this key, and signs what it publishes: a "
-        "file\n"
-        "                      of at least 32 bytes, mode 0600 (head -c 32 /dev/urandom)\n"
-        "  --scene FILE        sets the tower's parameters and adds the model to the results\n"
-        "  --angle DEG         contact angle, instead of the scene's\n";
-
 enum {
 	SAY_EVERY_MS = 1000,
 	ABORT_EVERY_MS = 100, /* those that prove nothing */
@@ -42,7 +24,6 @@ enum {
 struct bridge {
 	const char *link, *lcm, *scene_file, *key_file;
 	double angle_deg;
-	bool help;
 	struct scene scene;
 	struct session *session;
 	struct publisher *publisher;
@@ -59,49 +40,44 @@ struct bridge {
 	int64_t said_ms;
 };
 
-static int parse(struct bridge *bridge, int argc, char **argv)
-{
-	static const struct option options[] = {{"link", required_argument, NULL, 'l'},
-	                                        {"lcm", required_argument, NULL, 'L'},
-	                                        {"scene", required_argument, NULL, 's'},
-	                                        {"angle", required_argument, NULL, 'a'},
-	                                        {"help", no_argument, NULL, 'h'},
-	                                        {"commands", required_argument, NULL, 'k'},
-	                                        {0}};
-	int option, code = COMMAND_DONE;
+static const struct option_row rows[] = {
+        OPTION_TEXT("link", "URL", struct bridge, link, "unix:PATH, can:IF or slcan:DEV"),
+        OPTION_TEXT("lcm", "URL", struct bridge, lcm,
+                    "default " PUBLISH_URL
+                    "; with ttl=1 or more it sends to, and takes from, other machines"),
+        OPTION_TEXT("commands", "KEYFILE", struct bridge, key_file,
+                    "takes DT_COMMAND from whoever has this key, and signs what it publishes: a file of at "
+                    "least 32 bytes, mode 0600 (head -c 32 /dev/urandom)"),
+        OPTION_TEXT("scene", "FILE", struct bridge, scene_file,
+                    "sets the tower's parameters and adds the model to the results"),
+        OPTION_TAKEN("angle", "DEG", struct bridge, angle_deg, command_angle,
+                     "contact angle, instead of the scene's"),
+};
 
-	opterr = 0;
-	while (code == COMMAND_DONE && (option = getopt_long(argc, argv, "h", options, NULL)) != -1) {
-		switch (option) {
-		case 'l':
-			bridge->link = optarg;
-			break;
-		case 'L':
-			bridge->lcm = optarg;
-			break;
-		case 'k':
-			bridge->key_file = optarg;
-			break;
-		case 's':
-			bridge->scene_file = optarg;
-			break;
-		case 'a':
-			code = command_angle("bridge", optarg, &bridge->angle_deg);
-			break;
-		case 'h':
-			bridge->help = true;
-			return COMMAND_DONE;
-		default:
-			return command_option("bridge", argv[optind - 1]);
-		}
-	}
-	if (code == COMMAND_DONE && optind != argc)
-		code = command_usage("bridge", "'%s' is too much", argv[optind]);
-	if (code == COMMAND_DONE && bridge->link == NULL)
-		code = command_usage("bridge", "no --link given");
-	if (code == COMMAND_DONE && !isnan(bridge->angle_deg) && bridge->scene_file == NULL)
-		code = command_usage("bridge", "--angle needs a --scene to lay it over");
-	return code;
+static const struct option_table known_options = {
+        .program = "droptower",
+        .command = "bridge",
+        .head = "usage: droptower bridge --link URL [--lcm URL] [--commands KEYFILE] [--scene FILE [--angle "
+                "DEG]]\n"
+                "\n"
+                "CAN to LCM: publishes DT_BLOCK, DT_STATE, DT_DROP and DT_RESULT, keeps the host's heartbeat "
+                "going,\n"
+                "collects every drop until its CRC-32 agrees, accepts and analyses it. Takes ABORT from "
+                "anybody on "
+                "this\n"
+                "machine, and other commands only with --commands.\n"
+                "\n",
+        OPTION_ROWS(rows),
+};
+
+/* What does not go together. */
+static int check(const struct bridge *bridge)
+{
+	if (bridge->link == NULL)
+		return command_usage("bridge", "no --link given");
+	if (!isnan(bridge->angle_deg) && bridge->scene_file == NULL)
+		return command_usage("bridge", "--angle needs a --scene to lay it over");
+	return COMMAND_DONE;
 }
 
 /* ---- what is told ---- */
@@ -394,12 +370,10 @@ int command_bridge(int argc, char **argv)
 	int code;
 
 	bridge = (struct bridge){.lcm = PUBLISH_URL, .angle_deg = NAN};
-	code = parse(&bridge, argc, argv);
-
-	if (code == COMMAND_DONE && bridge.help) {
-		fputs(help, stdout);
-		return COMMAND_DONE;
-	}
+	code = option_read(&known_options, &bridge, argc, argv);
+	if (code != OPTIONS_READ)
+		return code;
+	code = check(&bridge);
 	if (code == COMMAND_DONE && bridge.scene_file != NULL)
 		code = evaluate_read_scene(&bridge.scene, bridge.scene_file, bridge.angle_deg);
 	if (code == COMMAND_DONE && bridge.key_file != NULL)

@@ -1,15 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/command/command.h"
 
-#include <getopt.h>
 #include <signal.h>
 #include <stdarg.h>
-#include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
+#include "common/base/number.h"
 #include "common/error.h"
 #include "common/scenes/scene.h"
 
@@ -29,22 +27,12 @@ void command_error(const char *format, ...)
 int command_usage(const char *name, const char *format, ...)
 {
 	va_list arguments;
+	int code;
 
 	va_start(arguments, format);
-	fprintf(stderr, "droptower: %s: ", name);
-	vfprintf(stderr, format, arguments);
-	fprintf(stderr, "; try 'droptower %s --help'\n", name);
+	code = option_vwrong("droptower", name, format, arguments);
 	va_end(arguments);
-	return COMMAND_USAGE;
-}
-
-int command_option(const char *name, const char *word)
-{
-	if (optopt == 0 || strncmp(word, "--", 2) != 0)
-		return command_usage(name, "no option '%s'", word);
-	if (strchr(word, '=') != NULL)
-		return command_usage(name, "option '%s' takes no value", word);
-	return command_usage(name, "option '%s' lacks its value", word);
+	return code;
 }
 
 bool command_is_input(const char *name, const char *out, const char *in)
@@ -92,50 +80,23 @@ int command_stopped(void)
 	return COMMAND_REFUSED;
 }
 
-bool command_is_number(const char *text, double min, double max, double *value)
-{
-	char *end;
-	double number = strtod(text, &end);
-
-	if (end == text || *end != '\0' || !(number >= min && number <= max))
-		return false;
-	*value = number;
-	return true;
-}
-
-int command_number(const char *name, const char *option, const char *text, double min, double max,
-                   double *value)
-{
-	if (command_is_number(text, min, max, value))
-		return COMMAND_DONE;
-	return command_usage(name, "--%s is '%s', expected a number from %g to %g", option, text, min, max);
-}
-
-static int of_the_drop(const char *name, const char *option, const char *key, const char *text, double *value)
+static int within_scene(const struct option_table *table, const char *name, const char *key, const char *text,
+                        void *field)
 {
 	double min, max;
 
 	scene_limits("drop", key, &min, &max);
-	return command_number(name, option, text, min, max, value);
+	if (number_read(text, min, max, field))
+		return OPTIONS_READ;
+	return option_wrong(table, "--%s is '%s', expected a number from %g to %g", name, text, min, max);
 }
 
-int command_angle(const char *name, const char *text, double *angle_deg)
+int command_angle(const struct option_table *table, const char *name, const char *text, void *field)
 {
-	return of_the_drop(name, "angle", "angle_deg", text, angle_deg);
+	return within_scene(table, name, "angle_deg", text, field);
 }
 
-int command_height(const char *name, const char *text, double *height_m)
+int command_height(const struct option_table *table, const char *name, const char *text, void *field)
 {
-	return of_the_drop(name, "height", "height_m", text, height_m);
-}
-
-int command_drop(const char *name, const char *text, unsigned *number)
-{
-	double value;
-
-	if (!command_is_number(text, 1, 1e9, &value) || value > floor(value))
-		return command_usage(name, "--drop is '%s', expected the number of a drop in its log, from 1",
-		                     text);
-	*number = (unsigned)value;
-	return COMMAND_DONE;
+	return within_scene(table, name, "height_m", text, field);
 }

@@ -7,6 +7,8 @@
  */
 #include <stdbool.h>
 
+#include "common/base/option.h"
+
 enum command_exit {
 	COMMAND_DONE = 0,
 	COMMAND_USAGE = 2,
@@ -38,10 +40,6 @@ void command_error(const char *format, ...) __attribute__((format(printf, 1, 2))
 /* Wrong usage: the line, then "try 'droptower NAME --help'"; returns COMMAND_USAGE. */
 int command_usage(const char *name, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-/* What getopt_long(3) did not take, read as word: an option that is none, or one without its value. Returns
- * COMMAND_USAGE. */
-int command_option(const char *name, const char *word);
-
 /* Whether out, which is to be written, is the file that is read: says so. NULL is none. */
 bool command_is_input(const char *name, const char *out, const char *in);
 
@@ -55,18 +53,7 @@ int command_interrupted(void);
 /* Interrupted before anything was released: says so and returns COMMAND_REFUSED. */
 int command_stopped(void);
 
-/* A whole text as a finite number in [min, max]. */
-bool command_is_number(const char *text, double min, double max, double *value);
-
-/* The same of --option; 0 on success, else says why and returns COMMAND_USAGE. */
-int command_number(const char *name, const char *option, const char *text, double min, double max,
-                   double *value);
-
-/* --drop: the number of a drop in its log, from 1. */
-int command_drop(const char *name, const char *text, unsigned *number);
-
 /* --angle and --height, within what a scene may have. */
-int command_angle(const char *name, const char *text, double *angle_deg);
-int command_height(const char *name, const char *text, double *height_m);
+option_take command_angle, command_height;
 
 #endif

@@ -12,21 +12,6 @@
 #include "host/record/whole.h"
 #include "host/record/write.h"
 
-static const char help[] =
-        "usage: droptower convert IN OUT [--drop N | --each] [--columns SPEC]\n"
-        "       droptower convert --dbc OUT\n"
-        "\n"
-        "Writes a logged drop in another format, chosen by OUT's ending: .log candump text, .lcm LCM event "
-        "log,\n"
-        ".csv, .unv or .uff universal file (dataset 58), .h5 or .hdf5 HDF5. IN is recognised by its "
-        "content.\n"
-        "Foreign recordings become CSV, universal files or HDF5; foreign text needs --columns.\n"
-        "\n"
-        "  --drop N        the N-th drop of a log of several, counted from 1 ('analyze --list' shows them)\n"
-        "  --each          every drop of IN into a file of its own: OUT.csv becomes OUT-0001.csv ...\n"
-        "  --columns SPEC  for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\"\n"
-        "  --dbc OUT       the wire as a DBC file for other CAN tools; - is standard output\n";
-
 enum { CONVERT_TOLD = 1 }; /* what was wrong was printed */
 
 static int write_dbc(const char *file)
@@ -124,44 +109,56 @@ static int convert_each(const char *in, const char *out, const char *columns)
 	return COMMAND_INPUT;
 }
 
+struct arguments {
+	const char *columns, *dbc;
+	unsigned drop; /* of a log of several; 0: the only one */
+	bool each;
+};
+
+static const struct option_row rows[] = {
+        OPTION_UNSIGNED("drop", "N", struct arguments, drop, 1, 1e9,
+                        "the N-th drop of a log of several, counted from 1 ('analyze --list' shows them)"),
+        OPTION_FLAG("each", struct arguments, each,
+                    "every drop of IN into a file of its own: OUT.csv becomes OUT-0001.csv ..."),
+        OPTION_TEXT("columns", "SPEC", struct arguments, columns,
+                    "for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\""),
+        OPTION_TEXT("dbc", "OUT", struct arguments, dbc,
+                    "the wire as a DBC file for other CAN tools; - is standard output"),
+};
+
+static const struct option_table known_options = {
+        .program = "droptower",
+        .command = "convert",
+        .head = "usage: droptower convert IN OUT [--drop N | --each] [--columns SPEC]\n"
+                "       droptower convert --dbc OUT\n"
+                "\n"
+                "Writes a logged drop in another format, chosen by OUT's ending: .log candump text, .lcm LCM "
+                "event "
+                "log,\n"
+                ".csv, .unv or .uff universal file (dataset 58), .h5 or .hdf5 HDF5. IN is recognised by its "
+                "content.\n"
+                "Foreign recordings become CSV, universal files or HDF5; foreign text needs --columns.\n"
+                "\n",
+        OPTION_ROWS(rows),
+        .words = true,
+};
+
 int command_convert(int argc, char **argv)
 {
-	static const struct option options[] = {
-	        {"columns", required_argument, NULL, 'c'}, {"dbc", required_argument, NULL, 'd'},
-	        {"drop", required_argument, NULL, 'n'},    {"each", no_argument, NULL, 'e'},
-	        {"help", no_argument, NULL, 'h'},          {0}};
-	const char *columns = NULL, *dbc = NULL;
-	unsigned number = 0;
-	bool each = false;
-	int option, code = COMMAND_DONE;
+	struct arguments a = {0};
+	int code = option_read(&known_options, &a, argc, argv);
 
-	opterr = 0;
-	while (code == COMMAND_DONE && (option = getopt_long(argc, argv, "h", options, NULL)) != -1) {
-		if (option == 'c')
-			columns = optarg;
-		else if (option == 'd')
-			dbc = optarg;
-		else if (option == 'n')
-			code = command_drop("convert", optarg, &number);
-		else if (option == 'e')
-			each = true;
-		else if (option == 'h') {
-			fputs(help, stdout);
-			return COMMAND_DONE;
-		} else
-			return command_option("convert", argv[optind - 1]);
-	}
-	if (code != COMMAND_DONE)
+	if (code != OPTIONS_READ)
 		return code;
-	if (dbc != NULL)
-		return optind == argc ? write_dbc(dbc) : command_usage("convert", "--dbc takes no IN");
+	if (a.dbc != NULL)
+		return optind == argc ? write_dbc(a.dbc) : command_usage("convert", "--dbc takes no IN");
 	if (optind + 2 != argc)
 		return command_usage("convert", "expected IN OUT, %d given", argc - optind);
-	if (each && number != 0)
+	if (a.each && a.drop != 0)
 		return command_usage("convert", "--drop and --each exclude each other");
-	if (each)
-		return convert_each(argv[optind], argv[optind + 1], columns);
+	if (a.each)
+		return convert_each(argv[optind], argv[optind + 1], a.columns);
 	if (command_is_input("convert", argv[optind + 1], argv[optind]))
 		return COMMAND_USAGE;
-	return convert(argv[optind], argv[optind + 1], columns, number);
+	return convert(argv[optind], argv[optind + 1], a.columns, a.drop);
 }

@@ -5,32 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/number.h"
 #include "common/wire_table.h"
 #include "host/command/command.h"
 #include "host/command/release.h"
 #include "host/command/tower_setup.h"
-
-static const char help[] =
-        "usage: droptower ctl [--link URL] [--unattended] [--key FILE] status|arm|abort|clear|set NAME "
-        "VALUE|get [NAME]\n"
-        "\n"
-        "  status         state, checks, faults and every counter\n"
-        "  arm            stays as the host that arms: asks for a key to arm, when horn and lamp have warned "
-        "for\n"
-        "                 another to release, and follows the fall; any other key disarms. The drop stays "
-        "in\n"
-        "                 the tower for 'droptower bridge' beside, or the next 'droptower run'\n"
-        "  abort          never asks, never refused\n"
-        "  clear          acknowledges that a guard was open; out of a fault whose cause is gone\n"
-        "  set NAME VALUE a parameter, until the tower starts again: bus_mode (0 CAN FD, 1 classic CAN), "
-        "data_kbit_s,\n"
-        "                 trigger_counts, ...; a name that is none lists them\n"
-        "  get [NAME]     what a parameter is, without NAME every one\n"
-        "\n"
-        "  --link URL     unix:PATH, can:IF, slcan:DEV or udpm://...; default $DROPTOWER_LINK, else "
-        "can:can0\n"
-        "  --unattended   arm without asking; on a terminal a typed word confirms it\n"
-        "  --key FILE     with udpm://...: the key that the bridge takes commands with\n";
 
 enum { STATUS_WAIT_MS = 1500, COUNTERS_WAIT_MS = 5000, FALL_MS = 20000 };
 
@@ -206,7 +185,6 @@ static int get(struct session *session, unsigned first, unsigned last)
 
 struct order {
 	const char *verb;
-	bool unattended;                   /* of arm */
 	enum wire_parameter_number number; /* of set and get */
 	bool all;                          /* of get */
 	uint32_t value;
@@ -240,7 +218,7 @@ static int parse_set(char **words, int count, struct order *order)
 	if (code != COMMAND_DONE)
 		return code;
 	parameter = &wire_parameters[order->number];
-	if (!command_is_number(words[1], parameter->min, parameter->max, &value) || value > floor(value))
+	if (!number_read(words[1], parameter->min, parameter->max, &value) || value > floor(value))
 		return command_usage("ctl", "set: %s is '%s', expected a whole number from %u to %u%s%s (%s)",
 		                     parameter->name, words[1], parameter->min, parameter->max,
 		                     parameter->unit[0] != '\0' ? " " : "", parameter->unit, parameter->doc);
@@ -277,7 +255,48 @@ static int parse_order(char **words, int count, struct order *order)
 
 /* ---- the order of things ---- */
 
-static int carry_out(struct session *session, const char *url, const struct order *order)
+struct arguments {
+	const char *url, *key;
+	bool unattended;
+};
+
+static const struct option_row rows[] = {
+        OPTION_TEXT("link", "URL", struct arguments, url,
+                    "unix:PATH, can:IF, slcan:DEV or udpm://...; default $DROPTOWER_LINK, else can:can0"),
+        OPTION_FLAG("unattended", struct arguments, unattended,
+                    "arm without asking; on a terminal a typed word confirms it"),
+        OPTION_TEXT("key", "FILE", struct arguments, key,
+                    "with udpm://...: the key that the bridge takes commands with"),
+};
+
+static const struct option_table known_options = {
+        .program = "droptower",
+        .command = "ctl",
+        .head = "usage: droptower ctl [--link URL] [--unattended] [--key FILE] status|arm|abort|clear|set "
+                "NAME "
+                "VALUE|get [NAME]\n"
+                "\n"
+                "  status         state, checks, faults and every counter\n"
+                "  arm            stays as the host that arms: asks for a key to arm, when horn and lamp "
+                "have warned "
+                "for\n"
+                "                 another to release, and follows the fall; any other key disarms. The drop "
+                "stays "
+                "in\n"
+                "                 the tower for 'droptower bridge' beside, or the next 'droptower run'\n"
+                "  abort          never asks, never refused\n"
+                "  clear          acknowledges that a guard was open; out of a fault whose cause is gone\n"
+                "  set NAME VALUE a parameter, until the tower starts again: bus_mode (0 CAN FD, 1 classic "
+                "CAN), "
+                "data_kbit_s,\n"
+                "                 trigger_counts, ...; a name that is none lists them\n"
+                "  get [NAME]     what a parameter is, without NAME every one\n"
+                "\n",
+        OPTION_ROWS(rows),
+        .words = true,
+};
+
+static int carry_out(struct session *session, const struct arguments *arguments, const struct order *order)
 {
 	int result;
 
@@ -287,24 +306,24 @@ static int carry_out(struct session *session, const char *url, const struct orde
 		return get(session, order->all ? 0 : order->number,
 		           order->all ? WIRE_PARAMETERS - 1 : order->number);
 	if (strcmp(order->verb, "arm") == 0)
-		return arm(session, order->unattended);
+		return arm(session, arguments->unattended);
 	if (strcmp(order->verb, "status") != 0)
 		return act(session, order->verb);
 	result = wait_for_status(session, true);
 	if (result != 0) {
-		command_error("%s: no tower heard: %s", url, error_text(result));
+		command_error("%s: no tower heard: %s", arguments->url, error_text(result));
 		return COMMAND_LINK;
 	}
 	print_status(session_view(session));
 	return COMMAND_DONE;
 }
 
-static int with_session(const char *url, const char *key, const struct order *order)
+static int with_session(const struct arguments *arguments, const struct order *order)
 {
 	struct session_options options = {
-	        .passive = strcmp(order->verb, "arm") != 0, .key = key, .program = "ctl"};
+	        .passive = strcmp(order->verb, "arm") != 0, .key = arguments->key, .program = "ctl"};
 	char message[SESSION_MESSAGE_MAX];
-	struct session *session = session_open(url, &options, message);
+	struct session *session = session_open(arguments->url, &options, message);
 	int code;
 
 	if (session == NULL) {
@@ -312,44 +331,28 @@ static int with_session(const char *url, const char *key, const struct order *or
 		return COMMAND_LINK;
 	}
 	session_hold(session, true); /* whoever collects does it beside us */
-	code = carry_out(session, url, order);
+	code = carry_out(session, arguments, order);
 	session_close(session);
 	return code;
 }
 
 int command_ctl(int argc, char **argv)
 {
-	static const struct option options[] = {{"link", required_argument, NULL, 'l'},
-	                                        {"unattended", no_argument, NULL, 'u'},
-	                                        {"key", required_argument, NULL, 'k'},
-	                                        {"help", no_argument, NULL, 'h'},
-	                                        {0}};
-	const char *url = getenv("DROPTOWER_LINK"), *key = NULL;
+	struct arguments arguments = {.url = getenv("DROPTOWER_LINK")};
 	struct order order = {0};
-	int option, code;
+	int code = option_read(&known_options, &arguments, argc, argv);
 
-	opterr = 0;
-	while ((option = getopt_long(argc, argv, "h", options, NULL)) != -1) {
-		if (option == 'h') {
-			fputs(help, stdout);
-			return COMMAND_DONE;
-		}
-		if (option == 'l')
-			url = optarg;
-		else if (option == 'u')
-			order.unattended = true;
-		else if (option == 'k')
-			key = optarg;
-		else
-			return command_option("ctl", argv[optind - 1]);
-	}
+	if (code != OPTIONS_READ)
+		return code;
 	code = parse_order(argv + optind, argc - optind, &order);
 	if (code != COMMAND_DONE)
 		return code;
-	if (order.unattended && strcmp(order.verb, "arm") != 0)
+	if (arguments.unattended && strcmp(order.verb, "arm") != 0)
 		return command_usage("ctl", "--unattended goes with arm");
+	if (arguments.url == NULL)
+		arguments.url = "can:can0";
 	command_catch_signals();
 	if (strcmp(order.verb, "arm") == 0)
-		code = release_consent("ctl", order.unattended);
-	return code == COMMAND_DONE ? with_session(url != NULL ? url : "can:can0", key, &order) : code;
+		code = release_consent("ctl", arguments.unattended);
+	return code == COMMAND_DONE ? with_session(&arguments, &order) : code;
 }

@@ -2,7 +2,6 @@
 /*
  * `droptower model`: its options.
  */
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,67 +11,7 @@
 #include "host/command/evaluate.h"
 #include "host/command/model_private.h"
 
-static const char help[] =
-        "usage: droptower model --scene FILE [OPTIONS]\n"
-        "\n"
-        "What a drop of the scene should look like, by the least model that answers.\n"
-        "\n"
-        "  --angle DEG        instead of the scene's\n"
-        "  --fidelity NAME    auto, paper, steady, sdof, coupled or planar; default: auto\n"
-        "  --tolerance PCT    auto: how far the answer may be from planar's (5)\n"
-        "  --ask LIST         plate, axes, box, lag, s2, direction: only these; default: everything\n"
-        "  --refine LIST      stiffness, wedge, grip, mounts or none, instead of the rung's own\n"
-        "  --json             one JSON object on standard output instead of the table\n"
-        "  --history FILE     write time histories as CSV, from 2 ms before the touch\n"
-        "  --step US          their step (10); --span MS: how far they go (12)\n"
-        "  --sweep KEY=FROM:TO:STEP   a row for each value; several make a grid\n"
-        "  --monte-carlo N    N drops with the inputs of --vary at random: mean, SD, 95 % bands\n"
-        "  --vary KEY=SD,...  their standard deviations; SD% is percent of the scene's value\n"
-        "  --seed S           another seed makes other drops (1)\n"
-        "  --sensitivity      percent for a percent (angles: for a degree) of every key that matters\n"
-        "\n"
-        "KEY is section.key of a scene file, alone, or with what depends on it: angle, height (contact "
-        "time),\n"
-        "mass, contact-time (contact stiffness), restitution, cube (mounts' stiffness and dampers),\n"
-        "stiffness, damping (dampers).\n";
-
-enum {
-	OPTION_SCENE = 256,
-	OPTION_ANGLE,
-	OPTION_FIDELITY,
-	OPTION_TOLERANCE,
-	OPTION_ASK,
-	OPTION_REFINE,
-	OPTION_JSON,
-	OPTION_HISTORY,
-	OPTION_STEP,
-	OPTION_SPAN,
-	OPTION_SWEEP,
-	OPTION_MONTE_CARLO,
-	OPTION_VARY,
-	OPTION_SEED,
-	OPTION_SENSITIVITY
-};
-
-static const struct option long_options[] = {
-        {"scene", required_argument, NULL, OPTION_SCENE},
-        {"angle", required_argument, NULL, OPTION_ANGLE},
-        {"fidelity", required_argument, NULL, OPTION_FIDELITY},
-        {"tolerance", required_argument, NULL, OPTION_TOLERANCE},
-        {"ask", required_argument, NULL, OPTION_ASK},
-        {"refine", required_argument, NULL, OPTION_REFINE},
-        {"json", no_argument, NULL, OPTION_JSON},
-        {"history", required_argument, NULL, OPTION_HISTORY},
-        {"step", required_argument, NULL, OPTION_STEP},
-        {"span", required_argument, NULL, OPTION_SPAN},
-        {"sweep", required_argument, NULL, OPTION_SWEEP},
-        {"monte-carlo", required_argument, NULL, OPTION_MONTE_CARLO},
-        {"vary", required_argument, NULL, OPTION_VARY},
-        {"seed", required_argument, NULL, OPTION_SEED},
-        {"sensitivity", no_argument, NULL, OPTION_SENSITIVITY},
-        {"help", no_argument, NULL, 'h'},
-        {0},
-};
+static const uint64_t NO_SEED = UINT64_MAX;
 
 enum { LIST_MAX = 256, HISTORY_MAX = 10000000 };
 
@@ -88,41 +27,51 @@ static bool next_word(const char **list, char word[LIST_MAX])
 	return true;
 }
 
-static int parse_ask(struct model_options *options, const char *list)
+static int take_ask(const struct option_table *table, const char *name, const char *list, void *into)
 {
+	struct model_options *asking = into;
 	char word[LIST_MAX];
 
 	while (next_word(&list, word)) {
 		enum model_question question;
 
 		if (model_question_parse(word, &question) != 0)
-			return command_usage(
-			        "model", "--ask has '%s', expected plate, axes, box, lag, s2 or direction",
-			        word);
-		options->asked |= question;
+			return option_wrong(table,
+			                    "--%s has '%s', expected plate, axes, box, lag, s2 or direction",
+			                    name, word);
+		asking->asked |= question;
 	}
-	return COMMAND_DONE;
+	return OPTIONS_READ;
 }
 
-static int parse_refine(struct model_options *options, const char *list)
+static int take_refine(const struct option_table *table, const char *name, const char *list, void *into)
 {
+	struct model_options *refined = into;
 	char word[LIST_MAX];
 
-	options->refinements = 0;
+	refined->refinements = 0;
 	if (strcmp(list, "none") == 0)
-		return COMMAND_DONE;
+		return OPTIONS_READ;
 	while (next_word(&list, word)) {
 		enum model_refinement refinement;
 
 		if (strcmp(word, "none") == 0)
-			return command_usage("model", "--refine has none among others, expected it alone");
+			return option_wrong(table, "--%s has none among others, expected it alone", name);
 		if (model_refinement_parse(word, &refinement) != 0)
-			return command_usage(
-			        "model", "--refine has '%s', expected stiffness, wedge, grip, mounts or none",
-			        word);
-		options->refinements |= refinement;
+			return option_wrong(table,
+			                    "--%s has '%s', expected stiffness, wedge, grip, mounts or none",
+			                    name, word);
+		refined->refinements |= refinement;
 	}
-	return COMMAND_DONE;
+	return OPTIONS_READ;
+}
+
+static int take_fidelity(const struct option_table *table, const char *name, const char *text, void *fidelity)
+{
+	if (model_fidelity_parse(text, fidelity) == 0)
+		return OPTIONS_READ;
+	return option_wrong(table, "--%s is '%s', expected auto, paper, steady, sdof, coupled or planar",
+	                    name, text);
 }
 
 static int parse_key(const char *option, const char *text, size_t length, struct vary_key *key)
@@ -200,84 +149,68 @@ static int parse_vary(struct ensemble *ensemble, const char *list)
 	return code;
 }
 
-static int parse_number(struct model_arguments *a, int option, const char *text)
+static int take_sweep(const struct option_table *table, const char *name, const char *text, void *into)
 {
-	double percent;
-	int code;
+	struct ensemble *ensemble = into;
 
-	switch (option) {
-	case OPTION_ANGLE:
-		return command_angle("model", text, &a->angle_deg);
-	case OPTION_STEP:
-		a->of_history = "--step";
-		return command_number("model", "step", text, 0.001, 1e6, &a->step_us);
-	case OPTION_SPAN:
-		a->of_history = "--span";
-		return command_number("model", "span", text, 0.001, 1e6, &a->span_ms);
-	case OPTION_MONTE_CARLO:
-		return command_number("model", "monte-carlo", text, 2, 1e6, &a->draws);
-	case OPTION_SEED:
-		return command_number("model", "seed", text, 0, 1e9, &a->seed);
-	default:
-		code = command_number("model", "tolerance", text, 1e-6, 100, &percent);
-		if (code == COMMAND_DONE)
-			a->ensemble.options.accuracy = percent / 100.0;
-		return code;
-	}
+	if (ensemble->axes == ENSEMBLE_KEYS_MAX)
+		return option_wrong(table, "--%s is given too often, expected %d at most", name,
+		                    ENSEMBLE_KEYS_MAX);
+	return parse_sweep(ensemble, text) == COMMAND_DONE ? OPTIONS_READ : OPTIONS_WRONG;
 }
 
-static int parse_one(struct model_arguments *a, int option, const char *unknown)
-{
-	switch (option) {
-	case OPTION_SCENE:
-		a->scene_file = optarg;
-		return COMMAND_DONE;
-	case OPTION_FIDELITY:
-		if (model_fidelity_parse(optarg, &a->ensemble.fidelity) == 0)
-			return COMMAND_DONE;
-		return command_usage(
-		        "model", "--fidelity is '%s', expected auto, paper, steady, sdof, coupled or planar",
-		        optarg);
-	case OPTION_ASK:
-		return parse_ask(&a->ensemble.options, optarg);
-	case OPTION_REFINE:
-		return parse_refine(&a->ensemble.options, optarg);
-	case OPTION_JSON:
-		a->json = true;
-		return COMMAND_DONE;
-	case OPTION_HISTORY:
-		a->history = optarg;
-		return COMMAND_DONE;
-	case OPTION_SWEEP:
-		if (a->ensemble.axes == ENSEMBLE_KEYS_MAX)
-			return command_usage("model", "--sweep is given too often, expected %d at most",
-			                     ENSEMBLE_KEYS_MAX);
-		return parse_sweep(&a->ensemble, optarg);
-	case OPTION_VARY:
-		a->vary = optarg;
-		return COMMAND_DONE;
-	case OPTION_SENSITIVITY:
-		a->sensitivity = true;
-		return COMMAND_DONE;
-	case OPTION_ANGLE:
-	case OPTION_STEP:
-	case OPTION_SPAN:
-	case OPTION_MONTE_CARLO:
-	case OPTION_SEED:
-	case OPTION_TOLERANCE:
-		return parse_number(a, option, optarg);
-	default:
-		return command_option("model", unknown);
-	}
-}
+static const struct option_row rows[] = {
+        OPTION_TEXT("scene", "FILE", struct model_arguments, scene_file, "what falls"),
+        OPTION_TAKEN("angle", "DEG", struct model_arguments, angle_deg, command_angle,
+                     "instead of the scene's"),
+        OPTION_TAKEN("fidelity", "NAME", struct model_arguments, ensemble.fidelity, take_fidelity,
+                     "auto, paper, steady, sdof, coupled or planar; default: auto"),
+        OPTION_PERCENT("tolerance", struct model_arguments, ensemble.options.accuracy,
+                       "auto: how far the answer may be from planar's (5)"),
+        OPTION_TAKEN("ask", "LIST", struct model_arguments, ensemble.options, take_ask,
+                     "plate, axes, box, lag, s2, direction: only these; default: everything"),
+        OPTION_TAKEN("refine", "LIST", struct model_arguments, ensemble.options, take_refine,
+                     "stiffness, wedge, grip, mounts or none, instead of the rung's own"),
+        OPTION_FLAG("json", struct model_arguments, json,
+                    "one JSON object on standard output instead of the table"),
+        OPTION_TEXT("history", "FILE", struct model_arguments, history,
+                    "write time histories as CSV, from 2 ms before the touch"),
+        OPTION_NUMBER("step", "US", struct model_arguments, step_us, 0.001, 1e6,
+                      "step of the histories (10)"),
+        OPTION_NUMBER("span", "MS", struct model_arguments, span_ms, 0.001, 1e6, "how far they go (12)"),
+        OPTION_TAKEN("sweep", "KEY=FROM:TO:STEP", struct model_arguments, ensemble, take_sweep,
+                     "a row for each value; several make a grid"),
+        OPTION_UNSIGNED("monte-carlo", "N", struct model_arguments, draws, 2, 1e6,
+                        "N drops with the inputs of --vary at random: mean, SD, 95 % bands"),
+        OPTION_TEXT("vary", "KEY=SD,...", struct model_arguments, vary,
+                    "their standard deviations; SD% is percent of the scene's value"),
+        OPTION_UINT64("seed", "S", struct model_arguments, seed, 0, 1e9,
+                      "another seed makes other drops (1)"),
+        OPTION_FLAG("sensitivity", struct model_arguments, sensitivity,
+                    "percent for a percent (angles: for a degree) of every key that matters"),
+};
+
+static const struct option_table known_options = {
+        .program = "droptower",
+        .command = "model",
+        .head = "usage: droptower model --scene FILE [OPTIONS]\n"
+                "\n"
+                "What a drop of the scene should look like, by the least model that answers.\n"
+                "\n",
+        OPTION_ROWS(rows),
+        .tail = "\n"
+                "KEY is section.key of a scene file, alone, or with what depends on it: angle, height "
+                "(contact "
+                "time),\n"
+                "mass, contact-time (contact stiffness), restitution, cube (mounts' stiffness and dampers),\n"
+                "stiffness, damping (dampers).\n",
+};
 
 /* What does not go together. */
-static int check(const struct model_arguments *a, int rest)
+static int check(struct model_arguments *a)
 {
 	int tasks = (a->ensemble.axes > 0) + (a->draws > 0) + a->sensitivity + (a->history != NULL);
 
-	if (rest > 0)
-		return command_usage("model", "%d words too many, expected options only", rest);
 	if (!a->scene_file)
 		return command_usage("model", "no scene, expected --scene FILE");
 	if (tasks > 1)
@@ -285,15 +218,17 @@ static int check(const struct model_arguments *a, int rest)
 		                     "expected one of --sweep, --monte-carlo, --sensitivity and --history");
 	if (command_is_input("model", a->history, a->scene_file))
 		return COMMAND_USAGE;
-	if (a->of_history != NULL && a->history == NULL)
-		return command_usage("model", "%s needs --history FILE", a->of_history);
+	if (a->history == NULL && (a->step_us > 0 || a->span_ms > 0))
+		return command_usage("model", "--%s needs --history FILE", a->step_us > 0 ? "step" : "span");
 	if (a->ensemble.axes > 0 && ensemble_points(&a->ensemble) == 0)
 		return command_usage("model", "--sweep makes too many points, expected %d at most",
 		                     ENSEMBLE_POINTS_MAX);
 	if ((a->draws > 0) != (a->vary != NULL))
 		return command_usage("model", "--monte-carlo and --vary need each other");
-	if (!isnan(a->seed) && a->draws == 0)
+	if (a->seed != NO_SEED && a->draws == 0)
 		return command_usage("model", "--seed needs --monte-carlo N");
+	a->step_us = a->step_us > 0 ? a->step_us : 10;
+	a->span_ms = a->span_ms > 0 ? a->span_ms : 12;
 	if (a->span_ms / a->step_us * 1e3 > HISTORY_MAX)
 		return command_usage("model",
 		                     "--span over --step makes too many samples, expected %d at most",
@@ -301,41 +236,24 @@ static int check(const struct model_arguments *a, int rest)
 	return COMMAND_DONE;
 }
 
-static int parse(struct model_arguments *a, int argc, char **argv)
-{
-	int option, code = COMMAND_DONE;
-
-	opterr = 0;
-	while (code == COMMAND_DONE && (option = getopt_long(argc, argv, "h", long_options, NULL)) != -1) {
-		if (option == 'h') {
-			a->help = true;
-			return COMMAND_DONE;
-		}
-		code = parse_one(a, option, argv[optind - 1]);
-	}
-	return code == COMMAND_DONE ? check(a, argc - optind) : code;
-}
-
 int command_model(int argc, char **argv)
 {
-	struct model_arguments a = {.angle_deg = NAN, .step_us = 10, .span_ms = 12, .seed = NAN};
+	struct model_arguments a = {.angle_deg = NAN, .seed = NO_SEED};
 	struct scene scene;
 	int code;
 
 	a.ensemble.fidelity = MODEL_AUTO;
 	a.ensemble.options = model_defaults;
-	code = parse(&a, argc, argv);
-	if (code != COMMAND_DONE)
+	code = option_read(&known_options, &a, argc, argv);
+	if (code != OPTIONS_READ)
 		return code;
-	if (a.help) {
-		fputs(help, stdout);
-		return COMMAND_DONE;
-	}
-	code = evaluate_read_scene(&scene, a.scene_file, a.angle_deg);
+	code = check(&a);
+	if (code == COMMAND_DONE)
+		code = evaluate_read_scene(&scene, a.scene_file, a.angle_deg);
 	if (code != COMMAND_DONE)
 		return code;
 	a.ensemble.scene = &scene;
-	a.ensemble.seed = isnan(a.seed) ? 1 : (unsigned long)a.seed;
+	a.ensemble.seed = a.seed != NO_SEED ? a.seed : 1;
 	if (a.vary)
 		code = parse_vary(&a.ensemble, a.vary);
 	return code == COMMAND_DONE ? model_answer(&a) : code;

@@ -132,7 +132,7 @@ static int history(const struct model_arguments *a)
 static int many(const struct model_arguments *a)
 {
 	const struct ensemble *e = &a->ensemble;
-	size_t failed = 0, points = a->draws > 0 ? (size_t)a->draws : ensemble_points(e);
+	size_t failed = 0, points = a->draws > 0 ? a->draws : ensemble_points(e);
 	int result = a->draws > 0 ? forecast_monte_carlo(e, points, a->json, stdout, &failed)
 	                          : forecast_sweep(e, a->json, stdout, &failed);
 

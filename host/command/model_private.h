@@ -5,16 +5,18 @@
  * What the files of `droptower model` share: model.c has the options, model_answer.c what is done with them.
  */
 #include <stdbool.h>
+#include <stdint.h>
 
 #include "host/model/ensemble.h"
 
 struct model_arguments {
 	const char *scene_file, *history;
-	const char *of_history; /* an option that says something of it */
-	double angle_deg, step_us, span_ms, draws, seed;
+	double angle_deg, step_us, span_ms; /* of the history: 0: not said */
+	unsigned draws;
+	uint64_t seed;
 	struct ensemble ensemble; /* scene is set once it is read */
 	const char *vary;
-	bool json, sensitivity, help;
+	bool json, sensitivity;
 };
 
 /* Prints what was asked for. A COMMAND_* exit code; what is wrong was printed. */

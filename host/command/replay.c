@@ -7,6 +7,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "common/base/number.h"
 #include "common/link/link.h"
 #include "common/wire.h"
 #include "common/wire_table.h"
@@ -14,20 +15,6 @@
 #include "host/command/publish.h"
 #include "host/command/session.h"
 #include "host/record/lcm_log.h"
-
-static const char help[] =
-        "usage: droptower replay FILE [--speed X|max] [--to URL] [--as-host]\n"
-        "\n"
-        "Sends a logged drop again, in its own time. candump text goes to a CAN link (unix:PATH, can:IF,\n"
-        "slcan:DEV, log:FILE) or, as the bridge would, to LCM (udpm://...); an LCM event log goes to LCM.\n"
-        "\n"
-        "  --speed X    X times as fast (default 1), or max: as fast as FILE can be read\n"
-        "  --to URL     where to (default log:-, candump text on standard output)\n"
-        "  --as-host    also what only a host may send: commands, parameters, its heartbeat, DT_COMMAND. "
-        "They\n"
-        "               are left out otherwise, but into a log; where a tower is heard they are refused\n"
-        "\n"
-        "Into a log: at a given speed the frames carry the time they were sent, at max their own.\n";
 
 static const double CENTURY_S = 3.15e9;
 
@@ -325,44 +312,49 @@ static int replay_file(struct replay *replay)
 	return code;
 }
 
-static int parse_speed(const char *text, double *speed)
+static int take_speed(const struct option_table *table, const char *name, const char *text, void *speed)
 {
-	if (strcmp(text, "max") != 0)
-		return command_is_number(text, 1e-3, 1e6, speed)
-		               ? COMMAND_DONE
-		               : command_usage(
-		                         "replay",
-		                         "--speed is '%s', expected max or a number from 0.001 to 1e+06",
-		                         text);
-	*speed = 0.0;
-	return COMMAND_DONE;
+	if (strcmp(text, "max") == 0) {
+		*(double *)speed = 0.0;
+		return OPTIONS_READ;
+	}
+	if (number_read(text, 1e-3, 1e6, speed))
+		return OPTIONS_READ;
+	return option_wrong(table, "--%s is '%s', expected max or a number from 0.001 to 1e+06", name, text);
 }
+
+static const struct option_row rows[] = {
+        OPTION_TAKEN("speed", "X", struct replay, pace.speed, take_speed,
+                     "X times as fast (default 1), or max: as fast as FILE can be read"),
+        OPTION_TEXT("to", "URL", struct replay, to,
+                    "where to (default log:-, candump text on standard output)"),
+        OPTION_FLAG("as-host", struct replay, as_host,
+                    "also what only a host may send: commands, parameters, its heartbeat, DT_COMMAND. They "
+                    "are left out otherwise, but into a log; where a tower is heard they are refused"),
+};
+
+static const struct option_table known_options = {
+        .program = "droptower",
+        .command = "replay",
+        .head = "usage: droptower replay FILE [--speed X|max] [--to URL] [--as-host]\n"
+                "\n"
+                "Sends a logged drop again, in its own time. candump text goes to a CAN link (unix:PATH, "
+                "can:IF,\n"
+                "slcan:DEV, log:FILE) or, as the bridge would, to LCM (udpm://...); an LCM event log goes to "
+                "LCM.\n"
+                "\n",
+        OPTION_ROWS(rows),
+        .words = true,
+        .tail = "\n"
+                "Into a log: at a given speed the frames carry the time they were sent, at max their own.\n",
+};
 
 int command_replay(int argc, char **argv)
 {
-	static const struct option options[] = {{"speed", required_argument, NULL, 's'},
-	                                        {"to", required_argument, NULL, 't'},
-	                                        {"as-host", no_argument, NULL, 'a'},
-	                                        {"help", no_argument, NULL, 'h'},
-	                                        {0}};
 	struct replay replay = {.to = "log:-", .pace = {.speed = 1.0}};
-	int option, code = COMMAND_DONE;
+	int code = option_read(&known_options, &replay, argc, argv);
 
-	opterr = 0;
-	while (code == COMMAND_DONE && (option = getopt_long(argc, argv, "h", options, NULL)) != -1) {
-		if (option == 's')
-			code = parse_speed(optarg, &replay.pace.speed);
-		else if (option == 't')
-			replay.to = optarg;
-		else if (option == 'a')
-			replay.as_host = true;
-		else if (option == 'h') {
-			fputs(help, stdout);
-			return COMMAND_DONE;
-		} else
-			code = command_option("replay", argv[optind - 1]);
-	}
-	if (code != COMMAND_DONE)
+	if (code != OPTIONS_READ)
 		return code;
 	if (optind + 1 != argc)
 		return command_usage("replay", "one FILE expected, %d given", argc - optind);

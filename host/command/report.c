@@ -15,75 +15,37 @@
 #include "host/report/pdf.h"
 #include "host/report/series.h"
 
-static const char help[] =
-        "usage: droptower report SERIES [OPTIONS]\n"
-        "\n"
-        "What a series of drops came to, for whoever ordered it: what was dropped and how, every drop's\n"
-        "traces, means and uncertainties, what was rejected and why, the model beside it, what proves it.\n"
-        "\n"
-        "  --html FILE      one page that holds all of it and needs nothing else\n"
-        "  --pdf FILE       the same on paper; needs chromium, chromium-browser or google-chrome\n"
-        "  --csv FILE       the table for spreadsheets, as series show --csv\n"
-        "  --archive DIR    the archive's folder; without it $DROPTOWER_ARCHIVE, else ./archive\n"
-        "  --undecided      drops that are not decided count, too\n"
-        "  --partial        even when a trace cannot be drawn or a file is not what was recorded\n";
-
-enum { OPTION_ARCHIVE = 256, OPTION_HTML, OPTION_PDF, OPTION_CSV, OPTION_UNDECIDED, OPTION_PARTIAL };
-
-static const struct option long_options[] = {
-        {"archive", required_argument, NULL, OPTION_ARCHIVE},
-        {"html", required_argument, NULL, OPTION_HTML},
-        {"pdf", required_argument, NULL, OPTION_PDF},
-        {"csv", required_argument, NULL, OPTION_CSV},
-        {"undecided", no_argument, NULL, OPTION_UNDECIDED},
-        {"partial", no_argument, NULL, OPTION_PARTIAL},
-        {"help", no_argument, NULL, 'h'},
-        {0},
-};
-
 struct arguments {
 	const char *archive, *html, *pdf, *csv;
-	bool undecided, partial, help;
+	bool undecided, partial;
 };
 
-static int parse(struct arguments *a, int argc, char **argv)
-{
-	int option;
+static const struct option_row rows[] = {
+        OPTION_TEXT("html", "FILE", struct arguments, html,
+                    "one page that holds all of it and needs nothing else"),
+        OPTION_TEXT("pdf", "FILE", struct arguments, pdf,
+                    "the same on paper; needs chromium, chromium-browser or google-chrome"),
+        OPTION_TEXT("csv", "FILE", struct arguments, csv, "the table for spreadsheets, as series show --csv"),
+        OPTION_TEXT("archive", "DIR", struct arguments, archive,
+                    "the archive's folder; without it $DROPTOWER_ARCHIVE, else ./archive"),
+        OPTION_FLAG("undecided", struct arguments, undecided, "drops that are not decided count, too"),
+        OPTION_FLAG("partial", struct arguments, partial,
+                    "even when a trace cannot be drawn or a file is not what was recorded"),
+};
 
-	opterr = 0;
-	while ((option = getopt_long(argc, argv, "h", long_options, NULL)) != -1) {
-		switch (option) {
-		case OPTION_ARCHIVE:
-			a->archive = optarg;
-			break;
-		case OPTION_HTML:
-			a->html = optarg;
-			break;
-		case OPTION_PDF:
-			a->pdf = optarg;
-			break;
-		case OPTION_CSV:
-			a->csv = optarg;
-			break;
-		case OPTION_UNDECIDED:
-			a->undecided = true;
-			break;
-		case OPTION_PARTIAL:
-			a->partial = true;
-			break;
-		case 'h':
-			a->help = true;
-			return COMMAND_DONE;
-		default:
-			return command_option("report", argv[optind - 1]);
-		}
-	}
-	if (argc - optind != 1)
-		return command_usage("report", "%d words, expected one SERIES", argc - optind);
-	if (a->html == NULL && a->pdf == NULL && a->csv == NULL)
-		return command_usage("report", "nothing to write: expected --html, --pdf or --csv");
-	return COMMAND_DONE;
-}
+static const struct option_table known_options = {
+        .program = "droptower",
+        .command = "report",
+        .head = "usage: droptower report SERIES [OPTIONS]\n"
+                "\n"
+                "What a series of drops came to, for whoever ordered it: what was dropped and how, every "
+                "drop's\n"
+                "traces, means and uncertainties, what was rejected and why, the model beside it, what "
+                "proves it.\n"
+                "\n",
+        OPTION_ROWS(rows),
+        .words = true,
+};
 
 static int failed(const char *message)
 {
@@ -222,14 +184,14 @@ int command_report(int argc, char **argv)
 	struct arguments a = {0};
 	char message[ARCHIVE_MESSAGE_MAX];
 	struct archive *archive;
-	int code = parse(&a, argc, argv);
+	int code = option_read(&known_options, &a, argc, argv);
 
-	if (code != COMMAND_DONE)
+	if (code != OPTIONS_READ)
 		return code;
-	if (a.help) {
-		fputs(help, stdout);
-		return COMMAND_DONE;
-	}
+	if (argc - optind != 1)
+		return command_usage("report", "%d words, expected one SERIES", argc - optind);
+	if (a.html == NULL && a.pdf == NULL && a.csv == NULL)
+		return command_usage("report", "nothing to write: expected --html, --pdf or --csv");
 	archive = archive_open(archived_folder(a.archive), ARCHIVE_READ, message);
 	if (archive == NULL)
 		return failed(message);

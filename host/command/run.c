@@ -2,7 +2,6 @@
 /*
  * `droptower run`: its options, and the order of things.
  */
-#include <getopt.h>
 #include <limits.h>
 #include <math.h>
 #include <stdarg.h>
@@ -16,64 +15,49 @@
 #include "host/command/run_private.h"
 #include "host/command/simulated.h"
 
-static const char help[] =
-        "usage: droptower run [OPTIONS]\n"
-        "\n"
-        "One drop: says what will fall, waits until every check is green, asks for a key to arm and, when\n"
-        "horn and lamp have warned, for another to release; follows the fall, fetches every sample, "
-        "analyses\n"
-        "and reports. Writes drop-NNNN.log (candump text), .csv, .json and .html into --out.\n"
-        "Any other key and Ctrl-C abort: at rest nothing is released, in motion the frame is braked and the\n"
-        "record kept. A simulated tower of our own asks nothing.\n"
-        "\n"
-        "  --link URL     unix:PATH, can:IF, slcan:DEV, or udpm://... for a running 'droptower bridge';\n"
-        "                 it needs --scene or --series; without it a simulated tower is started\n"
-        "  --unattended   with --link: drops without asking; on a terminal a typed word confirms it. It is\n"
-        "                 noted with the drop\n"
-        "  --key FILE     with udpm://...: the key that the bridge takes commands with\n"
-        "  --scene FILE   what is dropped: a file, or one of those that come along by its name (for a\n"
-        "                 simulated tower geometry-2A without it)\n"
-        "  --angle DEG    contact angle, instead of the scene's\n"
-        "  --out DIR      where the files go (default .)\n"
-        "  --series NAME  into an archive, as the series' next drop; 'droptower series new' makes a series,\n"
-        "                 which knows scene and angle\n"
-        "  --archive DIR  where that series is; without it $DROPTOWER_ARCHIVE or ./archive\n"
-        "  --operator NAME who drops into a series ($USER)\n"
-        "  --json         one JSON object on standard output instead of the table\n"
-        "  --strict       a flagged record or channel is a failure (exit 3)\n"
-        "  --bench WORD   simulated tower only: a word for droptower-bench, e.g. --bench=--loss\n"
-        "                 --bench=0.05; may be repeated\n";
-
-enum {
-	OPTION_LINK = 256,
-	OPTION_SCENE,
-	OPTION_ANGLE,
-	OPTION_OUT,
-	OPTION_ARCHIVE,
-	OPTION_SERIES,
-	OPTION_OPERATOR,
-	OPTION_JSON,
-	OPTION_STRICT,
-	OPTION_BENCH,
-	OPTION_UNATTENDED,
-	OPTION_KEY,
+static const struct option_row rows[] = {
+        OPTION_TEXT("link", "URL", struct run, link,
+                    "unix:PATH, can:IF, slcan:DEV, or udpm://... for a running 'droptower bridge'; it needs "
+                    "--scene or --series; without it a simulated tower is started"),
+        OPTION_FLAG("unattended", struct run, unattended,
+                    "with --link: drops without asking; on a terminal a typed word confirms it. It is noted "
+                    "with the drop"),
+        OPTION_TEXT("key", "FILE", struct run, key,
+                    "with udpm://...: the key that the bridge takes commands with"),
+        OPTION_TEXT("scene", "FILE", struct run, scene_file,
+                    "what is dropped: a file, or one of those that come along by its name (for a simulated "
+                    "tower geometry-2A without it)"),
+        OPTION_TAKEN("angle", "DEG", struct run, angle_deg, command_angle,
+                     "contact angle, instead of the scene's"),
+        OPTION_TEXT("out", "DIR", struct run, out, "where the files go (default .)"),
+        OPTION_TEXT("series", "NAME", struct run, series,
+                    "into an archive, as the series' next drop; 'droptower series new' makes a series, which "
+                    "knows scene and angle"),
+        OPTION_TEXT("archive", "DIR", struct run, archive_folder,
+                    "where that series is; without it $DROPTOWER_ARCHIVE or ./archive"),
+        OPTION_TEXT("operator", "NAME", struct run, operator_name, "who drops into a series ($USER)"),
+        OPTION_FLAG("json", struct run, json, "one JSON object on standard output instead of the table"),
+        OPTION_FLAG("strict", struct run, strict, "a flagged record or channel is a failure (exit 3)"),
+        OPTION_WORDS("bench", "WORD", struct run, bench, RUN_BENCH_WORDS_MAX,
+                     "simulated tower only: a word for droptower-bench, e.g. --bench=--loss --bench=0.05; "
+                     "may be repeated"),
 };
 
-static const struct option long_options[] = {
-        {"link", required_argument, NULL, OPTION_LINK},
-        {"scene", required_argument, NULL, OPTION_SCENE},
-        {"angle", required_argument, NULL, OPTION_ANGLE},
-        {"out", required_argument, NULL, OPTION_OUT},
-        {"archive", required_argument, NULL, OPTION_ARCHIVE},
-        {"series", required_argument, NULL, OPTION_SERIES},
-        {"operator", required_argument, NULL, OPTION_OPERATOR},
-        {"json", no_argument, NULL, OPTION_JSON},
-        {"strict", no_argument, NULL, OPTION_STRICT},
-        {"bench", required_argument, NULL, OPTION_BENCH},
-        {"unattended", no_argument, NULL, OPTION_UNATTENDED},
-        {"key", required_argument, NULL, OPTION_KEY},
-        {"help", no_argument, NULL, 'h'},
-        {0},
+static const struct option_table known_options = {
+        .program = "droptower",
+        .command = "run",
+        .head = "usage: droptower run [OPTIONS]\n"
+                "\n"
+                "One drop: says what will fall, waits until every check is green, asks for a key to arm and, "
+                "when\n"
+                "horn and lamp have warned, for another to release; follows the fall, fetches every sample, "
+                "analyses\n"
+                "and reports. Writes drop-NNNN.log (candump text), .csv, .json and .html into --out.\n"
+                "Any other key and Ctrl-C abort: at rest nothing is released, in motion the frame is braked "
+                "and the\n"
+                "record kept. A simulated tower of our own asks nothing.\n"
+                "\n",
+        OPTION_ROWS(rows),
 };
 
 /* A series says what is dropped, and where the files go. */
@@ -110,67 +94,16 @@ static int choose_scene(struct run *run)
 	return COMMAND_DONE;
 }
 
-static int parse(struct run *run, int argc, char **argv)
+/* What does not go together. */
+static int check(struct run *run)
 {
-	int option, code = COMMAND_DONE;
+	int code;
 
-	opterr = 0;
-	while (code == COMMAND_DONE && (option = getopt_long(argc, argv, "h", long_options, NULL)) != -1) {
-		switch (option) {
-		case OPTION_LINK:
-			run->link = optarg;
-			break;
-		case OPTION_SCENE:
-			run->scene_file = optarg;
-			break;
-		case OPTION_ANGLE:
-			code = command_angle("run", optarg, &run->angle_deg);
-			break;
-		case OPTION_OUT:
-			run->out = optarg;
-			break;
-		case OPTION_ARCHIVE:
-			run->archive_folder = optarg;
-			break;
-		case OPTION_SERIES:
-			run->series = optarg;
-			break;
-		case OPTION_OPERATOR:
-			run->operator_name = optarg;
-			break;
-		case OPTION_JSON:
-			run->json = true;
-			break;
-		case OPTION_STRICT:
-			run->strict = true;
-			break;
-		case OPTION_BENCH:
-			if (run->bench_word_count == RUN_BENCH_WORDS_MAX)
-				return command_usage("run", "more than %d --bench words",
-				                     RUN_BENCH_WORDS_MAX);
-			run->bench_words[run->bench_word_count++] = optarg;
-			break;
-		case OPTION_UNATTENDED:
-			run->unattended = true;
-			break;
-		case OPTION_KEY:
-			run->key = optarg;
-			break;
-		case 'h':
-			run->help = true;
-			return COMMAND_DONE;
-		default:
-			return command_option("run", argv[optind - 1]);
-		}
-	}
-	if (code == COMMAND_DONE && optind != argc)
-		code = command_usage("run", "'%s' is too much", argv[optind]);
-	if (code == COMMAND_DONE && run->link != NULL && run->bench_word_count > 0)
-		code = command_usage("run", "--bench is for the simulated tower, --link for another one");
-	if (code == COMMAND_DONE && run->link == NULL && (run->unattended || run->key != NULL))
-		code = command_usage("run", "--unattended and --key go with --link");
-	if (code == COMMAND_DONE)
-		code = check_archive(run);
+	if (run->link != NULL && run->bench.count > 0)
+		return command_usage("run", "--bench is for the simulated tower, --link for another one");
+	if (run->link == NULL && (run->unattended || run->key != NULL))
+		return command_usage("run", "--unattended and --key go with --link");
+	code = check_archive(run);
 	return code == COMMAND_DONE ? choose_scene(run) : code;
 }
 
@@ -188,21 +121,22 @@ void run_progress(const struct run *run, const char *format, ...)
 /* Behind the user's words, so that these hold; the seed before them, so that theirs does. */
 static void say_to_bench(struct run *run, char seed[32], char angle[32])
 {
-	const char **words = run->bench_words;
+	struct option_words *words = &run->bench;
 
 	/* with one seed for all the drops of a series would be the same drop */
 	if (run->series != NULL) {
 		snprintf(seed, 32, "%u", run->recording.number);
-		memmove(words + 2, words, (size_t)run->bench_word_count * sizeof(*words));
-		words[0] = "--seed";
-		words[1] = seed;
-		run->bench_word_count += 2;
+		memmove(words->word + 2, words->word, (size_t)words->count * sizeof(*words->word));
+		words->word[0] = "--seed";
+		words->word[1] = seed;
+		words->count += 2;
 	}
 	snprintf(angle, 32, "%.17g", run->scene.drop_angle_deg);
-	words[run->bench_word_count++] = "--scene";
-	words[run->bench_word_count++] = run->scene_file;
-	words[run->bench_word_count++] = "--angle";
-	words[run->bench_word_count++] = angle;
+	words->word[words->count++] = "--scene";
+	words->word[words->count++] = run->scene_file;
+	words->word[words->count++] = "--angle";
+	words->word[words->count++] = angle;
+	words->word[words->count] = NULL;
 }
 
 static int run_drop(struct run *run)
@@ -214,7 +148,7 @@ static int run_drop(struct run *run)
 
 	if (run->link == NULL) {
 		say_to_bench(run, seed, angle);
-		if (simulated_start(&tower, run->bench_words, message, sizeof(message)) != 0) {
+		if (simulated_start(&tower, run->bench.word, message, sizeof(message)) != 0) {
 			if (command_interrupted())
 				return command_stopped();
 			command_error("%s", message);
@@ -234,14 +168,13 @@ static int run_drop(struct run *run)
 int command_run(int argc, char **argv)
 {
 	struct run run = {.angle_deg = NAN, .recording.lock = -1};
-	int code = parse(&run, argc, argv);
+	int code = option_read(&known_options, &run, argc, argv);
 
+	if (code != OPTIONS_READ)
+		return code;
+	code = check(&run);
 	if (code != COMMAND_DONE)
 		return code;
-	if (run.help) {
-		fputs(help, stdout);
-		return COMMAND_DONE;
-	}
 	command_catch_signals();
 	if (run.link != NULL)
 		code = release_consent("run", run.unattended);

@@ -10,6 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "common/base/option.h"
 #include "common/scenes/scene.h"
 #include "host/command/archived.h"
 #include "host/command/session.h"
@@ -22,9 +23,8 @@ struct run {
 	const char *archive_folder, *series, *operator_name;
 	double angle_deg;
 	const char *key; /* for commands over LCM */
-	bool json, strict, help, unattended;
-	const char *bench_words[RUN_BENCH_WORDS_MAX + 8];
-	int bench_word_count;
+	bool json, strict, unattended;
+	struct option_words bench;
 	/* while it runs */
 	struct scene scene;
 	struct session *session;

@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/base/number.h"
 #include "common/wire_table.h"
 #include "host/command/archived.h"
 #include "host/command/command.h"
@@ -101,9 +102,9 @@ static int take_key(void *context, const char *section, const char *key, const c
 	struct adding *adding = context;
 
 	if (strcmp(section, "archive") == 0 && strcmp(key, "angle_deg") == 0)
-		command_is_number(value, -1e6, 1e6, &adding->angle_deg);
+		number_read(value, -1e6, 1e6, &adding->angle_deg);
 	if (strcmp(section, "archive") == 0 && strcmp(key, "height_m") == 0)
-		command_is_number(value, -1e6, 1e6, &adding->height_m);
+		number_read(value, -1e6, 1e6, &adding->height_m);
 	return 1;
 }
 

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/number.h"
 #include "host/command/archived.h"
 #include "host/command/beside.h"
 #include "host/command/command.h"
@@ -20,7 +21,7 @@ int series_verb_new(struct archive *archive, struct series_arguments *a)
 	char path[PATH_MAX];
 
 	if (archive_new_series(archive, a->word[0], campaign, beside_scene_file(a->scene, path),
-	                       a->filter.angle_deg, a->height_m, (unsigned)a->drops) != 0)
+	                       a->filter.angle_deg, a->height_m, a->drops) != 0)
 		return archived_failed(archive);
 	printf("series %s\n", a->word[0]);
 	return COMMAND_DONE;
@@ -166,7 +167,7 @@ int series_verb_calibrate(struct archive *archive, struct series_arguments *a)
 
 	if (a->count == 0)
 		return series_verb_calibrations(archive, a);
-	if (!command_is_number(a->word[1], 0.1, 10, &gain))
+	if (!number_read(a->word[1], 0.1, 10, &gain))
 		return command_usage("series", "calibrate: GAIN is '%s', expected a number from 0.1 to 10",
 		                     a->word[1]);
 	if (!is_sensor(a->word[0]))

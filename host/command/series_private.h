@@ -11,8 +11,9 @@
 
 struct series_arguments {
 	const char *archive, *csv, *reason, *note, *operator_name, *reference, *scene, *date;
-	bool json, rebuild, fewer, undecided, simulated, help;
-	double drops, height_m, limit;
+	bool json, rebuild, fewer, undecided, simulated;
+	unsigned drops;
+	double height_m;
 	struct archive_filter filter;
 	struct archive_dates dates;
 	int count;

@@ -10,195 +10,86 @@
 #include "host/report/spectrum.h"
 #include "host/shock/signal.h"
 
-static const char help[] =
-        "usage: droptower srs FILE [OPTIONS]\n"
-        "\n"
-        "Shock response spectrum of every channel (ramp-invariant, ISO 18431-4), one table on standard "
-        "output.\n"
-        "FILE and --columns are those of 'droptower analyze'; a sensor's high-pass is not undone.\n"
-        "\n"
-        "  --columns SPEC    for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\"\n"
-        "  --drop N          the N-th drop of a log of several, counted from 1\n"
-        "  --q Q             quality factor (10)\n"
-        "  --damping RATIO   damping ratio instead, 0 to below 1\n"
-        "  --per-octave N    frequencies in an octave (12)\n"
-        "  --from HZ         lowest frequency (5)\n"
-        "  --to HZ           highest (2000, or a quarter of the slowest rate); none above half a channel's "
-        "rate\n"
-        "  --quantity NAME   acceleration (absolute, g), velocity (pseudo, m/s) or displacement (relative, "
-        "m)\n"
-        "  --side NAME       positive, negative or maximax (maximax)\n"
-        "  --part NAME       primary, residual or total (total)\n"
-        "  --offset keep     leave the offset before the shock in\n"
-        "  --no-upsampling   take extremes from the samples as they are, above a tenth of the rate too\n"
-        "  --limit CSV       hold the spectrum against the curve frequency_hz,limit\n"
-        "  --csv FILE        write the table\n"
-        "  --svg FILE        write a picture\n"
-        "  --json            one JSON object on standard output instead of the table\n"
-        "  --strict          a flag, or a failed limit, is a failure (exit 3)\n";
-
-enum {
-	OPTION_COLUMNS = 256,
-	OPTION_DROP,
-	OPTION_Q,
-	OPTION_DAMPING,
-	OPTION_PER_OCTAVE,
-	OPTION_FROM,
-	OPTION_TO,
-	OPTION_QUANTITY,
-	OPTION_SIDE,
-	OPTION_PART,
-	OPTION_OFFSET,
-	OPTION_NO_UPSAMPLING,
-	OPTION_LIMIT,
-	OPTION_CSV,
-	OPTION_SVG,
-	OPTION_JSON,
-	OPTION_STRICT
-};
-
-static const struct option long_options[] = {
-        {"columns", required_argument, NULL, OPTION_COLUMNS},
-        {"drop", required_argument, NULL, OPTION_DROP},
-        {"q", required_argument, NULL, OPTION_Q},
-        {"damping", required_argument, NULL, OPTION_DAMPING},
-        {"per-octave", required_argument, NULL, OPTION_PER_OCTAVE},
-        {"from", required_argument, NULL, OPTION_FROM},
-        {"to", required_argument, NULL, OPTION_TO},
-        {"quantity", required_argument, NULL, OPTION_QUANTITY},
-        {"side", required_argument, NULL, OPTION_SIDE},
-        {"part", required_argument, NULL, OPTION_PART},
-        {"offset", required_argument, NULL, OPTION_OFFSET},
-        {"no-upsampling", no_argument, NULL, OPTION_NO_UPSAMPLING},
-        {"limit", required_argument, NULL, OPTION_LIMIT},
-        {"csv", required_argument, NULL, OPTION_CSV},
-        {"svg", required_argument, NULL, OPTION_SVG},
-        {"json", no_argument, NULL, OPTION_JSON},
-        {"strict", no_argument, NULL, OPTION_STRICT},
-        {"help", no_argument, NULL, 'h'},
-        {0},
-};
-
 struct arguments {
 	const char *columns, *limit_file, *csv, *svg;
 	unsigned drop; /* of a log of several; 0: the only one */
 	double q;
 	struct spectrum_options spectrum;
-	bool json, strict, help;
+	bool json, strict;
 };
 
-static int choose(const char *option, const char *text, const char *const *names, int count, int *chosen)
-{
-	for (int i = 0; i < count; i++) {
-		if (strcmp(text, names[i]) == 0) {
-			*chosen = i;
-			return COMMAND_DONE;
-		}
-	}
-	return command_usage("srs", "--%s is '%s', expected %s, %s or %s", option, text, names[0], names[1],
-	                     names[2]);
-}
-
 /* Options that choose one of three. */
-static int parse_choice(struct spectrum_options *spectrum, int option, const char *text)
+static int take_choice(const struct option_table *table, const char *name, const char *text, void *into)
 {
-	int chosen = 0, code;
+	struct spectrum_options *spectrum = &((struct arguments *)into)->spectrum;
+	int chosen;
 
-	switch (option) {
-	case OPTION_QUANTITY:
-		code = choose("quantity", text, srs_quantity_names, SRS_QUANTITIES, &chosen);
+	if (strcmp(name, "quantity") == 0) {
+		chosen = option_choose(table, name, text, srs_quantity_names, SRS_QUANTITIES);
 		spectrum->srs.quantity = (enum srs_quantity)chosen;
-		return code;
-	case OPTION_SIDE:
-		code = choose("side", text, srs_side_names, SRS_SIDES, &chosen);
+	} else if (strcmp(name, "side") == 0) {
+		chosen = option_choose(table, name, text, srs_side_names, SRS_SIDES);
 		spectrum->side = (enum srs_side)chosen;
-		return code;
-	default:
-		code = choose("part", text, srs_part_names, SRS_PARTS, &chosen);
+	} else {
+		chosen = option_choose(table, name, text, srs_part_names, SRS_PARTS);
 		spectrum->part = (enum srs_part)chosen;
-		return code;
 	}
+	return chosen < 0 ? OPTIONS_WRONG : OPTIONS_READ;
 }
 
-/* Options that are a number. */
-static int parse_number(struct arguments *arguments, int option, const char *text)
+static int take_offset(const struct option_table *table, const char *name, const char *text, void *keep)
 {
-	struct spectrum_options *spectrum = &arguments->spectrum;
-
-	switch (option) {
-	case OPTION_Q:
-		return command_number("srs", "q", text, 0.500001, 1e6, &arguments->q);
-	case OPTION_DAMPING:
-		return command_number("srs", "damping", text, 0, 0.999999, &spectrum->srs.damping);
-	case OPTION_PER_OCTAVE:
-		return command_number("srs", "per-octave", text, 0.1, 1000, &spectrum->per_octave);
-	case OPTION_FROM:
-		return command_number("srs", "from", text, 1e-6, 1e9, &spectrum->from_hz);
-	default:
-		return command_number("srs", "to", text, 1e-6, 1e9, &spectrum->to_hz);
-	}
+	*(bool *)keep = true;
+	return strcmp(text, "keep") == 0 ? OPTIONS_READ
+	                                 : option_wrong(table, "--%s is '%s', expected keep", name, text);
 }
 
-static int parse_one(struct arguments *arguments, int option, const char *unknown)
-{
-	switch (option) {
-	case OPTION_COLUMNS:
-		arguments->columns = optarg;
-		return COMMAND_DONE;
-	case OPTION_DROP:
-		return command_drop("srs", optarg, &arguments->drop);
-	case OPTION_Q:
-	case OPTION_DAMPING:
-	case OPTION_PER_OCTAVE:
-	case OPTION_FROM:
-	case OPTION_TO:
-		return parse_number(arguments, option, optarg);
-	case OPTION_QUANTITY:
-	case OPTION_SIDE:
-	case OPTION_PART:
-		return parse_choice(&arguments->spectrum, option, optarg);
-	case OPTION_OFFSET:
-		arguments->spectrum.keep_offset = true;
-		return strcmp(optarg, "keep") == 0
-		               ? COMMAND_DONE
-		               : command_usage("srs", "--offset is '%s', expected keep", optarg);
-	case OPTION_NO_UPSAMPLING:
-		arguments->spectrum.srs.keep_rate = true;
-		return COMMAND_DONE;
-	case OPTION_LIMIT:
-		arguments->limit_file = optarg;
-		return COMMAND_DONE;
-	case OPTION_CSV:
-		arguments->csv = optarg;
-		return COMMAND_DONE;
-	case OPTION_SVG:
-		arguments->svg = optarg;
-		return COMMAND_DONE;
-	case OPTION_JSON:
-		arguments->json = true;
-		return COMMAND_DONE;
-	case OPTION_STRICT:
-		arguments->strict = true;
-		return COMMAND_DONE;
-	default:
-		return command_option("srs", unknown);
-	}
-}
+static const struct option_row rows[] = {
+        OPTION_TEXT("columns", "SPEC", struct arguments, columns,
+                    "for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\""),
+        OPTION_UNSIGNED("drop", "N", struct arguments, drop, 1, 1e9,
+                        "the N-th drop of a log of several, counted from 1"),
+        OPTION_NUMBER("q", "Q", struct arguments, q, 0.500001, 1e6, "quality factor (10)"),
+        OPTION_NUMBER("damping", "RATIO", struct arguments, spectrum.srs.damping, 0, 0.999999,
+                      "damping ratio instead, 0 to below 1"),
+        OPTION_NUMBER("per-octave", "N", struct arguments, spectrum.per_octave, 0.1, 1000,
+                      "frequencies in an octave (12)"),
+        OPTION_NUMBER("from", "HZ", struct arguments, spectrum.from_hz, 1e-6, 1e9, "lowest frequency (5)"),
+        OPTION_NUMBER("to", "HZ", struct arguments, spectrum.to_hz, 1e-6, 1e9,
+                      "highest (2000, or a quarter of the slowest rate); none above half a channel's rate"),
+        OPTION_TAKEN_BY("quantity", "NAME", take_choice,
+                        "acceleration (absolute, g), velocity (pseudo, m/s) or displacement (relative, m)"),
+        OPTION_TAKEN_BY("side", "NAME", take_choice, "positive, negative or maximax (maximax)"),
+        OPTION_TAKEN_BY("part", "NAME", take_choice, "primary, residual or total (total)"),
+        OPTION_TAKEN("offset", "keep", struct arguments, spectrum.keep_offset, take_offset,
+                     "leave the offset before the shock in"),
+        OPTION_FLAG("no-upsampling", struct arguments, spectrum.srs.keep_rate,
+                    "take extremes from the samples as they are, above a tenth of the rate too"),
+        OPTION_TEXT("limit", "CSV", struct arguments, limit_file,
+                    "hold the spectrum against the curve frequency_hz,limit"),
+        OPTION_TEXT("csv", "FILE", struct arguments, csv, "write the table"),
+        OPTION_TEXT("svg", "FILE", struct arguments, svg, "write a picture"),
+        OPTION_FLAG("json", struct arguments, json,
+                    "one JSON object on standard output instead of the table"),
+        OPTION_FLAG("strict", struct arguments, strict, "a flag, or a failed limit, is a failure (exit 3)"),
+};
 
-static int parse(struct arguments *arguments, int argc, char **argv)
-{
-	int option, code = COMMAND_DONE;
+static const struct option_table known_options = {
+        .program = "droptower",
+        .command = "srs",
+        .head = "usage: droptower srs FILE [OPTIONS]\n"
+                "\n"
+                "Shock response spectrum of every channel (ramp-invariant, ISO 18431-4), one table on "
+                "standard "
+                "output.\n"
+                "FILE and --columns are those of 'droptower analyze'; a sensor's high-pass is not undone.\n"
+                "\n",
+        OPTION_ROWS(rows),
+        .words = true,
+};
 
-	opterr = 0;
-	while (code == COMMAND_DONE && (option = getopt_long(argc, argv, "h", long_options, NULL)) != -1) {
-		if (option == 'h') {
-			arguments->help = true;
-			return COMMAND_DONE;
-		}
-		code = parse_one(arguments, option, argv[optind - 1]);
-	}
-	if (code != COMMAND_DONE)
-		return code;
+static int check(struct arguments *arguments, int argc, char **argv)
+{
 	if (optind + 1 != argc)
 		return command_usage("srs", "expected one FILE, %d given", argc - optind);
 	if (command_is_input("srs", arguments->csv, argv[optind]) ||
@@ -323,14 +214,13 @@ int command_srs(int argc, char **argv)
 	struct limit_curve limit = {0};
 	char message[READ_MESSAGE_MAX];
 	struct record record;
-	int code = parse(&arguments, argc, argv);
+	int code = option_read(&known_options, &arguments, argc, argv);
 
+	if (code != OPTIONS_READ)
+		return code;
+	code = check(&arguments, argc, argv);
 	if (code != COMMAND_DONE)
 		return code;
-	if (arguments.help) {
-		fputs(help, stdout);
-		return COMMAND_DONE;
-	}
 	if (arguments.spectrum.to_hz > 0 && arguments.spectrum.to_hz < arguments.spectrum.from_hz)
 		return command_usage("srs", "--from %g Hz lies above --to %g Hz", arguments.spectrum.from_hz,
 		                     arguments.spectrum.to_hz);

@@ -14,25 +14,6 @@
 #include "host/record/log_capture.h"
 #include "host/record/read.h"
 
-static const char help[] =
-        "usage: droptower verify FILE|DROP|ARCHIVE|REPORT [--archive DIR]\n"
-        "\n"
-        "Whether it is what left the tower. One line says that it is, or one for each file what it is\n"
-        "instead: altered, exchanged, cut, emptied, missing, the chain broken. Exit code 0 only when all is\n"
-        "proven, else 3.\n"
-        "\n"
-        "  FILE      a log: of each of its captures every sample came, and CRC-32 and seal agree. Our CSV,\n"
-        "            LCM, universal and HDF5 files: their own SHA-256 as well\n"
-        "  DROP      SERIES/NUMBER: log, sidecar and results of a drop in an archive\n"
-        "  ARCHIVE   a folder: all of its drops, its chain and its index\n"
-        "  REPORT    the HTML or PDF of a series: its own SHA-256, its hashes and its head of the chain\n"
-        "            against the archive\n"
-        "\n"
-        "  --archive DIR    of a drop or a report; without it $DROPTOWER_ARCHIVE, else ./archive\n";
-
-static const struct option long_options[] = {
-        {"archive", required_argument, NULL, 'a'}, {"help", no_argument, NULL, 'h'}, {0}};
-
 /* ---- an archive, a drop ---- */
 
 static void tell(void *context, const char *text)
@@ -216,23 +197,48 @@ static int verify(const char *name, const char *folder)
 	return COMMAND_INPUT;
 }
 
+struct arguments {
+	const char *archive;
+};
+
+static const struct option_row rows[] = {
+        OPTION_TEXT("archive", "DIR", struct arguments, archive,
+                    "of a drop or a report; without it $DROPTOWER_ARCHIVE, else ./archive"),
+};
+
+static const struct option_table known_options = {
+        .program = "droptower",
+        .command = "verify",
+        .head = "usage: droptower verify FILE|DROP|ARCHIVE|REPORT [--archive DIR]\n"
+                "\n"
+                "Whether it is what left the tower. One line says that it is, or one for each file what it "
+                "is\n"
+                "instead: altered, exchanged, cut, emptied, missing, the chain broken. Exit code 0 only when "
+                "all is\n"
+                "proven, else 3.\n"
+                "\n"
+                "  FILE      a log: of each of its captures every sample came, and CRC-32 and seal agree. "
+                "Our CSV,\n"
+                "            LCM, universal and HDF5 files: their own SHA-256 as well\n"
+                "  DROP      SERIES/NUMBER: log, sidecar and results of a drop in an archive\n"
+                "  ARCHIVE   a folder: all of its drops, its chain and its index\n"
+                "  REPORT    the HTML or PDF of a series: its own SHA-256, its hashes and its head of the "
+                "chain\n"
+                "            against the archive\n"
+                "\n",
+        OPTION_ROWS(rows),
+        .words = true,
+};
+
 int command_verify(int argc, char **argv)
 {
-	const char *folder = NULL;
-	int option;
+	struct arguments arguments = {0};
+	int code = option_read(&known_options, &arguments, argc, argv);
 
-	opterr = 0;
-	while ((option = getopt_long(argc, argv, "h", long_options, NULL)) != -1) {
-		if (option == 'h') {
-			fputs(help, stdout);
-			return COMMAND_DONE;
-		}
-		if (option != 'a')
-			return command_option("verify", argv[optind - 1]);
-		folder = optarg;
-	}
+	if (code != OPTIONS_READ)
+		return code;
 	if (argc - optind != 1)
 		return command_usage("verify", "%d words, expected a FILE, DROP, ARCHIVE or REPORT",
 		                     argc - optind);
-	return verify(argv[optind], folder);
+	return verify(argv[optind], arguments.archive);
 }

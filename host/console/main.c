@@ -68,11 +68,11 @@ static int make_token(struct serve *serve)
 {
 	char message[GUARD_MESSAGE_MAX];
 
-	if (serve->options.token_file == NULL) {
+	if (serve->options.given.token_file == NULL) {
 		guard_make_token(serve->token);
 		return COMMAND_DONE;
 	}
-	if (guard_read_token(serve->options.token_file, serve->token, message) == 0)
+	if (guard_read_token(serve->options.given.token_file, serve->token, message) == 0)
 		return COMMAND_DONE;
 	command_error("%s", message);
 	return COMMAND_INPUT;
@@ -170,7 +170,7 @@ static void tell_refused(const struct serve *serve)
 	cJSON *answer = cJSON_ParseWithLength(serve->select.answer, serve->select.size);
 	const char *why = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(answer, "error"));
 
-	command_error("--series %s: %s", serve->options.series, why != NULL ? why : "no answer");
+	command_error("--series %s: %s", serve->options.given.series, why != NULL ? why : "no answer");
 	cJSON_Delete(answer);
 }
 
@@ -179,10 +179,10 @@ static int select_series(struct serve *serve)
 {
 	int status;
 
-	if (serve->options.series == NULL)
+	if (serve->options.given.series == NULL)
 		return COMMAND_DONE;
 	serve->select_body = cJSON_CreateObject();
-	cJSON_AddStringToObject(serve->select_body, "series", serve->options.series);
+	cJSON_AddStringToObject(serve->select_body, "series", serve->options.given.series);
 	ask_select(serve);
 	while (sem_wait(&serve->selected) != 0)
 		continue;
@@ -341,11 +341,12 @@ int main(int argc, char **argv)
 	static struct serve serve;
 	int code = options_read(&serve.options, argc, argv);
 
+	if (code != OPTIONS_READ)
+		return code;
 	gsl_set_error_handler_off();
 	sem_init(&serve.pong, 0, 0);
 	sem_init(&serve.selected, 0, 0);
-	if (code == COMMAND_DONE)
-		code = make_token(&serve);
+	code = make_token(&serve);
 	if (code != COMMAND_DONE)
 		return code;
 	catch_signals();

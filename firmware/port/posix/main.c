@@ -1,115 +1,75 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include <getopt.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
 
+#include "common/base/number.h"
+#include "common/base/option.h"
 #include "firmware/port.h"
 #include "firmware/port/posix/posix.h"
 
-static const char usage[] =
-        "Usage: droptower-firmware --bus PREFIX [OPTION]...\n"
-        "\n"
-        "The drop tower's controller as a Linux process. It has no sensors, gates and outputs of its own: "
-        "they are\n"
-        "at the other end of two FIFOs, normally droptower-bench, which creates them and starts this "
-        "program.\n"
-        "\n"
-        "  --bus PREFIX       write requests to PREFIX.request, read answers from PREFIX.answer\n"
-        "  --can URL          CAN on a link of its own, unix:PATH, can:IF or slcan:DEV; without it CAN "
-        "frames ride\n"
-        "                     in the requests and answers\n"
-        "  --classic          the bus carries no CAN FD: captures are uploaded after the drop\n"
-        "  --realtime         keep to the clock, a millisecond for a millisecond; without it time stands "
-        "still\n"
-        "                     until the other end has answered\n"
-        "  --reset-cause N    boot as after 0 power-on (the default), 1 command, 2 watchdog, 3 brown-out,\n"
-        "                     4 reset pin\n"
-        "  --kept N           what the firmware before the reset kept over it, 0 to 255\n"
-        "  --help             this text\n"
-        "\n"
-        "Ends with 0 when the other end closes its pipe or says stop, 2 wrong arguments, 4 link or bus "
-        "fault.\n";
-
-enum {
-	OPTION_BUS = 1,
-	OPTION_CAN,
-	OPTION_CLASSIC,
-	OPTION_REALTIME,
-	OPTION_RESET_CAUSE,
-	OPTION_KEPT,
-	OPTION_HELP
-};
-
-static const struct option options[] = {
-        {"bus", required_argument, NULL, OPTION_BUS},
-        {"can", required_argument, NULL, OPTION_CAN},
-        {"classic", no_argument, NULL, OPTION_CLASSIC},
-        {"realtime", no_argument, NULL, OPTION_REALTIME},
-        {"reset-cause", required_argument, NULL, OPTION_RESET_CAUSE},
-        {"kept", required_argument, NULL, OPTION_KEPT},
-        {"help", no_argument, NULL, OPTION_HELP},
-        {NULL, 0, NULL, 0},
-};
-
-static int refuse(const char *what, const char *value)
+static int take_cause(const struct option_table *table, const char *name, const char *text, void *cause)
 {
-	fprintf(stderr, "droptower-firmware: %s%s; see --help\n", what, value);
-	return POSIX_EXIT_USAGE;
+	uint64_t number;
+
+	if (!number_whole(text, 0, PORT_RESETS - 1, &number))
+		return option_wrong(table, "--%s is '%s', expected 0 to %d", name, text, PORT_RESETS - 1);
+	*(enum port_reset *)cause = (enum port_reset)number;
+	return OPTIONS_READ;
 }
 
-static int parse_number(const char *text, unsigned long max, unsigned long *number)
+static int take_kept(const struct option_table *table, const char *name, const char *text, void *kept)
 {
-	char *end;
-	unsigned long value = strtoul(text, &end, 10);
+	uint64_t number;
 
-	if (*text < '0' || *text > '9' || *end != '\0' || value > max)
-		return DT_E_ARGUMENT;
-	*number = value;
-	return 0;
+	if (!number_whole(text, 0, UINT8_MAX, &number))
+		return option_wrong(table, "--%s is '%s', expected 0 to 255", name, text);
+	*(uint8_t *)kept = (uint8_t)number;
+	return OPTIONS_READ;
 }
+
+static const struct option_row rows[] = {
+        OPTION_TEXT("bus", "PREFIX", struct posix_options, bus,
+                    "write requests to PREFIX.request, read answers from PREFIX.answer"),
+        OPTION_TEXT("can", "URL", struct posix_options, can,
+                    "CAN on a link of its own, unix:PATH, can:IF or slcan:DEV; without it CAN frames ride in "
+                    "the requests and answers"),
+        OPTION_FLAG("classic", struct posix_options, classic,
+                    "the bus carries no CAN FD: captures are uploaded after the drop"),
+        OPTION_FLAG("realtime", struct posix_options, realtime,
+                    "keep to the clock, a millisecond for a millisecond; without it time stands still until "
+                    "the other end has answered"),
+        OPTION_TAKEN(
+                "reset-cause", "N", struct posix_options, cause, take_cause,
+                "boot as after 0 power-on (the default), 1 command, 2 watchdog, 3 brown-out, 4 reset pin"),
+        OPTION_TAKEN("kept", "N", struct posix_options, kept, take_kept,
+                     "what the firmware before the reset kept over it, 0 to 255"),
+};
+
+static const struct option_table known_options = {
+        .program = "droptower-firmware",
+        .head = "Usage: droptower-firmware --bus PREFIX [OPTION]...\n"
+                "\n"
+                "The drop tower's controller as a Linux process. It has no sensors, gates and outputs of its "
+                "own: "
+                "they are\n"
+                "at the other end of two FIFOs, normally droptower-bench, which creates them and starts this "
+                "program.\n"
+                "\n",
+        OPTION_ROWS(rows),
+        .tail = "\n"
+                "Ends with 0 when the other end closes its pipe or says stop, 2 wrong arguments, 4 link or "
+                "bus "
+                "fault.\n",
+};
 
 int main(int argc, char **argv)
 {
 	struct posix_options wanted = {.cause = PORT_RESET_POWER_ON};
-	unsigned long number;
-	int option;
+	int code = option_read(&known_options, &wanted, argc, argv);
 
-	while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {
-		switch (option) {
-		case OPTION_BUS:
-			wanted.bus = optarg;
-			break;
-		case OPTION_CAN:
-			wanted.can = optarg;
-			break;
-		case OPTION_CLASSIC:
-			wanted.classic = true;
-			break;
-		case OPTION_REALTIME:
-			wanted.realtime = true;
-			break;
-		case OPTION_RESET_CAUSE:
-			if (parse_number(optarg, PORT_RESETS - 1, &number) != 0)
-				return refuse("--reset-cause takes 0 to 4, not ", optarg);
-			wanted.cause = (enum port_reset)number;
-			break;
-		case OPTION_KEPT:
-			if (parse_number(optarg, UINT8_MAX, &number) != 0)
-				return refuse("--kept takes 0 to 255, not ", optarg);
-			wanted.kept = (uint8_t)number;
-			break;
-		case OPTION_HELP:
-			fputs(usage, stdout);
-			return 0;
-		default:
-			return POSIX_EXIT_USAGE; /* getopt has said why */
-		}
-	}
-	if (optind < argc)
-		return refuse("no arguments expected beside options, got ", argv[optind]);
+	if (code != OPTIONS_READ)
+		return code;
 	if (wanted.bus == NULL)
-		return refuse("--bus PREFIX is needed", "");
+		return option_wrong(&known_options, "--bus PREFIX is needed");
 	signal(SIGPIPE, SIG_IGN);
 	return posix_run(&wanted);
 }

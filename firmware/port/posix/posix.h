@@ -10,7 +10,6 @@
 #include "firmware/port.h"
 
 enum {
-	POSIX_EXIT_USAGE = 2,
 	POSIX_EXIT_LINK = 4,
 };
 
