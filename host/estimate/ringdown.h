@@ -12,7 +12,7 @@
  *   "full"       every sample: where some are missing, or outliers (outlier.h) must go
  *   "full+hum"   mains terms too, if they help
  *   "amplitude"  a frequency that follows the swing; the value is the mean of its first three cycles
- *   "two-modes"  started by a matrix pencil
+ *   "two-modes"  started from the one mode and another beside it
  * The last two only when an F-test prefers them (F > 7: the nominal limit fires on clean records, because
  * a mode of no amplitude has no frequency); of several that explain the residual, the one with the best
  * Bayesian information. Two modes that are surely nearer than the width of a resonance, or not surely apart,

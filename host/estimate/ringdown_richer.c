@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "host/estimate/outlier.h"
-#include "host/estimate/pencil.h"
 
 #define CHI_GROSS 3.0
 
@@ -135,27 +134,20 @@ static void try_spring(struct ringdown_job *job, double k)
 		consider(job, &modes);
 }
 
-/* Two modes from a start; false unless both come out as decays. */
-static bool fit_two(struct modes *modes, const struct series *series, const struct pencil_pole pole[2])
+/* A second mode's frequency over the first's, to start from. */
+#define ASIDE_BELOW 0.85
+#define ASIDE_ABOVE 1.15
+
+/* Two modes from the one and another beside it; false unless both come out as decays. */
+static bool fit_two(struct modes *modes, const struct ringdown_job *job, double aside)
 {
 	*modes = (struct modes){.count = 2};
 	for (unsigned m = 0; m < 2; m++) {
-		modes->p[MODES_DECAY + MODES_EACH * m] = pole[m].decay;
-		modes->p[MODES_OMEGA + MODES_EACH * m] = pole[m].omega;
+		modes->p[MODES_DECAY + MODES_EACH * m] = job->single.p[MODES_DECAY];
+		modes->p[MODES_OMEGA + MODES_EACH * m] = (m ? aside : 1) * job->single.p[MODES_OMEGA];
 	}
-	return modes_linear(modes, series) && modes_fit(modes, series) && ringdown_decays(modes, 0) &&
-	       ringdown_decays(modes, 1);
-}
-
-static bool start_two(const struct ringdown_job *job, struct pencil_pole pole[2])
-{
-	const struct series *series = &job->series;
-	double filled[SERIES_MAX];
-
-	for (unsigned k = 0; k < series->count; k++)
-		filled[k] = series->good[k] ? series->value_g[k]
-		                            : modes_at(&job->single, series->first_s + k * series->step_s);
-	return pencil_find(pole, filled, series->count, series->step_s);
+	return modes_linear(modes, &job->series) && modes_fit(modes, &job->series) &&
+	       ringdown_decays(modes, 0) && ringdown_decays(modes, 1);
 }
 
 /* Two modes that are surely nearer than the stronger's width, or not surely apart, are one as far as anyone
@@ -172,30 +164,16 @@ static bool separable(const struct ringdown_job *job, const struct modes *modes)
 	return apart + 2 * unsure >= own[MODES_DECAY] && apart >= SEPARATION * unsure;
 }
 
-/* The same minimum, as far as two fits of it agree. */
-#define SAME 1e-3
-
-/* By the pencil; where noise hides the weaker pole from it, from either side of the one mode. */
+/* From either side of the one mode, the second only where the first does not pass. */
 static void try_two(struct ringdown_job *job)
 {
-	static const double aside[] = {0.85, 1.15};
+	static const double aside[] = {ASIDE_BELOW, ASIDE_ABOVE};
 	struct modes modes, best = job->single;
-	struct pencil_pole pole[2];
 
 	ringdown_try(job, "two-modes");
-	if (start_two(job, pole) && fit_two(&modes, &job->series, pole))
-		best = modes;
-	for (size_t i = 0; i < sizeof(aside) / sizeof(aside[0]) && !ringdown_passes(job, &best); i++) {
-		pole[0] = (struct pencil_pole){job->single.p[MODES_OMEGA], job->single.p[MODES_DECAY]};
-		pole[1] = (struct pencil_pole){aside[i] * pole[0].omega, pole[0].decay};
-		if (!fit_two(&modes, &job->series, pole))
-			continue;
-		/* Two starts that meet leave little hope for a third. */
-		if (best.count == 2 && fabs(modes.fit.squares - best.fit.squares) < SAME * best.fit.squares)
-			break;
-		if (modes.fit.squares < best.fit.squares)
+	for (size_t i = 0; i < sizeof(aside) / sizeof(aside[0]) && !ringdown_passes(job, &best); i++)
+		if (fit_two(&modes, job, aside[i]) && modes.fit.squares < best.fit.squares)
 			best = modes;
-	}
 	if (best.count < 2)
 		return;
 	if (separable(job, &best))

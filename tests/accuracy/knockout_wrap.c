@@ -18,7 +18,6 @@
 #include "host/estimate/modes.h"
 #include "host/estimate/outlier.h"
 #include "host/estimate/peak_private.h"
-#include "host/estimate/pencil.h"
 #include "host/estimate/quiet.h"
 #include "host/estimate/ringdown_private.h"
 #include "host/estimate/scan.h"
@@ -71,8 +70,8 @@ const struct knockout knockouts[] = {
         {"decay: hum", "ringdown_richer.c:fit_hum"},
         {"decay: any law", "spring.c spring.h ringdown_richer.c:try_square"},
         {"decay: softening spring", "spring.c spring.h"},
-        {"decay: two modes", "pencil.c pencil.h ringdown_richer.c:try_two ringdown_richer.c:separable"},
-        {"decay: two by a pencil", "pencil.c pencil.h"},
+        {"decay: two modes",
+         "ringdown_richer.c:fit_two ringdown_richer.c:try_two ringdown_richer.c:separable"},
 };
 /* clang-format on */
 const size_t knockout_count = sizeof(knockouts) / sizeof(knockouts[0]);
@@ -117,8 +116,6 @@ WRAP(bool, scan_find, (struct scan * s, const struct trace *t, size_t first, siz
 WRAP(unsigned, outlier_drop, (struct series * s, const struct modes *m, const bool *usable), (s, m, usable),
      "decay: outliers", 0)
 WRAP(void, ringdown_try_hum, (struct ringdown_job * j), (j), "decay: hum", )
-WRAP(bool, pencil_find, (struct pencil_pole p[2], const double *v, unsigned n, double step_s),
-     (p, v, n, step_s), "decay: two by a pencil", false)
 
 static bool law_is_off(const struct modes *modes)
 {

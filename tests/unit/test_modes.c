@@ -11,7 +11,6 @@
 #include "host/estimate/crossings.h"
 #include "host/estimate/modes.h"
 #include "host/estimate/outlier.h"
-#include "host/estimate/pencil.h"
 #include "host/estimate/scan.h"
 #include "tests/unit/near.h"
 #include "tests/unit/synth.h"
@@ -213,30 +212,6 @@ static void scanned(void **state)
 	}
 }
 
-static void pencil(void **state)
-{
-	struct trace trace = open_sum(40, 0, 0.3, 5);
-	struct pencil_pole pole[2];
-	struct series s;
-	unsigned low;
-
-	(void)state;
-	series_take(&s, &trace, 0, 350, 0.25, 3);
-	/* An offset is one more pole, not a worse answer. */
-	for (unsigned k = 0; k < s.count; k++)
-		s.value_g[k] += 30;
-	assert_true(pencil_find(pole, s.value_g, s.count, s.step_s));
-	low = pole[0].omega > pole[1].omega;
-	assert_near_part(pole[low].omega, w1, 0.01);
-	assert_near_part(pole[low].decay, a1, 0.1);
-	assert_near_part(pole[!low].omega, w2, 0.05);
-	assert_near_part(pole[!low].decay, a2, 0.5);
-	assert_false(pencil_find(pole, s.value_g, 20, s.step_s));
-	memset(s.value_g, 0, sizeof(s.value_g));
-	assert_false(pencil_find(pole, s.value_g, s.count, s.step_s));
-	trace_close(&trace);
-}
-
 /* Spikes go, alone or two together, first sample or last; a residual that is smooth stays. */
 static void outliers(void **state)
 {
@@ -323,10 +298,9 @@ static void bump(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(series), cmocka_unit_test(thinned),    cmocka_unit_test(exact),
-	        cmocka_unit_test(holes),  cmocka_unit_test(impossible), cmocka_unit_test(scanned),
-	        cmocka_unit_test(pencil), cmocka_unit_test(outliers),   cmocka_unit_test(crossings),
-	        cmocka_unit_test(bump),
+	        cmocka_unit_test(series),   cmocka_unit_test(thinned),    cmocka_unit_test(exact),
+	        cmocka_unit_test(holes),    cmocka_unit_test(impossible), cmocka_unit_test(scanned),
+	        cmocka_unit_test(outliers), cmocka_unit_test(crossings),  cmocka_unit_test(bump),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
