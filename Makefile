@@ -124,12 +124,6 @@ $(BUILD)/droptower-firmware: $(call obj,$(LOCKSTEP_C) $(POSIX_C)) $(foreach l,fi
 	$(call say,LINK,$@)
 	$(link)
 
-$(UNITS): $(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(call obj,$(UNIT_HELPER_C)) \
-		$(foreach l,console host hil firmware link common,$(call lib,$l))
-	$(call say,LINK,$@)
-	$(Q)mkdir -p $(@D) && $(CC) $(LDFLAGS) $(filter %.o,$^) -Wl,--start-group $(filter %.a,$^) -Wl,--end-group \
-		$(LIBRARIES) -lmicrohttpd -lcmocka -o $@
-
 $(TOOLS): $(BUILD)/tests/%: $(BUILD)/obj/tests/system/%.o $(foreach l,host link common,$(call lib,$l))
 	$(call say,LINK,$@)
 	$(link)

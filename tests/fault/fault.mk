@@ -92,8 +92,7 @@ CFLAGS += -O0 --coverage
 LDFLAGS += --coverage
 endif
 
-.PHONY: cov units
-units: $(UNITS)
+.PHONY: cov
 cov: setup-test ## run the unit tests and say which lines and branches of common/ and firmware/ they reach
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD)/cov CC=gcc COVERAGE=1 units
 	@tests/fault/cover $(BUILD)/cov

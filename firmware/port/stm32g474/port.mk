@@ -9,7 +9,6 @@ STM32G474 = $(BUILD)/firmware-stm32g474
 STM32G474_DRIVER_C = $(filter-out %/port.c %/start.c,$(wildcard firmware/port/stm32g474/*.c))
 STM32G474_C = $(FREESTANDING_C) $(wildcard firmware/port/stm32g474/*.c) firmware/port/memory.c
 STM32G474_O = $(STM32G474_C:%.c=$(STM32G474)/obj/%.o)
-STM32G474_TESTS = $(filter $(BUILD)/tests/test_stm32g474%,$(UNITS))
 STM32G474_CC = arm-none-eabi-gcc
 STM32G474_CPU = -mcpu=cortex-m4 -mthumb -mfloat-abi=soft
 STM32G474_CFLAGS = -std=c11 -O2 -g $(WARNINGS) $(STM32G474_CPU) -ffreestanding -nostdinc \
@@ -35,7 +34,7 @@ $(STM32G474)/obj/%.o: %.c Makefile firmware/port/stm32g474/port.mk
 
 $(call obj,$(STM32G474_DRIVER_C)): CFLAGS += -ffreestanding
 $(call lib,stm32g474): $(call obj,$(STM32G474_DRIVER_C))
-$(STM32G474_TESTS): $(call lib,stm32g474)
+$(BUILD)/tests/unit: $(call lib,stm32g474)
 
 ifndef SANITIZE
 tests: $(STM32G474)/firmware.bin
