@@ -5,7 +5,7 @@
  * What the printers share.
  */
 #include "host/archive/print.h"
-#include "host/report/put.h"
+#include "host/base/put.h"
 
 /* What is being printed, as the context of the archive_each_* calls. */
 struct print {

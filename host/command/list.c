@@ -10,7 +10,7 @@
 #include "common/wire_table.h"
 #include "host/command/command.h"
 #include "host/record/log_walk.h"
-#include "host/report/put.h"
+#include "host/base/put.h"
 
 struct list {
 	const char *file;

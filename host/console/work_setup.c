@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "host/console/work_private.h"
-#include "host/report/put.h"
+#include "host/base/put.h"
 
 enum { PRESETS_MAX = 20, PLANNED_MAX = 1000 };
 

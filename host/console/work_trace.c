@@ -14,7 +14,7 @@
 #include "host/console/work_private.h"
 #include "host/report/curves.h"
 #include "host/report/facts.h"
-#include "host/report/put.h"
+#include "host/base/put.h"
 #include "host/shock/spectrum.h"
 
 /* ---- a drop from its log ---- */

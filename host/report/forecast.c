@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "host/model/auto.h"
-#include "host/report/put.h"
+#include "host/base/put.h"
 
 enum { CELL_MAX = 48, ROW_MAX = CELL_MAX * (ENSEMBLE_OUTPUTS + ENSEMBLE_KEYS_MAX) };
 

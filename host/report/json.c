@@ -7,7 +7,7 @@
 
 #include "host/estimate/cfc.h"
 #include "host/report/facts.h"
-#include "host/report/put.h"
+#include "host/base/put.h"
 #include "host/report/shock.h"
 #include "host/result/quantity.h"
 

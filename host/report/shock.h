@@ -4,7 +4,7 @@
 /*
  * What host/shock found, as parts of JSON and text: shocks, free falls, and a pulse against its band.
  */
-#include "host/report/put.h"
+#include "host/base/put.h"
 #include "host/report/report.h"
 
 /* "events", "free_falls" (always there) and "band" (null without one). */

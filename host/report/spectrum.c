@@ -8,7 +8,7 @@
 
 #include "host/record/text.h"
 #include "host/report/picture.h"
-#include "host/report/put.h"
+#include "host/base/put.h"
 #include "host/shock/signal.h"
 
 static const char *const quantity_words[SRS_QUANTITIES] = {"absolute acceleration", "pseudo velocity",

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/report/put.h"
+#include "host/base/put.h"
 
 #include <math.h>
 #include <stdio.h>

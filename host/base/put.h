@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_REPORT_PUT_H
-#define DT_HOST_REPORT_PUT_H
+#ifndef DT_HOST_BASE_PUT_H
+#define DT_HOST_BASE_PUT_H
 /*
  * Building a JSON object: numbers with as many digits as give the same double again, NAN and infinities as
- * null, texts as valid UTF-8. For host/report and host/archive. Objects under construction belong to their
+ * null, texts as valid UTF-8. Objects under construction belong to their
  * parent; out of memory anywhere, and failed is set: it is looked at once, by put_out.
  */
 #include <stdbool.h>
