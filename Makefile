@@ -179,8 +179,9 @@ check: edges ## test, both compilers with warnings as errors, sanitizers, includ
 	@$(MAKE) --no-print-directory test
 	@clang-format --dry-run --Werror $$(git ls-files '*.c' '*.h')
 
-edges: ## check that no folder includes what it must not (tests/edges lists the rules)
+edges: all ## check that no folder includes or calls what it must not (tests/edges and tests/links list the rules)
 	@tests/edges
+	@tests/links $(BUILD)
 
 dbc: $(BUILD)/droptower.dbc ## write the wire as a DBC file for CAN tools
 $(BUILD)/droptower.dbc: $(BUILD)/droptower
