@@ -234,6 +234,10 @@ DT_MUST_USE int archive_each_calibration(struct archive *archive,
 /* The JSON of a drop's result, to be freed; version NULL: the newest. DT_E_EMPTY: there is none. */
 DT_MUST_USE int archive_json(struct archive *archive, const char *drop, const char *version, char **json);
 
+/* The tree of such a text, or of any JSON, to be deleted: DT_E_FORMAT when it is none, DT_E_MEMORY. */
+struct cJSON;
+DT_MUST_USE int archive_json_parse(const char *json, struct cJSON **root);
+
 /* Where a log with these bytes is: 1 and "SERIES/NUMBER" in drop, 0 when there is none, or DT_E_*. */
 DT_MUST_USE int archive_find(struct archive *archive, const char *file, char drop[ARCHIVE_NAME_MAX + 16]);
 

@@ -189,6 +189,7 @@ char *durable_read(const char *path, size_t *size)
 	char *text = NULL;
 	struct stat status;
 	size_t length = 0;
+	int failed;
 
 	if (in == NULL)
 		return NULL;
@@ -200,7 +201,13 @@ char *durable_read(const char *path, size_t *size)
 		length = fread(text, 1, (size_t)status.st_size, in);
 		text[length] = '\0';
 	}
+	if (text != NULL && ferror(in)) {
+		free(text);
+		text = NULL;
+	}
+	failed = errno;
 	fclose(in);
+	errno = failed;
 	if (size != NULL)
 		*size = length;
 	return text;

@@ -42,6 +42,8 @@ static int take(struct rebuild *rebuild, const char *file)
 	if (result != 0)
 		return result;
 	taken = sidecar_read(archive, file, &drop);
+	if (taken == DT_E_MEMORY) /* says nothing of the file, and so nothing of what the index would lack */
+		return taken;
 	if (taken != 0) {
 		snprintf(text, sizeof(text), "%.200s: %s", file, archive->message);
 		rebuild->wrong(rebuild->context, text);

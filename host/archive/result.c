@@ -34,6 +34,13 @@ const char *archive_value_unit(enum archive_value value)
 	return units[value];
 }
 
+int archive_json_parse(const char *json, cJSON **root)
+{
+	errno = 0; /* the library does not tell one from the other */
+	*root = cJSON_Parse(json);
+	return *root != NULL ? 0 : errno == ENOMEM ? DT_E_MEMORY : DT_E_FORMAT;
+}
+
 struct numbers {
 	double value[ARCHIVE_VALUE_COUNT], sigma[ARCHIVE_VALUE_COUNT];
 	int64_t not_ok;
@@ -204,10 +211,14 @@ static int insert(struct archive *archive, int64_t drop, const char *when, const
 int result_insert(struct archive *archive, int64_t drop, const char *when, const char *version,
                   const char *json)
 {
-	cJSON *root = cJSON_Parse(json);
+	cJSON *root = NULL;
 	int result = archive_check_name(archive, "version", version);
 
-	if (result == 0 && (root == NULL || !cJSON_HasObjectItem(root, "channels")))
+	if (result == 0)
+		result = archive_json_parse(json, &root);
+	if (result == DT_E_MEMORY)
+		return archive_refuse(archive, result, "%s", error_text(result));
+	if (result == DT_E_FORMAT || (result == 0 && !cJSON_HasObjectItem(root, "channels")))
 		result = archive_refuse(archive, DT_E_FORMAT,
 		                        "a result by %s is damaged, expected the JSON of an analysis",
 		                        version);

@@ -93,6 +93,8 @@ static int take_events(struct archive *archive, const struct sidecar *sidecar, i
 		char *copy = strdup(text), *rest = copy;
 		const char *part[4] = {"", "", "", ""};
 
+		if (copy == NULL)
+			return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
 		for (int i = 0; i < 4 && rest != NULL; i++)
 			part[i] = i < 3 ? strsep(&rest, "\t") : rest;
 		result = sql_run(archive,
@@ -141,6 +143,12 @@ static bool is_recorded(const struct sidecar_result *r, const char *json, size_t
 	return strcmp(hash, r->hash) == 0;
 }
 
+/* A file that cannot be opened or read for want of memory or descriptors is not for that reason a bad one. */
+static bool is_of_the_machine(int error)
+{
+	return error == ENOMEM || error == EMFILE || error == ENFILE;
+}
+
 /* 1 when it is not there, or not what was recorded: to be verified, and made again. */
 static int take_result(struct archive *archive, const struct sidecar *sidecar, int64_t drop, const char *text)
 {
@@ -158,7 +166,9 @@ static int take_result(struct archive *archive, const struct sidecar *sidecar, i
 		return result;
 	sidecar_json_path(archive, sidecar->file, r.version, path);
 	json = durable_read(path, &size);
-	if (json == NULL && r.bytes < 0)
+	if (json == NULL && is_of_the_machine(errno))
+		return archive_refuse(archive, DT_E_MEMORY, "%.500s: %s", path, strerror(errno));
+	if (json == NULL && (r.bytes < 0 || errno != ENOENT))
 		return archive_refuse(archive, DT_E_SYSTEM, "%.500s: %s", path, strerror(errno));
 	if (json != NULL && is_recorded(&r, json, size))
 		result = result_insert(archive, drop, r.time, r.version, json);
@@ -267,7 +277,8 @@ int sidecar_read(struct archive *archive, const char *file, int64_t *drop)
 	snprintf(path, sizeof(path), "%s/%.200s", archive->folder, file);
 	text = durable_read(path, NULL);
 	if (text == NULL)
-		return archive_refuse(archive, DT_E_SYSTEM, "%s", strerror(errno));
+		return archive_refuse(archive, is_of_the_machine(errno) ? DT_E_MEMORY : DT_E_SYSTEM, "%s",
+		                      strerror(errno));
 	result = sidecar_split(archive, &sidecar, text);
 	if (result == 0)
 		result = take(archive, &sidecar, drop);

@@ -166,14 +166,19 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 	if (scene == NULL)
 		return 0;
 	result = model_solve(scene, MODEL_AUTO, NULL, &e->prediction, message);
-	if (result != 0) {
+	if (result != 0 && result != DT_E_MEMORY) {
 		command_error("%s: no prediction: %s", scene->name, message);
 		return 0;
 	}
-	e->report.prediction = &e->prediction;
-	if (model_below(scene, &e->prediction, &e->below) == 0)
-		e->report.below = &e->below;
-	return 0;
+	if (result == 0) {
+		e->report.prediction = &e->prediction;
+		result = model_below(scene, &e->prediction, &e->below);
+		e->report.below = result == 0 ? &e->below : NULL;
+	}
+	if (result != DT_E_MEMORY)
+		return 0;
+	evaluate_close(e);
+	return result;
 }
 
 void evaluate_close(struct evaluated *e)

@@ -113,8 +113,11 @@ static int read_drop(struct series_page *page, struct series_drop *drop)
 		return result;
 	result = series_result_read(drop, json);
 	free(json);
+	if (result == DT_E_FORMAT && !drop->no_log[0])
+		snprintf(drop->no_log, sizeof(drop->no_log), "the result by %s is no analysis",
+		         drop->a.version);
 	if (result)
-		return result == DT_E_MEMORY ? result : 0;
+		return result == DT_E_FORMAT ? 0 : result;
 	drop->has_result = true;
 	drop->report = (struct report){.record = &drop->record, .analysis = &drop->analysis};
 	drop->zero = report_zero(&drop->report);
@@ -148,19 +151,24 @@ static void set_window(struct series_page *page)
 }
 
 /* A drop's first touch is where its S2 says, some tenths of a ms before zero: the curve begins earlier. */
-static void solve_model(struct series_page *page)
+static int solve_model(struct series_page *page)
 {
 	struct script_window *w = &page->curve;
+	int result = model_solve(&page->scene, MODEL_AUTO, NULL, &page->prediction, NULL);
 
-	page->has_model = model_solve(&page->scene, MODEL_AUTO, NULL, &page->prediction, NULL) == 0;
-	page->has_below = page->has_model && model_below(&page->scene, &page->prediction, &page->below) == 0;
+	page->has_model = result == 0;
+	if (page->has_model)
+		result = model_below(&page->scene, &page->prediction, &page->below);
+	page->has_below = page->has_model && result == 0;
 	*w = (struct script_window){-0.005, 0.025};
+	return result == DT_E_MEMORY ? result : 0; /* else there is none for this scene */
 }
 
-static void draw_model(struct series_page *page)
+static int draw_model(struct series_page *page)
 {
 	struct script_window *w = &page->curve;
 	double first_s = 0.0, last_s = 0.0;
+	int result = 0;
 
 	for (size_t i = 0; i < page->count; i++) {
 		first_s = fmax(first_s, page->drop[i]->model_s);
@@ -169,9 +177,11 @@ static void draw_model(struct series_page *page)
 	w->from_s = page->window.from_s - first_s;
 	w->to_s = page->window.to_s - last_s;
 	if (page->has_model)
-		page->has_model = model_histories(&page->scene, page->prediction.rung, NULL, w->from_s,
-		                                  (w->to_s - w->from_s) / (SCRIPT_CURVE_POINTS - 1),
-		                                  page->curve_g, SCRIPT_CURVE_POINTS, NULL) == 0;
+		result = model_histories(&page->scene, page->prediction.rung, NULL, w->from_s,
+		                         (w->to_s - w->from_s) / (SCRIPT_CURVE_POINTS - 1), page->curve_g,
+		                         SCRIPT_CURVE_POINTS, NULL);
+	page->has_model = page->has_model && result == 0;
+	return result == DT_E_MEMORY ? result : 0;
 }
 
 /* A trace that a reader of the page will miss. */
@@ -220,7 +230,8 @@ static int gather(struct series_page *page)
 		result = archive_each_drop(archive, &filter, take_drop, page);
 	if (result == 0)
 		result = archive_seal(archive, &page->seal);
-	solve_model(page);
+	if (result == 0)
+		result = solve_model(page);
 	for (size_t i = 0; i < page->count && result == 0; i++)
 		result = read_drop(page, page->drop[i]);
 	if (result != 0)
@@ -232,8 +243,10 @@ static int gather(struct series_page *page)
 	if (result != 0)
 		return result;
 	set_window(page);
-	draw_model(page);
-	return 0;
+	result = draw_model(page);
+	if (result != 0)
+		snprintf(page->page.message, page->page.size, "%s", error_text(result));
+	return result;
 }
 
 static void release(struct series_page *page)

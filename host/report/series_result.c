@@ -179,9 +179,12 @@ static int take(struct series_drop *drop, const cJSON *root)
 
 int series_result_read(struct series_drop *drop, const char *json)
 {
-	cJSON *root = cJSON_Parse(json);
-	int result = cJSON_GetArraySize(at(root, "channels")) > 0 ? take(drop, root) : DT_E_FORMAT;
+	cJSON *root;
+	int result = archive_json_parse(json, &root);
 
+	if (result)
+		return result;
+	result = cJSON_GetArraySize(at(root, "channels")) > 0 ? take(drop, root) : DT_E_FORMAT;
 	cJSON_Delete(root);
 	return result;
 }
