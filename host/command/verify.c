@@ -124,7 +124,11 @@ static const char *doubt(const struct record *r)
 		return "altered: the capture's CRC-32 does not agree with its samples";
 	if (!r->seal_known)
 		return "not sealed: its capture end has no checksum, as those of older towers";
-	return r->seal_agrees ? NULL : "altered: the capture end does not agree with its seal";
+	if (!r->seal_agrees)
+		return "altered: the capture end does not agree with its seal";
+	return r->flags & RECORD_FLAG_ALTERED
+	               ? "altered: the parameters are not those whose CRC-32 the capture end names"
+	               : NULL;
 }
 
 struct proving {
@@ -140,9 +144,11 @@ static void judge(struct proving *proving, const char *name, const struct record
 		proving->doubted = true;
 		command_error("%s: %s", name, why);
 	} else if (record->is_drop) {
-		printf("%s: proven: drop %u, every sample (CRC-32 %08lx) and the capture end (seal %08lx) as "
+		printf("%s: proven: drop %u, every sample (CRC-32 %08lx) and the capture end (seal %08lx)%s "
+		       "as "
 		       "the tower sent them%s\n",
 		       name, record->drop_id, (unsigned long)record->crc32, (unsigned long)record->seal,
+		       record->parameters_known ? ", the parameters" : "",
 		       record->file_sealed ? ", the file as it was written" : "");
 	} else {
 		printf("%s: proven: as it was written; no drop of a tower\n", name);

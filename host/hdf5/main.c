@@ -19,6 +19,7 @@ enum {
 	IMAGE_STEP = 1 << 20,  /* bytes by which a file in memory grows */
 	SAMPLES_MAX = 1 << 27, /* of a channel: a gigabyte */
 	MASK = SAMPLE_LOST | SAMPLE_BAD | SAMPLE_CLIPPED,
+	CHANNEL_NAME = sizeof(((struct channel *)NULL)->name),
 };
 
 /* Every failing call comes through here: says what of the file is not as expected. */
@@ -103,7 +104,35 @@ static int get_text(hid_t at, const char *name, char *text, size_t size)
 	return result;
 }
 
+/* The seal is of what we write: whatever else stands beside it was put there later. */
+static int hold_count(hid_t at, const char *path, int attributes)
+{
+	hid_t object = H5Oopen(at, path, H5P_DEFAULT);
+	bool same = object >= 0 && H5Aget_num_attrs(object) == attributes;
+	char told[96];
+
+	if (object >= 0)
+		H5Oclose(object);
+	if (same)
+		return 0;
+	snprintf(told, sizeof(told), "altered: attributes of %.40s added or taken away", path);
+	return refuse(told, "those that it was sealed with");
+}
+
+static int hold_text(hid_t at, const char *name, const char *expected)
+{
+	char text[64], told[128];
+
+	if (get_text(at, name, text, sizeof(text)) == 0 && strcmp(text, expected) == 0)
+		return 0;
+	snprintf(told, sizeof(told), "altered: %s is \"%.48s\"", name, text);
+	return refuse(told, expected);
+}
+
 /* ---- writing ---- */
+
+#define UNITS "g"
+#define BITS "1 lost, 2 not taken, 4 beyond the range"
 
 static int put_array(hid_t group, const char *name, hid_t type, const void *values, size_t count,
                      const char *key, const char *text)
@@ -134,24 +163,29 @@ static int put_samples(hid_t group, const struct channel *channel)
 	for (size_t k = 0; k < channel->count; k++)
 		mask[k] = channel->sample[k] & MASK;
 	result = put_array(group, "acceleration", H5T_NATIVE_DOUBLE, channel->value_g, channel->count,
-	                   "units", "g");
+	                   "units", UNITS);
 	if (result == 0)
-		result = put_array(group, "mask", H5T_NATIVE_UINT8, mask, channel->count, "bits",
-		                   "1 lost, 2 not taken, 4 beyond the range");
+		result = put_array(group, "mask", H5T_NATIVE_UINT8, mask, channel->count, "bits", BITS);
 	free(mask);
 	return result;
 }
 
+/* A stroke would make a group of its own. */
+static void name_link(const char *name, char link[CHANNEL_NAME])
+{
+	snprintf(link, CHANNEL_NAME, "%s", name);
+	for (char *p = link; *p; p++)
+		if (*p == '/')
+			*p = '_';
+}
+
 static int put_channel(hid_t file, const struct channel *channel)
 {
-	char link[sizeof(channel->name)];
+	char link[CHANNEL_NAME];
 	hid_t group;
 	int result = 0;
 
-	memcpy(link, channel->name, sizeof(link));
-	for (char *p = link; *p; p++)
-		if (*p == '/') /* would be a group of its own */
-			*p = '_';
+	name_link(channel->name, link);
 	group = H5Gcreate2(file, link, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
 	if (group < 0)
 		return refuse(channel->name, "names of channels that differ in more than a stroke");
@@ -272,7 +306,7 @@ static int get_samples(struct channel *channel, hid_t values, hid_t mask)
 	return 0;
 }
 
-static int get_arrays(struct record *record, hid_t group, const char *name, double rate_hz)
+static int get_arrays(struct record *record, hid_t group, const char *name, double rate_hz, bool sealed)
 {
 	hid_t values = H5Dopen2(group, "acceleration", H5P_DEFAULT),
 	      mask = H5Dopen2(group, "mask", H5P_DEFAULT);
@@ -286,6 +320,9 @@ static int get_arrays(struct record *record, hid_t group, const char *name, doub
 		refuse("no memory", "some");
 	else
 		result = get_samples(channel, values, mask);
+	if (result == 0 && sealed)
+		result = hold_count(group, "acceleration", 1) | hold_text(values, "units", UNITS) |
+		         hold_count(group, "mask", 1) | hold_text(mask, "bits", BITS);
 	if (values >= 0)
 		H5Dclose(values);
 	if (mask >= 0)
@@ -293,12 +330,24 @@ static int get_arrays(struct record *record, hid_t group, const char *name, doub
 	return result;
 }
 
-static int get_channel(struct record *record, hid_t file, const char *link)
+static int hold_channel(hid_t group, const char *link, const char *name)
+{
+	char expected[CHANNEL_NAME], told[128];
+	H5G_info_t info;
+
+	name_link(name, expected);
+	if (strcmp(link, expected) == 0 && H5Gget_info(group, &info) >= 0 && info.nlinks == 2)
+		return hold_count(group, ".", 5);
+	snprintf(told, sizeof(told), "altered: group %.40s", link);
+	return refuse(told, "each named as its channel, with acceleration and mask in it");
+}
+
+static int get_channel(struct record *record, hid_t file, const char *link, bool sealed)
 {
 	hid_t group = H5Gopen2(file, link, H5P_DEFAULT);
 	double rate_hz, start_s, range_g, uneven;
 	struct channel *channel;
-	char name[32];
+	char name[CHANNEL_NAME];
 	int result;
 
 	if (group < 0)
@@ -308,7 +357,9 @@ static int get_channel(struct record *record, hid_t file, const char *link)
 	    get_real(group, "uneven", &uneven) != 0)
 		result = refuse(link, "attributes name, rate_hz, start_s, range_g and uneven");
 	else
-		result = get_arrays(record, group, name, rate_hz);
+		result = sealed ? hold_channel(group, link, name) : 0;
+	if (result == 0)
+		result = get_arrays(record, group, name, rate_hz, sealed);
 	if (result == 0) {
 		channel = &record->channels[record->channel_count - 1];
 		channel->start_s = start_s;
@@ -320,7 +371,7 @@ static int get_channel(struct record *record, hid_t file, const char *link)
 }
 
 /* In the order they were written; by name where a program that copied the file did not keep it. */
-static int get_channels(struct record *record, hid_t file)
+static int get_channels(struct record *record, hid_t file, bool sealed)
 {
 	H5_index_t index = H5_INDEX_CRT_ORDER;
 	H5G_info_t info;
@@ -338,7 +389,7 @@ static int get_channels(struct record *record, hid_t file)
 		if (length <= 0 || length >= (ssize_t)sizeof(link))
 			result = refuse("a group's name is too long", "one for each channel");
 		else
-			result = get_channel(record, file, link);
+			result = get_channel(record, file, link, sealed);
 	}
 	return result;
 }
@@ -356,6 +407,16 @@ static int get_fields(struct record *record, hid_t file)
 			return refuse(entry->name, "a number that fits");
 	}
 	return 0;
+}
+
+static int hold_file(const struct record *record, hid_t file)
+{
+	const struct fields_entry *entry;
+	int count = 3; /* format, version, sha256 */
+
+	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++)
+		count += fields_known(record, entry);
+	return hold_count(file, "/", count);
 }
 
 /* The samples of a drop are counts. */
@@ -382,6 +443,7 @@ static int get_record(struct record *record, hid_t file, char seal[DIGEST_CHARS]
 {
 	char format[16];
 	double version;
+	bool sealed;
 	int result;
 
 	if (get_text(file, "format", format, sizeof(format)) != 0 || strcmp(format, "droptower") != 0 ||
@@ -390,9 +452,12 @@ static int get_record(struct record *record, hid_t file, char seal[DIGEST_CHARS]
 	seal[0] = '\0';
 	if (H5Aexists(file, "sha256") > 0 && get_text(file, "sha256", seal, DIGEST_CHARS) != 0)
 		return refuse("sha256 is no text", "64 digits");
+	sealed = seal[0] != '\0';
 	result = get_fields(record, file);
 	if (result == 0)
-		result = get_channels(record, file);
+		result = get_channels(record, file, sealed);
+	if (result == 0 && sealed)
+		result = hold_file(record, file);
 	return result == 0 && record->is_drop ? check_counts(record) : result;
 }
 

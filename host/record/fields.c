@@ -29,6 +29,10 @@ static const struct fields_entry entries[] = {
         FIELD("measured_latch_delay_us", FIELDS_U16, measured.latch_delay_us),
         FIELD("measured_clock_ppm", FIELDS_I16, measured.clock_ppm),
         FIELD("measured_trigger_latency_us", FIELDS_U16, measured.trigger_latency_us),
+/* the parameters that the drop was made with */
+#define WIRE_PARAMETER(name, index, unit, min, max, initial, doc) \
+	FIELD("set_" #name, FIELDS_U32, parameters[WIRE_PARAMETER_##name]),
+#include "common/wire.def"
         FIELD("blocks", FIELDS_U64, counters.blocks),
         FIELD("repeated", FIELDS_U64, counters.repeated),
         FIELD("reordered", FIELDS_U64, counters.reordered),
@@ -68,6 +72,17 @@ static bool of_measured(const struct fields_entry *entry)
 	       entry->offset < offsetof(struct record, measured) + sizeof(struct wire_measured);
 }
 
+/* Bit of parameters_held; 0: it is no parameter. */
+static uint32_t of_parameters(const struct fields_entry *entry)
+{
+	size_t first = offsetof(struct record, parameters);
+	size_t at = entry->offset - first;
+
+	return entry->offset >= first && at < sizeof(((struct record *)NULL)->parameters)
+	               ? UINT32_C(1) << at / sizeof(uint32_t)
+	               : 0;
+}
+
 bool fields_known(const struct record *record, const struct fields_entry *entry)
 {
 	if (entry->offset == offsetof(struct record, seal) && !record->seal_known)
@@ -77,6 +92,8 @@ bool fields_known(const struct record *record, const struct fields_entry *entry)
 	if (!record->is_drop || (of_capture_end(entry) && !record->crc_known) ||
 	    (of_measured(entry) && !record->measured_known))
 		return false;
+	if (of_parameters(entry) != 0)
+		return record->crc_known && (record->parameters_held & of_parameters(entry)) != 0;
 	return entry->kind != FIELDS_REAL || isfinite(fields_real(record, entry));
 }
 
@@ -156,5 +173,6 @@ int fields_set(struct record *record, const struct fields_entry *entry, double v
 	record->crc_known |= entry->offset == offsetof(struct record, crc32);
 	record->seal_known |= entry->offset == offsetof(struct record, seal);
 	record->measured_known |= of_measured(entry);
+	record->parameters_held |= of_parameters(entry);
 	return 0;
 }

@@ -35,9 +35,9 @@ bool fields_known(const struct record *record, const struct fields_entry *entry)
 double fields_real(const struct record *record, const struct fields_entry *entry);
 int64_t fields_whole(const struct record *record, const struct fields_entry *entry);
 
-/* Sets it; with drop_id the record becomes a drop, with crc32 one whose capture end came, with
- * what it measured one that measured. DT_E_RANGE if value
- * is not finite, not whole or does not fit. */
+/* Sets it; with drop_id the record becomes a drop, with crc32 one whose capture end came, with what it
+ * measured one that measured; a parameter is held. DT_E_RANGE if value is not finite, not whole or does not
+ * fit. */
 DT_MUST_USE int fields_set(struct record *record, const struct fields_entry *entry, double value);
 
 #endif

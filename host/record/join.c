@@ -233,6 +233,7 @@ static int feed_capture_end(struct join *join, const struct frame *frame)
 	if (join->has_capture)
 		tell_loss(join, JOIN_LOSS_CAPTURE);
 	join->end = end;
+	told_begin(&join->told, end.drop_id);
 	join->end_seen = true;
 	join->has_capture = true;
 	join->settling = true;
@@ -302,7 +303,7 @@ bool join_complete(const struct join *join)
 
 bool join_told(const struct join *join)
 {
-	return join->has_capture && told_whole(&join->told, join->end.drop_id);
+	return join->has_capture && told_whole(&join->told, &join->end);
 }
 
 bool join_next_gap(const struct join *join, unsigned sensor, uint32_t tick_ms, uint32_t limit,
@@ -492,8 +493,8 @@ int join_skip(struct join *join, struct log_capture *capture)
 	capture->crc32 = join->has_capture ? end->crc32 : 0;
 	capture->frame_speed_mm_s = join->has_capture ? end->frame_speed_mm_s : 0;
 	capture->crc_agrees = join->has_capture && join->crc_agrees;
-	/* one that does not agree ends no capture */
-	capture->seal_known = capture->seal_agrees = join->has_capture;
+	capture->seal_known = join->has_capture; /* an end that does not agree ends no capture */
+	capture->seal_agrees = join->has_capture && !told_is_altered(&join->told, end);
 	capture->seal = join->has_capture ? end->seal : 0;
 	make_room(join);
 	return 0;

@@ -111,6 +111,9 @@ static void fill_message(const struct record *record, droptower_drop *drop)
 	drop->seal_known = record->seal_known;
 	drop->seal = record->seal;
 	drop->parameters_crc32 = record->parameters_crc32;
+	drop->parameters_held = (int32_t)record->parameters_held;
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
+		drop->parameter[i] = record->parameters_held >> i & 1u ? record->parameters[i] : 0;
 	drop->blocks = (int64_t)counters->blocks;
 	drop->repeated = (int64_t)counters->repeated;
 	drop->reordered = (int64_t)counters->reordered;
@@ -209,6 +212,14 @@ static bool counters_fit(const droptower_drop *drop)
 	return true;
 }
 
+static bool parameters_fit(const droptower_drop *drop)
+{
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
+		if (!fits(drop->parameter[i], UINT32_MAX))
+			return false;
+	return fits(drop->parameters_held, RECORD_PARAMETERS_ALL);
+}
+
 static bool measured_fits(const droptower_drop *drop)
 {
 	return fits(drop->dropout_us, UINT16_MAX) && fits(drop->dropout_used_us, UINT16_MAX) &&
@@ -227,7 +238,7 @@ static bool message_fits(const droptower_drop *drop)
 	return fits(drop->drop_id, UINT16_MAX) && fits(drop->marks, UINT16_MAX) && counters_fit(drop) &&
 	       drop->gap_count <= ticks + 2 * WIRE_SENSORS && drop->trigger_us <= UINT32_MAX &&
 	       fits(drop->crc32, UINT32_MAX) && fits(drop->seal, UINT32_MAX) &&
-	       fits(drop->parameters_crc32, UINT32_MAX) && measured_fits(drop) &&
+	       fits(drop->parameters_crc32, UINT32_MAX) && parameters_fit(drop) && measured_fits(drop) &&
 	       fits(drop->frame_speed_mm_s, UINT16_MAX) && drop->x_count == ticks * WIRE_X_PER_TICK &&
 	       drop->yz_count == ticks * WIRE_YZ_PER_TICK;
 }
@@ -274,6 +285,9 @@ static void fill_record(const droptower_drop *drop, struct record *record)
 	record->seal_known = record->crc_known && drop->seal_known != 0;
 	record->seal = (uint32_t)drop->seal;
 	record->parameters_crc32 = (uint32_t)drop->parameters_crc32;
+	record->parameters_held = (uint32_t)drop->parameters_held;
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
+		record->parameters[i] = (uint32_t)drop->parameter[i];
 	take_measured(drop, record);
 	record->counters = (struct record_counters){
 	        .blocks = (uint64_t)drop->blocks,
@@ -326,14 +340,17 @@ int lcm_codec_decode_block(const void *bytes, size_t size, droptower_block *bloc
 /* Of an encoded drop, as drop.lcm has it. */
 enum {
 	SEAL = 1 + 2 * 8,
+	PARAMETERS = 4 + 8 * WIRE_PARAMETERS,
 	MEASURED = 1 + 3 * 4 + 8 + 2 * 4 + 2 + 4,
 	/* fingerprint, then utime to conflicting */
-	GAP_COUNT = 8 + 8 + 2 * 4 + 4 * 8 + 2 + 4 + 2 + SEAL + MEASURED + 7 * 8,
+	GAP_COUNT = 8 + 8 + 2 * 4 + 4 * 8 + 2 + 4 + 2 + SEAL + PARAMETERS + MEASURED + 7 * 8,
 	GAP_BYTES = 1 + 8 + 8,
 	MAC = 32,
 	FIXED_BYTES = GAP_COUNT + 3 * 4 + MAC, /* of one without gaps and samples */
 	DROP_BYTES_MAX = 1 << 20,              /* several times the longest drop's: bounds the memory */
 };
+
+_Static_assert(sizeof(((droptower_drop *)NULL)->parameter) == 8 * WIRE_PARAMETERS, "as drop.lcm has them");
 
 /* Bytes that are read one after the other; those beyond the end are 0. */
 struct cursor {

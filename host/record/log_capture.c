@@ -19,7 +19,7 @@ void log_capture_of_record(const struct record *record, struct log_capture *capt
 	        isfinite(record->frame_speed_m_s) ? (uint16_t)lround(record->frame_speed_m_s * 1e3) : 0;
 	capture->crc_agrees = record->crc_agrees;
 	capture->seal_known = record->seal_known;
-	capture->seal_agrees = record->seal_agrees;
+	capture->seal_agrees = record->seal_known && !(record->flags & RECORD_FLAG_ALTERED);
 	capture->seal = record->seal_known ? record->seal : 0;
 	capture->counters = record->counters;
 }

@@ -31,7 +31,7 @@ struct log_capture {
 	uint16_t frame_speed_mm_s;
 	bool crc_agrees;
 	bool seal_known, seal_agrees;
-	uint32_t seal; /* as sent; it covers all that the capture end says */
+	uint32_t seal; /* as sent; it covers all that the capture end says, and so the parameters */
 	struct record_counters counters;
 
 	struct log_capture_parameters parameters;

@@ -50,8 +50,8 @@ static bool describe(struct log_file *log, char lines[LINE_MAX_BYTES])
 	hash_part(log, log->size - ENDS_BYTES, &hash);
 	digest_text(&hash, ends);
 	snprintf(lines, LINE_MAX_BYTES, HEAD "%d, %s, wire %08" PRIx32 "\nlog %" PRIu64 " %lld.%09ld %s\n",
-	         FORMAT, DT_VERSION, wire_hash(), log->size, (long long)status.st_mtim.tv_sec,
-	         status.st_mtim.tv_nsec, ends);
+	         FORMAT, DT_VERSION, wire_hash(), log->size, (long long)status.st_ctim.tv_sec,
+	         status.st_ctim.tv_nsec, ends);
 	return log->failed == 0;
 }
 

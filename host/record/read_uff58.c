@@ -11,6 +11,7 @@
 #include "host/record/drop.h"
 #include "host/record/fields.h"
 #include "host/record/number.h"
+#include "host/record/seal.h"
 #include "host/record/timebase.h"
 #include "host/record/uff58_text.h"
 #include "host/record/unit.h"
@@ -148,28 +149,6 @@ static int read_channel(struct reading *reading, const struct uff58_head *head)
 
 /* ---- what our own say beside ---- */
 
-static int read_own_channel(struct reading *reading, const struct uff58_head *head)
-{
-	struct channel *channel = &reading->record->channels[reading->record->channel_count - 1];
-	double rate_hz, start_s, range_g;
-	int uneven, end = 0, end_2 = 0;
-
-	if (sscanf(head->id[1], UFF58_OWN "rate_hz=%lf start_s=%lf%n", &rate_hz, &start_s, &end) != 2 ||
-	    head->id[1][end] ||
-	    sscanf(head->id[3], "range_g=%lf uneven=%d%n", &range_g, &uneven, &end_2) != 2 ||
-	    head->id[3][end_2] || !(rate_hz > 0) || !isfinite(1 / rate_hz) || !isfinite(start_s) ||
-	    !isfinite(range_g))
-		return UFF58_REFUSE(&reading->text, DT_E_FORMAT,
-		                    "dataset of \"%.32s\", expected identification \"" UFF58_OWN
-		                    "rate_hz= start_s=\" and \"range_g= uneven=\"",
-		                    head->id[0]);
-	channel->rate_hz = rate_hz;
-	channel->start_s = start_s;
-	channel->range_g = range_g;
-	channel->flags = uneven ? RECORD_FLAG_UNEVEN : 0;
-	return 0;
-}
-
 /* "drop_id=3 marks=8 ..." */
 static int read_fields(struct reading *reading, const char *line)
 {
@@ -192,6 +171,29 @@ static int read_fields(struct reading *reading, const char *line)
 			                    "identification \"%.80s\", expected name=value words", line);
 	}
 	return 0;
+}
+
+static int read_own_channel(struct reading *reading, const struct uff58_head *head)
+{
+	struct channel *channel = &reading->record->channels[reading->record->channel_count - 1];
+	double rate_hz, start_s, range_g;
+	int uneven, end = 0, end_2 = 0;
+
+	if (sscanf(head->id[1], UFF58_OWN "rate_hz=%lf start_s=%lf%n", &rate_hz, &start_s, &end) != 2 ||
+	    head->id[1][end] ||
+	    sscanf(head->id[3], "range_g=%lf uneven=%d%n", &range_g, &uneven, &end_2) != 2 ||
+	    head->id[3][end_2] || !(rate_hz > 0) || !isfinite(1 / rate_hz) || !isfinite(start_s) ||
+	    !isfinite(range_g))
+		return UFF58_REFUSE(&reading->text, DT_E_FORMAT,
+		                    "dataset of \"%.32s\", expected identification \"" UFF58_OWN
+		                    "rate_hz= start_s=\" and \"range_g= uneven=\"",
+		                    head->id[0]);
+	channel->rate_hz = rate_hz;
+	channel->start_s = start_s;
+	channel->range_g = range_g;
+	channel->flags = uneven ? RECORD_FLAG_UNEVEN : 0;
+	return strncmp(head->id[4], SEAL_WORD, strlen(SEAL_WORD)) == 0 ? 0
+	                                                               : read_fields(reading, head->id[4]);
 }
 
 /* The line of sample k of one of the first channels of ours; 0 of another. */
@@ -261,9 +263,9 @@ static int read_mask(struct reading *reading, const struct uff58_head *head)
 	free(mask);
 	if (!error)
 		error = check_good(reading, channel);
-	if (!error)
-		error = read_fields(reading, head->id[3]);
-	return error ? error : read_fields(reading, head->id[4]);
+	for (int line = 2; line < UFF58_ID_LINES && !error; line++)
+		error = read_fields(reading, head->id[line]);
+	return error;
 }
 
 /* ---- the file ---- */

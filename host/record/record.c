@@ -144,7 +144,8 @@ void record_finish(struct record *record)
 		record->flags |= RECORD_FLAG_NO_CRC;
 	else if (!record->crc_agrees)
 		record->flags |= RECORD_FLAG_INCOMPLETE;
-	if (record->seal_known && !record->seal_agrees)
+	if ((record->seal_known && !record->seal_agrees) ||
+	    (record->parameters_held == RECORD_PARAMETERS_ALL && !record->parameters_known))
 		record->flags |= RECORD_FLAG_ALTERED;
 }
 

@@ -54,7 +54,8 @@ enum {
 	RECORD_FLAG_NO_LINE_END = 1u << 22, /* "no_line_end": the last row may be cut */
 	RECORD_FLAG_SAME_NAMES = 1u << 23,  /* "same_names": two columns are named alike in the file */
 	/* of a drop by our tower */
-	RECORD_FLAG_ALTERED = 1u << 25,         /* "altered": the capture end is not what its seal is of */
+	RECORD_FLAG_ALTERED = 1u << 25, /* "altered": the capture end or the parameters are not what their
+	                                   checksum is of */
 	RECORD_FLAG_SEPARATED_LATE = 1u << 26,  /* "separated_late" */
 	RECORD_FLAG_DROPOUT_CHANGED = 1u << 27, /* "dropout_changed": of the magnet */
 	RECORD_FLAG_FRAME_NOT_DOWN = 1u << 28,  /* "frame_not_down" */
@@ -79,6 +80,9 @@ struct record_gap {
 	uint32_t first_tick_ms; /* inclusive */
 	uint32_t last_tick_ms;
 };
+
+enum { RECORD_PARAMETERS_ALL = (1 << WIRE_PARAMETERS) - 1 }; /* of parameters_held */
+_Static_assert(WIRE_PARAMETERS < 31, "a bit for each");
 
 /* What happened to the frames of the capture on their way. */
 struct record_counters {
@@ -114,9 +118,10 @@ struct record {
 	bool seal_known, seal_agrees;
 	uint32_t seal;             /* as sent in the capture end: checksum of all of it */
 	uint32_t parameters_crc32; /* of the set that the drop was made with; if crc_known */
-	bool parameters_known;     /* the whole set, and its CRC-32 agrees */
+	uint32_t parameters_held;  /* bit i: parameters[i] has come; if crc_known */
 	uint32_t parameters[WIRE_PARAMETERS];
-	bool measured_known; /* what the drop has measured of its tower */
+	bool parameters_known; /* all of them, and their CRC-32 agrees; drop_close finds out */
+	bool measured_known;   /* what the drop has measured of its tower */
 	struct wire_measured measured;
 	struct record_counters counters;
 	struct record_gap *gaps; /* what stayed missing */

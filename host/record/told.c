@@ -5,13 +5,9 @@
 
 #include "common/wire_table.h"
 
-_Static_assert(WIRE_PARAMETERS < 32, "a bit for each");
-static const uint32_t ALL_PARAMETERS = (UINT32_C(1) << WIRE_PARAMETERS) - 1;
-
-static void turn_to(struct told *told, uint16_t drop_id)
+void told_begin(struct told *told, uint16_t drop_id)
 {
-	if (told->drop_id != drop_id)
-		*told = (struct told){.drop_id = drop_id};
+	*told = (struct told){.begun = true, .drop_id = drop_id};
 }
 
 static int feed_measured(struct told *told, const struct frame *frame)
@@ -23,7 +19,8 @@ static int feed_measured(struct told *told, const struct frame *frame)
 		result = wire_unpack_measured(frame, &measured);
 	if (result != 0)
 		return result;
-	turn_to(told, measured.drop_id);
+	if (measured.drop_id != told->drop_id)
+		return DT_E_CORRUPT;
 	told->measured_known = true;
 	told->measured = measured;
 	return 0;
@@ -36,34 +33,43 @@ static int feed_parameter(struct told *told, const struct frame *frame)
 
 	if (result != 0)
 		return result;
-	turn_to(told, parameter.drop_id);
+	if (parameter.drop_id != told->drop_id)
+		return DT_E_CORRUPT;
 	for (unsigned i = 0; i < WIRE_PARAMETERS; i++) {
+		bool held = told->held >> i & 1u, same = told->parameter[i] == parameter.value;
+
 		if (wire_parameters[i].index != parameter.index)
 			continue;
 		told->parameter[i] = parameter.value;
-		told->parameters_held |= 1u << i;
+		told->held |= UINT32_C(1) << i;
+		return held && !same ? DT_E_CORRUPT : 0;
 	}
-	return 0;
+	return DT_E_UNKNOWN;
 }
 
 int told_feed(struct told *told, const struct frame *frame)
 {
+	if (!told->begun)
+		return 0;
 	return frame->id == WIRE_ID_MEASURED ? feed_measured(told, frame) : feed_parameter(told, frame);
 }
 
-bool told_whole(const struct told *told, uint16_t drop_id)
+bool told_whole(const struct told *told, const struct wire_capture_end *end)
 {
-	return told->drop_id == drop_id && told->measured_known && told->parameters_held == ALL_PARAMETERS;
+	return told->measured_known && told->held == RECORD_PARAMETERS_ALL && !told_is_altered(told, end);
+}
+
+bool told_is_altered(const struct told *told, const struct wire_capture_end *end)
+{
+	return told->held == RECORD_PARAMETERS_ALL &&
+	       wire_parameters_crc32(told->parameter) != end->parameters_crc32;
 }
 
 void told_fill(const struct told *told, const struct wire_capture_end *end, struct record *record)
 {
-	if (told->drop_id != end->drop_id)
-		return;
 	record->measured_known = told->measured_known;
 	record->measured = told->measured;
-	record->parameters_known = told->parameters_held == ALL_PARAMETERS &&
-	                           wire_parameters_crc32(told->parameter) == end->parameters_crc32;
-	if (record->parameters_known)
-		memcpy(record->parameters, told->parameter, sizeof(record->parameters));
+	record->parameters_held = told->held;
+	memcpy(record->parameters, told->parameter, sizeof(record->parameters));
+	record->counters.corrupt += told_is_altered(told, end);
 }

@@ -71,13 +71,14 @@ static int send_told(const struct record *record, int (*send)(void *context, con
 		wire_seal_measured(frame);
 		result = send(context, frame);
 	}
-	for (unsigned i = 0; i < WIRE_PARAMETERS && record->parameters_known && result == 0; i++) {
+	for (unsigned i = 0; i < WIRE_PARAMETERS && result == 0; i++) {
 		struct wire_parameter parameter = {.drop_id = record->drop_id,
 		                                   .index = wire_parameters[i].index,
 		                                   .value = record->parameters[i]};
 
 		wire_pack_parameter(frame, WIRE_ID_PARAMETER, &parameter);
-		result = send(context, frame);
+		if (record->parameters_held >> i & 1u)
+			result = send(context, frame);
 	}
 	return result;
 }

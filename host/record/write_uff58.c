@@ -126,9 +126,9 @@ static void put_channel(const struct record *record, size_t i, size_t *next_fiel
 {
 	const struct channel *channel = &record->channels[i];
 	char rate[NUMBER_CHARS], start[NUMBER_CHARS], range[NUMBER_CHARS];
-	char own[UFF58_ID_CHARS + 1], more[UFF58_ID_CHARS + 1], fields[2][UFF58_ID_CHARS + 1];
+	char own[UFF58_ID_CHARS + 1], more[UFF58_ID_CHARS + 1], line[4][UFF58_ID_CHARS + 1];
 	struct dataset dataset = {
-	        .id = {channel->name, own, "NONE", more, i == 0 ? SEAL_BLANK : "NONE"},
+	        .id = {channel->name, own, "NONE", more, i == 0 ? SEAL_BLANK : line[0]},
 	        .function = UFF58_TIME_RESPONSE,
 	        .precision = UFF58_DOUBLE,
 	        .count = channel->count,
@@ -143,15 +143,15 @@ static void put_channel(const struct record *record, size_t i, size_t *next_fiel
 	snprintf(own, sizeof(own), UFF58_OWN "rate_hz=%s start_s=%s", rate, start);
 	snprintf(more, sizeof(more), "range_g=%s uneven=%d", range,
 	         (channel->flags & RECORD_FLAG_UNEVEN) != 0);
+	for (int k = i == 0; k < 4; k++)
+		fill_line(record, next_field, line[k]);
 	place(record, i, &dataset);
 	put_head(out, &dataset);
 	put_values(out, channel);
 
 	dataset.id[1] = UFF58_OWN "mask: 1 lost, 2 not taken, 4 beyond the range";
-	for (int line = 0; line < 2; line++) {
-		fill_line(record, next_field, fields[line]);
-		dataset.id[3 + line] = fields[line];
-	}
+	for (int k = 1; k < 4; k++)
+		dataset.id[1 + k] = line[k];
 	dataset.function = UFF58_UNKNOWN;
 	dataset.precision = UFF58_SINGLE;
 	dataset.ordinate = (struct axis){UFF58_UNKNOWN, "Mask", "NONE"};
@@ -168,5 +168,7 @@ int write_uff58(const struct record *record, FILE *out)
 			return DT_E_ARGUMENT;
 	for (size_t i = 0; i < record->channel_count; i++)
 		put_channel(record, i, &next_field, out);
+	if (record->is_drop && fields_entry(next_field) != NULL)
+		return DT_E_FULL; /* a number that no line has room for */
 	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
 }

@@ -124,8 +124,8 @@ bool report_verdict(const struct report *report, char *line, size_t size)
 	else if (!r->crc_agrees)
 		snprintf(line, size, "CORRUPT: no sample is missing, yet the CRC-32 does not agree");
 	else if (altered)
-		snprintf(line, size,
-		         "ALTERED: the CRC-32 agrees, yet the capture end is not what was sealed");
+		snprintf(line, size, "ALTERED: the CRC-32 agrees, yet %s not what was sealed",
+		         r->seal_agrees ? "the parameters are" : "the capture end is");
 	else
 		snprintf(line, size, "complete: every sample arrived, and the CRC-32 agrees");
 	return !r->lost_samples && !altered && (!r->is_drop || (r->crc_known && r->crc_agrees));
@@ -212,7 +212,8 @@ const char *report_flag_words(unsigned flag)
 	case RECORD_FLAG_STUCK:
 		return "a channel gave one value for 20 ms: check sensor and converter";
 	case RECORD_FLAG_ALTERED:
-		return "the capture end is not what the tower sealed: trust no number of this drop";
+		return "the capture end or the parameters are not what the tower sealed: trust no number of "
+		       "this drop";
 	case RECORD_FLAG_SEPARATED_LATE:
 		return "the product left the frame later than planned";
 	case RECORD_FLAG_DROPOUT_CHANGED:

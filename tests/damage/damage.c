@@ -79,8 +79,9 @@ static const char *tower_differs(const struct record *a, const struct record *b)
 		return "the seal";
 	if (b->measured_known && measured_differs(&a->measured, &b->measured))
 		return "what the tower measured";
-	if (b->parameters_known && memcmp(a->parameters, b->parameters, sizeof(a->parameters)) != 0)
-		return "the parameters";
+	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
+		if (b->parameters_held >> i & 1 && a->parameters[i] != b->parameters[i])
+			return "a parameter";
 	return NULL;
 }
 

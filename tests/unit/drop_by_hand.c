@@ -235,6 +235,11 @@ void hand_check_equal(const struct record *a, const struct record *b)
 	assert_int_equal(a->seal, b->seal);
 	assert_int_equal(a->seal_agrees, b->seal_agrees);
 	assert_int_equal(a->parameters_crc32, b->parameters_crc32);
+	assert_int_equal(a->parameters_held, b->parameters_held);
+	assert_int_equal(a->parameters_known, b->parameters_known);
+	for (unsigned i = 0; i < HAND_PARAMETERS; i++)
+		if (a->parameters_held >> i & 1)
+			assert_int_equal(a->parameters[i], b->parameters[i]);
 	assert_int_equal(a->measured_known, b->measured_known);
 	if (a->measured_known) {
 		assert_int_equal(a->measured.dropout_us, b->measured.dropout_us);

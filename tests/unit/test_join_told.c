@@ -78,6 +78,43 @@ static void damage_is_counted(void **state)
 	record_free(&record);
 }
 
+/* A set with another value: counted, marked, and kept as it came, under whatever way it was read. */
+static void an_altered_set_is_marked(void **state)
+{
+	struct log_capture capture;
+	struct record record;
+	struct frame frame;
+
+	(void)state;
+	for (unsigned altered = 1; altered < FOLLOW; altered++)
+		for (unsigned skip = 0; skip < 2; skip++) {
+			join_forget_run(join);
+			begin_capture();
+			for (unsigned i = 0; i < FOLLOW; i++) {
+				hand_told(&drop, i, &frame);
+				frame.data[4 + altered % 4] ^= (uint8_t)(i == altered ? 0x10 : 0);
+				assert_int_equal(join_feed(join, &frame), 0);
+			}
+			assert_false(join_told(join)); /* it may come again as it was */
+			if (skip) {
+				assert_int_equal(join_skip(join, &capture), 0);
+				assert_true(capture.seal_known);
+				assert_false(capture.seal_agrees);
+				continue;
+			}
+			assert_int_equal(join_take(join, &record), 0);
+			assert_int_equal(record.flags & RECORD_FLAG_ALTERED, RECORD_FLAG_ALTERED);
+			assert_true(record.seal_agrees);
+			assert_false(record.parameters_known);
+			assert_int_equal(record.parameters_held, 0x1FFFFF);
+			assert_int_equal(record.counters.corrupt, 1);
+			log_capture_of_record(&record, &capture);
+			assert_true(capture.seal_known);
+			assert_false(capture.seal_agrees);
+			record_free(&record);
+		}
+}
+
 static void only_another_capture_is_news(void **state)
 {
 	struct frame end, other;
@@ -104,6 +141,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test_setup_teardown(told_when_all_has_come, join_by_hand_begin, join_by_hand_end),
 	        cmocka_unit_test_setup_teardown(damage_is_counted, join_by_hand_begin, join_by_hand_end),
+	        cmocka_unit_test_setup_teardown(an_altered_set_is_marked, join_by_hand_begin,
+	                                        join_by_hand_end),
 	        cmocka_unit_test_setup_teardown(only_another_capture_is_news, join_by_hand_begin,
 	                                        join_by_hand_end),
 	};

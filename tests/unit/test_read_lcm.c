@@ -286,13 +286,14 @@ static void test_a_written_log(void **state)
 static void test_a_log_cut_in_its_drop(void **state)
 {
 	enum {
-		TICKS = 8,
+		TICKS = 16,
 		SEAL = 28 + 7 + 7 + 64,
 		MAC = 32,
 		END = 1 + 8 + 8,
+		PARAMETERS = 4 + 8 * 21,
 		MEASURED = 1 + 12 + 8 + 8 + 2 + 4
 	};
-	enum { FRONT = 28 + 7 + 8 + 8 + 8 + 32 + 2 + 4 + 2 + END + MEASURED + 56 + 12 };
+	enum { FRONT = 28 + 7 + 8 + 8 + 8 + 32 + 2 + 4 + 2 + END + PARAMETERS + MEASURED + 56 + 12 };
 	char *file = hand_file(".lcm", "", 0), *bytes, message[READ_MESSAGE_MAX];
 	struct record record, again;
 	size_t size;

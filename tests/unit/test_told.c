@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
  * What follows a capture end: in whatever order and however often it comes, of which drop, damaged, and
- * whether it makes up the set that the capture end names. The CRC-32 of the sets is worked out by Python's
- * zlib.
+ * whether it makes up the set that the capture end names or an altered one. The CRC-32 of the sets is worked
+ * out by Python's zlib.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -24,7 +24,8 @@ static struct told told;
 static int begin(void **state)
 {
 	(void)state;
-	memset(&told, 0, sizeof(told));
+	memset(&told, 0xA5, sizeof(told));
+	told_begin(&told, 7);
 	return 0;
 }
 
@@ -60,35 +61,50 @@ static void feed_set(uint16_t drop_id)
 		assert_int_equal(feed_parameter(drop_id, (uint16_t)(0x2000 + i), 1000 + i), 0);
 }
 
-static struct record filled(uint16_t drop_id, uint32_t parameters_crc32)
+static bool whole(uint32_t parameters_crc32)
 {
-	struct wire_capture_end end = {.drop_id = drop_id, .parameters_crc32 = parameters_crc32};
+	const struct wire_capture_end end = {.drop_id = 7, .parameters_crc32 = parameters_crc32};
+
+	return told_whole(&told, &end);
+}
+
+/* What the record of that capture end has of the parameters: all of them that are held. */
+static uint32_t held(uint32_t parameters_crc32, unsigned corrupt)
+{
+	const struct wire_capture_end end = {.drop_id = 7, .parameters_crc32 = parameters_crc32};
 	struct record record;
 
 	memset(&record, 0, sizeof(record));
+	record.counters.corrupt = 5;
 	told_fill(&told, &end, &record);
-	return record;
+	assert_int_equal(record.counters.corrupt, 5 + corrupt);
+	assert_int_equal(told_is_altered(&told, &end), corrupt);
+	assert_memory_equal(record.parameters, told.parameter, sizeof(record.parameters));
+	return record.parameters_held;
 }
 
 static void all_of_it(void **state)
 {
+	const struct wire_capture_end end = {.drop_id = 7, .parameters_crc32 = SET_CRC32};
 	struct record record;
 
 	(void)state;
 	assert_int_equal(feed_measured(7, 8123), 0);
-	assert_false(told_whole(&told, 7));
+	assert_false(whole(SET_CRC32));
 	feed_set(7);
-	assert_true(told_whole(&told, 7));
-	assert_false(told_whole(&told, 8));
-	record = filled(7, SET_CRC32);
+	assert_true(whole(SET_CRC32));
+	memset(&record, 0, sizeof(record));
+	told_fill(&told, &end, &record);
 	assert_true(record.measured_known);
 	assert_int_equal(record.measured.dropout_us, 8123);
-	assert_true(record.parameters_known);
+	assert_int_equal(record.parameters_held, 0x1FFFFF);
 	for (unsigned i = 0; i < SET; i++)
 		assert_int_equal(record.parameters[i], 1000 + i);
+	assert_int_equal(record.counters.corrupt, 0);
 }
 
-/* One that lacks is no set, whichever it is; nor is one that has another value. */
+/* One that lacks is no set, whichever it is. One that has another value is an altered one, until it comes
+ * again as it was. */
 static void any_that_lacks(void **state)
 {
 	for (unsigned lost = 0; lost < SET; lost++) {
@@ -97,45 +113,52 @@ static void any_that_lacks(void **state)
 		for (unsigned i = 0; i < SET; i++)
 			if (i != lost)
 				assert_int_equal(feed_parameter(7, (uint16_t)(0x2000 + i), 1000 + i), 0);
-		assert_false(told_whole(&told, 7));
-		assert_false(filled(7, SET_CRC32).parameters_known);
+		assert_false(whole(SET_CRC32));
+		assert_int_equal(held(SET_CRC32, 0), 0x1FFFFF & ~(1u << lost));
 		assert_int_equal(feed_parameter(7, (uint16_t)(0x2000 + lost), 1001 + lost), 0);
-		assert_true(told_whole(&told, 7));
-		assert_false(filled(7, SET_CRC32).parameters_known);
+		assert_false(whole(SET_CRC32));
+		assert_int_equal(held(SET_CRC32, 1), 0x1FFFFF);
+		assert_int_equal(feed_parameter(7, (uint16_t)(0x2000 + lost), 1000 + lost), DT_E_CORRUPT);
+		assert_true(whole(SET_CRC32));
 		assert_int_equal(feed_parameter(7, (uint16_t)(0x2000 + lost), 1000 + lost), 0);
-		assert_true(filled(7, SET_CRC32).parameters_known);
+		assert_int_equal(held(SET_CRC32, 0), 0x1FFFFF);
 	}
 }
 
-static void another_set_is_none(void **state)
+static void another_set_is_altered(void **state)
 {
 	(void)state;
 	feed_set(7);
-	assert_false(told_whole(&told, 7)); /* nothing measured */
-	assert_false(filled(7, SET_CRC32).measured_known);
-	assert_true(filled(7, SET_CRC32).parameters_known);
-	assert_false(filled(7, SET_CRC32 ^ 1).parameters_known);
-	assert_int_equal(filled(7, SET_CRC32 ^ 1).parameters[0], 0);
+	assert_false(whole(SET_CRC32)); /* nothing measured */
+	assert_int_equal(held(SET_CRC32, 0), 0x1FFFFF);
+	assert_int_equal(held(SET_CRC32 ^ 1, 1), 0x1FFFFF);
+	assert_int_equal(feed_measured(7, 1), 0);
+	assert_true(whole(SET_CRC32));
+	assert_false(whole(SET_CRC32 ^ 1));
 }
 
 static void of_another_drop(void **state)
 {
 	(void)state;
+	memset(&told, 0, sizeof(told)); /* no capture end came: of no drop */
+	assert_int_equal(feed_measured(0, 8000), 0);
+	feed_set(0);
+	assert_false(told.measured_known);
+	assert_int_equal(told.held, 0);
+	begin(state);
 	assert_int_equal(feed_measured(7, 8000), 0);
 	feed_set(7);
-	assert_false(filled(8, SET_CRC32).parameters_known);
-	assert_false(filled(8, SET_CRC32).measured_known);
-	assert_int_equal(feed_parameter(8, 0x2000, 1000), 0); /* the next one's: what was is forgotten */
-	assert_false(told_whole(&told, 7));
-	assert_false(filled(8, SET_CRC32).parameters_known);
-	feed_set(8);
-	assert_false(told_whole(&told, 8));
+	assert_int_equal(feed_measured(8, 8001), DT_E_CORRUPT);
+	for (unsigned i = 0; i < SET; i++)
+		assert_int_equal(feed_parameter(8, (uint16_t)(0x2000 + i), 5), DT_E_CORRUPT);
+	assert_true(whole(SET_CRC32));
+	assert_int_equal(told.measured.dropout_us, 8000);
+	told_begin(&told, 8); /* the next one's: what was is forgotten */
+	assert_false(whole(SET_CRC32));
+	assert_int_equal(held(SET_CRC32, 0), 0);
 	assert_int_equal(feed_measured(8, 8001), 0);
-	assert_true(told_whole(&told, 8));
-	assert_int_equal(filled(8, SET_CRC32).measured.dropout_us, 8001);
-	assert_int_equal(feed_measured(9, 8002), 0);
-	assert_false(filled(9, SET_CRC32).parameters_known);
-	assert_true(filled(9, SET_CRC32).measured_known);
+	assert_int_equal(feed_measured(7, 8000), DT_E_CORRUPT);
+	assert_int_equal(told.measured.dropout_us, 8001);
 }
 
 /* An index that is no parameter's, or beyond the table. */
@@ -144,8 +167,8 @@ static void what_is_no_parameter(void **state)
 	(void)state;
 	for (uint32_t index = 0; index <= UINT16_MAX; index++)
 		if (index < 0x2000 || index >= 0x2000 + SET)
-			assert_int_equal(feed_parameter(7, (uint16_t)index, 5), 0);
-	assert_int_equal(told.parameters_held, 0);
+			assert_int_equal(feed_parameter(7, (uint16_t)index, 5), DT_E_UNKNOWN);
+	assert_int_equal(told.held, 0);
 	for (unsigned i = 0; i < SET; i++)
 		assert_int_equal(told.parameter[i], 0);
 }
@@ -166,7 +189,7 @@ static void damaged(void **state)
 	good = (struct frame){.id = WIRE_ID_PARAMETER, .length = 7};
 	assert_int_equal(told_feed(&told, &good), DT_E_LENGTH);
 	assert_false(told.measured_known);
-	assert_int_equal(told.drop_id, 0);
+	assert_int_equal(told.held, 0);
 }
 
 int main(void)
@@ -174,7 +197,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test_setup(all_of_it, begin),
 	        cmocka_unit_test_setup(any_that_lacks, begin),
-	        cmocka_unit_test_setup(another_set_is_none, begin),
+	        cmocka_unit_test_setup(another_set_is_altered, begin),
 	        cmocka_unit_test_setup(of_another_drop, begin),
 	        cmocka_unit_test_setup(what_is_no_parameter, begin),
 	        cmocka_unit_test_setup(damaged, begin),
