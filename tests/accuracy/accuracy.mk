@@ -18,7 +18,7 @@ $(BUILD)/tests/accuracy $(BUILD)/tests/test_accuracy: $(BUILD)/tests/%: $(BUILD)
 KNOCKOUT_WRAPS = $(shell sed -n 's/^WRAP.[a-z _]*, \([a-z_]*\),.*/\1/p; s/^.* __wrap_\([a-z_]*\)(.*);$$/\1/p' \
 	tests/accuracy/knockout_wrap.c)
 
-$(BUILD)/tests/knockout: $(call obj,$(KNOCKOUT_C)) $(ACCURACY_O) $(foreach l,host link common,$(call lib,$l))
+$(BUILD)/tests/knockout: $(call obj,$(filter-out %_none.c,$(KNOCKOUT_C))) $(ACCURACY_O) $(foreach l,host link common,$(call lib,$l))
 	$(call say,LINK,$@)
 	$(Q)mkdir -p $(@D) && $(CC) $(LDFLAGS) $(KNOCKOUT_WRAPS:%=-Wl,--wrap=%) $(filter %.o,$^) \
 		-Wl,--start-group $(filter %.a,$^) -Wl,--end-group $(LIBRARIES) -o $@
@@ -30,7 +30,7 @@ endif
 
 DROPS ?= 10000
 
-.PHONY: accuracy knockout chart
+.PHONY: accuracy knockout thresholds chart
 accuracy: setup ## every estimate against its Cramer-Rao bound, thousands of drops of known truth (DROPS=)
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(BUILD)/tests/accuracy
 	@$(BUILD)/tests/accuracy --drops $(DROPS)
@@ -49,6 +49,10 @@ $(BUILD)/knockout/%.log: $(BUILD)/droptower-bench $(BUILD)/droptower-firmware
 
 knockout: all $(BUILD)/tests/knockout $(KNOCKOUT_DROPS) ## what each special mechanism of the estimators is worth
 	@$(BUILD)/tests/knockout $(KNOCKOUT_DROPS) $(KNOCKOUT_DATA)
+
+thresholds: all $(BUILD)/tests/knockout $(call obj,tests/accuracy/knockout_none.c) $(KNOCKOUT_DROPS) ## what each hand-set number does at half and at twice
+	@tests/accuracy/thresholds $(BUILD) $(BUILD)/thresholds.txt $(KNOCKOUT_DROPS) $(KNOCKOUT_DATA)
+	@echo "$(BUILD)/thresholds.txt"
 
 # What README.md and host/chart/README.md show; the other pictures stay in the build folder.
 SHOWN = accuracy-peak accuracy-plate-peak accuracy-frequency stability-peak stability-frequency \

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * knockout [--drops N] [--only TEXT] [FILE[=COLUMNS]]...: what every special mechanism of host/estimate is
- * worth. Each is switched off, one at a time, by the linker (--wrap, knockout_wrap.c), so that the product
- * holds no switch; then files are estimated once more, and the cells of make accuracy, the same drops.
+ * knockout [--drops N] [--only TEXT] [--figures] [FILE[=COLUMNS]]...: what every special mechanism of
+ * host/estimate is worth. Each is switched off, one at a time, by the linker (--wrap, knockout_wrap.c), so
+ * that the product holds no switch; then files are estimated once more, and the cells of make accuracy, the
+ * same drops.
  *
  * A figure is a number with a standard uncertainty. Moved: it differs at all; far: by more than that
  * uncertainty; lost: it is no number any more, or has become one. Of the cells: those whose error grew by
@@ -284,6 +285,26 @@ static void knock_out(const struct knockout *off, const struct file *files, unsi
 	cells_free(&without);
 }
 
+/* Everything a mechanism or a number may move, for tests/accuracy/thresholds: what, value, uncertainty, and
+ * of a cell the number of values, its value the error. */
+static void print_figures(const struct file *files, unsigned count, const struct cells *cells)
+{
+	for (unsigned i = 0; i < count; i++)
+		for (unsigned k = 0; k < files[i].figures.count; k++) {
+			const struct figure *f = &files[i].figures.figure[k];
+
+			printf("%s\t%s\t%.17g\t%.17g\t0\n", files[i].name, f->name, f->value, f->sigma);
+		}
+	for (unsigned i = 0; i < cells->count; i++)
+		for (int q = 0; q < QUANTITIES; q++) {
+			const struct tally *t = &cells->scene[i].tally[q];
+
+			if (t->values > 0)
+				printf("%u\t%d\t%.17g\t0\t%u\n", i, q, sqrt(t->square / t->values),
+				       t->values);
+		}
+}
+
 static void print_head(const struct file *files, unsigned count, const struct cells_options *options)
 {
 	unsigned with_sigma[2] = {0};
@@ -304,6 +325,7 @@ int main(int argc, char **argv)
 	static struct file files[FILES_MAX];
 	struct cells_options options = {.drops = 20, .all = true};
 	const char *only = "";
+	bool figures = false;
 	long processors = sysconf(_SC_NPROCESSORS_ONLN);
 	struct cells cells;
 	unsigned count = 0;
@@ -314,12 +336,23 @@ int main(int argc, char **argv)
 			options.drops = (unsigned)strtoul(argv[++i], NULL, 10);
 		else if (strcmp(argv[i], "--only") == 0 && i + 1 < argc)
 			only = argv[++i];
+		else if (strcmp(argv[i], "--figures") == 0)
+			figures = true;
 		else if (argv[i][0] != '-' && count < FILES_MAX)
 			open_file(&files[count++], argv[i]);
 		else
-			return fprintf(stderr, "knockout [--drops N] [--only TEXT] [FILE[=COLUMNS]]...\n"), 2;
+			return fprintf(stderr, "knockout [--drops N] [--only TEXT] [--figures] "
+			                       "[FILE[=COLUMNS]]...\n"),
+			       2;
 	}
 	options.jobs = processors > 0 ? (unsigned)processors : 1;
+	if (figures) {
+		options.bounds = &cells; /* none are asked for */
+		cells_run(&options, &cells);
+		print_figures(files, count, &cells);
+		cells_free(&cells);
+		return 0;
+	}
 	cells_run(&options, &cells);
 	print_head(files, count, &options);
 	for (size_t i = 0; i < knockout_count; i++)
