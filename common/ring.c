@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "common/ring.h"
 
+#include "common/assert.h"
 #include "common/memory.h"
 
 static unsigned char *slot(const struct ring *ring, uint32_t index)
@@ -13,6 +14,7 @@ int ring_put(struct ring *ring, const void *entry)
 	uint32_t head = atomic_load_explicit(&ring->head, memory_order_relaxed);
 	uint32_t tail = atomic_load_explicit(&ring->tail, memory_order_acquire);
 
+	DT_ASSERT(head - tail <= ring->count);
 	if (head - tail == ring->count)
 		return DT_E_FULL;
 	memcpy(slot(ring, head), entry, ring->entry_size);

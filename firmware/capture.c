@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "firmware/capture.h"
 
+#include "common/assert.h"
 #include "common/crc.h"
 #include "common/memory.h"
 #include "firmware/sequence.h"
@@ -76,6 +77,7 @@ static void look_for_trigger(struct capture *capture, const struct acquire_tick 
 
 static void store(struct capture *capture, const struct acquire_tick *tick)
 {
+	DT_ASSERT(capture->phase < CAPTURE_FULL && capture->count <= CAPTURE_TICKS);
 	capture->ring[tick->tick_ms % CAPTURE_TICKS] = *tick;
 	capture->newest_ms = tick->tick_ms;
 	if (capture->count < CAPTURE_TICKS)
@@ -166,6 +168,7 @@ bool capture_work(struct capture *capture)
 
 	if ((capture->phase != CAPTURE_TRIGGERED && capture->phase != CAPTURE_FULL) || tick == NULL)
 		return false;
+	DT_ASSERT(capture->crc_ms - capture->first_ms <= capture->last_ms - capture->first_ms);
 	for (unsigned s = 0; s < WIRE_SENSORS; s++) {
 		acquire_pack(tick, s, 0, &frame);
 		capture->crc32 = crc32(capture->crc32, frame.data + WIRE_SAMPLE_OFFSET, WIRE_SAMPLE_BYTES);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "firmware/sequence.h"
 
+#include "common/assert.h"
 #include "common/memory.h"
 
 /* Short names for the tables. */
@@ -126,6 +127,7 @@ void sequence_plan(struct sequence *sequence)
 
 static void enter(struct sequence *sequence, uint8_t state)
 {
+	DT_ASSERT(state < WIRE_STATES);
 	sequence->state = state;
 	sequence->entered_ms = sequence->tick_ms;
 	if (state != ARMED)
@@ -146,8 +148,10 @@ static void enter(struct sequence *sequence, uint8_t state)
 /* 0, or DT_E_STATE if the event has no place here. */
 static int step(struct sequence *sequence, enum sequence_event event)
 {
-	uint8_t next = table[sequence->state][event];
+	uint8_t next;
 
+	DT_ASSERT(sequence->state < WIRE_STATES && event < SEQUENCE_EVENTS);
+	next = table[sequence->state][event];
 	if (next == NO)
 		return DT_E_STATE;
 	if (next != STAY)
@@ -306,6 +310,7 @@ static int release(struct sequence *sequence, uint32_t checks, uint32_t now_us,
 	sequence->released_ms = sequence->tick_ms;
 	sequence->times.released_us = now_us;
 	result = step(sequence, SEQUENCE_RELEASE);
+	DT_ASSERT(result == 0 && sequence->state == FALLING);
 	/* The relief ends in time, whatever the gates say later or do not say. */
 	(void)switch_off(sequence, RELIEVE, now_us + sequence->plan.relief_us);
 	return result;
@@ -317,6 +322,7 @@ static int clear(struct sequence *sequence, uint32_t checks)
 		return DT_E_STATE;
 	if (sequence->state == SAFE && (checks & GUARDS) != 0)
 		return DT_E_CHECKS;
+	DT_ASSERT(sequence->fault < WIRE_FAULTS);
 	if (sequence->state == FAULT_HELD && (checks & (WIRE_CHECK_CLOCKS | causes[sequence->fault])) != 0)
 		return DT_E_CHECKS;
 	sequence->acknowledged = (checks & GUARDS) == 0;

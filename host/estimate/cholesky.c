@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "common/assert.h"
+
 /* A pivot this much smaller than its diagonal is rounding. */
 #define PIVOT_MIN 1e-13
 
@@ -10,6 +12,7 @@ bool cholesky_factor(struct cholesky *factor, unsigned size, double a[CHOLESKY_M
 {
 	double scaled[CHOLESKY_MAX]; /* a row of L D */
 
+	DT_ASSERT(size <= CHOLESKY_MAX);
 	factor->size = size;
 	for (unsigned i = 0; i < size; i++) {
 		double pivot = a[i][i];

@@ -3,8 +3,11 @@
 
 #include <string.h>
 
+#include "common/assert.h"
+
 void gram_start(struct gram *gram, unsigned unknowns)
 {
+	DT_ASSERT(unknowns < GRAM_MAX);
 	gram->columns = unknowns + 1;
 	gram->taken = 0;
 	memset(gram->sum, 0, (unknowns < GRAM_COMMON ? GRAM_COMMON : unknowns + 1) * sizeof(gram->sum[0]));

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/assert.h"
 #include "common/crc.h"
 #include "common/segment.h"
 #include "common/wire.h"
@@ -146,7 +147,9 @@ static void put_in_window(struct join *join, unsigned s, uint32_t tick_ms, const
 	if (!join->has_capture || tick >= join->ticks || !(resent || join->settling))
 		return;
 	join->touched++;
+	DT_ASSERT(join->ticks <= DROP_TICKS_MAX && join->missing <= WIRE_SENSORS * join->ticks);
 	if (put(&join->window[s][tick], frame, resent, reordered)) {
+		DT_ASSERT(join->missing > 0);
 		join->missing--;
 		if (join->missing == 0)
 			check_crc(join);
@@ -184,6 +187,7 @@ static void open_window(struct join *join, uint32_t first_ms, uint32_t ticks)
 {
 	bool before = true;
 
+	DT_ASSERT(ticks <= DROP_TICKS_MAX);
 	join->ticks = ticks;
 	join->missing = 0;
 	join->gaps = 0;

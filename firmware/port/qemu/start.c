@@ -10,6 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "common/assert.h"
 #include "common/memory.h"
 #include "firmware/port/qemu/qemu.h"
 #include "firmware/port/qemu/semihost.h"
@@ -73,6 +74,17 @@ __attribute__((used)) static _Noreturn void fault(const uint32_t *frame)
 	say_address(status);
 	semihost_say("\n");
 	semihost_exit(EXIT_FAULT + (int)number);
+}
+
+void assert_failed(const char *file, int line, const char *condition)
+{
+	semihost_say("droptower-firmware-qemu: ");
+	semihost_say(file);
+	semihost_say_number(", line ", (uint32_t)line, 10);
+	semihost_say(": this cannot be: not ");
+	semihost_say(condition);
+	semihost_say("\n");
+	semihost_exit(ASSERT_EXIT);
 }
 
 /* Nothing returns from here, so the whole stack is free again. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "common/assert.h"
 #include "firmware/app.h"
 #include "firmware/port/stm32g474/adc.h"
 #include "firmware/port/stm32g474/board.h"
@@ -238,6 +239,12 @@ _Noreturn void board_main(void)
 	register_release(0);
 	for (;;)
 		app_poll();
+}
+
+void assert_failed(const char *file, int line, const char *condition)
+{
+	(void)file, (void)line, (void)condition;
+	board_crash();
 }
 
 /* A reset lets go of latch and dampers at once, and pulls the magnet up. */
