@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "common/base/process.h"
 #include "hil/target.h"
 
 #include <errno.h>
@@ -6,7 +7,6 @@
 #include <poll.h>
 #include <sched.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -139,33 +139,6 @@ static int make_bus(struct target *target)
 	return target->request_fd < 0 || target->answer_fd < 0 ? -1 : 0;
 }
 
-/* The firmware gets a process group of its own, so that a Ctrl-C reaches the bench alone, which then
- * ends the firmware in order. Returns 0 or errno. */
-static int spawn(struct target *target, char *const *argv)
-{
-	posix_spawnattr_t attributes;
-	posix_spawn_file_actions_t files;
-	sigset_t none, all;
-	int error;
-
-	sigemptyset(&none);
-	sigfillset(&all);
-	posix_spawnattr_init(&attributes);
-	posix_spawnattr_setflags(&attributes,
-	                         POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-	posix_spawnattr_setpgroup(&attributes, 0);
-	posix_spawnattr_setsigmask(&attributes, &none);
-	posix_spawnattr_setsigdefault(&attributes, &all);
-	posix_spawn_file_actions_init(&files);
-	posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-	error = posix_spawnp(&target->pid, argv[0], &files, &attributes, argv, environ);
-	if (error != 0)
-		target->pid = 0;
-	posix_spawn_file_actions_destroy(&files);
-	posix_spawnattr_destroy(&attributes);
-	return error;
-}
-
 /* droptower-firmware next to this program. */
 static int firmware_beside(char path[PATH_MAX_BYTES])
 {
@@ -198,7 +171,7 @@ static void share_processor(void)
 }
 
 /* An option and its number, in text; nothing for 0. Returns the words. */
-static size_t add_number(char **argv, char *option, unsigned number, char *text, size_t size)
+static size_t add_number(const char **argv, const char *option, unsigned number, char *text, size_t size)
 {
 	if (number == 0)
 		return 0;
@@ -211,13 +184,11 @@ static size_t add_number(char **argv, char *option, unsigned number, char *text,
 static int run_command(struct target *target, const struct target_options *options,
                        char message[TARGET_MESSAGE_MAX])
 {
-	static char bus[] = "--bus", clock_paced[] = "--realtime", reset_cause[] = "--reset-cause",
-	            kept[] = "--kept";
 	const char *command = options->command;
 	char cause_text[12], kept_text[12];
 	wordexp_t words = {.we_offs = 0};
 	char beside[PATH_MAX_BYTES];
-	char *argv[68];
+	const char *argv[68];
 	size_t count = 0;
 	int error;
 
@@ -235,14 +206,18 @@ static int run_command(struct target *target, const struct target_options *optio
 	}
 	for (size_t i = 0; command != NULL && i < words.we_wordc; i++)
 		argv[count++] = words.we_wordv[i];
-	argv[count++] = bus;
+	argv[count++] = "--bus";
 	argv[count++] = target->prefix;
 	if (options->realtime)
-		argv[count++] = clock_paced;
-	count += add_number(argv + count, reset_cause, options->cause, cause_text, sizeof(cause_text));
-	count += add_number(argv + count, kept, options->kept, kept_text, sizeof(kept_text));
+		argv[count++] = "--realtime";
+	count += add_number(argv + count, "--reset-cause", options->cause, cause_text, sizeof(cause_text));
+	count += add_number(argv + count, "--kept", options->kept, kept_text, sizeof(kept_text));
 	argv[count] = NULL;
-	error = spawn(target, argv);
+	/* a Ctrl-C reaches the bench alone, which then ends the firmware in order */
+	error = process_start(&(struct process){.words = argv, .fd = {PROCESS_NOTHING}, .alone = true},
+	                      &target->pid);
+	if (error != 0)
+		target->pid = 0;
 	if (error != 0)
 		snprintf(message, TARGET_MESSAGE_MAX, "cannot run the firmware %s: %s", argv[0],
 		         strerror(error));

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/process.h"
 #include "common/sensorbus.h"
 #include "common/wire.h"
 #include "common/wire_table.h"
@@ -253,7 +254,12 @@ static void put_picture(const struct timeline *timeline, const struct observe *o
 int timeline_draw(const struct timeline *timeline, const struct observe *observe, const char *title,
                   const char *file)
 {
+	static const char *const gnuplot[] = {"gnuplot", "--default-settings", NULL};
+	struct process_streams streams;
+	char *script = NULL;
+	size_t size = 0;
 	FILE *out;
+	int result;
 
 	if (timeline == NULL || timeline->count == 0)
 		return 0;
@@ -261,9 +267,15 @@ int timeline_draw(const struct timeline *timeline, const struct observe *observe
 		errno = ENOMEM;
 		return DT_E_SYSTEM;
 	}
-	out = popen("gnuplot --default-settings", "we");
+	out = open_memstream(&script, &size);
 	if (out == NULL)
 		return DT_E_SYSTEM;
 	put_picture(timeline, observe, title, file, out);
-	return pclose(out) == 0 ? 0 : DT_E_SYSTEM;
+	result = fclose(out) == 0 ? process_streams_open(&streams, script, size) : ENOMEM;
+	free(script);
+	if (result != 0)
+		return DT_E_SYSTEM;
+	result = process_filter(gnuplot, &streams);
+	process_streams_close(&streams);
+	return result == 0 ? 0 : DT_E_SYSTEM;
 }

@@ -9,6 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/base/process.h"
+
 enum { FILE_MAX_BYTES = 1 << 28 };
 
 /* Closes and keeps the errno of what failed before. */
@@ -74,26 +76,10 @@ int durable_folders(const char *path)
 	return result;
 }
 
-static int put_all(int fd, const char *bytes, size_t size)
-{
-	while (size > 0) {
-		ssize_t n = write(fd, bytes, size);
-
-		if (n < 0 && errno == EINTR)
-			continue;
-		if (n < 0)
-			return DT_E_SYSTEM;
-		bytes += n;
-		size -= (size_t)n;
-	}
-	return 0;
-}
-
 static int write_all(int fd, const char *bytes, size_t size)
 {
-	int result = put_all(fd, bytes, size);
-
-	return result == 0 && fsync(fd) != 0 ? DT_E_SYSTEM : result;
+	errno = process_write(fd, bytes, size);
+	return errno == 0 && fsync(fd) == 0 ? 0 : DT_E_SYSTEM;
 }
 
 static char *part_of(const char *path)
@@ -174,7 +160,7 @@ int durable_hash(const char *path, char hash[DIGEST_CHARS], int64_t *bytes, int 
 		sha256_update(&context, (size_t)n, block);
 		total += n;
 		if (copy >= 0)
-			result = put_all(copy, (const char *)block, (size_t)n);
+			result = process_write(copy, block, (size_t)n);
 	}
 	if (shut(fd, result == 0 && n == 0 ? 0 : DT_E_SYSTEM) != 0)
 		return DT_E_SYSTEM;

@@ -6,7 +6,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,14 +13,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "common/base/process.h"
 #include "common/wire_table.h"
 #include "host/archive/durable.h"
 #include "host/command/beside.h"
 #include "host/console/work_private.h"
 
 enum { NICE = 10 };
-
-extern char **environ;
 
 /* Nothing falls, is about to, or is being fetched. */
 static bool at_rest(const struct work *work)
@@ -37,22 +35,12 @@ static int run_program(struct work_report *r, const char *folder, const char *se
 {
 	char path[PATH_MAX];
 	const char *words[] = {path, "report", series, "--archive", folder, "--html", r->file, NULL};
-	union { /* posix_spawn promises not to write through its argument */
-		const char **given;
-		char *const *taken;
-	} argv = {.given = words};
-	posix_spawn_file_actions_t actions;
 	int result;
 
 	if (beside("droptower", path) != 0)
 		return errno;
-	result = posix_spawn_file_actions_init(&actions);
-	if (result != 0)
-		return result;
-	result = posix_spawn_file_actions_adddup2(&actions, r->errors, STDERR_FILENO);
-	if (result == 0)
-		result = posix_spawn(&r->pid, path, &actions, NULL, argv.taken, environ);
-	posix_spawn_file_actions_destroy(&actions);
+	result = process_start(&(struct process){.words = words, .fd = {[STDERR_FILENO] = r->errors}},
+	                       &r->pid);
 	if (result == 0)
 		setpriority(PRIO_PROCESS, (id_t)r->pid, NICE);
 	return result;

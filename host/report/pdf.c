@@ -1,20 +1,17 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/report/pdf.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/pidfd.h>
-#include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
+#include "common/base/process.h"
 #include "common/link/temporary.h"
 #include "host/archive/durable.h"
 #include "host/record/whole.h"
@@ -50,43 +47,33 @@ static bool find_browser(char program[PROGRAM_MAX])
 /* Starts it in folder, where page.html is and page.pdf is wanted; 0 or errno. */
 static int start(const char *program, const char *folder, pid_t *pid)
 {
-	char name[] = "chromium", headless[] = "--headless", gpu[] = "--disable-gpu";
-	char shm[] = "--disable-dev-shm-usage", quiet[] = "--disable-background-networking";
-	char still[] = "--disable-component-update", bare[] = "--no-pdf-header-footer";
-	char first[] = "--no-first-run", pdf[] = "--print-to-pdf=page.pdf", page[] = "page.html";
 	char profile[FOLDER_MAX + 32], home[FOLDER_MAX + 32], temporary[FOLDER_MAX + 32],
 	        path[PROGRAM_MAX + 32];
-	char root[] = "--no-sandbox", language[] = "LANG=C.UTF-8";
-	char *argv[] = {name, headless, gpu, shm, quiet, still, first, bare, pdf, profile, page, NULL, NULL};
-	char *environment[] = {path, home, temporary, language, NULL};
-	posix_spawn_file_actions_t actions;
-	posix_spawnattr_t attributes;
-	int error;
+	const char *const words[] = {program,
+	                             "--headless",
+	                             "--disable-gpu",
+	                             "--disable-dev-shm-usage",
+	                             "--disable-background-networking",
+	                             "--disable-component-update",
+	                             "--no-pdf-header-footer",
+	                             "--no-first-run",
+	                             "--print-to-pdf=page.pdf",
+	                             profile,
+	                             geteuid() == 0 ? "--no-sandbox" : "page.html",
+	                             geteuid() == 0 ? "page.html" : NULL,
+	                             NULL};
+	const char *const environment[] = {path, home, temporary, "LANG=C.UTF-8", NULL};
 
 	snprintf(profile, sizeof(profile), "--user-data-dir=%s/profile", folder);
 	snprintf(home, sizeof(home), "HOME=%s", folder);
 	snprintf(temporary, sizeof(temporary), "TMPDIR=%s", folder);
 	snprintf(path, sizeof(path), "PATH=%s", getenv("PATH"));
-	if (geteuid() == 0) {
-		argv[11] = argv[10];
-		argv[10] = root;
-	}
-	if (posix_spawn_file_actions_init(&actions) != 0)
-		return ENOMEM;
-	if (posix_spawnattr_init(&attributes) != 0) {
-		posix_spawn_file_actions_destroy(&actions);
-		return ENOMEM;
-	}
-	error = posix_spawn_file_actions_addchdir_np(&actions, folder);
-	for (int fd = 0; fd < 3 && !error; fd++)
-		error = posix_spawn_file_actions_addopen(&actions, fd, "/dev/null", O_RDWR, 0);
-	if (!error) /* a group of its own, so that all of it can be ended */
-		error = posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-	if (!error)
-		error = posix_spawn(pid, program, &actions, &attributes, argv, environment);
-	posix_spawnattr_destroy(&attributes);
-	posix_spawn_file_actions_destroy(&actions);
-	return error;
+	return process_start(&(struct process){.words = words,
+	                                       .environment = environment,
+	                                       .folder = folder,
+	                                       .fd = {PROCESS_NOTHING, PROCESS_NOTHING, PROCESS_NOTHING},
+	                                       .alone = true}, /* so that all of it can be ended */
+	                     pid);
 }
 
 static long now_ms(void)
@@ -102,7 +89,7 @@ static int wait_for(pid_t pid, int (*stop)(void))
 {
 	struct pollfd end = {.fd = pidfd_open(pid, 0), .events = POLLIN};
 	long until_ms = now_ms() + LIMIT_MS;
-	int status = 0, result = end.fd >= 0 ? 0 : DT_E_SYSTEM;
+	int result = end.fd >= 0 ? 0 : DT_E_SYSTEM;
 
 	while (!result && poll(&end, 1, ASK_MS) <= 0) {
 		if (stop && stop())
@@ -113,11 +100,7 @@ static int wait_for(pid_t pid, int (*stop)(void))
 	if (end.fd >= 0)
 		close(end.fd);
 	kill(-pid, SIGKILL); /* what it left behind, too */
-	while (waitpid(pid, &status, 0) < 0 && errno == EINTR)
-		;
-	if (!result && !(WIFEXITED(status) && WEXITSTATUS(status) == 0))
-		result = DT_E_SYSTEM;
-	return result;
+	return process_wait(pid) != 0 && result == 0 ? DT_E_SYSTEM : result;
 }
 
 static int fail(int result, const char *why, char *message, size_t size)
