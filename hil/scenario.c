@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/number.h"
 #include "common/wire_table.h"
 #include "hil/scenario_private.h"
 
@@ -114,7 +115,7 @@ static int read_number(struct scenario_reading *reading, const char *section, co
 
 		if (strcmp(section, number->section) != 0 || strcmp(name, number->name) != 0)
 			continue;
-		if (!settings_number(value, number->min, number->max, number_in(&reading->scenario, number)))
+		if (!number_read(value, number->min, number->max, number_in(&reading->scenario, number)))
 			return fail_number(reading, name, value, number->min, number->max);
 		return 1;
 	}
@@ -135,7 +136,7 @@ static int read_override(struct scenario_reading *reading, const char *name, con
 			return settings_fail(&reading->settings, DT_E_FULL,
 			                     "only %d values of the scene can be changed",
 			                     SCENARIO_OVERRIDES_MAX);
-		if (!settings_number(value, scene_keys[i].min, scene_keys[i].max, &to->value))
+		if (!number_read(value, scene_keys[i].min, scene_keys[i].max, &to->value))
 			return fail_number(reading, name, value, scene_keys[i].min, scene_keys[i].max);
 		to->offset = scene_keys[i].offset;
 		scenario->override_count++;

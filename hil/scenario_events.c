@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/base/number.h"
 #include "common/link/candump.h"
 #include "common/wire_table.h"
 #include "hil/scenario_private.h"
@@ -92,7 +93,7 @@ static bool parse_bus(unsigned count, char **words, struct event *event)
 			continue;
 		event->action = spans[i].action;
 		if (event->action != EVENT_BUS_BURST)
-			return settings_number(words[2], 0.001, 60, &event->duration_s);
+			return number_read(words[2], 0.001, 60, &event->duration_s);
 		if (!scenario_parse_whole(words[2], 1000000, &frames))
 			return false;
 		event->number = (unsigned)frames;
@@ -138,7 +139,7 @@ static bool parse_gate(unsigned count, char **words, struct event *event)
 static bool parse_dropout(unsigned count, char **words, struct event *event)
 {
 	event->action = EVENT_DROPOUT;
-	return count == 2 && settings_number(words[1], 0.002, 0.05, &event->duration_s);
+	return count == 2 && number_read(words[1], 0.002, 0.05, &event->duration_s);
 }
 
 const char scenario_actions[] =
@@ -172,10 +173,9 @@ static bool parse_when(unsigned count, char **words, struct event *event)
 		return false;
 	event->state = scenario_find(words[1], WIRE_STATES, wire_state_name);
 	if (event->state >= 0)
-		return count == 2 ||
-		       (words[2][0] == '+' && settings_number(words[2] + 1, 0, 60, &event->time_s));
+		return count == 2 || (words[2][0] == '+' && number_read(words[2] + 1, 0, 60, &event->time_s));
 	event->state = EVENT_AT_TIME;
-	return count == 2 && settings_number(words[1], 0, 60, &event->time_s);
+	return count == 2 && number_read(words[1], 0, 60, &event->time_s);
 }
 
 int scenario_read_event(struct scenario_reading *reading, const char *name, const char *value)

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/base/number.h"
 #include "common/wire_table.h"
 #include "hil/scenario_private.h"
 
@@ -51,7 +52,7 @@ static bool parse_range(const char *text, struct scenario_range *range)
 	struct scenario_range wanted;
 
 	if (dots == NULL) {
-		if (!settings_number(text, -1e12, 1e12, &wanted.min))
+		if (!number_read(text, -1e12, 1e12, &wanted.min))
 			return false;
 		wanted.max = wanted.min;
 	} else {
@@ -59,8 +60,8 @@ static bool parse_range(const char *text, struct scenario_range *range)
 			return false;
 		memcpy(first, text, (size_t)(dots - text));
 		first[dots - text] = '\0';
-		if (!settings_number(first, -1e12, 1e12, &wanted.min) ||
-		    !settings_number(dots + 2, wanted.min, 1e12, &wanted.max))
+		if (!number_read(first, -1e12, 1e12, &wanted.min) ||
+		    !number_read(dots + 2, wanted.min, 1e12, &wanted.max))
 			return false;
 	}
 	*range = wanted;

@@ -15,6 +15,7 @@
 
 #include "common/link/slcan_text.h"
 #include "common/link/transport.h"
+#include "common/base/number.h"
 
 #define INPUT_BYTES 4096u
 
@@ -30,7 +31,7 @@ struct slcan {
 };
 
 static const struct {
-	long baud;
+	uint64_t baud;
 	speed_t speed;
 } speeds[] = {
         {9600, B9600},       {19200, B19200},     {38400, B38400},     {57600, B57600},
@@ -44,16 +45,13 @@ static const struct {
 static bool parse_rest(char *device, speed_t *speed)
 {
 	char *at = strrchr(device, '@');
-	char *end;
-	long baud;
+	uint64_t baud;
 
 	*speed = B3000000;
 	if (at == NULL)
 		return true;
-	errno = 0;
-	baud = strtol(at + 1, &end, 10);
-	for (size_t i = 0; i < sizeof(speeds) / sizeof(speeds[0]) && errno == 0 && *end == '\0'; i++)
-		if (speeds[i].baud == baud) {
+	for (size_t i = 0; i < sizeof(speeds) / sizeof(speeds[0]); i++)
+		if (number_whole(at + 1, speeds[i].baud, speeds[i].baud, &baud)) {
 			*speed = speeds[i].speed;
 			*at = '\0';
 			return true;

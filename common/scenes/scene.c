@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "common/base/number.h"
 #include "common/scenes/scene.h"
 #include "common/plain.h"
 
@@ -79,10 +80,10 @@ static int read_number(struct reading *reading, size_t index, const char *text)
 
 	if (reading->line_of[index] != 0)
 		return settings_fail(settings, DT_E_FORMAT, "%.60s is given twice", key->name);
-	if (!settings_number(text, -INFINITY, INFINITY, &any) && strcasecmp(text, "nan") != 0)
+	if (!number_read(text, -INFINITY, INFINITY, &any) && strcasecmp(text, "nan") != 0)
 		return settings_fail(settings, DT_E_FORMAT, "%.60s = '%.60s' is not a number", key->name,
 		                     text);
-	if (!settings_number(text, key->min, key->max, value_of(&reading->scene, key)))
+	if (!number_read(text, key->min, key->max, value_of(&reading->scene, key)))
 		return settings_fail(settings, DT_E_RANGE, "%.60s is %.60s, expected %g to %g", key->name,
 		                     text, key->min, key->max);
 	reading->line_of[index] = settings->line;

@@ -36,17 +36,6 @@ int settings_refuse(const struct settings *settings, int code, const char *forma
 	return code;
 }
 
-bool settings_number(const char *text, double min, double max, double *number)
-{
-	char *end;
-	double value = strtod(text, &end);
-
-	if (end == text || *end != '\0' || !(value >= min && value <= max)) /* NaN fails too */
-		return false;
-	*number = value;
-	return true;
-}
-
 /* fgets for inih that counts the lines: Debian's build does not tell the handler where it is. */
 static char *read_line(char *text, int size, void *user)
 {

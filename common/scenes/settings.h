@@ -36,7 +36,4 @@ __attribute__((format(printf, 3, 4))) int settings_fail(struct settings *setting
 __attribute__((format(printf, 3, 4))) int settings_refuse(const struct settings *settings, int code,
                                                           const char *format, ...);
 
-/* The whole text is a number from min to max; else false and *number unchanged. */
-bool settings_number(const char *text, double min, double max, double *number);
-
 #endif

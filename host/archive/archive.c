@@ -15,6 +15,7 @@
 #include "common/plain.h"
 #include "host/archive/durable.h"
 #include "host/archive/private.h"
+#include "common/base/number.h"
 
 enum { FOLDER_MAX = 4000, WAIT_MS = 10000 };
 
@@ -313,11 +314,10 @@ int archive_scene(struct archive *archive, const char *series, struct scene *sce
 static int parse_drop(struct archive *archive, const char *drop, struct archive_place *place)
 {
 	const char *slash = strrchr(drop, '/');
-	char *end;
-	unsigned long number = slash != NULL ? strtoul(slash + 1, &end, 10) : 0;
+	uint64_t number;
 
-	if (slash == NULL || (size_t)(slash - drop) >= sizeof(place->name) || number < 1 ||
-	    number > 1000000 || *end != '\0' || !isdigit((unsigned char)slash[1]))
+	if (slash == NULL || (size_t)(slash - drop) >= sizeof(place->name) ||
+	    !number_whole(slash + 1, 1, 1000000, &number))
 		return archive_refuse(archive, DT_E_ARGUMENT, "'%.100s' is no drop, expected SERIES/NUMBER",
 		                      drop);
 	memcpy(place->name, drop, (size_t)(slash - drop));

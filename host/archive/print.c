@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/number.h"
 #include "host/archive/print_private.h"
 
 void print_key(char key[PRINT_KEY_MAX], enum archive_value value, const char *part)
@@ -48,16 +49,11 @@ void csv_text(FILE *out, const char *text)
 
 void csv_number(FILE *out, double value)
 {
-	char text[32];
+	char text[NUMBER_CHARS] = "";
 
-	for (int digits = 6; isfinite(value) && digits <= 17; digits++) {
-		snprintf(text, sizeof(text), "%.*g", digits, value);
-		if (fabs(strtod(text, NULL) - value) > 0)
-			continue;
-		fputs(text, out);
-		break;
-	}
-	fputc(',', out);
+	if (isfinite(value))
+		number_format(text, value, 6);
+	fprintf(out, "%s,", text);
 }
 
 void csv_mean(FILE *out, const struct archive_mean *mean)

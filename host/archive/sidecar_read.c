@@ -10,6 +10,7 @@
 
 #include "host/archive/durable.h"
 #include "host/archive/sidecar.h"
+#include "common/base/number.h"
 
 const char *sidecar_next(const struct sidecar *sidecar, const char *key, const char **at)
 {
@@ -34,11 +35,10 @@ const char *sidecar_value(const struct sidecar *sidecar, const char *key)
 
 static double number(const struct sidecar *sidecar, const char *key)
 {
-	const char *text = sidecar_value(sidecar, key);
-	char *end;
-	double read = strtod(text, &end);
+	double read = NAN;
 
-	return end == text || *end != '\0' ? (double)NAN : read;
+	number_read(sidecar_value(sidecar, key), -HUGE_VAL, HUGE_VAL, &read);
+	return read;
 }
 
 int sidecar_split(struct archive *archive, struct sidecar *sidecar, char *text)

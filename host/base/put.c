@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/number.h"
 #include "common/error.h"
 
 void put_item(struct builder *b, cJSON *object, const char *key, cJSON *item)
@@ -19,15 +20,11 @@ void put_item(struct builder *b, cJSON *object, const char *key, cJSON *item)
 /* cJSON's own numbers may lose the last digit. */
 static cJSON *number(double value)
 {
-	char text[32];
+	char text[NUMBER_CHARS];
 
 	if (!isfinite(value))
 		return cJSON_CreateNull();
-	for (int digits = 15; digits <= 17; digits++) {
-		snprintf(text, sizeof(text), "%.*g", digits, value);
-		if (strtod(text, NULL) == value)
-			break;
-	}
+	number_format(text, value, 15);
 	return cJSON_CreateRaw(text);
 }
 

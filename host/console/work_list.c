@@ -2,11 +2,13 @@
 /*
  * What the archive says of series, drops and results, in the very bytes that `droptower series` prints.
  */
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/number.h"
 #include "host/archive/print.h"
 #include "host/console/work_private.h"
 #include "host/record/text.h"
@@ -23,9 +25,9 @@ struct wanted {
 static bool read_count(struct job *job, const char *name, unsigned *to)
 {
 	const char *text = job->query(job, name);
-	unsigned long count = text != NULL ? strtoul(text, NULL, 10) : 1;
+	uint64_t count = 1;
 
-	if (text != NULL && (text[strspn(text, "0123456789")] != '\0' || count < 1 || count > COUNT_MAX)) {
+	if (text != NULL && !number_whole(text, 1, COUNT_MAX, &count)) {
 		job_refuse(job, 400, "%s is '%.40s', expected a whole number from 1 to %d", name, text,
 		           COUNT_MAX);
 		return false;
@@ -40,7 +42,6 @@ static bool read_query(struct job *job, struct wanted *w)
 {
 	const char *angle = job->query(job, "angle_deg"), *date = job->query(job, "date"),
 	           *undecided = job->query(job, "undecided");
-	char *end;
 
 	w->filter = archive_filter_none();
 	w->filter.series = job->query(job, "series");
@@ -48,12 +49,9 @@ static bool read_query(struct job *job, struct wanted *w)
 	w->filter.scene_name = job->query(job, "scene");
 	w->filter.text = job->query(job, "text");
 	w->undecided = undecided != NULL && strcmp(undecided, "1") == 0;
-	if (angle != NULL) {
-		w->filter.angle_deg = strtod(angle, &end);
-		if (end == angle || *end != '\0' || !isfinite(w->filter.angle_deg)) {
-			job_refuse(job, 400, "angle_deg is '%.40s', expected a number", angle);
-			return false;
-		}
+	if (angle != NULL && !number_read(angle, -DBL_MAX, DBL_MAX, &w->filter.angle_deg)) {
+		job_refuse(job, 400, "angle_deg is '%.40s', expected a number", angle);
+		return false;
 	}
 	if (!read_count(job, "limit", &w->filter.limit) || !read_count(job, "number", &w->filter.number))
 		return false;

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "host/record/number.h"
+#include "common/base/number.h"
 
 static bool is_blank(char c)
 {

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "host/record/cells.h"
-#include "host/record/number.h"
+#include "common/base/number.h"
 #include "host/record/source.h"
 
 static int refuse(char *message, struct piece entry, const char *expected)

@@ -9,7 +9,7 @@
 
 #include "host/record/drop.h"
 #include "host/record/fields.h"
-#include "host/record/number.h"
+#include "common/base/number.h"
 #include "host/record/seal.h"
 
 struct reading {

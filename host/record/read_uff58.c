@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/number.h"
 #include "host/record/drop.h"
 #include "host/record/fields.h"
-#include "host/record/number.h"
 #include "host/record/seal.h"
 #include "host/record/timebase.h"
 #include "host/record/uff58_text.h"

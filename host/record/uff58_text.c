@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "host/record/number.h"
+#include "common/base/number.h"
 
 /* ---- columns ---- */
 

@@ -15,7 +15,7 @@
 #include "host/record/fields.h"
 #include "host/record/hdf5.h"
 #include "host/record/lcm_codec.h"
-#include "host/record/number.h"
+#include "common/base/number.h"
 #include "host/record/lcm_log.h"
 #include "host/record/seal.h"
 #include "host/record/text.h"
@@ -113,7 +113,7 @@ static void put_number(FILE *out, double value)
 {
 	char text[NUMBER_CHARS];
 
-	number_format(text, value);
+	number_format(text, value, 15);
 	fputs(text, out);
 }
 

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "host/record/fields.h"
-#include "host/record/number.h"
+#include "common/base/number.h"
 #include "host/record/seal.h"
 #include "host/record/uff58.h"
 
@@ -110,7 +110,7 @@ static void fill_line(const struct record *record, size_t *next, char line[UFF58
 		if (!fields_known(record, entry))
 			continue;
 		if (entry->kind == FIELDS_REAL)
-			number_format(number, fields_real(record, entry));
+			number_format(number, fields_real(record, entry), 15);
 		else
 			snprintf(number, sizeof(number), "%" PRId64, fields_whole(record, entry));
 		length =
@@ -137,9 +137,9 @@ static void put_channel(const struct record *record, size_t i, size_t *next_fiel
 	        .ordinate = {UFF58_ACCELERATION, "Acceleration", "g"},
 	};
 
-	number_format(rate, channel->rate_hz);
-	number_format(start, channel->start_s);
-	number_format(range, channel->range_g);
+	number_format(rate, channel->rate_hz, 15);
+	number_format(start, channel->start_s, 15);
+	number_format(range, channel->range_g, 15);
 	snprintf(own, sizeof(own), UFF58_OWN "rate_hz=%s start_s=%s", rate, start);
 	snprintf(more, sizeof(more), "range_g=%s uneven=%d", range,
 	         (channel->flags & RECORD_FLAG_UNEVEN) != 0);

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/record/number.h"
+#include "common/base/number.h"
 #include "host/record/source.h"
 
 #define SPECTRUM_NAMES "frequency_hz,limit"

@@ -161,7 +161,7 @@ static void a_number_is_the_whole_text(void **state)
 
 	(void)state;
 	assert_true(number_read("1e3", 0, 1e3, &value) && value == 1000);
-	assert_false(number_read("inf", -INFINITY, INFINITY, &value));
+	assert_false(number_read("inf", -1e308, 1e308, &value));
 	assert_false(number_read("1e3x", 0, 1e9, &value));
 	assert_true(value == 1000); /* untouched */
 	assert_true(number_whole("007", 0, 7, &whole) && whole == 7);

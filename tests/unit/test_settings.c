@@ -16,6 +16,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "common/base/number.h"
 #include "common/scenes/settings.h"
 
 struct reader {
@@ -120,12 +121,12 @@ static void numbers_are_whole_texts(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
-		assert_false(settings_number(wrong[i], 1, 3, &number));
+		assert_false(number_read(wrong[i], 1, 3, &number));
 		assert_true(number == 7);
 	}
-	assert_true(settings_number("1", 1, 3, &number) && number == 1);
-	assert_true(settings_number("3e0", 1, 3, &number) && number == 3);
-	assert_true(settings_number("inf", 1, INFINITY, &number) && isinf(number));
+	assert_true(number_read("1", 1, 3, &number) && number == 1);
+	assert_true(number_read("3e0", 1, 3, &number) && number == 3);
+	assert_true(number_read("inf", 1, INFINITY, &number) && isinf(number));
 }
 
 int main(void)
