@@ -208,7 +208,8 @@ int drop_close(struct record *record)
 	drop_set_axes(record);
 	drop_capture_end(record, &end);
 	record->seal_agrees = record->seal_known && wire_check_capture_end(&end) == 0;
-	record->parameters_held = record->crc_known ? record->parameters_held : 0;
+	if (!record->crc_known || record->parameters_held != RECORD_PARAMETERS_ALL)
+		record->parameters_held = 0; /* nothing proves a part of the set */
 	record->parameters_known = record->parameters_held == RECORD_PARAMETERS_ALL &&
 	                           wire_parameters_crc32(record->parameters) == record->parameters_crc32;
 	record_finish(record);

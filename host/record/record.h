@@ -118,7 +118,7 @@ struct record {
 	bool seal_known, seal_agrees;
 	uint32_t seal;             /* as sent in the capture end: checksum of all of it */
 	uint32_t parameters_crc32; /* of the set that the drop was made with; if crc_known */
-	uint32_t parameters_held;  /* bit i: parameters[i] has come; if crc_known */
+	uint32_t parameters_held;  /* bit i: parameters[i] has come; none if one lacks, or the end */
 	uint32_t parameters[WIRE_PARAMETERS];
 	bool parameters_known; /* all of them, and their CRC-32 agrees; drop_close finds out */
 	bool measured_known;   /* what the drop has measured of its tower */
