@@ -182,14 +182,9 @@ uint32_t wire_parameters_crc32(const uint32_t value[WIRE_PARAMETERS])
 	return crc;
 }
 
-uint32_t wire_arm_key(uint32_t session, uint32_t parameters_crc32)
+uint32_t wire_answer(uint32_t nonce, uint32_t subject, uint32_t parameters_crc32)
 {
-	return crc_u32(crc_u32(CRC32_INIT, session), parameters_crc32);
-}
-
-uint32_t wire_release_key(uint32_t nonce, uint16_t drop_id, uint32_t parameters_crc32)
-{
-	return crc_u32(crc_u32(crc_u32(CRC32_INIT, nonce), drop_id), parameters_crc32);
+	return crc_u32(crc_u32(crc_u32(CRC32_INIT, nonce), subject), parameters_crc32);
 }
 
 uint8_t wire_fd_length(size_t count)

@@ -151,13 +151,11 @@ DT_MUST_USE int wire_check_measured(const struct frame *frame);
 /* CRC-32 over a whole parameter set, values little endian, in the order of wire.def. */
 uint32_t wire_parameters_crc32(const uint32_t value[WIRE_PARAMETERS]);
 
-/* The argument of ARM: CRC-32 over the sender's session and the CRC-32 of the parameters it believes in. */
-uint32_t wire_arm_key(uint32_t session, uint32_t parameters_crc32);
-
-/* The argument of RELEASE: CRC-32 over the nonce that ARM was answered with, the number of the drop to come
- * and the CRC-32 of the parameters. It proves that the release was asked for after this ARM; it is no
- * secret. */
-uint32_t wire_release_key(uint32_t nonce, uint16_t drop_id, uint32_t parameters_crc32);
+/* The argument of ARM and RELEASE: CRC-32 over the nonce of the challenge that is answered, the sender's
+ * session for ARM or the number of the drop to come for RELEASE, and the CRC-32 of the parameters believed
+ * in. ARM over nonce 0 answers nothing and asks for a challenge. It proves that the command was given after
+ * that challenge; it is no secret. */
+uint32_t wire_answer(uint32_t nonce, uint32_t subject, uint32_t parameters_crc32);
 
 /* CRC-32 over wire.def without its texts: equal on both ends or they do not speak the same wire. */
 uint32_t wire_hash(void);

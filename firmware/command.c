@@ -38,17 +38,20 @@ static struct sequence_order prepare(struct app *app, const struct wire_command 
 	return order;
 }
 
-/* Says again, if need be, what the arming host has to know. The window of the drop before goes. */
-static void armed(struct app *app, const struct wire_armed *message, bool again)
+/* What the next answer has to name; again, if need be. */
+static void challenge(struct app *app, const struct wire_challenge *message)
 {
 	struct frame frame;
 
-	if (!again) {
-		app->set = app->parameters;
-		capture_release(&app->capture);
-	}
-	wire_pack_armed(&frame, WIRE_ID_ARMED, message);
+	wire_pack_challenge(&frame, WIRE_ID_CHALLENGE, message);
 	stream_send(&app->stream, &frame);
+}
+
+/* The window of the drop before goes. */
+static void armed(struct app *app)
+{
+	app->set = app->parameters;
+	capture_release(&app->capture);
 }
 
 static void operate(struct app *app, const struct wire_command *command)
@@ -56,26 +59,28 @@ static void operate(struct app *app, const struct wire_command *command)
 	const struct sequence *sequence = &app->sequence;
 	struct sequence_order order = prepare(app, command);
 	struct sequence_view view;
-	struct wire_armed message;
+	struct wire_challenge message;
 	struct wire_reply reply = {.op = command->op, .sequence = command->sequence};
 	struct frame frame;
-	bool again;
+	bool was_armed;
 	int result;
 
 	port_lock();
 	view = app_view(app);
-	again = sequence->state == WIRE_STATE_ARMED;
+	was_armed = sequence->state == WIRE_STATE_ARMED;
 	result = sequence_command(&app->sequence, &view, &order);
-	message.drop_id = sequence_next_drop(sequence);
+	reply.state = sequence->state;
+	message.drop_id = reply.state == WIRE_STATE_ARMED ? sequence_next_drop(sequence) : 0;
 	message.host = command->host;
 	message.nonce = sequence->nonce;
-	reply.state = sequence->state;
 	reply.checks = sequence_checks(sequence, view.checks);
 	port_unlock();
+	if (!was_armed && reply.state == WIRE_STATE_ARMED)
+		armed(app);
 	if (result != 0)
 		count(app, WIRE_COUNTER_commands_refused);
 	else if (command->op == WIRE_OP_ARM)
-		armed(app, &message, again);
+		challenge(app, &message);
 	reply.result = (int8_t)result;
 	wire_pack_reply(&frame, WIRE_ID_REPLY, &reply);
 	stream_send(&app->stream, &frame);

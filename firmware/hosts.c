@@ -68,15 +68,15 @@ bool hosts_hash_differs(const struct hosts *hosts, uint16_t low)
 	return false;
 }
 
-int hosts_find(const struct hosts *hosts, uint16_t low, uint32_t arm_key, uint32_t parameters_crc32,
-               uint32_t *session)
+int hosts_find(const struct hosts *hosts, uint16_t low, uint32_t answer, uint32_t nonce,
+               uint32_t parameters_crc32, uint32_t *session)
 {
 	int result = DT_E_SESSION;
 
 	for (unsigned i = 0; i < HOSTS_MAX; i++) {
 		if (!named(hosts, i, low) || !hosts->host[i].hash_good)
 			continue;
-		if (wire_arm_key(hosts->host[i].session, parameters_crc32) == arm_key) {
+		if (wire_answer(nonce, hosts->host[i].session, parameters_crc32) == answer) {
 			*session = hosts->host[i].session;
 			return 0;
 		}

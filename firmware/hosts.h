@@ -39,9 +39,9 @@ bool hosts_here(const struct hosts *hosts, uint32_t session);
 /* A host with this low half is here, but with another wire.def. */
 bool hosts_hash_differs(const struct hosts *hosts, uint16_t low);
 
-/* Who of those with this low half arms with this key: 0 and *session; DT_E_SESSION when none is here,
- * DT_E_PARAMETERS when the key is of another parameter set. */
-DT_MUST_USE int hosts_find(const struct hosts *hosts, uint16_t low, uint32_t arm_key,
+/* Who of those with this low half answers the nonce so: 0 and *session; DT_E_SESSION when none is here,
+ * DT_E_PARAMETERS when the answer is of another nonce or parameter set. */
+DT_MUST_USE int hosts_find(const struct hosts *hosts, uint16_t low, uint32_t answer, uint32_t nonce,
                            uint32_t parameters_crc32, uint32_t *session);
 
 #endif

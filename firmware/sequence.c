@@ -21,7 +21,10 @@ enum {
 	FRAME_SEEN = WIRE_IO_GATE_UPPER | WIRE_IO_GATE_LOWER | WIRE_IO_FRAME_DOWN,
 	FRAME_AT_REST = WIRE_IO_LATCH_CLOSED | WIRE_IO_FRAME_DOWN,
 	GUARDS = WIRE_CHECK_ESTOP | WIRE_CHECK_DOOR | WIRE_CHECK_LATCH | WIRE_CHECK_PRODUCT,
+	KEPT_STATE = 0x0F, /* of the byte that outlives a reset; above it the fault */
+	KEPT_FAULT = 4,
 };
+_Static_assert(WIRE_STATES <= 16 && WIRE_FAULTS <= 16, "both are kept in one byte");
 
 /* clang-format off */
 static const uint8_t table[WIRE_STATES][SEQUENCE_EVENTS] = {
@@ -141,8 +144,8 @@ static void enter(struct sequence *sequence, uint8_t state)
 	if (state == FAULT_MOVING && sequence->fault != WIRE_FAULT_NO_IMPACT)
 		sequence->no_impact_ms = sequence->tick_ms + SEQUENCE_NO_IMPACT_MS;
 	port_outputs(outputs[state].on, outputs[state].off);
-	if (state != BOOT) /* a reset in BOOT shall still know of the motion before */
-		port_keep(state);
+	if (state != BOOT) /* a reset in BOOT shall still know of what was before */
+		port_keep((uint8_t)(state | sequence->fault << KEPT_FAULT));
 }
 
 /* 0, or DT_E_STATE if the event has no place here. */
@@ -204,7 +207,7 @@ void sequence_full(struct sequence *sequence)
 void sequence_init(struct sequence *sequence, const struct parameters *parameters,
                    volatile uint32_t *counters, enum port_reset cause)
 {
-	bool moved = sequence_moving(port_kept());
+	uint8_t state = port_kept() & KEPT_STATE, fault = port_kept() >> KEPT_FAULT;
 
 	memset(sequence, 0, sizeof(*sequence));
 	sequence->parameters = parameters;
@@ -214,8 +217,10 @@ void sequence_init(struct sequence *sequence, const struct parameters *parameter
 		sequence_fault(sequence, WIRE_FAULT_WATCHDOG);
 	else if (cause == PORT_RESET_BROWN_OUT)
 		sequence_fault(sequence, WIRE_FAULT_BROWN_OUT);
-	else if (moved)
+	else if (sequence_moving(state))
 		sequence_fault(sequence, WIRE_FAULT_RESET);
+	else if (state < WIRE_STATES && fault != WIRE_FAULT_NONE) /* nobody has cleared it */
+		sequence_fault(sequence, (enum wire_fault)fault);
 }
 
 /* ---- commands ---- */
@@ -239,29 +244,47 @@ static bool armed_by(const struct sequence *sequence, const struct wire_command 
 	       command->argument == sequence->arm_key;
 }
 
+/* The challenge that may be answered now, 0: none. It is good for one ARM, taken or refused. */
+static uint32_t take_nonce(struct sequence *sequence)
+{
+	bool late = sequence->tick_ms - sequence->challenged_ms > SEQUENCE_ANSWER_MS;
+	uint32_t nonce = late ? 0 : sequence->nonce;
+
+	sequence->nonce = 0;
+	return nonce;
+}
+
 static int arm(struct sequence *sequence, uint32_t checks, const struct sequence_order *order)
 {
 	const struct wire_command *command = &order->command;
-	uint32_t session;
+	uint32_t nonce, session;
+	bool answered = false;
 	int result;
 
 	if (armed_by(sequence, command))
 		return step(sequence, SEQUENCE_ARM);
 	if (sequence->state != SAFE && sequence->state != READY)
 		return DT_E_STATE;
+	nonce = take_nonce(sequence);
 	if (hosts_hash_differs(order->hosts, command->host))
 		return DT_E_HASH;
 	if (sequence->state == SAFE || checks != 0)
 		return DT_E_CHECKS;
-	result =
-	        hosts_find(order->hosts, command->host, command->argument, order->parameters_crc32, &session);
-	if (result != 0)
+	result = hosts_find(order->hosts, command->host, command->argument, 0, order->parameters_crc32,
+	                    &session);
+	if (result != 0 && nonce != 0)
+		answered = hosts_find(order->hosts, command->host, command->argument, nonce,
+		                      order->parameters_crc32, &session) == 0;
+	if (result != 0 && !answered)
 		return result;
 	if (!order->nonce_good)
 		return DT_E_SYSTEM;
+	sequence->nonce = order->nonce;
+	sequence->challenged_ms = sequence->tick_ms;
+	if (!answered)
+		return 0;
 	sequence->session = session;
 	sequence->arm_key = command->argument;
-	sequence->nonce = order->nonce;
 	sequence->parameters_crc32 = order->parameters_crc32;
 	sequence->times = (struct fall_times){.dropout_us = order->dropout_us};
 	return step(sequence, SEQUENCE_ARM);
@@ -270,8 +293,7 @@ static int arm(struct sequence *sequence, uint32_t checks, const struct sequence
 static int refuse_release(const struct sequence *sequence, uint32_t checks,
                           const struct wire_command *command)
 {
-	uint32_t key =
-	        wire_release_key(sequence->nonce, sequence_next_drop(sequence), sequence->parameters_crc32);
+	uint32_t key = wire_answer(sequence->nonce, sequence_next_drop(sequence), sequence->parameters_crc32);
 	uint32_t warned_ms = sequence->tick_ms - sequence->entered_ms;
 
 	if (sequence->state != ARMED)
@@ -316,14 +338,18 @@ static int release(struct sequence *sequence, uint32_t checks, uint32_t now_us,
 	return result;
 }
 
-static int clear(struct sequence *sequence, uint32_t checks)
+/* While the frame is neither down nor latched keep out: also what was a fault before a reset. */
+static int clear(struct sequence *sequence, const struct sequence_view *view)
 {
+	uint32_t checks = view->checks;
+
 	if (sequence->state != SAFE && sequence->state != FAULT_HELD)
 		return DT_E_STATE;
 	if (sequence->state == SAFE && (checks & GUARDS) != 0)
 		return DT_E_CHECKS;
 	DT_ASSERT(sequence->fault < WIRE_FAULTS);
-	if (sequence->state == FAULT_HELD && (checks & (WIRE_CHECK_CLOCKS | causes[sequence->fault])) != 0)
+	if (sequence->state == FAULT_HELD && ((checks & (WIRE_CHECK_CLOCKS | causes[sequence->fault])) != 0 ||
+	                                      (view->io & FRAME_AT_REST) == 0))
 		return DT_E_CHECKS;
 	sequence->acknowledged = (checks & GUARDS) == 0;
 	sequence->fault = WIRE_FAULT_NONE;
@@ -345,7 +371,7 @@ int sequence_command(struct sequence *sequence, const struct sequence_view *view
 		sequence_abort(sequence);
 		return 0;
 	case WIRE_OP_CLEAR:
-		return clear(sequence, view->checks);
+		return clear(sequence, view);
 	case WIRE_OP_ACCEPT:
 		if (sequence->state == CAPTURED && command->argument != order->capture_crc32)
 			return DT_E_CORRUPT;

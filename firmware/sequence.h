@@ -14,8 +14,11 @@
  * sequence_init and by SAFE, and de-energised by nothing but the edge computed from the two light gates.
  *
  * READY takes an acknowledgement (CLEAR) after each drop, after a reset, and after emergency stop, door,
- * latch or product were lost; then all checks green for settle_ms. RELEASE takes the answer to the nonce that
- * this ARM was given, from the host that armed, and warning_ms of warning before it.
+ * latch or product were lost; then all checks green for settle_ms. ARM answers a challenge that it asked for
+ * less than SEQUENCE_ANSWER_MS ago and that no other ARM came after. RELEASE answers the challenge of this
+ * ARM, from the host that armed, after warning_ms of warning. What was recorded answers neither.
+ *
+ * A fault outlives a reset until it is cleared, and none is while the frame is neither down nor latched.
  *
  * Context: control (sequence_tick, sequence_gate, sequence_keeper); sequence_plan main; everything else main
  * between port_lock and port_unlock, so that no two calls overlap. Times in us wrap after 71 minutes, in ms
@@ -64,6 +67,7 @@ enum {
 	SEQUENCE_LATCH_MS = 100,     /* the latch must be open by then */
 	SEQUENCE_NO_IMPACT_MS = 600, /* after separation, or after a fault in motion */
 	SEQUENCE_UPLOADED_MS = 200,  /* two status messages show it */
+	SEQUENCE_ANSWER_MS = 1000,   /* a challenge to ARM is good for so long */
 };
 
 struct sequence {
@@ -82,11 +86,13 @@ struct sequence {
 	uint16_t drop_id;
 	uint16_t marks; /* WIRE_MARK_* of this drop */
 	uint16_t frame_speed_mm_s;
-	uint32_t session, arm_key, nonce; /* who has armed, with what, and the answer; 0 unless armed */
-	uint32_t parameters_crc32;        /* of the set that the last ARM confirmed */
-	uint32_t tick_ms;                 /* now */
-	uint32_t entered_ms;              /* the state */
-	uint32_t green_ms; /* the last tick with a check red: green for less than the time since */
+	uint32_t session, arm_key; /* who has armed, with what; 0 unless armed */
+	uint32_t nonce;            /* of the challenge that waits for its answer, 0: none */
+	uint32_t challenged_ms;    /* when READY gave one */
+	uint32_t parameters_crc32; /* of the set that the last ARM confirmed */
+	uint32_t tick_ms;          /* now */
+	uint32_t entered_ms;       /* the state */
+	uint32_t green_ms;         /* the last tick with a check red: green for less than the time since */
 	uint32_t released_ms;
 	uint32_t no_impact_ms; /* when waiting for an impact ends */
 };
@@ -135,9 +141,10 @@ void sequence_keeper(struct sequence *sequence, uint32_t time_us);
 uint32_t sequence_checks(const struct sequence *sequence, uint32_t checks);
 
 /* 0 or why not, in this order. ARM: DT_E_STATE, DT_E_HASH, DT_E_CHECKS, DT_E_SESSION, DT_E_PARAMETERS,
- * DT_E_SYSTEM; by the host that has armed while it is armed: 0, nothing changes. RELEASE: DT_E_STATE,
- * DT_E_SESSION, DT_E_TOKEN, DT_E_EARLY, DT_E_CHECKS. CLEAR: DT_E_STATE, DT_E_CHECKS. ACCEPT with a CRC-32 and
- * DISCARD with a number that are not the drop's: DT_E_CORRUPT. DT_E_UNKNOWN. */
+ * DT_E_SYSTEM; 0: challenged, or armed when it was the answer; repeated by the host that has armed while it
+ * is armed: 0, nothing changes. In both `nonce` waits for its answer. RELEASE: DT_E_STATE, DT_E_SESSION,
+ * DT_E_TOKEN, DT_E_EARLY, DT_E_CHECKS. CLEAR: DT_E_STATE, DT_E_CHECKS. ACCEPT with a CRC-32 and DISCARD with
+ * a number that are not the drop's: DT_E_CORRUPT. DT_E_UNKNOWN. */
 DT_MUST_USE int sequence_command(struct sequence *sequence, const struct sequence_view *view,
                                  const struct sequence_order *order);
 

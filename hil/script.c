@@ -133,10 +133,17 @@ static void feed_parameter(struct script *script, const struct frame *frame, uin
 	script->progress_ms = now_ms;
 }
 
-static void feed_armed(struct script *script, const struct frame *frame)
+static void feed_challenge(struct script *script, const struct frame *frame, uint32_t now_ms)
 {
-	if (wire_unpack_armed(frame, &script->armed) == 0)
-		script->has_armed = script->armed.host == (SCRIPT_SESSION & UINT16_MAX);
+	const struct wire_challenge *challenge = &script->challenge;
+
+	if (wire_unpack_challenge(frame, &script->challenge) != 0)
+		return;
+	script->has_armed = challenge->host == (SCRIPT_SESSION & UINT16_MAX) && challenge->drop_id != 0;
+	if (script->has_armed)
+		script->status.state = WIRE_STATE_ARMED; /* the reply may be lost */
+	else if (script->phase == SCRIPT_ARM && challenge->host == (SCRIPT_SESSION & UINT16_MAX))
+		script->send_ms = now_ms; /* answered at once */
 }
 
 /* A tower that starts anew has forgotten what was written. */
@@ -156,6 +163,8 @@ static void feed_reply(struct script *script, const struct frame *frame)
 		return;
 	script->status.state = reply.state;
 	script->status.checks = reply.checks;
+	if (reply.op == WIRE_OP_ARM && reply.result != 0 && reply.state != WIRE_STATE_ARMED)
+		script->challenge = (struct wire_challenge){.nonce = 0}; /* it is used up */
 }
 
 /* Written or refused: who looks at the bus sees which. */
@@ -207,8 +216,8 @@ void script_feed(struct script *script, const struct frame *part, uint32_t now_m
 	case WIRE_ID_PARAMETER:
 		feed_parameter(script, frame, now_ms);
 		break;
-	case WIRE_ID_ARMED:
-		feed_armed(script, frame);
+	case WIRE_ID_CHALLENGE:
+		feed_challenge(script, frame, now_ms);
 		break;
 	case WIRE_ID_HEARTBEAT_TOWER:
 		feed_heartbeat(script, frame);
@@ -242,15 +251,17 @@ static void fail(struct script *script, const char *what)
 
 void script_verb(const struct script *script, uint32_t session, struct wire_command *message)
 {
+	const struct wire_challenge *challenge = &script->challenge;
 	uint32_t parameters = wire_parameters_crc32(script->value);
 
 	message->host = (uint16_t)session;
 	switch (message->op) {
 	case WIRE_OP_ARM:
-		message->argument = wire_arm_key(session, parameters);
+		message->argument =
+		        wire_answer(challenge->drop_id == 0 ? challenge->nonce : 0, session, parameters);
 		break;
 	case WIRE_OP_RELEASE:
-		message->argument = wire_release_key(script->armed.nonce, script->armed.drop_id, parameters);
+		message->argument = wire_answer(challenge->nonce, challenge->drop_id, parameters);
 		break;
 	case WIRE_OP_ACCEPT:
 		message->argument = script->capture.crc32;
@@ -336,7 +347,7 @@ static unsigned do_set(struct script *script, uint32_t now_ms, struct frame *out
 	return 1;
 }
 
-/* Armed without the tower's answer, which was lost: ARM once more brings the same again. */
+/* Armed without the tower's challenge, which was lost: the same ARM once more brings the same again. */
 static unsigned do_arm(struct script *script, uint32_t now_ms, struct frame *out)
 {
 	bool armed = script->status.state == WIRE_STATE_ARMED;

@@ -62,8 +62,8 @@ struct script {
 	uint32_t send_ms;                /* when the phase's next command or request is due */
 	uint32_t clear_ms;               /* when the guards may be acknowledged again */
 	uint32_t value[WIRE_PARAMETERS]; /* that it believes the tower has */
-	struct wire_armed armed;         /* the tower's last */
-	bool has_armed;                  /* it answers our ARM */
+	struct wire_challenge challenge; /* the tower's last, to whomever */
+	bool has_armed;                  /* it is that of the ARM by which we have armed */
 	uint32_t progress_ms;            /* when a block of the capture came last ... */
 	uint32_t segment_ms;             /* ... and a segment of anything */
 	uint32_t resend_at; /* where the next round begins: S1's blocks are counted first, then S2's */

@@ -8,6 +8,7 @@
 enum {
 	REPLY_MS = 300, /* a reply takes a millisecond; then it or the command was lost */
 	TRIES = 10,
+	ROUNDS = 3, /* challenge and answer, when another's ARM comes between them or a second passes */
 };
 
 /* CiA 301, expedited transfer of four bytes: the first byte of a request and of its answer. */
@@ -35,30 +36,31 @@ static bool is_answer(const struct wire_sdo *answer, const struct wire_sdo *requ
 	       (answer->specifier == wanted || answer->specifier == SDO_ABORT);
 }
 
-/* The answer to our ARM, or to another host's. */
-static void hear_armed(struct session *session, const struct wire_armed *armed)
+/* To our ARM, or to another host's; or to the ARM before, late. */
+static void hear_challenge(struct session *session, const struct wire_challenge *challenge)
 {
 	struct can_way *way = session->way;
 	struct session_view *view = &session->view;
+	bool armed = challenge->drop_id != 0;
 
-	if (!way->armed_awaited || armed->host != (uint16_t)view->session)
+	if (!way->challenge_awaited || challenge->host != (uint16_t)view->session || armed != way->answering)
 		return;
-	way->armed_awaited = false;
-	view->armed = true;
-	view->nonce = armed->nonce;
-	view->armed_drop_id = armed->drop_id;
+	way->challenge_awaited = false;
+	view->armed = armed;
+	view->nonce = challenge->nonce;
+	view->armed_drop_id = challenge->drop_id;
 	view->release_from_ms = session_now_ms() + view->parameters[WIRE_PARAMETER_warning_ms];
 }
 
 void can_hear_answer(struct session *session, const struct frame *frame)
 {
 	struct can_way *way = session->way;
-	struct wire_armed armed;
+	struct wire_challenge challenge;
 	struct wire_reply reply;
 	struct wire_sdo sdo;
 
-	if (frame->id == WIRE_ID_ARMED && wire_unpack_armed(frame, &armed) == 0) {
-		hear_armed(session, &armed);
+	if (frame->id == WIRE_ID_CHALLENGE && wire_unpack_challenge(frame, &challenge) == 0) {
+		hear_challenge(session, &challenge);
 	} else if (frame->id == WIRE_ID_REPLY && wire_unpack_reply(frame, &reply) == 0) {
 		if (way->reply_awaited && reply.sequence == way->sequence) {
 			way->reply = reply;
@@ -126,7 +128,7 @@ static int try_op(struct session *session, enum wire_op op, uint32_t argument)
 		result = await(session, &way->reply_awaited, op == WIRE_OP_ABORT);
 	if (result == 0)
 		result = way->reply.result;
-	return result == 0 && way->armed_awaited ? DT_E_TIMEOUT : result;
+	return result == 0 && way->challenge_awaited ? DT_E_TIMEOUT : result;
 }
 
 static int ask_op(struct session *session, enum wire_op op, uint32_t argument)
@@ -148,20 +150,40 @@ static int ask_op(struct session *session, enum wire_op op, uint32_t argument)
 	return result;
 }
 
-static int arm(struct session *session)
+/* With nonce 0 asks for a challenge, else answers it; 0: the next one is in view. */
+static int ask_arm(struct session *session, uint32_t nonce)
 {
 	struct can_way *way = session->way;
+	struct session_view *view = &session->view;
+	int result;
+
+	way->challenge_awaited = true;
+	way->answering = nonce != 0;
+	result = ask_op(session, WIRE_OP_ARM,
+	                wire_answer(nonce, view->session, wire_parameters_crc32(view->parameters)));
+	way->challenge_awaited = false;
+	return result;
+}
+
+/* That an answer came too late, or after another's ARM, looks as if the parameters were not the tower's.
+ * Whether they are says the next challenge, which is asked for with them. */
+static int arm(struct session *session)
+{
 	struct session_view *view = &session->view;
 	int result = view->parameters_known ? 0 : session_read_parameters(session);
 
 	if (result != 0)
 		return result;
 	view->armed = false;
-	view->armed_until_ms = session_now_ms() + view->parameters[WIRE_PARAMETER_arm_timeout_ms];
-	way->armed_awaited = true;
-	result = ask_op(session, WIRE_OP_ARM,
-	                wire_arm_key(view->session, wire_parameters_crc32(view->parameters)));
-	way->armed_awaited = false;
+	for (unsigned round = 0; round < ROUNDS; round++) {
+		result = ask_arm(session, 0);
+		if (result != 0)
+			return result;
+		view->armed_until_ms = session_now_ms() + view->parameters[WIRE_PARAMETER_arm_timeout_ms];
+		result = ask_arm(session, view->nonce);
+		if (result != DT_E_PARAMETERS)
+			return result;
+	}
 	return result;
 }
 
@@ -172,8 +194,8 @@ static int release(struct session *session)
 
 	if (view->armed)
 		result = ask_op(session, WIRE_OP_RELEASE,
-		                wire_release_key(view->nonce, view->armed_drop_id,
-		                                 wire_parameters_crc32(view->parameters)));
+		                wire_answer(view->nonce, view->armed_drop_id,
+		                            wire_parameters_crc32(view->parameters)));
 	if (result == 0)
 		view->armed = false;
 	return result;

@@ -22,7 +22,8 @@ struct can_way {
 	uint8_t sequence;
 	bool reply_awaited;
 	struct wire_reply reply; /* valid once reply_awaited fell */
-	bool armed_awaited;      /* ARM was sent: `armed` is news to the view */
+	bool challenge_awaited;  /* ARM was sent: a challenge is news to the view ... */
+	bool answering;          /* ... that of an ARM which answered one */
 	bool sdo_awaited;
 	struct wire_sdo sdo;
 

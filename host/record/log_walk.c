@@ -300,7 +300,7 @@ static void note_frame(struct log_walk *walk, const struct frame *frame)
 {
 	struct wire_heartbeat heartbeat;
 	struct wire_status status;
-	struct wire_armed armed;
+	struct wire_challenge armed;
 
 	switch (frame->id) {
 	case WIRE_ID_BLOCK_S1:
@@ -312,8 +312,8 @@ static void note_frame(struct log_walk *walk, const struct frame *frame)
 		if (!walk->live && wire_unpack_status(frame, &status) == 0)
 			note_state(walk, status.state, walk->armed_drop);
 		break;
-	case WIRE_ID_ARMED:
-		if (wire_unpack_armed(frame, &armed) == 0)
+	case WIRE_ID_CHALLENGE:
+		if (wire_unpack_challenge(frame, &armed) == 0)
 			walk->armed_drop = armed.drop_id;
 		break;
 	case WIRE_ID_EMCY:
@@ -370,7 +370,7 @@ void log_walk_frame(struct log_walk *walk, const struct frame *frame)
 	else if (frame->id == WIRE_ID_CAPTURE_END && !in_segments)
 		forget_places(walk, walk->next); /* it came again */
 	/* as soon as it is complete with what follows its end, as a live host does */
-	if (join_complete(walk->join) && (join_told(walk->join) || frame->id == WIRE_ID_ARMED))
+	if (join_complete(walk->join) && (join_told(walk->join) || frame->id == WIRE_ID_CHALLENGE))
 		take_capture(walk);
 }
 

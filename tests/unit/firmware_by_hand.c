@@ -163,27 +163,40 @@ static uint32_t read_parameters(void)
 	return wire_parameters_crc32(value);
 }
 
+struct wire_reply firmware_arm_again(void)
+{
+	struct wire_reply reply = firmware_order(WIRE_OP_ARM, by_hand.answer);
+	struct wire_challenge challenge;
+
+	assert_int_equal(fake_count(WIRE_ID_CHALLENGE), reply.result == 0);
+	if (reply.result == 0) {
+		assert_true(firmware_last(WIRE_ID_CHALLENGE) < firmware_last(WIRE_ID_REPLY));
+		assert_int_equal(wire_unpack_challenge(firmware_last(WIRE_ID_CHALLENGE), &challenge), 0);
+		assert_int_equal(challenge.host, (uint16_t)by_hand.session);
+		assert_int_equal(challenge.drop_id != 0, reply.state == WIRE_STATE_ARMED);
+		by_hand.nonce = challenge.nonce;
+	}
+	return reply;
+}
+
 struct wire_reply firmware_arm(void)
 {
 	struct wire_reply reply;
-	struct wire_armed armed;
 
 	by_hand.parameters = read_parameters();
-	reply = firmware_order(WIRE_OP_ARM, wire_arm_key(by_hand.session, by_hand.parameters));
-	if (reply.result == 0) {
-		assert_int_equal(fake_count(WIRE_ID_ARMED), 1);
-		assert_true(firmware_last(WIRE_ID_ARMED) < firmware_last(WIRE_ID_REPLY));
-		assert_int_equal(wire_unpack_armed(firmware_last(WIRE_ID_ARMED), &armed), 0);
-		assert_int_equal(armed.host, (uint16_t)by_hand.session);
-		by_hand.nonce = armed.nonce;
-	}
-	return reply;
+	by_hand.answer = wire_answer(0, by_hand.session, by_hand.parameters);
+	reply = firmware_arm_again();
+	if (reply.result != 0)
+		return reply;
+	assert_int_equal(reply.state, WIRE_STATE_READY);
+	by_hand.answer = wire_answer(by_hand.nonce, by_hand.session, by_hand.parameters);
+	return firmware_arm_again();
 }
 
 struct wire_reply firmware_release(unsigned drop_id)
 {
 	return firmware_order(WIRE_OP_RELEASE,
-	                      wire_release_key(by_hand.nonce, (uint16_t)drop_id, by_hand.parameters));
+	                      wire_answer(by_hand.nonce, (uint16_t)drop_id, by_hand.parameters));
 }
 
 void firmware_wait_for_warning(void)

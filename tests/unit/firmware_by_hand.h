@@ -21,7 +21,8 @@ struct firmware_by_hand {
 	bool host_alive;
 	uint32_t session; /* of the host that beats, and commands */
 	uint32_t host_hash;
-	uint32_t nonce;      /* of the last `armed` */
+	uint32_t nonce;      /* of the last challenge */
+	uint32_t answer;     /* to the one before, in the last ARM */
 	uint32_t parameters; /* CRC-32 of the set as read before the last ARM */
 	uint32_t dropout_us; /* of the magnet; 0: the keeper says nothing */
 	uint32_t down_ms;    /* tick at which the frame is down, and when the keeper falls; 0 never */
@@ -49,9 +50,10 @@ uint32_t firmware_counter(unsigned index);
 struct wire_reply firmware_order(unsigned op, uint32_t argument);
 struct wire_sdo firmware_sdo(unsigned specifier, unsigned index, unsigned subindex, uint32_t value);
 
-/* ARM as a host does it, with the set it reads, and RELEASE with the nonce that came back; RELEASE after the
- * warning. */
+/* ARM as a host does it, with the set it reads, asked for and answered; that answer again; and RELEASE, which
+ * answers what came back, after the warning. */
 struct wire_reply firmware_arm(void);
+struct wire_reply firmware_arm_again(void);
 struct wire_reply firmware_release(unsigned drop_id);
 void firmware_wait_for_warning(void);
 

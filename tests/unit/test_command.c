@@ -141,11 +141,11 @@ static void a_foreign_parameter_refuses_the_arm(void **state)
 	firmware_run(3);
 	assert_int_equal(firmware_sdo(0x23, 0x2002, 0, 790000).specifier, 0x60);
 	assert_int_equal(
-	        firmware_order(WIRE_OP_ARM, wire_arm_key(FIRMWARE_SESSION, by_hand.parameters)).result,
+	        firmware_order(WIRE_OP_ARM, wire_answer(0, FIRMWARE_SESSION, by_hand.parameters)).result,
 	        DT_E_PARAMETERS);
 	assert_int_equal(firmware_sdo(0x23, 0x2002, 0, 780000).specifier, 0x60);
 	assert_int_equal(
-	        firmware_order(WIRE_OP_ARM, wire_arm_key(FIRMWARE_SESSION, by_hand.parameters)).result, 0);
+	        firmware_order(WIRE_OP_ARM, wire_answer(0, FIRMWARE_SESSION, by_hand.parameters)).result, 0);
 }
 
 /* Told by EMCY as every fault. */
@@ -264,7 +264,7 @@ static void commands_are_refused_with_a_reason(void **state)
 	by_hand.session++; /* somebody who does not beat */
 	assert_int_equal(firmware_arm().result, DT_E_SESSION);
 	by_hand.session--;
-	assert_int_equal(firmware_order(WIRE_OP_ARM, wire_arm_key(FIRMWARE_SESSION, 0)).result,
+	assert_int_equal(firmware_order(WIRE_OP_ARM, wire_answer(0, FIRMWARE_SESSION, 0)).result,
 	                 DT_E_PARAMETERS);
 	by_hand.session ^= 0x10000; /* the low half fits a host that is here, the key does not */
 	assert_int_equal(firmware_arm().result, DT_E_PARAMETERS);
@@ -293,19 +293,19 @@ static void commands_are_refused_with_a_reason(void **state)
 	assert_int_equal(firmware_counter(WIRE_COUNTER_commands_refused), 18);
 }
 
-/* The reply, or `armed` itself, was lost: the host asks again, and gets the same nonce. */
+/* The reply, or the challenge, was lost: the host answers once more, and gets the same nonce. */
 static void arm_may_be_repeated(void **state)
 {
-	struct wire_armed armed;
+	struct wire_challenge challenge;
 	uint32_t nonce;
 
 	(void)state;
 	firmware_to_armed();
-	assert_int_equal(wire_unpack_armed(firmware_last(WIRE_ID_ARMED), &armed), 0);
-	assert_int_equal(armed.drop_id, 1);
+	assert_int_equal(wire_unpack_challenge(firmware_last(WIRE_ID_CHALLENGE), &challenge), 0);
+	assert_int_equal(challenge.drop_id, 1);
 	nonce = by_hand.nonce;
 	firmware_run(600);
-	assert_int_equal(firmware_arm().result, 0);
+	assert_int_equal(firmware_arm_again().result, 0);
 	assert_int_equal(by_hand.nonce, nonce);
 	firmware_forget_frames();
 	firmware_ask(1, fake.now_us / 1000 - 100, 50); /* nor the ring: what came before is held */
@@ -329,16 +329,20 @@ static void arm_and_release_take_time(void **state)
 {
 	struct wire_command command = {.op = WIRE_OP_ARM, .host = (uint16_t)FIRMWARE_SESSION};
 	struct frame frame;
+	uint32_t challenge;
 
 	(void)state;
 	firmware_to_armed();
 	firmware_order(WIRE_OP_ABORT, 0);
 	firmware_run(5);
-	command.argument = wire_arm_key(FIRMWARE_SESSION, by_hand.parameters);
+	challenge = fake.random; /* that will be drawn */
+	assert_int_equal(
+	        firmware_order(WIRE_OP_ARM, wire_answer(0, FIRMWARE_SESSION, by_hand.parameters)).result, 0);
+	command.argument = wire_answer(challenge, FIRMWARE_SESSION, by_hand.parameters);
 	wire_pack_command(&frame, WIRE_ID_COMMAND, &command);
 	fake_receive(&frame);
 	command.op = WIRE_OP_RELEASE; /* whoever knows the nonce */
-	command.argument = wire_release_key(fake.random, 1, by_hand.parameters);
+	command.argument = wire_answer(fake.random, 1, by_hand.parameters);
 	wire_pack_command(&frame, WIRE_ID_COMMAND, &command);
 	fake_receive(&frame);
 	app_poll();

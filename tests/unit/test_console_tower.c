@@ -120,32 +120,44 @@ static void fall_unseen(void)
 	fake.captured = true;
 }
 
-static void send_armed(uint16_t host)
+static void send_challenge(uint16_t host)
 {
-	struct wire_armed armed = {
-	        .drop_id = (uint16_t)(fake.drop.drop_id + 1), .host = host, .nonce = fake.nonce};
+	bool armed = fake.state == WIRE_STATE_ARMED;
+	struct wire_challenge challenge = {
+	        .drop_id = (uint16_t)(armed ? fake.drop.drop_id + 1 : 0), .host = host, .nonce = fake.nonce};
 	struct frame frame;
 
-	wire_pack_armed(&frame, WIRE_ID_ARMED, &armed);
+	wire_pack_challenge(&frame, WIRE_ID_CHALLENGE, &challenge);
 	send(frame);
+}
+
+/* The first ARM asks, the second answers; the third of the same is the second again. */
+static int be_armed(const struct wire_command *command)
+{
+	uint32_t set = wire_parameters_crc32(fake.values.value);
+	bool asks = command->argument == wire_answer(0, fake.session, set);
+
+	if (fake.refusal != 0)
+		return fake.refusal;
+	if (fake.state != WIRE_STATE_ARMED && !asks &&
+	    command->argument != wire_answer(fake.nonce, fake.session, set))
+		return DT_E_PARAMETERS;
+	if (fake.state != WIRE_STATE_ARMED)
+		fake.nonce += 0x9E3779B9u;
+	if (!asks)
+		fake.state = WIRE_STATE_ARMED;
+	send_challenge(command->host);
+	return 0;
 }
 
 static int obey(const struct wire_command *command)
 {
 	switch (command->op) {
 	case WIRE_OP_ARM:
-		if (fake.refusal != 0)
-			return fake.refusal;
-		if (command->argument != wire_arm_key(fake.session, wire_parameters_crc32(fake.values.value)))
-			return DT_E_PARAMETERS;
-		if (fake.state != WIRE_STATE_ARMED)
-			fake.nonce += 0x9E3779B9u;
-		fake.state = WIRE_STATE_ARMED;
-		send_armed(command->host);
-		return 0;
+		return be_armed(command);
 	case WIRE_OP_RELEASE:
-		if (command->argument != wire_release_key(fake.nonce, (uint16_t)(fake.drop.drop_id + 1),
-		                                          wire_parameters_crc32(fake.values.value)))
+		if (command->argument != wire_answer(fake.nonce, (uint16_t)(fake.drop.drop_id + 1),
+		                                     wire_parameters_crc32(fake.values.value)))
 			return DT_E_TOKEN;
 		fake.state = WIRE_STATE_FALLING;
 		if (fake.falls)

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * What was recorded, forged, reordered or delayed releases nothing. Whole drops are done and everything that
+ * What was recorded, forged, reordered or delayed moves nothing. Whole drops are done and everything that
  * their hosts said is kept. A million frames made of that are then given to a tower that is ready, or armed
- * by another host, or armed again by the same: none may move latch, dampers, camera or magnet. The warning
- * may sound: an ARM of a session that is heard arms. Two controls show that the check can fail: the right
- * answer does release, and so does a recording where the nonce comes again.
+ * by another host, or armed again by the same: none may move latch, dampers, camera or magnet, or start the
+ * warning. Two controls show that the check can fail: the right answers do arm and release, and so does a
+ * recording where the nonces come again.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,8 +18,8 @@
 #include "tests/unit/firmware_by_hand.h"
 
 enum {
-	DROPS = 5,
-	TAPE = 1024,
+	DROPS = 100,
+	TAPE = 8192,
 	FRAMES = 1000000,
 	PER_MS = 48, /* of 80 that a millisecond's polls take; the host's own come beside them */
 	SEED = 20261123,
@@ -62,7 +62,8 @@ static void record_drop(unsigned number)
 /* The target: its host, what it has been told, and the answers of its earlier arms. */
 static struct {
 	uint32_t nonce, drop_id, set;
-	struct frame stale[8]; /* releases that were right once */
+	struct frame stale[8]; /* releases that were right once ... */
+	struct frame stale_arm[8];
 	unsigned stale_count;
 	unsigned given, moved, warned, arms, replayed;
 	unsigned armed_ms, other_ms;
@@ -70,16 +71,21 @@ static struct {
 	unsigned next; /* in the tape */
 } target;
 
-static struct frame release_frame(uint32_t nonce, uint16_t drop_id)
+static struct frame order_frame(uint8_t op, uint32_t argument)
 {
-	struct wire_command command = {.op = WIRE_OP_RELEASE,
+	struct wire_command command = {.op = op,
 	                               .sequence = (uint8_t)target.given,
 	                               .host = (uint16_t)by_hand.session,
-	                               .argument = wire_release_key(nonce, drop_id, target.set)};
+	                               .argument = argument};
 	struct frame frame = {0};
 
 	wire_pack_command(&frame, WIRE_ID_COMMAND, &command);
 	return frame;
+}
+
+static struct frame release_frame(uint32_t nonce, uint16_t drop_id)
+{
+	return order_frame(WIRE_OP_RELEASE, wire_answer(nonce, drop_id, target.set));
 }
 
 /* The one frame that may release. */
@@ -102,6 +108,8 @@ static struct frame forge(void)
 	}
 	if (kind == 2) /* in any order */
 		return tape[(r >> 3) % taped];
+	if (kind == 3 && r >> 31) /* ... and arms, that of now too, which changes nothing once more */
+		return target.stale_arm[(r >> 3) % (target.arms < 8 ? target.arms : 8)];
 	if (kind == 3 && target.stale_count > 0) /* late */
 		return target.stale[(r >> 3) % target.stale_count];
 	if (kind == 4) { /* one or two bits beside the right one */
@@ -170,6 +178,7 @@ static void arm_target(void)
 	}
 	assert_int_equal(reply.result, 0);
 	target.set = by_hand.parameters;
+	target.stale_arm[target.arms % 8] = order_frame(WIRE_OP_ARM, by_hand.answer);
 	target.stale[target.arms++ % 8] = release_frame(by_hand.nonce, 1);
 }
 
@@ -208,6 +217,7 @@ static void a_million_frames_move_nothing(void **state)
 	              target.warned, target.moved);
 	assert_int_equal(target.given, FRAMES);
 	assert_int_equal(target.moved, 0);
+	assert_int_equal(target.warned, 0);
 	assert_true(target.arms >= 8 && target.armed_ms > 10000 && target.other_ms > 2000);
 	arm_target(); /* the tower is as willing as ever */
 	firmware_wait_for_warning();
@@ -215,24 +225,29 @@ static void a_million_frames_move_nothing(void **state)
 	assert_true(fake.outputs & WIRE_IO_LATCH_OPEN);
 }
 
-/* The whole tape, onto a tower that is ready: with fresh nonces nothing falls; with the nonces of the
- * recording it does, which shows that nothing else in the recording is wrong. */
+/* The whole tape, onto a tower that is ready: with fresh nonces nothing moves, not even the warning; with the
+ * nonces of the recording it falls, which shows that nothing else in the recording is wrong. */
 static void only_the_nonce_keeps_a_recording_out(void **state)
 {
 	(void)state;
 	for (unsigned again = 0; again < 2; again++) {
-		bool fell = false;
+		bool fell = false, warned = false;
+		unsigned arms = 0;
 
 		to_target();
 		for (unsigned i = 0; i < taped; i++) {
-			if (again && tape[i].id == WIRE_ID_COMMAND && tape[i].data[0] == WIRE_OP_ARM)
-				fake.random = 0x9E3779B9u; /* of the first drop */
+			bool arm = tape[i].id == WIRE_ID_COMMAND && tape[i].data[0] == WIRE_OP_ARM;
+
+			if (again && arm && arms++ % 2 == 0)
+				fake.random = 0x9E3779B9u; /* of the first drop, challenge and answer */
 			fake_receive(&tape[i]);
 			firmware_run(tape[i].id == WIRE_ID_HEARTBEAT_HOST ? 100 : 1);
 			firmware_forget_frames();
 			fell |= (fake.outputs & WIRE_IO_LATCH_OPEN) != 0;
+			warned |= (fake.outputs & WIRE_IO_WARNING) != 0;
 		}
 		assert_int_equal(fell, again);
+		assert_int_equal(warned, again);
 	}
 }
 

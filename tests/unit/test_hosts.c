@@ -62,24 +62,32 @@ static void another_wire_is_no_host(void **state)
 	assert_false(hosts_hash_differs(&hosts, 7));
 }
 
-/* The keys of test_wire: set A7DEE12E, sessions 51E7A0D3 and 12345678. */
-static void an_arm_key_belongs_to_a_session_and_a_set(void **state)
+/* The answers of test_wire: nonce CAFEF00D, set A7DEE12E, sessions 51E7A0D3 and 12345678. */
+static void an_answer_belongs_to_a_session_a_nonce_and_a_set(void **state)
 {
 	uint32_t session = 99;
 
 	(void)state;
-	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x1BED0CF9, 0xA7DEE12E, &session), DT_E_SESSION);
+	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x311A4681, 0xCAFEF00D, 0xA7DEE12E, &session),
+	                 DT_E_SESSION);
 	hosts_heard(&hosts, 0, 0x1234A0D3, true); /* the same low half */
-	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x1BED0CF9, 0xA7DEE12E, &session), DT_E_PARAMETERS);
+	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x311A4681, 0xCAFEF00D, 0xA7DEE12E, &session),
+	                 DT_E_PARAMETERS);
 	assert_int_equal(session, 99);
 	hosts_heard(&hosts, 0, 0x51E7A0D3, true);
-	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x1BED0CF9, 0xA7DEE12E, &session), 0);
+	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x311A4681, 0xCAFEF00D, 0xA7DEE12E, &session), 0);
 	assert_int_equal(session, 0x51E7A0D3);
-	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x1BED0CF9, 0xA7DEE12F, &session), DT_E_PARAMETERS);
-	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x1BED0CF8, 0xA7DEE12E, &session), DT_E_PARAMETERS);
-	assert_int_equal(hosts_find(&hosts, 0x5678, 0x86829DEB, 0x9ABCDEF0, &session), DT_E_SESSION);
+	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x311A4681, 0xCAFEF00D, 0xA7DEE12F, &session),
+	                 DT_E_PARAMETERS);
+	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x311A4680, 0xCAFEF00D, 0xA7DEE12E, &session),
+	                 DT_E_PARAMETERS);
+	assert_int_equal(hosts_find(&hosts, 0x5678, 0xAC75D793, 0xCAFEF00D, 0x9ABCDEF0, &session),
+	                 DT_E_SESSION);
+	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x311A4681, 0, 0xA7DEE12E, &session), DT_E_PARAMETERS);
+	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x051A15FF, 0, 0xA7DEE12E, &session), 0);
 	hosts_heard(&hosts, 0, 0x51E7A0D3, false);
-	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x1BED0CF9, 0xA7DEE12E, &session), DT_E_PARAMETERS);
+	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x311A4681, 0xCAFEF00D, 0xA7DEE12E, &session),
+	                 DT_E_PARAMETERS);
 }
 
 /* Whoever beats with ever new sessions does not push out those that are here. */
@@ -106,7 +114,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test_setup(a_silent_host_is_forgotten_and_counted, begin),
 	        cmocka_unit_test_setup(another_wire_is_no_host, begin),
-	        cmocka_unit_test_setup(an_arm_key_belongs_to_a_session_and_a_set, begin),
+	        cmocka_unit_test_setup(an_answer_belongs_to_a_session_a_nonce_and_a_set, begin),
 	        cmocka_unit_test_setup(a_fifth_waits, begin),
 	};
 

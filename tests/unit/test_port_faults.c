@@ -99,7 +99,7 @@ static struct {
 	bool released, ended, complete, accepted;
 	uint32_t sent, blocks[2], given, overruns, late_edges, bus_offs, lost, garbage;
 	struct wire_capture_end end;
-	struct wire_armed armed;
+	struct wire_challenge challenge;
 } host;
 
 static struct join *the_join; /* one for all drops: the tower's boot message parts them */
@@ -211,8 +211,8 @@ static void hear(const struct frame *frame)
 
 	host.blocks[0] += frame->id == WIRE_ID_BLOCK_S1;
 	host.blocks[1] += frame->id == WIRE_ID_BLOCK_S2;
-	if (frame->id == WIRE_ID_ARMED)
-		assert_int_equal(wire_unpack_armed(frame, &host.armed), 0);
+	if (frame->id == WIRE_ID_CHALLENGE)
+		assert_int_equal(wire_unpack_challenge(frame, &host.challenge), 0);
 	if (whole == NULL)
 		return;
 	if (join_feed(the_join, whole) == 1 || (whole->id == WIRE_ID_CAPTURE_END && !host.ended)) {
@@ -415,18 +415,19 @@ static void operate(void)
 {
 	uint8_t state = the_app->sequence.state;
 	uint32_t set_crc32 = wire_parameters_crc32(the_app->parameters.value);
+	const struct wire_challenge *challenge = &host.challenge;
 
 	host.complete |= host.ended && join_complete(the_join);
-	if (state == WIRE_STATE_READY && !world.opened)
-		say(WIRE_OP_ARM, wire_arm_key(SESSION, set_crc32));
-	if (state == WIRE_STATE_ARMED && host.armed.nonce == 0) /* it did not come */
-		say(WIRE_OP_ARM, wire_arm_key(SESSION, set_crc32));
-	if (state == WIRE_STATE_ARMED && host.armed.nonce != 0) {
+	if (state == WIRE_STATE_READY && challenge->nonce == 0 && !world.opened)
+		say(WIRE_OP_ARM, wire_answer(0, SESSION, set_crc32));
+	if (challenge->nonce != 0 && challenge->drop_id == 0) /* again when the next did not come */
+		say(WIRE_OP_ARM, wire_answer(challenge->nonce, SESSION, set_crc32));
+	if (state == WIRE_STATE_ARMED && challenge->drop_id != 0) {
 		host.released = true;
-		say(WIRE_OP_RELEASE, wire_release_key(host.armed.nonce, host.armed.drop_id, set_crc32));
+		say(WIRE_OP_RELEASE, wire_answer(challenge->nonce, challenge->drop_id, set_crc32));
 	}
-	if (state != WIRE_STATE_ARMED)
-		host.armed.nonce = 0;
+	if (state != WIRE_STATE_ARMED && (state != WIRE_STATE_READY || world.now_ms % 50 == 0))
+		host.challenge = (struct wire_challenge){.nonce = 0}; /* the answer was lost */
 	if ((state == WIRE_STATE_FAULT_HELD ||
 	     (state == WIRE_STATE_SAFE && !the_app->sequence.acknowledged)) &&
 	    !world.opened)

@@ -73,6 +73,7 @@ static struct {
 	uint32_t nonce, set;
 	uint16_t drop_id;
 	bool asked, right_release; /* a RELEASE is under way, and it is the right one */
+	bool right_arm;            /* the last ARM answered a challenge that had been asked for */
 	unsigned visited[WIRE_STATES], opened, let_go, ready, refused_early, resets_in_motion, kept_out;
 } judge;
 
@@ -163,12 +164,14 @@ static void judge_state(uint8_t state)
 		if (world.ms - judge.red_ms < 1000)
 			complain("READY before all was green for a second");
 	}
-	if (state == STATE(ARMED) && before != STATE(READY))
-		complain("ARMED, but not from READY");
+	if (state == STATE(ARMED) && (before != STATE(READY) || !judge.right_arm))
+		complain("ARMED, but not from READY by the answer to a challenge");
 	if (state == STATE(FALLING) && before != STATE(ARMED))
 		complain("FALLING, but not from ARMED");
 	if (moving(before) && state == STATE(CAPTURED) && !(judge.agreed & AT_REST))
 		complain("motion ended, but the frame is neither down nor latched");
+	if (before == STATE(FAULT_HELD) && !(judge.agreed & AT_REST))
+		complain("a fault is cleared, but the frame is neither down nor latched");
 	if (before == STATE(KEEP_OUT) && state != STATE(CAPTURED))
 		complain("KEEP_OUT left for something else");
 	if (!moving(before) && !(BIT(state) & (BIT(STATE(FALLING)))) && moving(state))
@@ -343,7 +346,15 @@ static void say_release(void)
 	judge.asked = true;
 	judge.right_release = nonce == judge.nonce && host == SESSION && drop == judge.drop_id &&
 	                      app.sequence.state == STATE(ARMED);
-	say(WIRE_OP_RELEASE, host, wire_release_key(nonce, drop, judge.set));
+	say(WIRE_OP_RELEASE, host, wire_answer(nonce, drop, judge.set));
+}
+
+static void say_arm(void)
+{
+	uint32_t nonce = judge.drop_id == 0 && !one_in(3) ? judge.nonce : up_to(1);
+
+	judge.right_arm = nonce != 0 && nonce == judge.nonce;
+	say(WIRE_OP_ARM, SESSION, wire_answer(nonce, SESSION, judge.set));
 }
 
 static void operate(void)
@@ -358,7 +369,7 @@ static void operate(void)
 	if (world.ms / 4096 % 4 && one_in(state == STATE(SAFE) || state == STATE(FAULT_HELD) ? 60 : 3000))
 		say(WIRE_OP_CLEAR, SESSION, 0);
 	if (one_in(state == STATE(READY) ? 60 : 3000))
-		say(WIRE_OP_ARM, SESSION, wire_arm_key(SESSION, judge.set));
+		say_arm();
 	if (one_in(state == STATE(ARMED) ? 60 : 3000))
 		say_release();
 	if (one_in(20000))
@@ -375,13 +386,13 @@ static void operate(void)
 /* What the tower has said since. */
 static void listen(void)
 {
-	struct wire_armed armed;
+	struct wire_challenge armed;
 	struct wire_reply reply;
 
 	for (unsigned i = 0; i < fake.sent_count; i++) {
 		const struct frame *frame = &fake.sent[i];
 
-		if (frame->id == WIRE_ID_ARMED && wire_unpack_armed(frame, &armed) == 0) {
+		if (frame->id == WIRE_ID_CHALLENGE && wire_unpack_challenge(frame, &armed) == 0) {
 			judge.nonce = armed.nonce;
 			judge.drop_id = armed.drop_id;
 		}
@@ -404,7 +415,7 @@ static void reset(enum port_reset cause)
 	uint8_t expected = cause == PORT_RESET_WATCHDOG    ? WIRE_FAULT_WATCHDOG
 	                   : cause == PORT_RESET_BROWN_OUT ? WIRE_FAULT_BROWN_OUT
 	                   : was_moving                    ? WIRE_FAULT_RESET
-	                                                   : WIRE_FAULT_NONE;
+	                                                   : app.sequence.fault; /* outlives it */
 
 	fake.outputs = WIRE_IO_MAGNET_HOLD; /* as the drivers hold it in reset */
 	fake.planned = 0;

@@ -78,14 +78,26 @@ static int command(unsigned op, uint32_t argument)
 	return command_by(SESSION, op, argument);
 }
 
+static int ask(void)
+{
+	return command(WIRE_OP_ARM, wire_answer(0, SESSION, SET));
+}
+
+static int answer(void)
+{
+	return command(WIRE_OP_ARM, wire_answer(NONCE, SESSION, SET));
+}
+
 static int arm(void)
 {
-	return command(WIRE_OP_ARM, wire_arm_key(SESSION, SET));
+	int result = ask();
+
+	return result == 0 ? answer() : result;
 }
 
 static int release(void)
 {
-	return command(WIRE_OP_RELEASE, wire_release_key(NONCE, sequence_next_drop(&sequence), SET));
+	return command(WIRE_OP_RELEASE, wire_answer(NONCE, sequence_next_drop(&sequence), SET));
 }
 
 static int clear(void)
@@ -348,7 +360,7 @@ static void outputs_of_every_state(void **state)
 			fail_msg("state %u: outputs %#x, expected %#x", s, fake.outputs, wanted[s]);
 		assert_int_equal(sequence.nonce, s == STATE(ARMED) ? NONCE : 0);
 		assert_int_equal(sequence.session, s == STATE(ARMED) ? SESSION : 0);
-		assert_int_equal(fake.kept, s); /* for the time after a reset */
+		assert_int_equal(fake.kept, s | sequence.fault << 4); /* for the time after a reset */
 	}
 	to_uploaded();
 	ticks(200);
@@ -441,20 +453,26 @@ static void arm_and_release_are_guarded(void **state)
 	checks = WIRE_CHECK_DOOR; /* opened since the last tick */
 	assert_int_equal(arm(), DT_E_CHECKS);
 	checks = 0;
-	assert_int_equal(command_by(SESSION + 1, WIRE_OP_ARM, wire_arm_key(SESSION + 1, SET)), DT_E_SESSION);
-	assert_int_equal(command(WIRE_OP_ARM, wire_arm_key(SESSION, SET + 1)), DT_E_PARAMETERS);
+	assert_int_equal(command_by(SESSION + 1, WIRE_OP_ARM, wire_answer(0, SESSION + 1, SET)),
+	                 DT_E_SESSION);
+	assert_int_equal(command(WIRE_OP_ARM, wire_answer(0, SESSION, SET + 1)), DT_E_PARAMETERS);
 	no_nonce = true;
-	assert_int_equal(arm(), DT_E_SYSTEM);
+	assert_int_equal(ask(), DT_E_SYSTEM);
+	no_nonce = false;
+	assert_int_equal(ask(), 0);
+	no_nonce = true;
+	assert_int_equal(answer(), DT_E_SYSTEM);
 	assert_int_equal(sequence.state, STATE(READY));
 	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
 	to_armed();
-	assert_int_equal(command(WIRE_OP_ARM, wire_arm_key(SESSION, SET + 1)), DT_E_STATE);
-	assert_int_equal(command_by(SESSION + 1, WIRE_OP_ARM, wire_arm_key(SESSION + 1, SET)), DT_E_STATE);
-	assert_int_equal(command_by(SESSION + 1, WIRE_OP_RELEASE, wire_release_key(NONCE, 1, SET)),
-	                 DT_E_SESSION);
-	assert_int_equal(command(WIRE_OP_RELEASE, wire_release_key(NONCE + 1, 1, SET)), DT_E_TOKEN);
-	assert_int_equal(command(WIRE_OP_RELEASE, wire_release_key(NONCE, 2, SET)), DT_E_TOKEN);
-	assert_int_equal(command(WIRE_OP_RELEASE, wire_release_key(NONCE, 1, SET + 1)), DT_E_TOKEN);
+	assert_int_equal(ask(), DT_E_STATE);
+	assert_int_equal(command(WIRE_OP_ARM, wire_answer(NONCE, SESSION, SET + 1)), DT_E_STATE);
+	assert_int_equal(command_by(SESSION + 1, WIRE_OP_ARM, wire_answer(NONCE, SESSION + 1, SET)),
+	                 DT_E_STATE);
+	assert_int_equal(command_by(SESSION + 1, WIRE_OP_RELEASE, wire_answer(NONCE, 1, SET)), DT_E_SESSION);
+	assert_int_equal(command(WIRE_OP_RELEASE, wire_answer(NONCE + 1, 1, SET)), DT_E_TOKEN);
+	assert_int_equal(command(WIRE_OP_RELEASE, wire_answer(NONCE, 2, SET)), DT_E_TOKEN);
+	assert_int_equal(command(WIRE_OP_RELEASE, wire_answer(NONCE, 1, SET + 1)), DT_E_TOKEN);
 	assert_int_equal(command(WIRE_OP_RELEASE, 0), DT_E_TOKEN);
 	checks = WIRE_CHECK_DAMPERS;
 	assert_int_equal(release(), DT_E_EARLY);
@@ -479,14 +497,102 @@ static void nobody_else_is_told_that_it_has_armed(void **state)
 {
 	(void)state;
 	to_armed();
-	assert_int_equal(command_by(SESSION ^ 1, WIRE_OP_ARM, wire_arm_key(SESSION, SET)), DT_E_STATE);
-	assert_int_equal(command_by(SESSION, WIRE_OP_ARM, wire_arm_key(SESSION, SET) ^ 1), DT_E_STATE);
-	assert_int_equal(arm(), 0);
+	assert_int_equal(command_by(SESSION ^ 1, WIRE_OP_ARM, wire_answer(NONCE, SESSION, SET)), DT_E_STATE);
+	assert_int_equal(command_by(SESSION, WIRE_OP_ARM, wire_answer(NONCE, SESSION, SET) ^ 1), DT_E_STATE);
+	assert_int_equal(answer(), 0);
 	to_ready(); /* where session and key are 0 */
 	assert_int_equal(command_by(0, WIRE_OP_ARM, 0), DT_E_SESSION);
 	assert_int_equal(command_by(SESSION, WIRE_OP_ARM, 0), DT_E_PARAMETERS);
-	assert_int_equal(command_by(0, WIRE_OP_ARM, wire_arm_key(SESSION, SET)), DT_E_SESSION);
+	assert_int_equal(command_by(0, WIRE_OP_ARM, wire_answer(0, SESSION, SET)), DT_E_SESSION);
 	assert_int_equal(sequence.state, STATE(READY));
+}
+
+/* What answers a challenge does so once, and not after anything else has happened. */
+static void an_answer_is_good_once(void **state)
+{
+	(void)state;
+	to_ready();
+	assert_int_equal(answer(), DT_E_PARAMETERS); /* to nothing */
+	assert_int_equal(ask(), 0);
+	assert_int_equal(sequence.state, STATE(READY));
+	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
+	checks = WIRE_CHECK_DOOR; /* refused it is used up, too */
+	assert_int_equal(answer(), DT_E_CHECKS);
+	checks = 0;
+	assert_int_equal(answer(), DT_E_PARAMETERS);
+	assert_int_equal(ask(), 0);
+	assert_int_equal(command_by(7, WIRE_OP_ARM, 7), DT_E_SESSION); /* nor after another's */
+	assert_int_equal(answer(), DT_E_PARAMETERS);
+	assert_int_equal(ask(), 0);
+	assert_int_equal(command(WIRE_OP_ABORT, 0), 0);
+	ticks(1);
+	assert_int_equal(sequence.state, STATE(READY));
+	assert_int_equal(answer(), DT_E_PARAMETERS);
+	assert_int_equal(ask(), 0);
+	ticks(1001);
+	assert_int_equal(answer(), DT_E_PARAMETERS);
+	assert_int_equal(ask(), 0);
+	ticks(1000);
+	assert_int_equal(answer(), 0);
+	assert_int_equal(sequence.state, STATE(ARMED));
+	assert_int_equal(command(WIRE_OP_ABORT, 0), 0);
+	ticks(1);
+	assert_int_equal(sequence.state, STATE(READY));
+	assert_int_equal(answer(), DT_E_PARAMETERS); /* the one that armed */
+	assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
+}
+
+/* A fault at rest, and one in motion that has been uploaded; not one that was cleared. */
+static void a_fault_outlives_a_reset(void **state)
+{
+	(void)state;
+	for (unsigned cause = 0; cause < PORT_RESETS; cause++)
+		for (unsigned from = 0; from < 3; from++) {
+			uint8_t kept, fault = from == 1 ? WIRE_FAULT_ABORTED : WIRE_FAULT_DOOR;
+
+			if (from == 1)
+				to_fault_moving();
+			else
+				to_armed();
+			checks = from == 1 ? 0 : WIRE_CHECK_DOOR;
+			if (from != 1)
+				tick();
+			checks = 0;
+			if (from == 1) {
+				fake.inputs |= WIRE_IO_FRAME_DOWN;
+				tick();
+				sequence_full(&sequence);
+				assert_int_equal(command(WIRE_OP_ACCEPT, 0xC0FFEE), 0);
+			}
+			if (from == 2)
+				assert_int_equal(clear(), 0);
+			assert_int_equal(sequence.fault, from == 2 ? WIRE_FAULT_NONE : fault);
+			kept = fake.kept;
+			fake_init();
+			fake.kept = kept;
+			sequence_init(&sequence, &parameters, counters, (enum port_reset)cause);
+			if (cause == PORT_RESET_WATCHDOG)
+				fault = WIRE_FAULT_WATCHDOG;
+			else if (cause == PORT_RESET_BROWN_OUT)
+				fault = WIRE_FAULT_BROWN_OUT;
+			else if (from == 2)
+				fault = WIRE_FAULT_NONE;
+			assert_int_equal(sequence.fault, fault);
+			assert_int_equal(sequence.state, fault ? STATE(FAULT_HELD) : STATE(BOOT));
+		}
+}
+
+/* The switches of latch and dampers, both open: the frame hangs. */
+static void nothing_is_cleared_under_a_hanging_frame(void **state)
+{
+	(void)state;
+	to_fault_held();
+	fake.inputs &= (uint16_t)~WIRE_IO_LATCH_CLOSED;
+	assert_int_equal(clear(), DT_E_CHECKS);
+	assert_int_equal(sequence.state, STATE(FAULT_HELD));
+	fake.inputs |= WIRE_IO_FRAME_DOWN;
+	assert_int_equal(clear(), 0);
+	assert_int_equal(sequence.state, STATE(SAFE));
 }
 
 static void a_guard_wants_to_be_acknowledged(void **state)
@@ -584,7 +690,7 @@ static void warning_may_be_longer(void **state)
 	parameters.value[WIRE_PARAMETER_warning_ms] = 4000;
 	assert_int_equal(arm(), 0);
 	ticks(2000);
-	assert_int_equal(arm(), 0); /* again: no timer begins anew */
+	assert_int_equal(answer(), 0); /* again: no timer begins anew */
 	ticks(1999);
 	assert_int_equal(release(), DT_E_EARLY);
 	tick();
@@ -1125,18 +1231,21 @@ static void reset_in_motion_is_a_fault(void **state)
 		for (size_t i = 0; i < 3; i++) {
 			bool moving = (s >= STATE(FALLING) && s <= STATE(BRAKED)) ||
 			              s == STATE(FAULT_MOVING) || s == STATE(KEEP_OUT);
+			bool held = moving || s == STATE(FAULT_HELD); /* whose fault outlives it */
+			uint8_t fault;
 
 			reach[s]();
+			fault = moving ? WIRE_FAULT_RESET : sequence.fault;
 			fake.outputs = WIRE_IO_MAGNET_HOLD;
 			fake.planned = 0;
 			fake.inputs = FAKE_ALL_GOOD;
 			checks = 0;
 			now_ms = 0;
 			sequence_init(&sequence, &parameters, counters, causes[i]);
-			assert_int_equal(sequence.fault, moving ? WIRE_FAULT_RESET : WIRE_FAULT_NONE);
-			assert_int_equal(sequence.state, moving ? STATE(FAULT_HELD) : STATE(BOOT));
+			assert_int_equal(sequence.fault, fault);
+			assert_int_equal(sequence.state, held ? STATE(FAULT_HELD) : STATE(BOOT));
 			ticks(200);
-			assert_int_equal(sequence.state, moving ? STATE(FAULT_HELD) : STATE(SAFE));
+			assert_int_equal(sequence.state, held ? STATE(FAULT_HELD) : STATE(SAFE));
 			assert_int_equal(fake.outputs, WIRE_IO_MAGNET_HOLD);
 			assert_int_equal(clear(), 0);
 			sequence_init(&sequence, &parameters, counters, causes[i]);
@@ -1233,6 +1342,9 @@ int main(void)
 	        cmocka_unit_test(boot_looks_for_the_frame),
 	        cmocka_unit_test(arm_and_release_are_guarded),
 	        cmocka_unit_test(nobody_else_is_told_that_it_has_armed),
+	        cmocka_unit_test(an_answer_is_good_once),
+	        cmocka_unit_test(a_fault_outlives_a_reset),
+	        cmocka_unit_test(nothing_is_cleared_under_a_hanging_frame),
 	        cmocka_unit_test(a_guard_wants_to_be_acknowledged),
 	        cmocka_unit_test(a_drop_wants_to_be_acknowledged),
 	        cmocka_unit_test(clear_of_a_fault_acknowledges_if_it_may),

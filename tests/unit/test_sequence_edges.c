@@ -118,13 +118,14 @@ static void turn_red(void)
 
 static void arm(void)
 {
-	assert_int_equal(command(WIRE_OP_ARM, wire_arm_key(SESSION, SET)), 0);
+	sequence.nonce = NONCE;
+	sequence.challenged_ms = now_ms;
+	assert_int_equal(command(WIRE_OP_ARM, wire_answer(NONCE, SESSION, SET)), 0);
 }
 
 static void release(void)
 {
-	assert_int_equal(
-	        command(WIRE_OP_RELEASE, wire_release_key(NONCE, sequence_next_drop(&sequence), SET)), 0);
+	assert_int_equal(command(WIRE_OP_RELEASE, wire_answer(NONCE, sequence_next_drop(&sequence), SET)), 0);
 }
 
 static void magnet_goes(void)
@@ -665,7 +666,7 @@ static void safe_is_not_armed_even_when_all_is_green(void **state)
 	(void)state;
 	boot();
 	be_in(STATE(SAFE));
-	assert_int_equal(command(WIRE_OP_ARM, wire_arm_key(SESSION, SET)), DT_E_CHECKS);
+	assert_int_equal(command(WIRE_OP_ARM, wire_answer(0, SESSION, SET)), DT_E_CHECKS);
 	assert_int_equal(sequence.session, 0);
 }
 

@@ -95,19 +95,19 @@ static void measured_carries_its_checksum(void **state)
 	assert_int_equal(wire_check_measured(&frame), DT_E_CORRUPT);
 }
 
-static void armed_and_heartbeat_have_their_bytes(void **state)
+static void challenge_and_heartbeat_have_their_bytes(void **state)
 {
-	static const uint8_t armed_bytes[8] = {0x07, 0x00, 0xD3, 0xA0, 0x0D, 0xF0, 0xFE, 0xCA};
+	static const uint8_t challenge_bytes[8] = {0x07, 0x00, 0xD3, 0xA0, 0x0D, 0xF0, 0xFE, 0xCA};
 	static const uint8_t beat_bytes[7] = {5, 0xD3, 0xA0, 0xE7, 0x51, 0x22, 0x11};
 	static const uint8_t parameter_bytes[8] = {0x07, 0x00, 0x04, 0x20, 0x40, 0x1F, 0x00, 0x00};
 	struct frame frame = {0};
 
 	(void)state;
-	wire_pack_armed(&frame, WIRE_ID_ARMED,
-	                &(struct wire_armed){.drop_id = 7, .host = 0xA0D3, .nonce = 0xCAFEF00D});
+	wire_pack_challenge(&frame, WIRE_ID_CHALLENGE,
+	                    &(struct wire_challenge){.drop_id = 7, .host = 0xA0D3, .nonce = 0xCAFEF00D});
 	assert_int_equal(frame.id, 0x685);
 	assert_int_equal(frame.length, 8);
-	assert_memory_equal(frame.data, armed_bytes, 8);
+	assert_memory_equal(frame.data, challenge_bytes, 8);
 	wire_pack_host_heartbeat(&frame, WIRE_ID_HEARTBEAT_HOST,
 	                         &(struct wire_host_heartbeat){
 	                                 .nmt_state = 5, .session = 0x51E7A0D3, .wire_hash_low = 0x1122});
@@ -120,7 +120,7 @@ static void armed_and_heartbeat_have_their_bytes(void **state)
 	assert_memory_equal(frame.data, parameter_bytes, 8);
 }
 
-static void keys_of_arm_and_release(void **state)
+static void answers_of_arm_and_release(void **state)
 {
 	uint32_t value[WIRE_PARAMETERS];
 
@@ -128,10 +128,11 @@ static void keys_of_arm_and_release(void **state)
 	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
 		value[i] = wire_parameters[i].initial;
 	assert_int_equal(wire_parameters_crc32(value), 0xA7DEE12E);
-	assert_int_equal(wire_arm_key(0x51E7A0D3, 0xA7DEE12E), 0x1BED0CF9);
-	assert_int_equal(wire_arm_key(0x12345678, 0x9ABCDEF0), 0x86829DEB);
-	assert_int_equal(wire_release_key(0xCAFEF00D, 7, 0xA7DEE12E), 0xFAD42048);
-	assert_int_equal(wire_release_key(0x11223344, 0xFFFF, 0x9ABCDEF0), 0xE48D3B87);
+	assert_int_equal(wire_answer(0, 0x51E7A0D3, 0xA7DEE12E), 0x051A15FF);
+	assert_int_equal(wire_answer(0xCAFEF00D, 0x51E7A0D3, 0xA7DEE12E), 0x311A4681);
+	assert_int_equal(wire_answer(0xCAFEF00D, 0x12345678, 0x9ABCDEF0), 0xAC75D793);
+	assert_int_equal(wire_answer(0xCAFEF00D, 7, 0xA7DEE12E), 0xFAD42048);
+	assert_int_equal(wire_answer(0x11223344, 0xFFFF, 0x9ABCDEF0), 0xE48D3B87);
 }
 
 static void block_has_the_bytes_of_the_design(void **state)
@@ -324,8 +325,8 @@ int main(void)
 	        cmocka_unit_test(command_has_the_bytes_of_the_design),
 	        cmocka_unit_test(capture_end_is_sealed),
 	        cmocka_unit_test(measured_carries_its_checksum),
-	        cmocka_unit_test(armed_and_heartbeat_have_their_bytes),
-	        cmocka_unit_test(keys_of_arm_and_release),
+	        cmocka_unit_test(challenge_and_heartbeat_have_their_bytes),
+	        cmocka_unit_test(answers_of_arm_and_release),
 	        cmocka_unit_test(block_has_the_bytes_of_the_design),
 	        cmocka_unit_test(any_flipped_bit_of_a_block_is_seen),
 	        cmocka_unit_test(every_layout_there_and_back),
