@@ -124,11 +124,11 @@ static bool unanswered(int result)
 	return result == DT_E_TIMEOUT || result == DT_E_CLOSED || result == DT_E_LINK;
 }
 
-/* By the person: what is armed is disarmed. */
-static int stop(struct release *release)
+/* By the person: what is armed, or may be, is disarmed. */
+static int stop(struct release *release, bool asked_to_arm)
 {
 	const struct session_view *view = session_view(release->session);
-	bool armed = view->armed || view->state == WIRE_STATE_ARMED;
+	bool armed = asked_to_arm || view->armed || view->state == WIRE_STATE_ARMED;
 	int result = armed ? session_command(release->session, WIRE_OP_ABORT) : 0;
 
 	return result == 0 ? command_stopped() : command_link_failed("abort", result);
@@ -190,7 +190,7 @@ static int arm(struct release *release)
 	int result = session_command(release->session, WIRE_OP_ARM);
 
 	if (command_interrupted())
-		return stop(release);
+		return stop(release, true);
 	return sent(release, result);
 }
 
@@ -247,7 +247,7 @@ static int hear_key(struct release *release)
 		say(release, "early     the warning is not over yet");
 		return COMMAND_DONE;
 	}
-	return stop(release);
+	return stop(release, false);
 }
 
 static int turn(struct release *release)
@@ -257,7 +257,7 @@ static int turn(struct release *release)
 	enum release_phase phase;
 
 	if (command_interrupted())
-		return stop(release);
+		return stop(release, false);
 	if (result != 0)
 		return command_link_failed("waiting for the checks", result);
 	if (view->state == WIRE_STATE_FAULT_HELD)
