@@ -310,6 +310,6 @@ int main(int argc, char **argv)
 		return code;
 	if (line.ready_fd != NO_FD)
 		line.bench.ready_fd = (int)line.ready_fd;
-	line.bench.realtime = line.pace != NULL ? strcmp(line.pace, "1") == 0 : !line.operate;
+	line.bench.realtime = line.pace != NULL ? strcmp(line.pace, "1") == 0 : line.bench.link != NULL;
 	return line.scenario_file != NULL ? run_scenario(&line) : run_scene(&line);
 }
