@@ -4,7 +4,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cjson/cJSON.h>
 
 #include "hil/study/contact.h"
 #include "host/record/read.h"
@@ -29,30 +28,29 @@ static struct study_series *place(struct reading *reading, const struct archive_
 	return NULL;
 }
 
-static double number(const cJSON *object, const char *name)
-{
-	const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
-
-	return cJSON_IsNumber(item) ? item->valuedouble : (double)NAN;
-}
-
-/* What stands in the full result only. */
+/* What stands in no column of a table of drops. */
 static int take_result(struct reading *reading, struct study_series *series, const char *name)
 {
-	char *text = NULL;
-	cJSON *json = archive_json(reading->archive, name, NULL, &text) == 0 ? cJSON_Parse(text) : NULL;
-	const cJSON *resultants = cJSON_GetObjectItemCaseSensitive(json, "resultants");
+	struct record record;
+	struct analysis analysis = {.channels = NULL};
+	struct estimate_options options = {.tolerance = 0};
+	struct result said;
+	int status;
 
-	free(text);
-	if (json == NULL) {
+	record_init(&record);
+	said = result_of(&record, &analysis, &options);
+	status = archive_analysis(reading->archive, name, NULL, &said);
+	if (status == 0) {
+		series->s2_peak_s =
+		        analysis.resultant_count > 1 ? analysis.resultants[1].time_s : (double)NAN;
+		series->rebound[series->cell.drops] =
+		        analysis.has_rebound ? analysis.rebound.velocity_ratio : (double)NAN;
+	} else {
 		snprintf(reading->message, STUDY_MESSAGE_MAX, "%s: no result", name);
-		return DT_E_FORMAT;
 	}
-	series->s2_peak_s = number(cJSON_GetArrayItem(resultants, 1), "time_s");
-	series->rebound[series->cell.drops] =
-	        number(cJSON_GetObjectItemCaseSensitive(json, "rebound"), "velocity_ratio");
-	cJSON_Delete(json);
-	return 0;
+	free(analysis.channels);
+	record_free(&record);
+	return status;
 }
 
 static int take_log(struct reading *reading, struct study_series *series, double tau_s)

@@ -22,6 +22,7 @@
 
 #include "common/error.h"
 #include "common/scenes/scene.h"
+#include "host/result/quantity.h"
 
 struct archive;
 
@@ -118,10 +119,10 @@ struct archive_log {
 DT_MUST_USE int archive_open_log(struct archive *archive, const char *drop, struct archive_log *log);
 void archive_close_log(struct archive_log *log);
 
-/* json: as `analyze --json` gives it. Kept in the index and beside the log; the result of the same version is
- * replaced, others stay. Drops are named SERIES/NUMBER. */
+/* What an analysis said, and the same as `analyze --json` gives it, which is kept beside the log. The result
+ * of the same version is replaced, others stay. Drops are named SERIES/NUMBER. */
 DT_MUST_USE int archive_result(struct archive *archive, const char *drop, const char *version,
-                               const char *json);
+                               struct result *said, const char *json);
 
 enum archive_decision { ARCHIVE_OPEN, ARCHIVE_ACCEPTED, ARCHIVE_REJECTED };
 
@@ -139,29 +140,11 @@ DT_MUST_USE int archive_calibrate(struct archive *archive, const char *sensor, d
 
 /* ---- looking ---- */
 
-/* What a result says in numbers; names by archive_value_name. Instants and frequencies as the JSON has them;
- * NAN where there is none. */
-#define ARCHIVE_VALUES(V)                                             \
-	V(S1_X, "s1_x", "g") /* signed peaks */                       \
-	V(S1_Y, "s1_y", "g")                                          \
-	V(S1_R, "s1_r", "g") /* resultant of X and Y */               \
-	V(S1_Z, "s1_z", "g")                                          \
-	V(S2_X, "s2_x", "g")                                          \
-	V(S2_Y, "s2_y", "g")                                          \
-	V(S2_R, "s2_r", "g")                                          \
-	V(S2_Z, "s2_z", "g")                                          \
-	V(LAG, "lag_largest_peak", "s") /* S1 after S2 */             \
-	V(LAG_FIRST, "lag_first_peak", "s")                           \
-	V(LAG_DRIVEN, "lag_driven", "s") /* as an oscillator on S2 */ \
-	V(FREQUENCY, "frequency", "hz")  /* of the plate, damped */   \
-	V(THREE_CYCLE, "three_cycle_frequency", "hz")                 \
-	V(DAMPING, "damping", "ratio")
-
+/* What a result says in numbers: the columns of quantity.def. NAN where there is none. */
 enum archive_value {
-#define ARCHIVE_VALUE(name, text, unit) ARCHIVE_##name,
-	ARCHIVE_VALUES(ARCHIVE_VALUE)
-#undef ARCHIVE_VALUE
-	        ARCHIVE_VALUE_COUNT
+#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) ARCHIVE_##NAME,
+#include "host/result/quantity.def"
+	ARCHIVE_VALUE_COUNT
 };
 const char *archive_value_name(enum archive_value value); /* "s1_x" */
 const char *archive_value_unit(enum archive_value value); /* "g" */
@@ -178,6 +161,7 @@ struct archive_drop {
 	const char *fault;                 /* one line on the file that is missing or altered; "" */
 	bool simulated;                    /* known to be from a simulated tower; false: not known */
 	const char *version;               /* of the result; NULL: there is none */
+	const char *quantities;            /* quantity_version of it; "": from before there was one */
 	double value[ARCHIVE_VALUE_COUNT]; /* NAN: none */
 	double sigma[ARCHIVE_VALUE_COUNT];
 	unsigned not_ok;   /* bit for each value whose status is not ok */
@@ -231,12 +215,14 @@ DT_MUST_USE int archive_each_calibration(struct archive *archive,
                                                      const struct archive_calibration *calibration),
                                          void *context);
 
+/* A drop's result back, by version or the newest (NULL). said->record: empty, or from the drop's log, and
+ * then it keeps all but its flags. Methods and paths stay empty. DT_E_EMPTY: there is none. The channels of
+ * said->analysis are to be freed. */
+DT_MUST_USE int archive_analysis(struct archive *archive, const char *drop, const char *version,
+                                 struct result *said);
+
 /* The JSON of a drop's result, to be freed; version NULL: the newest. DT_E_EMPTY: there is none. */
 DT_MUST_USE int archive_json(struct archive *archive, const char *drop, const char *version, char **json);
-
-/* The tree of such a text, or of any JSON, to be deleted: DT_E_FORMAT when it is none, DT_E_MEMORY. */
-struct cJSON;
-DT_MUST_USE int archive_json_parse(const char *json, struct cJSON **root);
 
 /* Where a log with these bytes is: 1 and "SERIES/NUMBER" in drop, 0 when there is none, or DT_E_*. */
 DT_MUST_USE int archive_find(struct archive *archive, const char *file, char drop[ARCHIVE_NAME_MAX + 16]);

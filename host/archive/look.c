@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "host/archive/durable.h"
-#include "host/archive/private.h"
+#include "host/archive/quantities.h"
 
 struct archive_filter archive_filter_none(void)
 {
@@ -250,24 +250,29 @@ static double number_or_nan(sqlite3_stmt *s, int column)
 	return sqlite3_column_type(s, column) == SQLITE_NULL ? (double)NAN : sqlite3_column_double(s, column);
 }
 
-#define VALUE_COLUMNS(name, text, unit) ", r." text "_" unit ", r." text "_sigma_" unit
-#define DROP_COLUMNS                                                                                         \
-	SERIES_COLUMNS                                                                                       \
-	", d.number, CASE d.proof WHEN '' THEN d.state ELSE d.proof END, d.decision, d.reason, d.operator, " \
-	"d.note, d.raw, d.sha256,"                                                                           \
-	" d.time, d.bytes, d.simulated, v.name, r.not_ok, r.flags, d.entry, d.fault, d.id" ARCHIVE_VALUES(   \
-	        VALUE_COLUMNS)
+static const char drop_columns[] =
+        "SELECT " SERIES_COLUMNS
+        ", d.number, CASE d.proof WHEN '' THEN d.state ELSE d.proof END, d.decision, d.reason, d.operator, "
+        "d.note, d.raw, d.sha256,"
+        " d.time, d.bytes, d.simulated, v.name, r.not_ok, r.flags, d.entry, d.fault, d.id, r.quantities"
+#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
+	", r." name "_" unit ", r." name "_sigma_" unit
+#include "host/result/quantity.def"
+        ;
 
 /* The same columns, of which means need only these: half the time for ten thousand drops. */
-#define NUMBER_COLUMNS(name, text, unit) ", r." text "_" unit ", NULL"
-#define DROP_NUMBERS                                                                      \
-	SERIES_COLUMNS                                                                    \
-	", d.number, d.proof, d.decision, NULL, NULL, NULL, NULL, substr(d.sha256, 1, 1)" \
-	", NULL, NULL, NULL, NULL, r.not_ok, NULL, NULL, NULL, d.id" ARCHIVE_VALUES(NUMBER_COLUMNS)
+static const char drop_numbers[] =
+        "SELECT " SERIES_COLUMNS
+        ", d.number, d.proof, d.decision, NULL, NULL, NULL, NULL, substr(d.sha256, 1, 1)"
+        ", NULL, NULL, NULL, NULL, r.not_ok, NULL, NULL, NULL, d.id, NULL"
+#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
+	", r." name "_" unit ", NULL"
+#include "host/result/quantity.def"
+        ;
 
 static void drop_of(const struct archive *archive, sqlite3_stmt *s, struct archive_drop *drop)
 {
-	enum { N = SERIES_COLUMN_COUNT, VALUES = N + 17 };
+	enum { N = SERIES_COLUMN_COUNT, VALUES = N + 18 };
 
 	*drop = (struct archive_drop){
 	        .series = series_of(s),
@@ -287,6 +292,7 @@ static void drop_of(const struct archive *archive, sqlite3_stmt *s, struct archi
 	        .flags = sql_text(s, N + 13),
 	        .sealed = sqlite3_column_int64(s, N + 14) != 0,
 	        .fault = sql_text(s, N + 15),
+	        .quantities = sql_text(s, N + 17),
 	};
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
 		drop->value[i] = number_or_nan(s, VALUES + 2 * i);
@@ -352,13 +358,13 @@ static int each_drop(struct archive *archive, const char *columns, const struct 
 int archive_each_drop(struct archive *archive, const struct archive_filter *filter,
                       int (*each)(void *context, const struct archive_drop *drop), void *context)
 {
-	return each_drop(archive, "SELECT " DROP_COLUMNS, filter, each, context);
+	return each_drop(archive, drop_columns, filter, each, context);
 }
 
 int archive_each_numbers(struct archive *archive, const struct archive_filter *filter,
                          int (*each)(void *context, const struct archive_drop *drop), void *context)
 {
-	return each_drop(archive, "SELECT " DROP_NUMBERS, filter, each, context);
+	return each_drop(archive, drop_numbers, filter, each, context);
 }
 
 /* ---- the rest ---- */
@@ -407,6 +413,27 @@ int archive_each_calibration(struct archive *archive,
 			break;
 	}
 	sqlite3_finalize(s);
+	return result;
+}
+
+int archive_analysis(struct archive *archive, const char *drop, const char *version, struct result *said)
+{
+	struct archive_place place;
+	int64_t row = 0;
+	int result = archive_locate(archive, drop, &place);
+
+	if (result == 0)
+		result = sql_number(archive, &row,
+		                    "SELECT r.id FROM results r JOIN versions v ON v.id = r.version_id"
+		                    " WHERE r.drop_id = ?1 AND (?2 IS NULL OR v.name = ?2)"
+		                    " ORDER BY r.id DESC LIMIT 1",
+		                    "is", place.drop, version);
+	if (result == DT_E_EMPTY)
+		return archive_refuse(archive, result, "%.100s: no result", drop);
+	if (result == 0)
+		result = quantities_read(archive, row, said);
+	if (result == 0 && said->analysis->channel_count == 0)
+		result = archive_refuse(archive, DT_E_FORMAT, "%.100s: its result is no analysis", drop);
 	return result;
 }
 

@@ -114,9 +114,10 @@ DT_MUST_USE int series_insert(struct archive *archive, const char *name, const c
 DT_MUST_USE int event_insert(struct archive *archive, int64_t drop, const char *what,
                              const char *operator_name, const char *text);
 
-/* Puts a result into the index alone. DT_E_FORMAT: json is none of ours. */
-DT_MUST_USE int result_insert(struct archive *archive, int64_t drop, const char *when, const char *version,
-                              const char *json);
+/* Puts the JSON of a result that was recorded into the index alone, as archive_result would have.
+ * DT_E_FORMAT: json is none of ours. */
+DT_MUST_USE int result_restore(struct archive *archive, int64_t drop, const char *when, const char *version,
+                               const char *json);
 
 /* A scene from its text. */
 DT_MUST_USE int scene_of_text(struct archive *archive, const char *name, const char *text, double angle_deg,

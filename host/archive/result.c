@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * A result as JSON, to the columns that tables need.
+ * Results: what an analysis said as rows, the columns that tables of drops need, the JSON as it is.
  */
 #include <errno.h>
 #include <math.h>
@@ -8,162 +8,109 @@
 #include <string.h>
 #include <time.h>
 
-#include <cjson/cJSON.h>
-
 #include "host/archive/proof.h"
+#include "host/archive/quantities.h"
 
 const char *archive_value_name(enum archive_value value)
 {
-	static const char *const names[] = {
-#define NAME(name, text, unit) text,
-	        ARCHIVE_VALUES(NAME)
-#undef NAME
-	};
-
-	return names[value];
+	return quantity_columns[value].name;
 }
 
 const char *archive_value_unit(enum archive_value value)
 {
-	static const char *const units[] = {
-#define UNIT(name, text, unit) unit,
-	        ARCHIVE_VALUES(UNIT)
-#undef UNIT
-	};
-
-	return units[value];
+	return quantity_columns[value].unit;
 }
 
-int archive_json_parse(const char *json, cJSON **root)
-{
-	errno = 0; /* the library does not tell one from the other */
-	*root = cJSON_Parse(json);
-	return *root != NULL ? 0 : errno == ENOMEM ? DT_E_MEMORY : DT_E_FORMAT;
-}
+/* ---- columns ---- */
 
 struct numbers {
 	double value[ARCHIVE_VALUE_COUNT], sigma[ARCHIVE_VALUE_COUNT];
 	int64_t not_ok;
-	char flags[ARCHIVE_TEXT_MAX];
 };
 
-static const char *text_of(const cJSON *object, const char *key)
+/* A value of a lag or a plate that is not there is not ok. */
+static void take(struct numbers *n, int which, struct result *said)
 {
-	const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(object, key));
+	const struct quantity_column *c = &quantity_columns[which];
+	const struct quantity *q = quantity_find(quantity_homes[c->place].object, c->key);
+	const char *subject;
+	const void *object;
+	size_t i = 0;
 
-	return text != NULL ? text : "";
-}
-
-/* Takes object's value and uncertainty; its status too, when status is an object. */
-static void take(struct numbers *n, enum archive_value which, const cJSON *object, const char *value,
-                 const char *sigma, const cJSON *status)
-{
-	n->value[which] = cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(object, value));
-	n->sigma[which] = cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(object, sigma));
-	if (strcmp(text_of(status, "status"), "ok") != 0)
+	n->value[which] = n->sigma[which] = (double)NAN;
+	while ((object = result_at(said, c->place, i++, &subject)) != NULL &&
+	       strcmp(subject, c->subject) != 0)
+		;
+	if (object != NULL) {
+		n->value[which] = quantity_number(q, object);
+		n->sigma[which] = quantity_sigma(q, object);
+	}
+	if (object == NULL ? !quantity_homes[c->place].array[0]
+	                   : quantity_object_status(q->object, object) != ESTIMATE_OK)
 		n->not_ok |= (int64_t)1 << which;
 }
 
-static void take_peaks(struct numbers *n, const cJSON *root)
+static int update_columns(struct archive *archive, int64_t row, struct result *said)
 {
-	static const struct {
-		const char *channel;
-		enum archive_value value;
-	} peaks[] = {{"S1X", ARCHIVE_S1_X}, {"S1Y", ARCHIVE_S1_Y}, {"S1Z", ARCHIVE_S1_Z},
-	             {"S2X", ARCHIVE_S2_X}, {"S2Y", ARCHIVE_S2_Y}, {"S2Z", ARCHIVE_S2_Z}};
-	const cJSON *item;
-
-	cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(root, "channels"))
-	{
-		const cJSON *peak = cJSON_GetObjectItemCaseSensitive(item, "peak");
-
-		for (size_t i = 0; i < sizeof(peaks) / sizeof(peaks[0]); i++)
-			if (strcmp(text_of(item, "name"), peaks[i].channel) == 0)
-				take(n, peaks[i].value, peak, "value_g", "sigma_g", peak);
-	}
-	cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(root, "resultants"))
-	{
-		const char *sensor = text_of(item, "sensor");
-
-		if (strcmp(sensor, "S1") == 0 || strcmp(sensor, "S2") == 0)
-			take(n, sensor[1] == '1' ? ARCHIVE_S1_R : ARCHIVE_S2_R, item, "peak_g", "sigma_g",
-			     item);
-	}
-}
-
-static void take_rest(struct numbers *n, const cJSON *root)
-{
-	const cJSON *lag = cJSON_GetObjectItemCaseSensitive(root, "lag");
-	const cJSON *driven = cJSON_GetObjectItemCaseSensitive(lag, "driven");
-	const cJSON *plate = cJSON_GetObjectItemCaseSensitive(root, "plate");
-
-	take(n, ARCHIVE_LAG, lag, "largest_peak_s", "sigma_s", lag);
-	take(n, ARCHIVE_LAG_FIRST, lag, "first_peak_s", "sigma_s", lag);
-	take(n, ARCHIVE_LAG_DRIVEN, driven, "lag_s", "sigma_s", driven);
-	take(n, ARCHIVE_FREQUENCY, plate, "frequency_hz", "sigma_hz", plate);
-	take(n, ARCHIVE_THREE_CYCLE, plate, "three_cycle_frequency_hz", "sigma_hz", plate);
-	take(n, ARCHIVE_DAMPING, plate, "damping_ratio", "sigma_damping", plate);
-}
-
-static void take_flags(struct numbers *n, const cJSON *root)
-{
-	size_t at = 0;
-	const cJSON *flag;
-
-	cJSON_ArrayForEach(flag, cJSON_GetObjectItemCaseSensitive(root, "flags")) if (cJSON_IsString(flag))
-	{
-		int length = snprintf(n->flags + at, sizeof(n->flags) - at, "%s%s", at > 0 ? " " : "",
-		                      flag->valuestring);
-
-		if (length < 0 || (size_t)length >= sizeof(n->flags) - at)
-			return;
-		at += (size_t)length;
-	}
-}
-
-/* ---- rows ---- */
-
-#define COLUMNS(name, text, unit) ", " text "_" unit ", " text "_sigma_" unit
-#define MARKS(name, text, unit) ", ?, ?"
-
-static int insert_row(struct archive *archive, int64_t drop, int64_t version, const char *when,
-                      const struct numbers *n)
-{
-	enum { FIRST = 6 };
-	static const char text[] =
-	        "INSERT INTO results (drop_id, version_id, time, not_ok, flags" ARCHIVE_VALUES(
-	                COLUMNS) ") VALUES (?, ?, ?, ?, ?" ARCHIVE_VALUES(MARKS) ")";
+	static const char text[] = "UPDATE results SET not_ok = ?"
+#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
+	", " name "_" unit " = ?, " name "_sigma_" unit " = ?"
+#include "host/result/quantity.def"
+	                           " WHERE id = ?";
+	struct numbers n = {.not_ok = 0};
 	sqlite3_stmt *s;
-	int result = sql_query(archive, &s, text, "iisis", drop, version, when, n->not_ok, n->flags);
+	int result;
 
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
+		take(&n, i, said);
+	result = sql_query(archive, &s, text, "i", n.not_ok);
 	if (result != 0)
 		return result;
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
-		if (isfinite(n->value[i]))
-			sqlite3_bind_double(s, FIRST + 2 * i, n->value[i]);
-		if (isfinite(n->sigma[i]))
-			sqlite3_bind_double(s, FIRST + 2 * i + 1, n->sigma[i]);
+		if (isfinite(n.value[i]))
+			sqlite3_bind_double(s, 2 + 2 * i, n.value[i]);
+		if (isfinite(n.sigma[i]))
+			sqlite3_bind_double(s, 3 + 2 * i, n.sigma[i]);
 	}
+	sqlite3_bind_int64(s, 2 + 2 * ARCHIVE_VALUE_COUNT, row);
 	result = sql_step(archive, s);
 	sqlite3_finalize(s);
 	return result;
 }
 
-/* The flags of object, or of one of its channels. */
-static int insert_flags(struct archive *archive, int64_t row, const char *channel, const cJSON *object)
+/* ---- rows ---- */
+
+static int insert_flags(struct archive *archive, int64_t row, const char *channel, unsigned flags)
 {
-	const cJSON *flag;
 	int result = 0;
 
-	cJSON_ArrayForEach(flag, cJSON_GetObjectItemCaseSensitive(object, "flags"))
-	{
-		if (result == 0 && cJSON_IsString(flag))
-			result = sql_run(archive,
-			                 "INSERT OR IGNORE INTO flags (result_id, channel, flag)"
-			                 " VALUES (?, ?, ?)",
-			                 "iss", row, channel, flag->valuestring);
-	}
+	for (; flags && result == 0; flags &= flags - 1)
+		result = sql_run(archive,
+		                 "INSERT OR IGNORE INTO flags (result_id, channel, flag) VALUES (?, ?, ?)",
+		                 "iss", row, channel, record_flag_name(flags));
 	return result;
+}
+
+/* In the order of their bits: of the record with its channels, as JSON has them. */
+static int insert_all_flags(struct archive *archive, int64_t row, const struct result *said)
+{
+	unsigned all = said->record->flags;
+	char text[ARCHIVE_TEXT_MAX] = "";
+	size_t at = 0;
+	int result = 0;
+
+	for (size_t i = 0; i < said->analysis->channel_count && result == 0; i++) {
+		all |= said->analysis->channels[i].flags;
+		result = insert_flags(archive, row, said->record->channels[i].name,
+		                      said->analysis->channels[i].flags);
+	}
+	if (result == 0)
+		result = insert_flags(archive, row, "", all);
+	for (; all && at < sizeof(text); all &= all - 1)
+		at += (size_t)snprintf(text + at, sizeof(text) - at, "%s%s", at > 0 ? " " : "",
+		                       record_flag_name(all));
+	return result != 0 ? result
+	                   : sql_run(archive, "UPDATE results SET flags = ? WHERE id = ?", "si", text, row);
 }
 
 static int version_row(struct archive *archive, const char *version, const char *when, int64_t *row)
@@ -175,58 +122,105 @@ static int version_row(struct archive *archive, const char *version, const char 
 	                   : sql_number(archive, row, "SELECT id FROM versions WHERE name = ?", "s", version);
 }
 
-static int insert(struct archive *archive, int64_t drop, const char *when, const char *version,
-                  const char *json, const cJSON *root)
+/* The result's row and its text. */
+static int insert_text(struct archive *archive, int64_t drop, const char *when, const char *version,
+                       const char *quantities, const char *json, int64_t *row)
 {
-	struct numbers numbers = {.not_ok = 0};
-	const cJSON *item;
-	int64_t of = 0, row;
-	int result;
+	int64_t of = 0;
+	int result = archive_check_name(archive, "version", version);
 
-	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
-		numbers.value[i] = numbers.sigma[i] = NAN;
-	take_peaks(&numbers, root);
-	take_rest(&numbers, root);
-	take_flags(&numbers, root);
-	result = version_row(archive, version, when, &of);
+	if (result == 0)
+		result = version_row(archive, version, when, &of);
 	if (result == 0)
 		result = sql_run(archive, "DELETE FROM results WHERE drop_id = ? AND version_id = ?", "ii",
 		                 drop, of);
 	if (result == 0)
-		result = insert_row(archive, drop, of, when, &numbers);
-	row = sqlite3_last_insert_rowid(archive->index);
+		result = sql_run(archive,
+		                 "INSERT INTO results (drop_id, version_id, time, not_ok, flags, quantities)"
+		                 " VALUES (?, ?, ?, 0, '', ?)",
+		                 "iiss", drop, of, when, quantities);
+	*row = sqlite3_last_insert_rowid(archive->index);
+	return result != 0 ? result
+	                   : sql_run(archive, "INSERT INTO texts (result_id, json) VALUES (?, ?)", "is", *row,
+	                             json);
+}
+
+static int insert(struct archive *archive, int64_t drop, const char *when, const char *version,
+                  struct result *said, const char *json)
+{
+	int64_t row;
+	int result = insert_text(archive, drop, when, version, quantity_version(), json, &row);
+
 	if (result == 0)
-		result = sql_run(archive, "INSERT INTO texts (result_id, json) VALUES (?, ?)", "is", row,
-		                 json);
+		result = quantities_insert(archive, row, said);
 	if (result == 0)
-		result = insert_flags(archive, row, "", root);
-	cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(root, "channels"))
-	{
-		if (result == 0)
-			result = insert_flags(archive, row, text_of(item, "name"), item);
-	}
+		result = update_columns(archive, row, said);
+	return result != 0 ? result : insert_all_flags(archive, row, said);
+}
+
+/* ---- what was recorded, from its JSON ---- */
+
+static int restore_rows(struct archive *archive, int64_t row)
+{
+	struct record record;
+	struct analysis analysis = {.channels = NULL};
+	struct estimate_options options = {.tolerance = 0.0};
+	struct result said;
+	int result = quantities_fill(archive, row);
+
+	if (result == 0)
+		result = sql_run(archive,
+		                 "INSERT OR IGNORE INTO flags SELECT t.result_id, '', f.value FROM texts t,"
+		                 " json_each(t.json, '$.flags') f WHERE t.result_id = ?",
+		                 "i", row);
+	if (result == 0)
+		result = sql_run(archive,
+		                 "INSERT OR IGNORE INTO flags SELECT t.result_id,"
+		                 " coalesce(json_extract(c.value, '$.name'), ''), f.value FROM texts t,"
+		                 " json_each(t.json, '$.channels') c, json_each(c.value, '$.flags') f"
+		                 " WHERE t.result_id = ?",
+		                 "i", row);
+	if (result != 0)
+		return result;
+	record_init(&record);
+	said = result_of(&record, &analysis, &options);
+	result = quantities_read(archive, row, &said);
+	if (result == 0)
+		result = update_columns(archive, row, &said);
+	if (result == 0)
+		result = insert_all_flags(archive, row, &said);
+	free(analysis.channels);
+	record_free(&record);
 	return result;
 }
 
-int result_insert(struct archive *archive, int64_t drop, const char *when, const char *version,
-                  const char *json)
+int result_restore(struct archive *archive, int64_t drop, const char *when, const char *version,
+                   const char *json)
 {
-	cJSON *root = NULL;
+	int64_t row, ours = 0;
 	int result = archive_check_name(archive, "version", version);
 
 	if (result == 0)
-		result = archive_json_parse(json, &root);
-	if (result == DT_E_MEMORY)
-		return archive_refuse(archive, result, "%s", error_text(result));
-	if (result == DT_E_FORMAT || (result == 0 && !cJSON_HasObjectItem(root, "channels")))
+		result = sql_number(
+		        archive, &ours,
+		        "SELECT CASE WHEN json_valid(?1) THEN json_type(?1, '$.channels') = 'array' END", "s",
+		        json);
+	if (result == 0 && !ours)
 		result = archive_refuse(archive, DT_E_FORMAT,
 		                        "a result by %s is damaged, expected the JSON of an analysis",
 		                        version);
 	if (result == 0)
-		result = insert(archive, drop, when, version, json, root);
-	cJSON_Delete(root);
-	return result;
+		result = insert_text(archive, drop, when, version, "", json, &row);
+	if (result == 0)
+		result = sql_run(
+		        archive,
+		        "UPDATE results SET quantities = coalesce(json_extract(?, '$.quantities'), '')"
+		        " WHERE id = ?",
+		        "si", json, row);
+	return result != 0 ? result : restore_rows(archive, row);
 }
+
+/* ---- beside the log ---- */
 
 static int write_json(struct archive *archive, const char *raw, const char *version, const char *json)
 {
@@ -249,7 +243,8 @@ int event_insert(struct archive *archive, int64_t drop, const char *what, const 
 	               "issss", drop, now, what, operator_name, text);
 }
 
-int archive_result(struct archive *archive, const char *drop, const char *version, const char *json)
+int archive_result(struct archive *archive, const char *drop, const char *version, struct result *said,
+                   const char *json)
 {
 	char now[ARCHIVE_TIME_CHARS], fault[ARCHIVE_MESSAGE_MAX];
 	struct archive_place place;
@@ -262,7 +257,7 @@ int archive_result(struct archive *archive, const char *drop, const char *versio
 	archive_time(now, time(NULL));
 	result = archive_locate(archive, drop, &place);
 	if (result == 0)
-		result = result_insert(archive, place.drop, now, version, json);
+		result = insert(archive, place.drop, now, version, said, json);
 	if (result == 0)
 		result = proof_log(archive, place.drop, fault);
 	if (result == 0)

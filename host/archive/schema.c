@@ -3,13 +3,10 @@
  * The tables, as the steps from one version to the next: an index says in user_version how many of them it
  * has had. A step that was released is never changed; a change is one more step.
  */
-#include "host/archive/private.h"
+#include "host/archive/quantities.h"
 
 /* "DrTw": the file is one of ours */
 #define APPLICATION 0x44725477
-
-#define VALUE(name, text, unit) ", " text "_" unit " REAL, " text "_sigma_" unit " REAL"
-#define VALUE_COLUMNS ARCHIVE_VALUES(VALUE)
 
 static const char first[] =
         "CREATE TABLE campaigns (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, created TEXT NOT NULL);"
@@ -33,7 +30,7 @@ static const char first[] =
         "CREATE TABLE versions (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, first_used TEXT NOT NULL);"
         "CREATE TABLE results (id INTEGER PRIMARY KEY, drop_id INTEGER NOT NULL REFERENCES drops(id)"
         " ON DELETE CASCADE, version_id INTEGER NOT NULL REFERENCES versions(id), time TEXT NOT NULL,"
-        " not_ok INTEGER NOT NULL, flags TEXT NOT NULL" VALUE_COLUMNS ");"
+        " not_ok INTEGER NOT NULL, flags TEXT NOT NULL);"
         "CREATE UNIQUE INDEX results_by_drop ON results(drop_id, version_id);"
         /* by itself: tables of numbers are read without it */
         "CREATE TABLE texts (result_id INTEGER PRIMARY KEY REFERENCES results(id) ON DELETE CASCADE,"
@@ -71,7 +68,14 @@ static const char fifth[] =
         "CREATE TABLE chain (id INTEGER PRIMARY KEY CHECK (id = 1), entries INTEGER NOT NULL,"
         " head TEXT NOT NULL);";
 
-static const char *const steps[] = {first, second, third, fourth, fifth};
+/* By which table of quantities a result was made, and which one the index has its columns from. */
+static const char sixth[] =
+        "ALTER TABLE results ADD COLUMN quantities TEXT NOT NULL DEFAULT '';"
+        "CREATE TABLE shape (id INTEGER PRIMARY KEY CHECK (id = 1), quantities TEXT NOT NULL);"
+        "INSERT INTO shape VALUES (1, '');";
+enum { WITH_QUANTITIES = 6 };
+
+static const char *const steps[] = {first, second, third, fourth, fifth, sixth};
 enum { STEPS = sizeof(steps) / sizeof(steps[0]) };
 
 static int version_of(struct archive *archive, int64_t *version)
@@ -107,20 +111,46 @@ static int take_steps(struct archive *archive, int64_t version)
 	return result != 0 ? result : sql_script(archive, done);
 }
 
+static int is_shaped(struct archive *archive, int64_t version, int64_t *shaped)
+{
+	*shaped = 0;
+	return version < WITH_QUANTITIES
+	               ? 0
+	               : sql_number(archive, shaped, "SELECT COUNT(*) FROM shape WHERE quantities = ?", "s",
+	                            quantity_version());
+}
+
+/* The columns of the results, which grow with quantity.def; results of before are taken from their texts. */
+static int shape(struct archive *archive, int64_t version)
+{
+	int result = quantities_shape(archive);
+
+	if (result == 0 && version < WITH_QUANTITIES)
+		result = quantities_fill(archive, 0);
+	if (result == 0)
+		result = sql_run(archive, "UPDATE shape SET quantities = ?", "s", quantity_version());
+	return result;
+}
+
 int schema_upgrade(struct archive *archive)
 {
-	int64_t version = 0;
+	int64_t version = 0, shaped = 0;
 	int result = sql_script(archive, "BEGIN"); /* for both numbers from one moment */
 
 	if (result == 0)
-		result = archive_end(archive, version_of(archive, &version));
-	if (result != 0 || version == STEPS)
+		result = version_of(archive, &version);
+	if (result == 0)
+		result = is_shaped(archive, version, &shaped);
+	result = archive_end(archive, result);
+	if (result != 0 || (version == STEPS && shaped))
 		return result;
 	result = archive_start(archive);
 	if (result != 0)
 		return result;
 	result = version_of(archive, &version); /* somebody else may have been quicker */
-	if (result == 0)
+	if (result == 0 && version < STEPS)
 		result = take_steps(archive, version);
+	if (result == 0)
+		result = shape(archive, version);
 	return archive_end(archive, result);
 }

@@ -171,7 +171,7 @@ static int take_result(struct archive *archive, const struct sidecar *sidecar, i
 	if (json == NULL && (r.bytes < 0 || errno != ENOENT))
 		return archive_refuse(archive, DT_E_SYSTEM, "%.500s: %s", path, strerror(errno));
 	if (json != NULL && is_recorded(&r, json, size))
-		result = result_insert(archive, drop, r.time, r.version, json);
+		result = result_restore(archive, drop, r.time, r.version, json);
 	else
 		result = 1;
 	free(json);

@@ -106,26 +106,33 @@ int archived_read(struct archive *archive, const char *drop, struct record *reco
 
 /* The result does not depend on where the archive stands. */
 static int analyse(struct archive *archive, const char *drop, const struct scene *scene,
-                   char fault[ARCHIVE_MESSAGE_MAX], char **json, char message[ARCHIVE_MESSAGE_MAX])
+                   struct record *record, char message[ARCHIVE_MESSAGE_MAX])
 {
-	struct record record;
-	int result = archived_read(archive, drop, &record, fault, message);
+	struct evaluated e;
+	struct result said;
+	char *json = evaluate_json(&e, record, scene);
+	int result;
 
-	if (result != 0)
-		return result;
-	*json = evaluate_json(&record, scene);
-	if (*json == NULL)
+	if (json == NULL) {
 		snprintf(message, ARCHIVE_MESSAGE_MAX, "%.500s: cannot be analysed; kept without a result",
-		         record.file);
-	record_free(&record);
-	return *json != NULL ? 0 : DT_E_FORMAT;
+		         record->file);
+		return DT_E_FORMAT;
+	}
+	said = result_of(record, &e.analysis, &e.report.options);
+	result = archive_result(archive, drop, DT_VERSION, &said, json);
+	if (result != 0)
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%s", archive_message(archive));
+	evaluate_close(&e);
+	free(json);
+	return result;
 }
 
 int archived_result(struct archive *archive, const char *series, unsigned number,
                     char fault[ARCHIVE_MESSAGE_MAX], char message[ARCHIVE_MESSAGE_MAX])
 {
-	char drop[ARCHIVE_NAME_MAX + 16], *json;
+	char drop[ARCHIVE_NAME_MAX + 16];
 	struct scene scene;
+	struct record record;
 	int result = archive_scene(archive, series, &scene);
 
 	fault[0] = '\0';
@@ -133,13 +140,11 @@ int archived_result(struct archive *archive, const char *series, unsigned number
 	if (result != 0)
 		return result;
 	snprintf(drop, sizeof(drop), "%.60s/%u", series, number);
-	result = analyse(archive, drop, &scene, fault, &json, message);
+	result = archived_read(archive, drop, &record, fault, message);
 	if (result != 0)
 		return result;
-	result = archive_result(archive, drop, DT_VERSION, json);
-	if (result != 0)
-		snprintf(message, ARCHIVE_MESSAGE_MAX, "%s", archive_message(archive));
-	free(json);
+	result = analyse(archive, drop, &scene, &record, message);
+	record_free(&record);
 	return result;
 }
 

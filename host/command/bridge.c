@@ -280,6 +280,7 @@ static bool cancelled(void *user)
 static int hand_on_drop(struct bridge *bridge)
 {
 	struct record record;
+	struct evaluated e;
 	char *json;
 	int taken = session_take_drop(bridge->session, &record);
 	int result;
@@ -287,7 +288,7 @@ static int hand_on_drop(struct bridge *bridge)
 	if (taken <= 0)
 		return taken;
 	result = publisher_drop(bridge->publisher, &record);
-	json = evaluate_json(&record, bridge->scene_file != NULL ? &bridge->scene : NULL);
+	json = evaluate_json(&e, &record, bridge->scene_file != NULL ? &bridge->scene : NULL);
 	if (json == NULL)
 		command_error("drop %u: no result, it cannot be analysed", record.drop_id);
 	else if (result == 0)
@@ -296,6 +297,8 @@ static int hand_on_drop(struct bridge *bridge)
 	        "droptower: drop %u: %" PRIu64 " samples lost; %" PRIu64 " blocks, %" PRIu64
 	        " states published\n",
 	        record.drop_id, record.lost_samples, bridge->publisher->blocks, bridge->publisher->states);
+	if (json != NULL)
+		evaluate_close(&e);
 	free(json);
 	record_free(&record);
 	return result;

@@ -211,20 +211,21 @@ int evaluate(const struct record *record, const struct evaluate_options *options
 	return code;
 }
 
-char *evaluate_json(const struct record *record, const struct scene *scene)
+char *evaluate_json(struct evaluated *e, const struct record *record, const struct scene *scene)
 {
 	struct evaluate_options options = {.scene = scene, .iepe_time_constant_s = NAN};
-	struct evaluated e;
 	struct text json;
 	int result;
 
-	if (evaluate_open(&e, record, &options) != 0)
+	if (evaluate_open(e, record, &options) != 0)
 		return NULL;
 	result = text_open(&json);
 	if (result == 0)
-		result = text_close(&json, report_json(&e.report, json.out));
-	evaluate_close(&e);
-	return result == 0 ? json.bytes : NULL;
+		result = text_close(&json, report_json(&e->report, json.out));
+	if (result == 0)
+		return json.bytes;
+	evaluate_close(e);
+	return NULL;
 }
 
 int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg)

@@ -51,9 +51,9 @@ void evaluate_close(struct evaluated *e);
 /* Prints and writes what was asked for. Returns a COMMAND_* exit code; errors were printed. */
 int evaluate(const struct record *record, const struct evaluate_options *options);
 
-/* The JSON of a record as `analyze --scene` gives it, to be freed; NULL if it cannot be analysed. scene may
- * be NULL. */
-char *evaluate_json(const struct record *record, const struct scene *scene);
+/* The JSON of a record as `analyze --scene` gives it, to be freed, with e open; NULL if it cannot be
+ * analysed. scene may be NULL. */
+char *evaluate_json(struct evaluated *e, const struct record *record, const struct scene *scene);
 
 /* Reads a scene and lays angle_deg over it when that is not NAN. 0 or a COMMAND_* code, errors printed. */
 int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg);

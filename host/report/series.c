@@ -97,7 +97,8 @@ static int read_log(struct series_page *page, struct series_drop *drop, const ch
 
 static int read_drop(struct series_page *page, struct series_drop *drop)
 {
-	char name[ARCHIVE_NAME_MAX + 16], *json;
+	struct result said = result_of(&drop->record, &drop->analysis, &drop->options);
+	char name[ARCHIVE_NAME_MAX + 16];
 	int result;
 
 	snprintf(name, sizeof(name), "%.60s/%u", page->series.name, drop->a.number);
@@ -108,11 +109,7 @@ static int read_drop(struct series_page *page, struct series_drop *drop)
 		archive_cell_add(&page->cell, &drop->a);
 	if (result || !drop->a.version)
 		return result;
-	result = archive_json(page->request->archive, name, drop->a.version, &json);
-	if (result)
-		return result;
-	result = series_result_read(drop, json);
-	free(json);
+	result = archive_analysis(page->request->archive, name, drop->a.version, &said);
 	if (result == DT_E_FORMAT && !drop->no_log[0])
 		snprintf(drop->no_log, sizeof(drop->no_log), "the result by %s is no analysis",
 		         drop->a.version);

@@ -302,10 +302,10 @@ static void fact_sampling(FILE *out, const struct series_drop *drop)
 
 static void fact_processing(FILE *out, const struct series_drop *drop)
 {
-	if (!(drop->highpass_undone_s > 0.0))
+	if (!(drop->options.iepe_time_constant_s > 0.0))
 		return;
 	begin_fact(out, "processing");
-	fprintf(out, "sensor high-pass of %g s undone", drop->highpass_undone_s);
+	fprintf(out, "sensor high-pass of %g s undone", drop->options.iepe_time_constant_s);
 	end_fact(out);
 }
 

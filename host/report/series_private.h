@@ -19,8 +19,8 @@ struct series_drop {
 	char no_log[320];         /* why there is no trace to draw; "": there is one */
 	struct record record;     /* from the log; without it, what the result knows of it, without samples */
 	struct analysis analysis; /* from the result: what pictures and remarks need */
-	double highpass_undone_s; /* says the result; NAN or 0: does not */
-	struct report report;     /* of these */
+	struct estimate_options options; /* of the result: the high-pass that was undone */
+	struct report report;            /* of these */
 	struct report_zero zero;
 	double model_s; /* the model's first touch, after zero; NAN: no model to lay over it */
 };
@@ -41,10 +41,6 @@ struct series_page {
 	double curve_g[SCRIPT_CURVE_POINTS][MODEL_AXES]; /* the model, from curve.from_s to curve.to_s */
 	struct script_window curve;                      /* after its first touch */
 };
-
-/* Fills analysis, and what the log did not give of record, from the JSON of a result. 0, or DT_E_FORMAT or
- * DT_E_MEMORY with nothing to be freed but record. */
-DT_MUST_USE int series_result_read(struct series_drop *drop, const char *json);
 
 /* Gnuplot scripts as those of traces.h: one sensor (0: S1) along an axis ('X', 'Y') of all drops that count,
  * with the model; and both sensors of one drop. The same axes for all drops. */

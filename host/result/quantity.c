@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/result/quantity.h"
 
+#include <inttypes.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "common/crc.h"
@@ -87,17 +89,206 @@ double quantity_scale(const struct quantity *quantity)
 	return 1.0;
 }
 
+enum estimate_status quantity_object_status(enum quantity_object which, const void *object)
+{
+	const struct quantity *q = quantity_find(which, "status");
+
+	return q ? *(const enum estimate_status *)(const void *)((const char *)object + q->offset)
+	         : ESTIMATE_OK;
+}
+
 enum estimate_status quantity_status(const struct quantity *quantity, const void *object)
 {
-	const struct quantity *q = NULL;
-	enum estimate_status status = ESTIMATE_OK;
+	enum estimate_status status = quantity_object_status(quantity->object, object);
 
-	while ((q = quantity_next(quantity->object, q)))
-		if (q->kind == QUANTITY_STATUS)
-			status = *(const enum estimate_status *)(const void *)((const char *)object +
-			                                                       q->offset);
 	return status == ESTIMATE_OK && !isfinite(quantity_number(quantity, object)) ? ESTIMATE_SHORT
 	                                                                             : status;
+}
+
+const struct quantity_home quantity_homes[QUANTITY_PLACES] = {
+#define QUANTITY_PLACE(PLACE, OBJECT, table, array, path) {QUANTITY_##OBJECT, table, array, path},
+#include "host/result/quantity.def"
+};
+
+const struct quantity_column quantity_columns[QUANTITY_COLUMNS] = {
+#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
+	{name, unit, QUANTITY_AT_##PLACE, subject, key, title, shown, digits},
+#include "host/result/quantity.def"
+};
+
+/* ---- texts ---- */
+
+static void flag_names(unsigned flags, char *text, size_t size)
+{
+	size_t at = 0;
+
+	text[0] = '\0';
+	for (; flags && at < size; flags &= flags - 1)
+		at += (size_t)snprintf(text + at, size - at, "%s%s", at ? " " : "",
+		                       estimate_flag_name(flags));
+}
+
+bool quantity_words(const struct quantity *quantity, const void *object, char text[QUANTITY_TEXT_MAX])
+{
+	const void *at = (const char *)object + quantity->offset;
+	const char *name = "";
+
+	switch (quantity->kind) {
+	case QUANTITY_NAME:
+		name = *(const char *const *)at ? *(const char *const *)at : "";
+		break;
+	case QUANTITY_STATUS:
+		name = estimate_status_name(*(const enum estimate_status *)at);
+		break;
+	case QUANTITY_FAMILY:
+		name = estimate_family_name(*(const enum estimate_family *)at);
+		break;
+	case QUANTITY_FLAGS:
+		flag_names(*(const unsigned *)at, text, QUANTITY_TEXT_MAX);
+		return true;
+	default:
+		return false;
+	}
+	snprintf(text, QUANTITY_TEXT_MAX, "%s", name);
+	return true;
+}
+
+static unsigned flags_of(const char *text)
+{
+	unsigned flags = 0;
+
+	while (*text) {
+		size_t length = strcspn(text, " ");
+
+		for (unsigned bit = 1; estimate_flag_name(bit)[0]; bit <<= 1)
+			if (strlen(estimate_flag_name(bit)) == length &&
+			    !strncmp(estimate_flag_name(bit), text, length))
+				flags |= bit;
+		text += length + strspn(text + length, " ");
+	}
+	return flags;
+}
+
+static enum estimate_status status_of(const char *text)
+{
+	for (enum estimate_status s = ESTIMATE_OK; s <= ESTIMATE_NOT_CONVERGED; s++)
+		if (!strcmp(estimate_status_name(s), text))
+			return s;
+	return ESTIMATE_NO_PEAK;
+}
+
+void quantity_set_text(const struct quantity *quantity, void *object, const char *text)
+{
+	void *at = (char *)object + quantity->offset;
+
+	if (quantity->kind == QUANTITY_FLAGS)
+		*(unsigned *)at = flags_of(text);
+	else if (quantity->kind == QUANTITY_STATUS)
+		*(enum estimate_status *)at = status_of(text);
+	else if (quantity->kind == QUANTITY_NAME)
+		*(const char **)at = "";
+	else if (quantity->kind == QUANTITY_FAMILY && estimate_family_parse(text, at) != 0)
+		*(enum estimate_family *)at = ESTIMATE_FAMILY_AUTO;
+}
+
+void quantity_set_number(const struct quantity *quantity, void *object, double value)
+{
+	void *at = (char *)object + quantity->offset;
+	bool counts = value >= 0.0 && value <= 9e15;
+
+	switch (quantity->kind) {
+	case QUANTITY_NUMBER:
+	case QUANTITY_POSITIVE:
+		*(double *)at = value;
+		break;
+	case QUANTITY_COUNT:
+		*(size_t *)at = counts ? (size_t)value : 0;
+		break;
+	case QUANTITY_WHOLE:
+		*(uint32_t *)at = counts && value <= UINT32_MAX ? (uint32_t)value : 0;
+		break;
+	case QUANTITY_LARGE:
+		*(uint64_t *)at = counts ? (uint64_t)value : 0;
+		break;
+	case QUANTITY_YES:
+		*(bool *)at = value > 0.0;
+		break;
+	default:
+		break;
+	}
+}
+
+void quantity_clear(enum quantity_object which, void *object)
+{
+	const struct quantity *q = NULL;
+
+	while ((q = quantity_next(which, q))) {
+		quantity_set_number(q, object, (double)NAN);
+		quantity_set_text(q, object, "");
+	}
+}
+
+/* ---- one record's ---- */
+
+struct result result_of(struct record *record, struct analysis *analysis, struct estimate_options *options)
+{
+	return (struct result){record, analysis, options, measured_of(record)};
+}
+
+static void *of_channel(struct result *result, enum quantity_place place, size_t i, const char **subject)
+{
+	struct estimate_channel *e = &result->analysis->channels[i];
+
+	if (i >= result->analysis->channel_count)
+		return NULL;
+	*subject = result->record->channels[i].name;
+	switch (place) {
+	case QUANTITY_AT_SAMPLES:
+		return &result->record->channels[i];
+	case QUANTITY_AT_BASELINE:
+		return &e->baseline;
+	case QUANTITY_AT_PEAK:
+		return &e->peak;
+	case QUANTITY_AT_RINGDOWN:
+		return &e->ringdown;
+	default:
+		return &e->pulse;
+	}
+}
+
+static void *of_drop(struct result *result, enum quantity_place place)
+{
+	struct analysis *a = result->analysis;
+
+	switch (place) {
+	case QUANTITY_AT_RECORD:
+		return result->record;
+	case QUANTITY_AT_PROCESSING:
+		return result->options;
+	case QUANTITY_AT_DROP:
+		return result->record->is_drop ? result->record : NULL;
+	case QUANTITY_AT_TOWER:
+		return result->record->is_drop ? &result->measured : NULL;
+	case QUANTITY_AT_PLATE:
+		return a->has_plate ? &a->plate : NULL;
+	case QUANTITY_AT_REBOUND:
+		return a->has_rebound ? &a->rebound : NULL;
+	default:
+		return a->has_lag ? &a->lag : NULL;
+	}
+}
+
+void *result_at(struct result *result, enum quantity_place place, size_t i, const char **subject)
+{
+	*subject = "";
+	if (!strcmp(quantity_homes[place].array, "channels"))
+		return of_channel(result, place, i, subject);
+	if (place != QUANTITY_AT_RESULTANT)
+		return i ? NULL : of_drop(result, place);
+	if (i >= result->analysis->resultant_count)
+		return NULL;
+	*subject = result->analysis->resultants[i].sensor;
+	return &result->analysis->resultants[i];
 }
 
 uint32_t quantity_hash(void)
@@ -110,4 +301,12 @@ uint32_t quantity_hash(void)
 	        ;
 
 	return crc32(CRC32_INIT, (const uint8_t *)text, sizeof(text) - 1);
+}
+
+const char *quantity_version(void)
+{
+	static char text[QUANTITY_VERSION_CHARS];
+
+	snprintf(text, sizeof(text), "%08" PRIX32, quantity_hash());
+	return text;
 }

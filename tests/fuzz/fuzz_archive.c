@@ -15,7 +15,8 @@
 #include "host/archive/archive.h"
 #include "tests/fuzz/fuzz.h"
 
-static char folder[64], series_file[200], drop_file[200], *series_text, *drop_text;
+static char folder[64], series_file[200], drop_file[200], result_file[220], *series_text, *drop_text,
+        *with_result;
 
 static int remove_one(const char *path, const struct stat *status, int type, struct FTW *walk)
 {
@@ -85,6 +86,9 @@ static void begin(void)
 	archive_close(archive);
 	series_text = load(series_file);
 	drop_text = load(drop_file);
+	snprintf(result_file, sizeof(result_file), "%.*s.fuzz.json", (int)(strlen(drop_file) - 4), drop_file);
+	with_result = load(drop_file); /* as before there were hashes: whatever the file holds is taken */
+	strcat(with_result, "result = 2026-11-02T08:00:00Z\tfuzz\n");
 }
 
 static void told(void *context, const char *text)
@@ -98,22 +102,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
 	static unsigned times;
 	struct archive *archive;
-	char json[4096], message[ARCHIVE_MESSAGE_MAX];
+	char message[ARCHIVE_MESSAGE_MAX];
 
 	if (folder[0] == '\0')
 		begin();
-	if (size < 1 || size > sizeof(json))
+	if (size < 1 || size > 4096)
 		return 0;
 	if (bytes[0] % 3 == 0) {
-		memcpy(json, bytes + 1, size - 1);
-		json[size - 1] = '\0';
-		archive = open_archive();
-		if (archive_result(archive, "one/1", "fuzz", json) != 0)
-			told(NULL, archive_message(archive));
-		archive_close(archive);
-		return 0;
+		store(result_file, bytes + 1, size - 1);
+		store(drop_file, with_result, strlen(with_result));
+	} else {
+		store(bytes[0] % 3 == 1 ? drop_file : series_file, bytes + 1, size - 1);
 	}
-	store(bytes[0] % 3 == 1 ? drop_file : series_file, bytes + 1, size - 1);
 	if (archive_rebuild(folder, true, told, NULL, message) == 0) {
 		archive = open_archive();
 		(void)!archive_verify(archive, NULL, 0, told, NULL);
@@ -125,6 +125,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 		clean();
 		free(series_text);
 		free(drop_text);
+		free(with_result);
 		begin();
 	}
 	return 0;

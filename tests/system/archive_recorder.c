@@ -37,8 +37,15 @@ static int copy_log(const char *from, const char *to)
 
 static int record(struct archive *archive, const char *series, const char *log)
 {
-	static const char json[] = "{\"flags\":[],\"channels\":[{\"name\":\"S1X\",\"flags\":[],\"peak\":{"
-	                           "\"value_g\":300,\"sigma_g\":1,\"status\":\"ok\"}}]}";
+	static const char json[] =
+	        "{\"flags\":[],\"channels\":[{\"name\":\"S1X\",\"rate_hz\":7000,\"flags\":[],\"peak\":{"
+	        "\"value_g\":300,\"sigma_g\":1,\"status\":\"ok\"}}]}";
+	struct channel channel = {.name = "S1X", .rate_hz = 7000};
+	struct record said_of = {.channels = &channel, .channel_count = 1};
+	struct estimate_channel estimate = {.peak = {.value_g = 300, .sigma_g = 1}};
+	struct analysis analysis = {.channels = &estimate, .channel_count = 1};
+	struct estimate_options options = {.tolerance = 0};
+	struct result said = result_of(&said_of, &analysis, &options);
 	struct archive_recording r;
 	char drop[ARCHIVE_NAME_MAX + 16];
 	int result = archive_begin(archive, series, "recorder", ".log", false, &r);
@@ -55,7 +62,7 @@ static int record(struct archive *archive, const char *series, const char *log)
 	snprintf(drop, sizeof(drop), "%s/%u", r.series, r.number);
 	puts(drop);
 	fflush(stdout);
-	return archive_result(archive, drop, "recorder", json);
+	return archive_result(archive, drop, "recorder", &said, json);
 }
 
 int main(int argc, char **argv)

@@ -4,11 +4,6 @@
 #include <sqlite3.h>
 #include <stdio.h>
 
-#define COLUMN(name, text, unit) "," text "_" unit "," text "_sigma_" unit
-#define VALUE(name, text, unit) \
-	",CASE '" text          \
-	"' WHEN 's1_x' THEN 290 + 10 * number WHEN 's2_x' THEN 580 + 20 * number ELSE 1 END, 0.5"
-
 static const char series[] =
         "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < %u)"
         " INSERT INTO series (name, campaign_id, scene_name, scene, angle_deg, height_m, plate_mass_kg,"
@@ -21,16 +16,18 @@ static const char drops[] =
         " CASE i WHEN 5 THEN 'cable' ELSE '' END, 'raw/' || name || '/' || i || '.log', 1,"
         " printf('%%064d', 5 * id + i), printf('2026-%%02d-%%02dT08:00:00Z', 1 + id %% 12, 1 + i)"
         " FROM series, n WHERE name LIKE 'bulk-%%'";
-static const char results[] =
-        "INSERT OR IGNORE INTO versions (name, first_used) VALUES ('bulk', '2026');"
-        "INSERT INTO results (drop_id, version_id, time, not_ok, flags" ARCHIVE_VALUES(
-                COLUMN) ") SELECT d.id, v.id, d.time, 0, ''" ARCHIVE_VALUES(VALUE) " FROM drops d, versions "
-                                                                                   "v WHERE v.name = 'bulk' "
-                                                                                   "AND raw LIKE "
-                                                                                   "'raw/bulk-%%';"
-                                                                                   "INSERT INTO texts SELECT "
-                                                                                   "id, printf('%%.*c', %u, "
-                                                                                   "'x') FROM results";
+static const char results[] = "INSERT OR IGNORE INTO versions (name, first_used) VALUES ('bulk', '2026');"
+                              "INSERT INTO results (drop_id, version_id, time, not_ok, flags"
+#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
+	"," name "_" unit "," name "_sigma_" unit
+#include "host/result/quantity.def"
+                              ") SELECT d.id, v.id, d.time, 0, ''"
+#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
+	",CASE '" name                                                               \
+	"' WHEN 's1_x' THEN 290 + 10 * number WHEN 's2_x' THEN 580 + 20 * number ELSE 1 END, 0.5"
+#include "host/result/quantity.def"
+                              " FROM drops d, versions v WHERE v.name = 'bulk' AND raw LIKE 'raw/bulk-%%';"
+                              "INSERT INTO texts SELECT id, printf('%%.*c', %u, 'x') FROM results";
 
 static bool run(sqlite3 *index, const char *format, unsigned number)
 {

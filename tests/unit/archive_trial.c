@@ -68,17 +68,31 @@ unsigned trial_record(struct archive *archive, const char *series, const char *t
 
 void trial_result(struct archive *archive, const char *drop, const char *version, double s1x, double s2x)
 {
-	char json[600];
+	struct channel channels[] = {{.name = "S1X", .rate_hz = 7000}, {.name = "S2X", .rate_hz = 7000}};
+	struct record record = {.channels = channels, .channel_count = 2};
+	struct estimate_channel estimates[] = {
+	        {.peak = {.value_g = s1x, .sigma_g = 0.5}},
+	        {.peak = {.value_g = s2x, .sigma_g = NAN, .how = {.status = ESTIMATE_CLIPPED}},
+	         .flags = RECORD_FLAG_CLIPPED},
+	};
+	struct analysis analysis = {.channels = estimates,
+	                            .channel_count = 2,
+	                            .resultants = {{.sensor = "S2", .peak_g = 7.5, .sigma_g = 1}},
+	                            .resultant_count = 1};
+	struct estimate_options options = {.tolerance = 0};
+	struct result said = result_of(&record, &analysis, &options);
+	char json[700];
 
 	snprintf(json, sizeof(json),
-	         "{\"flags\":[\"clipped\"],\"channels\":[{\"name\":\"S1X\",\"flags\":[],\"peak\":{\"value_"
-	         "g\":%.17g,"
-	         "\"sigma_g\":0.5,\"status\":\"ok\"}},{\"name\":\"S2X\",\"flags\":[\"clipped\"],\"peak\":{"
+	         "{\"flags\":[\"clipped\"],\"channels\":[{\"name\":\"S1X\",\"rate_hz\":7000,\"flags\":[],"
+	         "\"peak\":{\"value_g\":%.17g,"
+	         "\"sigma_g\":0.5,\"status\":\"ok\"}},{\"name\":\"S2X\",\"rate_hz\":7000,\"flags\":"
+	         "[\"clipped\"],\"peak\":{"
 	         "\"value_g\":%.17g,\"sigma_g\":null,\"status\":\"clipped\"}}],\"resultants\":[{\"sensor\":"
 	         "\"S2\","
 	         "\"peak_g\":7.5,\"sigma_g\":1,\"status\":\"ok\"}],\"lag\":null,\"plate\":null}",
 	         s1x, s2x);
-	assert_int_equal(archive_result(archive, drop, version, json), 0);
+	assert_int_equal(archive_result(archive, drop, version, &said, json), 0);
 }
 
 int trial_see(void *context, const struct archive_drop *drop)

@@ -74,7 +74,7 @@ static void test_a_version_1_index_is_migrated(void **state)
 	(void)state;
 	trial_sql(version_1);
 	archive = trial_open(ARCHIVE_READ);
-	assert_int_equal(schema_version(), 5);
+	assert_int_equal(schema_version(), 6);
 	seen = trial_look(archive, "one", 1, NULL);
 	assert_string_equal(seen.decision, "accepted");
 	assert_string_equal(seen.version, "v0");

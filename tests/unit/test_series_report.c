@@ -103,49 +103,59 @@ static unsigned add_drop(double peak_g)
 	return r.number;
 }
 
-static void put_channel(FILE *out, const char *name, double value, const char *status, const char *flags)
+static struct estimate_channel channel_of(double value)
 {
-	fprintf(out,
-	        "%s{\"name\":\"%s\",\"rate_hz\":%d,\"flags\":[%s],\"baseline\":{\"offset_g\":0,\"noise_g\":1}"
-	        ","
-	        "\"peak\":{\"value_g\":%.17g,\"sigma_g\":0.5,\"time_s\":0.1015,\"sigma_time_s\":1e-6,"
-	        "\"flags\":[\"gaps\"],\"status\":\"%s\"},\"pulse\":{\"duration_s\":0.0028,\"start_s\":0.1001,"
-	        "\"status\":\"ok\"}}",
-	        strcmp(name, "S1X") ? "," : "", name, name[2] == 'X' ? 7000 : 10000, flags, value, status);
+	return (struct estimate_channel){
+	        .baseline = {.noise_g = 1},
+	        .peak = {.value_g = value,
+	                 .sigma_g = 0.5,
+	                 .time_s = 0.1015,
+	                 .sigma_time_s = 1e-6,
+	                 .how = {.flags = ESTIMATE_FLAG_GAPS}},
+	        .pulse = {.duration_s = 0.0028, .start_s = 0.1001, .contact_time_s = NAN},
+	};
 }
 
 /* Every value of it another number. S2 X is as asked. */
-static void give_result(const char *drop, double v, const char *status, const char *flags)
+static void give_result(const char *drop, double v, enum estimate_status status, unsigned flags)
 {
-	char *json = NULL;
-	size_t size = 0;
-	FILE *out = open_memstream(&json, &size);
+	static const char *const names[] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
+	struct channel channels[6] = {{.count = 0}};
+	struct estimate_channel estimates[] = {channel_of(v),        channel_of(0.5 * v + 0.3),
+	                                       channel_of(-0.1 * v), channel_of(2 * v),
+	                                       channel_of(0.7 * v),  channel_of(-0.03 * v)};
+	struct record record = {.channels = channels, .channel_count = 6, .flags = flags};
+	struct analysis analysis = {
+	        .channels = estimates,
+	        .channel_count = 6,
+	        .resultants = {{.sensor = "S1", .peak_g = 1.2 * v, .sigma_g = 0.4, .time_s = 0.1015},
+	                       {.sensor = "S2", .peak_g = 2.2 * v, .sigma_g = 0.6, .time_s = 0.1015}},
+	        .resultant_count = 2,
+	        .has_lag = true,
+	        .lag = {.first_peak_s = v * 5e-6,
+	                .largest_peak_s = v * 6e-6,
+	                .sigma_s = 5e-6,
+	                .driven_s = v * 5.5e-6,
+	                .sigma_driven_s = 1e-5,
+	                .driven = {.flags = ESTIMATE_FLAG_MODEL}},
+	        .has_plate = true,
+	        .plate = {.frequency_hz = 0.4 * v,
+	                  .sigma_hz = 0.05,
+	                  .three_cycle_frequency_hz = 0.41 * v,
+	                  .damping_ratio = 3e-4 * v,
+	                  .sigma_damping = 3e-4,
+	                  .how = {.flags = ESTIMATE_FLAG_AMPLITUDE}},
+	};
+	struct estimate_options options = {.iepe_time_constant_s = 0.25};
+	struct result said = result_of(&record, &analysis, &options);
 
-	assert_non_null(out);
-	fprintf(out,
-	        "{\"flags\":[%s],\"lost_samples\":0,\"drop\":null,\"processing\":"
-	        "{\"filter\":null,\"cutoff_hz\":null,\"highpass_undone_s\":0.25},\"channels\":[",
-	        flags);
-	put_channel(out, "S1X", v, "ok", "");
-	put_channel(out, "S1Y", 0.5 * v + 0.3, "ok", "");
-	put_channel(out, "S1Z", -0.1 * v, "ok", "");
-	put_channel(out, "S2X", 2.0 * v, status, flags);
-	put_channel(out, "S2Y", 0.7 * v, "ok", "");
-	put_channel(out, "S2Z", -0.03 * v, "ok", "");
-	fprintf(out,
-	        "],\"resultants\":[{\"sensor\":\"S1\",\"peak_g\":%.17g,\"sigma_g\":0.4,\"time_s\":0.1015,"
-	        "\"status\":\"ok\"},{\"sensor\":\"S2\",\"peak_g\":%.17g,\"sigma_g\":0.6,\"time_s\":0.1015,"
-	        "\"status\":\"ok\"}],\"lag\":{\"first_peak_s\":%.17g,\"largest_peak_s\":%.17g,\"sigma_s\":5e-"
-	        "6,"
-	        "\"status\":\"ok\",\"driven\":{\"lag_s\":%.17g,\"sigma_s\":1e-5,\"flags\":[\"model_refused\"]"
-	        ","
-	        "\"status\":\"ok\"}},\"plate\":{\"frequency_hz\":%.17g,\"sigma_hz\":0.05,"
-	        "\"three_cycle_frequency_hz\":%.17g,\"damping_ratio\":%.17g,\"sigma_damping\":3e-4,"
-	        "\"flags\":[\"amplitude_dependent\"],\"status\":\"ok\"}}",
-	        1.2 * v, 2.2 * v, v * 5e-6, v * 6e-6, v * 5.5e-6, 0.4 * v, 0.41 * v, 3e-4 * v);
-	assert_int_equal(fclose(out), 0);
-	assert_int_equal(archive_result(archive, drop, "1.0-test", json), 0);
-	free(json);
+	for (size_t i = 0; i < 6; i++) {
+		snprintf(channels[i].name, sizeof(channels[i].name), "%s", names[i]);
+		channels[i].rate_hz = names[i][2] == 'X' ? 7000 : 10000;
+	}
+	estimates[3].peak.how.status = status;
+	estimates[3].flags = flags;
+	assert_int_equal(archive_result(archive, drop, "1.0-test", &said, "{}"), 0);
 }
 
 static void decide(const char *drop, enum archive_decision decision, const char *reason)
@@ -163,7 +173,7 @@ static void make_series(void)
 
 		assert_int_equal(add_drop(peak_g[i]), i + 1);
 		snprintf(drop, sizeof(drop), "by-hand/%u", i + 1);
-		give_result(drop, peak_g[i], "ok", "");
+		give_result(drop, peak_g[i], ESTIMATE_OK, 0);
 		decide(drop, i == 2 ? ARCHIVE_REJECTED : ARCHIVE_ACCEPTED,
 		       i == 2 ? "<img src=x onerror=alert(1)> 'tape'" : "");
 	}
@@ -429,7 +439,7 @@ static void test_remarks_in_words(void **state)
 
 	(void)state;
 	make_series();
-	give_result("by-hand/2", 320.6, "clipped", "\"clipped\"");
+	give_result("by-hand/2", 320.6, ESTIMATE_CLIPPED, RECORD_FLAG_CLIPPED);
 	page = report();
 	assert_has(page, "COMPLETE, WITH REMARKS: 3 drops count");
 	assert_cell(page, "<h2>Peaks", "2", 6, "641.2 p 0.5*");
@@ -461,7 +471,7 @@ static void test_all_rejected(void **state)
 
 	(void)state;
 	assert_int_equal(add_drop(300), 1);
-	give_result("by-hand/1", 300, "ok", "");
+	give_result("by-hand/1", 300, ESTIMATE_OK, 0);
 	decide("by-hand/1", ARCHIVE_REJECTED, "slid");
 	page = report();
 	assert_has(page, "NO RESULT: none of 1 drops is accepted");
@@ -478,7 +488,7 @@ static void test_undecided_counts_when_asked(void **state)
 
 	(void)state;
 	assert_int_equal(add_drop(300), 1);
-	give_result("by-hand/1", 300, "ok", "");
+	give_result("by-hand/1", 300, ESTIMATE_OK, 0);
 	page = report();
 	assert_has(page, "nobody has accepted or rejected it yet");
 	free(page);

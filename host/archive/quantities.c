@@ -1,0 +1,387 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * What an analysis says, as rows: a table for each place of quantity.def, a column for each value of it.
+ * Made, filled and read by the same lines, so that an archive of before gets the columns of today.
+ */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/archive/quantities.h"
+#include "host/record/text.h"
+
+static bool is_kept(const struct quantity *q)
+{
+	return q->kind != QUANTITY_NAMES;
+}
+
+/* Ends the statement in text and prepares it. */
+static int query(struct archive *archive, sqlite3_stmt **s, struct text *text)
+{
+	int result = text_close(text, 0);
+
+	if (result != 0)
+		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+	result = sql_query(archive, s, text->bytes, "");
+	free(text->bytes);
+	return result;
+}
+
+static int begin(struct archive *archive, struct text *text)
+{
+	return text_open(text) == 0 ? 0 : archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+}
+
+/* What is written of each value that is kept, with a comma in front. */
+static void each(FILE *out, const struct quantity_home *home,
+                 void (*put)(FILE *, const struct quantity_home *, const struct quantity *))
+{
+	const struct quantity *q = NULL;
+
+	while ((q = quantity_next(home->object, q)))
+		if (is_kept(q)) {
+			fputs(", ", out);
+			put(out, home, q);
+		}
+}
+
+static void put_key(FILE *out, const struct quantity_home *home, const struct quantity *q)
+{
+	(void)home;
+	fprintf(out, "\"%s\"", q->key);
+}
+
+static void put_mark(FILE *out, const struct quantity_home *home, const struct quantity *q)
+{
+	(void)home;
+	(void)q;
+	fputc('?', out);
+}
+
+/* Where the JSON of a result has it. */
+static void put_path(FILE *out, const struct quantity_home *home, const struct quantity *q)
+{
+	const char *from = home->array[0] ? "c.value" : "t.json";
+
+	if (q->kind == QUANTITY_FLAGS)
+		fprintf(out, "(SELECT group_concat(value, ' ') FROM json_each(%s, '$.%s%s%s'))", from,
+		        home->path, home->path[0] ? "." : "", q->key);
+	else
+		fprintf(out, "json_extract(%s, '$.%s%s%s')", from, home->path, home->path[0] ? "." : "",
+		        q->key);
+}
+
+/* ---- tables ---- */
+
+static int has_column(struct archive *archive, const char *table, const char *column, int64_t *has)
+{
+	return sql_number(archive, has, "SELECT COUNT(*) FROM pragma_table_info(?) WHERE name = ?", "ss",
+	                  table, column);
+}
+
+static int need_column(struct archive *archive, const char *table, const char *column)
+{
+	char text[200];
+	int64_t has = 0;
+	int result = has_column(archive, table, column, &has);
+
+	if (result != 0 || has)
+		return result;
+	snprintf(text, sizeof(text), "ALTER TABLE %s ADD COLUMN \"%s\"", table, column);
+	return sql_script(archive, text);
+}
+
+static int need_table(struct archive *archive, const struct quantity_home *home)
+{
+	const struct quantity *q = NULL;
+	char text[240];
+	int result;
+
+	snprintf(text, sizeof(text),
+	         "CREATE TABLE IF NOT EXISTS %s (result_id INTEGER NOT NULL REFERENCES results(id)"
+	         " ON DELETE CASCADE, subject TEXT NOT NULL, PRIMARY KEY (result_id, subject)) WITHOUT ROWID",
+	         home->table);
+	result = sql_script(archive, text);
+	while (result == 0 && (q = quantity_next(home->object, q)))
+		if (is_kept(q))
+			result = need_column(archive, home->table, q->key);
+	return result;
+}
+
+int quantities_shape(struct archive *archive)
+{
+	int result = 0;
+
+	for (int p = 0; p < QUANTITY_PLACES && result == 0; p++)
+		result = need_table(archive, &quantity_homes[p]);
+	for (int i = 0; i < QUANTITY_COLUMNS && result == 0; i++) {
+		const struct quantity_column *c = &quantity_columns[i];
+		char column[80];
+
+		snprintf(column, sizeof(column), "%s_%s", c->name, c->unit);
+		result = need_column(archive, "results", column);
+		snprintf(column, sizeof(column), "%s_sigma_%s", c->name, c->unit);
+		if (result == 0)
+			result = need_column(archive, "results", column);
+	}
+	return result;
+}
+
+/* ---- from an analysis ---- */
+
+static int insert_object(struct archive *archive, int64_t row, const struct quantity_home *home,
+                         const char *subject, const void *object)
+{
+	const struct quantity *q = NULL;
+	struct text text;
+	sqlite3_stmt *s;
+	int at = 3, result = begin(archive, &text);
+
+	if (result != 0)
+		return result;
+	fprintf(text.out, "INSERT OR IGNORE INTO %s (result_id, subject", home->table);
+	each(text.out, home, put_key);
+	fputs(") VALUES (?, ?", text.out);
+	each(text.out, home, put_mark);
+	fputs(")", text.out);
+	result = query(archive, &s, &text);
+	if (result != 0)
+		return result;
+	sqlite3_bind_int64(s, 1, row);
+	sqlite3_bind_text(s, 2, subject, -1, SQLITE_TRANSIENT);
+	while ((q = quantity_next(home->object, q))) {
+		char value[QUANTITY_TEXT_MAX];
+
+		if (!is_kept(q))
+			continue;
+		if (quantity_words(q, object, value))
+			sqlite3_bind_text(s, at, value, -1, SQLITE_TRANSIENT);
+		else if (isfinite(quantity_number(q, object)))
+			sqlite3_bind_double(s, at, quantity_number(q, object));
+		at++;
+	}
+	result = sql_step(archive, s);
+	sqlite3_finalize(s);
+	return result;
+}
+
+int quantities_insert(struct archive *archive, int64_t row, struct result *said)
+{
+	int result = 0;
+
+	for (int p = 0; p < QUANTITY_PLACES && result == 0; p++) {
+		const char *subject;
+		void *object;
+
+		for (size_t i = 0;
+		     result == 0 && (object = result_at(said, (enum quantity_place)p, i, &subject)); i++)
+			result = insert_object(archive, row, &quantity_homes[p], subject, object);
+	}
+	return result;
+}
+
+/* ---- from the JSON of a result that was recorded ---- */
+
+static int fill_place(struct archive *archive, const struct quantity_home *home, int64_t row)
+{
+	bool listed = home->array[0] != '\0';
+	struct text text;
+	sqlite3_stmt *s;
+	int result = begin(archive, &text);
+
+	if (result != 0)
+		return result;
+	fprintf(text.out, "INSERT OR IGNORE INTO %s (result_id, subject", home->table);
+	each(text.out, home, put_key);
+	if (listed)
+		fprintf(text.out, ") SELECT t.result_id, coalesce(json_extract(c.value, '$.%s'), '')",
+		        strcmp(home->array, "channels") == 0 ? "name" : "sensor");
+	else
+		fputs(") SELECT t.result_id, ''", text.out);
+	each(text.out, home, put_path);
+	fputs(" FROM texts t", text.out);
+	if (listed)
+		fprintf(text.out,
+		        ", json_each(CASE WHEN json_valid(t.json) THEN t.json ELSE '{}' END, '$.%s') c",
+		        home->array);
+	fprintf(text.out,
+	        " WHERE (?1 = 0 OR t.result_id = ?1) AND CASE WHEN json_valid(t.json) THEN json_type(%s, "
+	        "'$%s%s')"
+	        " END = 'object'",
+	        listed ? "c.value" : "t.json", home->path[0] ? "." : "", home->path);
+	result = query(archive, &s, &text);
+	if (result != 0)
+		return result;
+	sqlite3_bind_int64(s, 1, row);
+	result = sql_step(archive, s);
+	sqlite3_finalize(s);
+	return result;
+}
+
+int quantities_fill(struct archive *archive, int64_t row)
+{
+	int result = 0;
+
+	for (int p = 0; p < QUANTITY_PLACES && result == 0; p++)
+		result = fill_place(archive, &quantity_homes[p], row);
+	return result;
+}
+
+/* ---- back to an analysis ---- */
+
+/* Where a row goes; a channel or resultant that is new is made. NULL: there is no room. */
+static void *object_of(struct result *said, enum quantity_place place, const char *subject)
+{
+	struct analysis *a = said->analysis;
+	const char *whose;
+	void *object;
+
+	said->record->is_drop |= place == QUANTITY_AT_DROP;
+	a->has_lag |= place == QUANTITY_AT_LAG;
+	a->has_plate |= place == QUANTITY_AT_PLATE;
+	a->has_rebound |= place == QUANTITY_AT_REBOUND;
+	for (size_t i = 0; (object = result_at(said, place, i, &whose)); i++)
+		if (strcmp(whose, subject) == 0)
+			return object;
+	if (place != QUANTITY_AT_RESULTANT || a->resultant_count == ESTIMATE_SENSORS_MAX)
+		return NULL;
+	object = &a->resultants[a->resultant_count++];
+	snprintf(((struct estimate_resultant *)object)->sensor, sizeof(a->resultants[0].sensor), "%.7s",
+	         subject);
+	return object;
+}
+
+static void read_row(sqlite3_stmt *s, const struct quantity_home *home, void *object)
+{
+	const struct quantity *q = NULL;
+	int at = 1;
+
+	while ((q = quantity_next(home->object, q))) {
+		char text[QUANTITY_TEXT_MAX];
+
+		if (!is_kept(q))
+			continue;
+		if (quantity_words(q, object, text))
+			quantity_set_text(q, object, sql_text(s, at));
+		else
+			quantity_set_number(q, object,
+			                    sqlite3_column_type(s, at) == SQLITE_NULL
+			                            ? (double)NAN
+			                            : sqlite3_column_double(s, at));
+		at++;
+	}
+}
+
+static int read_place(struct archive *archive, int64_t row, enum quantity_place place, struct result *said)
+{
+	const struct quantity_home *home = &quantity_homes[place];
+	struct text text;
+	sqlite3_stmt *s;
+	int result = begin(archive, &text);
+
+	if (result != 0)
+		return result;
+	fputs("SELECT subject", text.out);
+	each(text.out, home, put_key);
+	fprintf(text.out, " FROM %s WHERE result_id = ?", home->table);
+	result = query(archive, &s, &text);
+	if (result != 0)
+		return result;
+	sqlite3_bind_int64(s, 1, row);
+	while ((result = sql_step(archive, s)) > 0) {
+		void *object = object_of(said, place, sql_text(s, 0));
+
+		if (object)
+			read_row(s, home, object);
+	}
+	sqlite3_finalize(s);
+	return result;
+}
+
+/* Channels as the result had them, for a record that no log has filled. */
+static int read_channels(struct archive *archive, int64_t row, struct record *record)
+{
+	sqlite3_stmt *s;
+	int result = sql_query(archive, &s, "SELECT subject, rate_hz FROM of_samples WHERE result_id = ?",
+	                       "i", row);
+
+	if (result != 0)
+		return result;
+	while ((result = sql_step(archive, s)) > 0)
+		if (!(sqlite3_column_double(s, 1) > 0.0) ||
+		    !record_add_channel(record, sql_text(s, 0), sqlite3_column_double(s, 1), 0)) {
+			result = archive_refuse(archive, DT_E_FORMAT,
+			                        "a channel of the result cannot be used");
+			break;
+		}
+	sqlite3_finalize(s);
+	return result;
+}
+
+static void clear(struct analysis *a)
+{
+	for (size_t i = 0; i < a->channel_count; i++) {
+		quantity_clear(QUANTITY_BASELINE, &a->channels[i].baseline);
+		quantity_clear(QUANTITY_PEAK, &a->channels[i].peak);
+		quantity_clear(QUANTITY_PULSE, &a->channels[i].pulse);
+		quantity_clear(QUANTITY_CONTACT, &a->channels[i].pulse);
+		quantity_clear(QUANTITY_RINGDOWN, &a->channels[i].ringdown);
+	}
+	quantity_clear(QUANTITY_LAG, &a->lag);
+	quantity_clear(QUANTITY_DRIVEN, &a->lag);
+	quantity_clear(QUANTITY_RINGDOWN, &a->plate);
+	quantity_clear(QUANTITY_REBOUND, &a->rebound);
+}
+
+static unsigned flag_of(const char *name)
+{
+	unsigned flag = 1;
+
+	while (record_flag_name(flag)[0] && strcmp(record_flag_name(flag), name) != 0)
+		flag <<= 1;
+	return record_flag_name(flag)[0] ? flag : 0;
+}
+
+/* The flags of the record and of its channels. */
+static int read_flags(struct archive *archive, int64_t row, struct result *said)
+{
+	sqlite3_stmt *s;
+	int result = sql_query(archive, &s, "SELECT channel, flag FROM flags WHERE result_id = ?", "i", row);
+
+	if (result != 0)
+		return result;
+	said->record->flags = 0;
+	while ((result = sql_step(archive, s)) > 0) {
+		unsigned flag = flag_of(sql_text(s, 1));
+
+		if (sql_text(s, 0)[0] == '\0')
+			said->record->flags |= flag;
+		for (size_t i = 0; i < said->analysis->channel_count; i++)
+			if (strcmp(said->record->channels[i].name, sql_text(s, 0)) == 0)
+				said->analysis->channels[i].flags |= flag;
+	}
+	sqlite3_finalize(s);
+	return result;
+}
+
+int quantities_read(struct archive *archive, int64_t row, struct result *said)
+{
+	bool from_log = said->record->channel_count > 0;
+	struct analysis *a = said->analysis;
+	int result = from_log ? 0 : read_channels(archive, row, said->record);
+
+	if (result != 0)
+		return result;
+	*a = (struct analysis){.channels = calloc(said->record->channel_count + 1, sizeof(*a->channels)),
+	                       .channel_count = said->record->channel_count};
+	if (a->channels == NULL)
+		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+	clear(a);
+	for (int p = 0; p < QUANTITY_PLACES && result == 0; p++)
+		if (!from_log ||
+		    (p != QUANTITY_AT_RECORD && p != QUANTITY_AT_DROP && p != QUANTITY_AT_SAMPLES))
+			result = read_place(archive, row, (enum quantity_place)p, said);
+	if (result == 0)
+		result = read_flags(archive, row, said);
+	return result;
+}
