@@ -174,7 +174,7 @@ tests: $(UNITS) $(TOOLS)
 
 # ---- more ---------------------------------------------------------------------------------------------
 
-.PHONY: check edges dbc readme format clean help
+.PHONY: check edges dbc schema readme format clean help
 check: edges ## test, both compilers with warnings as errors, sanitizers, include edges, formatting
 	@$(MAKE) --no-print-directory test
 	@clang-format --dry-run --Werror $$(git ls-files '*.c' '*.h')
@@ -182,6 +182,10 @@ check: edges ## test, both compilers with warnings as errors, sanitizers, includ
 edges: all ## check that no folder includes or calls what it must not (tests/edges and tests/links list the rules)
 	@tests/edges
 	@tests/links $(BUILD)
+
+schema: $(BUILD)/droptower.schema.json ## write the table of results as a JSON Schema
+$(BUILD)/droptower.schema.json: $(BUILD)/droptower
+	$(Q)$(BUILD)/droptower --schema >$@
 
 dbc: $(BUILD)/droptower.dbc ## write the wire as a DBC file for CAN tools
 $(BUILD)/droptower.dbc: $(BUILD)/droptower

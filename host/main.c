@@ -35,7 +35,8 @@ static void help(FILE *out)
 	fputs("usage: droptower COMMAND [OPTIONS]\n\n", out);
 	for (int i = 0; i < COMMANDS; i++)
 		fprintf(out, "  %-8s %s\n", commands[i].name, commands[i].what);
-	fputs("\n'droptower COMMAND --help' tells the options. Exit codes: 0 done, 2 usage, 3 input "
+	fputs("\n'droptower COMMAND --help' tells the options, 'droptower --schema' what a result is. Exit "
+	      "codes: 0 done, 2 usage, 3 input "
 	      "unusable,\n"
 	      "4 link or hardware, 5 refused by an interlock or stopped.\n",
 	      out);
@@ -54,6 +55,8 @@ static int run(int argc, char **argv)
 	if (strcmp(argv[1], "--version") == 0) {
 		return command_version();
 	}
+	if (strcmp(argv[1], "--schema") == 0)
+		return command_schema();
 	for (int i = 0; i < COMMANDS; i++)
 		if (strcmp(argv[1], commands[i].name) == 0)
 			return commands[i].run(argc - 1, argv + 1);

@@ -84,6 +84,7 @@ static int drop_json(void *context, const struct archive_drop *drop)
 		put_text(b, item, "version", drop->version);
 	else
 		put_item(b, item, "version", cJSON_CreateNull());
+	put_text(b, item, "quantities", drop->quantities);
 	put_text(b, item, "flags", drop->flags);
 	put_values(b, item, drop);
 	result = p->with_events ? put_events(p, item, drop) : 0;
@@ -182,6 +183,7 @@ static int drop_csv(void *context, const struct archive_drop *drop)
 	csv_text(p->out, drop->operator_name);
 	csv_text(p->out, drop->note);
 	csv_text(p->out, drop->version != NULL ? drop->version : "");
+	csv_text(p->out, drop->quantities);
 	csv_text(p->out, drop->flags);
 	fputs(drop->simulated ? "yes," : ",", p->out);
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
@@ -200,7 +202,7 @@ static int drops_csv(struct print *p, const struct archive_filter *filter)
 
 	fputs("series,number,campaign,scene,angle_deg,height_m,time,state,decision,reason,operator,note,"
 	      "version,"
-	      "flags,simulated,",
+	      "quantities,flags,simulated,",
 	      p->out);
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
 		print_key(key, (enum archive_value)i, "");

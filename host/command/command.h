@@ -34,6 +34,9 @@ int command_serve(int argc, char **argv);
 /* What `droptower --version` prints: this program, its wire, and the libraries that run with it. */
 int command_version(void);
 
+/* What `droptower --schema` prints: the JSON Schema of results. */
+int command_schema(void);
+
 /* One line to stderr: "droptower: ..." */
 void command_error(const char *format, ...) __attribute__((format(printf, 1, 2)));
 

@@ -8,10 +8,19 @@
 
 #include "common/wire.h"
 #include "host/command/command.h"
+#include "host/report/report.h"
 
 int command_version(void)
 {
 	printf("droptower %s\nwire %08" PRIx32 "\nGSL %s\nLCM %d.%d.%d\nSQLite %s\n", DT_VERSION, wire_hash(),
 	       gsl_version, LCM_MAJOR_VERSION, LCM_MINOR_VERSION, LCM_MICRO_VERSION, sqlite3_libversion());
 	return COMMAND_DONE;
+}
+
+int command_schema(void)
+{
+	if (report_schema(stdout) == 0)
+		return COMMAND_DONE;
+	command_error("standard output: the schema cannot be written");
+	return COMMAND_INPUT;
 }

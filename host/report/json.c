@@ -230,6 +230,7 @@ static cJSON *build(struct builder *b, const struct report *report)
 	b->failed = !root;
 	put_text(b, root, "file", r->file);
 	put_text(b, root, "format", r->format);
+	put_text(b, root, "quantities", quantity_version());
 	if (record_lacks_seal(r)) /* by an older version or another program */
 		put_item(b, root, "sealed", cJSON_CreateFalse());
 	put_flags(b, root, report_flags(report), record_flag_name);

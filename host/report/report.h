@@ -44,4 +44,8 @@ DT_MUST_USE int report_json(const struct report *report, FILE *out);
  * is whole or not there: it is written beside and then renamed. 0, or DT_E_* with a line in message. */
 DT_MUST_USE int report_html(const struct report *report, const char *file, char *message, size_t size);
 
+/* The JSON Schema of what report_json writes, as far as quantity.def has it: one object on one line. 0,
+ * DT_E_SYSTEM or DT_E_MEMORY. */
+DT_MUST_USE int report_schema(FILE *out);
+
 #endif

@@ -9,7 +9,7 @@
 #include "host/report/script.h"
 #include "host/report/series.h"
 
-enum { SERIES_TEXTS = 10 };
+enum { SERIES_TEXTS = 11 };
 
 struct series_drop {
 	struct archive_drop a; /* its texts stand in text */

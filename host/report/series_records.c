@@ -12,7 +12,7 @@
 
 /* ---- remarks ---- */
 
-enum remark_kind { OF_RECORD, OF_ESTIMATE, OF_STATUS };
+enum remark_kind { OF_RECORD, OF_ESTIMATE, OF_STATUS, OF_TABLE };
 
 /* One thing to know of one quantity, and the drops that it is true of. */
 struct remark {
@@ -111,6 +111,8 @@ static void add_drop(struct remarks *remarks, const struct series_drop *drop)
 	size_t notes = report_notes(&drop->report, note);
 	const struct record *r = &drop->record;
 
+	if (strcmp(drop->a.quantities, quantity_version()))
+		add_remark(remarks, OF_TABLE, 1, "", drop->a.number);
 	add_statuses(remarks, drop);
 	for (unsigned f = report_flags(&drop->report); f; f &= f - 1) {
 		unsigned flag = f & ~(f - 1), named = 0;
@@ -138,7 +140,10 @@ static void tell(FILE *out, struct remarks *remarks, size_t first, size_t counte
 	fprintf(out, "<li>%s: <b>",
 	        kind == OF_RECORD     ? report_flag_words(flag)
 	        : kind == OF_ESTIMATE ? report_note_words(flag)
-	                              : status_words(flag));
+	        : kind == OF_TABLE
+	                ? "results by another table of quantities: what it did not have is missing,"
+	                  " and 'droptower series reanalyse' makes it"
+	                : status_words(flag));
 	for (size_t i = first; i < remarks->count; i++) {
 		struct remark *r = &remarks->item[i];
 
@@ -156,6 +161,7 @@ static void tell(FILE *out, struct remarks *remarks, size_t first, size_t counte
 	fprintf(out, "</b> <span class=\"soft\">(%s)</span></li>\n",
 	        kind == OF_RECORD     ? record_flag_name(flag)
 	        : kind == OF_ESTIMATE ? estimate_flag_name(flag)
+	        : kind == OF_TABLE    ? "quantities"
 	                              : estimate_status_name((enum estimate_status)flag));
 }
 

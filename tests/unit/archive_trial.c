@@ -84,14 +84,15 @@ void trial_result(struct archive *archive, const char *drop, const char *version
 	char json[700];
 
 	snprintf(json, sizeof(json),
-	         "{\"flags\":[\"clipped\"],\"channels\":[{\"name\":\"S1X\",\"rate_hz\":7000,\"flags\":[],"
+	         "{\"quantities\":\"%s\",\"flags\":[\"clipped\"],\"channels\":[{\"name\":\"S1X\",\"rate_hz\":"
+	         "7000,\"flags\":[],"
 	         "\"peak\":{\"value_g\":%.17g,"
 	         "\"sigma_g\":0.5,\"status\":\"ok\"}},{\"name\":\"S2X\",\"rate_hz\":7000,\"flags\":"
 	         "[\"clipped\"],\"peak\":{"
 	         "\"value_g\":%.17g,\"sigma_g\":null,\"status\":\"clipped\"}}],\"resultants\":[{\"sensor\":"
 	         "\"S2\","
 	         "\"peak_g\":7.5,\"sigma_g\":1,\"status\":\"ok\"}],\"lag\":null,\"plate\":null}",
-	         s1x, s2x);
+	         quantity_version(), s1x, s2x);
 	assert_int_equal(archive_result(archive, drop, version, &said, json), 0);
 }
 
