@@ -4,7 +4,7 @@
  */
 #include <string.h>
 
-#include "host/report/put.h"
+#include "host/base/put.h"
 #include "host/report/report.h"
 #include "host/result/quantity.h"
 

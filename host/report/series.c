@@ -55,9 +55,9 @@ static int take_drop(void *context, const struct archive_drop *drop)
 	a = &d->a;
 	*a = *drop;
 	a->series = page->series;
-	const char **texts[SERIES_TEXTS] = {&a->state,   &a->decision, &a->reason, &a->operator_name,
-	                                    &a->note,    &a->raw,      &a->sha256, &a->time,
-	                                    &a->version, &a->flags, &a->quantities};
+	const char **texts[SERIES_TEXTS] = {&a->state,   &a->decision, &a->reason,    &a->operator_name,
+	                                    &a->note,    &a->raw,      &a->sha256,    &a->time,
+	                                    &a->version, &a->flags,    &a->quantities};
 	for (size_t i = 0; i < SERIES_TEXTS; i++)
 		keep(d->text[i], texts[i]);
 	return 0;
