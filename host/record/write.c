@@ -365,6 +365,10 @@ int write_record(const struct record *record, const char *file, char message[REA
 	if (format->drops_only && !record->is_drop)
 		return source_refuse(message, DT_E_ARGUMENT, file, 0,
 		                     "not a drop of a tower, which only .csv, .unv and .h5 can hold");
+	if (format->write == write_candump && record->seal_known && !record->seal_agrees)
+		return source_refuse(message, DT_E_ARGUMENT, file, 0,
+		                     "altered: the capture end is not what the tower sealed, and a log of "
+		                     "frames cannot say so; expected .csv, .lcm, .unv or .h5");
 	error = whole_open(&whole, file, message, READ_MESSAGE_MAX);
 	if (error)
 		return error;

@@ -282,6 +282,29 @@ static void test_a_written_log(void **state)
 	hand_unlink(file);
 }
 
+/* As frames it would have no capture end any more, and so no doubt either. */
+static void test_an_altered_drop_is_no_log_of_frames(void **state)
+{
+	char message[READ_MESSAGE_MAX] = "", *log = hand_file(".log", "", 0),
+	     *file = hand_file(".lcm", "", 0);
+	struct record record, again;
+
+	(void)state;
+	hand_fill(&drop, 1000, 500, 4);
+	record = make_record(true);
+	record.seal ^= 1;
+	record.seal_agrees = false;
+	assert_int_equal(write_record(&record, file, message), 0);
+	read_back(file, &again);
+	assert_true(again.flags & RECORD_FLAG_ALTERED);
+	assert_int_equal(write_record(&again, log, message), DT_E_ARGUMENT);
+	assert_non_null(strstr(message, ": altered: the capture end is not what the tower sealed"));
+	record_free(&again);
+	record_free(&record);
+	hand_unlink(file);
+	hand_unlink(log);
+}
+
 /* A log that ends within its drop: the ticks that are whole are there, the others lost and marked. */
 static void test_a_log_cut_in_its_drop(void **state)
 {
@@ -545,6 +568,7 @@ int main(void)
 	        cmocka_unit_test(test_a_drop_there_and_back),
 	        cmocka_unit_test(test_drops_that_do_not_fit),
 	        cmocka_unit_test(test_a_written_log),
+	        cmocka_unit_test(test_an_altered_drop_is_no_log_of_frames),
 	        cmocka_unit_test(test_a_log_cut_in_its_drop),
 	        cmocka_unit_test(test_blocks_without_a_drop),
 	        cmocka_unit_test(test_a_drop_goes_before_blocks),

@@ -360,7 +360,8 @@ static void outputs_of_every_state(void **state)
 			fail_msg("state %u: outputs %#x, expected %#x", s, fake.outputs, wanted[s]);
 		assert_int_equal(sequence.nonce, s == STATE(ARMED) ? NONCE : 0);
 		assert_int_equal(sequence.session, s == STATE(ARMED) ? SESSION : 0);
-		assert_int_equal(fake.kept, s | sequence.fault << 4); /* for the time after a reset */
+		assert_int_equal(fake.kept,
+		                 s | (unsigned)sequence.fault << 4); /* for the time after a reset */
 	}
 	to_uploaded();
 	ticks(200);
