@@ -272,7 +272,7 @@ static int arm(struct sequence *sequence, uint32_t checks, const struct sequence
 		return DT_E_CHECKS;
 	result = hosts_find(order->hosts, command->host, command->argument, 0, order->parameters_crc32,
 	                    &session);
-	if (result != 0 && nonce != 0)
+	if (result != 0)
 		answered = hosts_find(order->hosts, command->host, command->argument, nonce,
 		                      order->parameters_crc32, &session) == 0;
 	if (result != 0 && !answered)

@@ -14,7 +14,7 @@
 
 enum {
 	PARENT_MAX = 56,
-	TRIES = 3, /* a sweep may take a folder away that is not locked yet */
+	TRIES = 100, /* a sweep may take a folder away that is not locked yet */
 	DEPTH = 16,
 };
 
@@ -34,15 +34,17 @@ static int remove_one(const char *path, const struct stat *status, int type, str
 	return 0;
 }
 
-/* The locked lock of a folder; -1: it cannot be had. */
+/* The locked lock of a folder; -1: it cannot be had, or was swept between its opening and its locking. */
 static int take_lock(const char *folder, int flags)
 {
 	char path[TEMPORARY_PATH_MAX + 8];
+	struct stat status;
 	int fd;
 
 	snprintf(path, sizeof(path), "%s/lock", folder);
 	fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW | flags, 0600);
-	if (fd >= 0 && flock(fd, LOCK_EX | LOCK_NB) != 0) {
+	if (fd >= 0 &&
+	    (flock(fd, LOCK_EX | LOCK_NB) != 0 || fstat(fd, &status) != 0 || status.st_nlink == 0)) {
 		close(fd);
 		fd = -1;
 	}

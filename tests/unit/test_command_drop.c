@@ -216,6 +216,9 @@ static void the_window_stays_until_the_next_arm(void **state)
 	firmware_run(300);
 	firmware_acknowledge();
 	assert_int_equal(firmware_status().state, WIRE_STATE_READY);
+	/* to be challenged is not to arm */
+	assert_int_equal(
+	        firmware_order(WIRE_OP_ARM, wire_answer(0, by_hand.session, by_hand.parameters)).result, 0);
 	firmware_forget_frames();
 	firmware_ask(2, end.first_tick_ms, 500);
 	firmware_run(300);

@@ -532,6 +532,11 @@ static void an_answer_is_good_once(void **state)
 	assert_int_equal(ask(), 0);
 	ticks(1001);
 	assert_int_equal(answer(), DT_E_PARAMETERS);
+	/* what is over has no number that could be guessed */
+	assert_int_equal(ask(), 0);
+	ticks(1001);
+	assert_int_equal(command(WIRE_OP_ARM, wire_answer(1, SESSION, SET)), DT_E_PARAMETERS);
+	assert_int_equal(command(WIRE_OP_ARM, wire_answer(1, SESSION, SET)), DT_E_PARAMETERS);
 	assert_int_equal(ask(), 0);
 	ticks(1000);
 	assert_int_equal(answer(), 0);
@@ -1258,6 +1263,10 @@ static void reset_in_motion_is_a_fault(void **state)
 	fake.kept = UINT8_MAX; /* nothing that makes sense */
 	sequence_init(&sequence, &parameters, counters, PORT_RESET_POWER_ON);
 	assert_int_equal(sequence.state, STATE(BOOT));
+	fake.kept = WIRE_STATES | WIRE_FAULT_ABORTED << 4; /* nor a state beyond the last */
+	sequence_init(&sequence, &parameters, counters, PORT_RESET_POWER_ON);
+	assert_int_equal(sequence.state, STATE(BOOT));
+	assert_int_equal(sequence.fault, WIRE_FAULT_NONE);
 }
 
 static void no_impact_is_forced_after_600_ms(void **state)

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include <fcntl.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -122,11 +123,43 @@ static void test_what_is_not_ours_stays(void **state)
 	assert_int_equal(rmdir(path[0]) | unlink(path[1]) | unlink(path[2]) | rmdir(kept), 0);
 }
 
+/* Who makes one while others sweep has it, however their steps fall between its own. */
+static void test_none_is_swept_while_it_is_made(void **state)
+{
+	enum { MAKERS = 8, TIMES = 400 };
+	pid_t pid[MAKERS];
+
+	(void)state;
+	for (int i = 0; i < MAKERS; i++) {
+		pid[i] = fork();
+		if (pid[i] != 0)
+			continue;
+		for (int k = 0; k < TIMES; k++) {
+			struct temporary own;
+
+			if (temporary_make(&own, "trial") != 0)
+				_exit(1);
+			for (int look = 0; look < 3; look++)
+				if (sched_yield() != 0 || !is_there(own.path))
+					_exit(2);
+			temporary_remove(&own);
+		}
+		_exit(0);
+	}
+	for (int i = 0; i < MAKERS; i++) {
+		int status = -1;
+
+		assert_int_equal(waitpid(pid[i], &status, 0), pid[i]);
+		assert_int_equal(status, 0);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(test_a_killed_ones_folder_is_swept),
 	        cmocka_unit_test(test_what_is_not_ours_stays),
+	        cmocka_unit_test(test_none_is_swept_while_it_is_made),
 	};
 
 	return cmocka_run_group_tests(tests, begin, end);
