@@ -91,20 +91,30 @@ static int need_column(struct archive *archive, const char *table, const char *c
 	return sql_script(archive, text);
 }
 
+/* A new one with all its columns at once: each that is added later costs a rewrite of the schema. */
 static int need_table(struct archive *archive, const struct quantity_home *home)
 {
 	const struct quantity *q = NULL;
-	char text[240];
-	int result;
+	struct text text;
+	int result = begin(archive, &text);
 
-	snprintf(text, sizeof(text),
-	         "CREATE TABLE IF NOT EXISTS %s (result_id INTEGER NOT NULL REFERENCES results(id)"
-	         " ON DELETE CASCADE, subject TEXT NOT NULL, PRIMARY KEY (result_id, subject)) WITHOUT ROWID",
-	         home->table);
-	result = sql_script(archive, text);
-	while (result == 0 && (q = quantity_next(home->object, q)))
+	if (result != 0)
+		return result;
+	fprintf(text.out,
+	        "CREATE TABLE IF NOT EXISTS %s (result_id INTEGER NOT NULL REFERENCES results(id)"
+	        " ON DELETE CASCADE, subject TEXT NOT NULL, ",
+	        home->table);
+	while ((q = quantity_next(home->object, q)) != NULL)
+		if (is_kept(q))
+			fprintf(text.out, "\"%s\", ", q->key);
+	fputs("PRIMARY KEY (result_id, subject)) WITHOUT ROWID", text.out);
+	if (text_close(&text, 0) != 0)
+		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+	result = sql_script(archive, text.bytes);
+	while (result == 0 && (q = quantity_next(home->object, q)) != NULL)
 		if (is_kept(q))
 			result = need_column(archive, home->table, q->key);
+	free(text.bytes);
 	return result;
 }
 

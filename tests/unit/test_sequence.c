@@ -523,6 +523,7 @@ static void an_answer_is_good_once(void **state)
 	assert_int_equal(answer(), DT_E_PARAMETERS);
 	assert_int_equal(ask(), 0);
 	assert_int_equal(command_by(7, WIRE_OP_ARM, 7), DT_E_SESSION); /* nor after another's */
+	assert_int_equal(command(WIRE_OP_ARM, wire_answer(1, SESSION, SET)), DT_E_PARAMETERS);
 	assert_int_equal(answer(), DT_E_PARAMETERS);
 	assert_int_equal(ask(), 0);
 	assert_int_equal(command(WIRE_OP_ABORT, 0), 0);
