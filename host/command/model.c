@@ -164,7 +164,8 @@ static const struct option_row rows[] = {
         OPTION_TAKEN("angle", "DEG", struct model_arguments, angle_deg, command_angle,
                      "instead of the scene's"),
         OPTION_TAKEN("fidelity", "NAME", struct model_arguments, ensemble.fidelity, take_fidelity,
-                     "auto, paper, steady, sdof, coupled or planar; default: auto"),
+                     "auto: sdof, coupled or planar, the least that serves; or one of these; or the study's, "
+                     "paper or steady, for comparison; default: auto"),
         OPTION_PERCENT("tolerance", struct model_arguments, ensemble.options.accuracy,
                        "auto: how far the answer may be from planar's (5)"),
         OPTION_TAKEN("ask", "LIST", struct model_arguments, ensemble.options, take_ask,

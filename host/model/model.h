@@ -2,13 +2,17 @@
 #ifndef DT_HOST_MODEL_MODEL_H
 #define DT_HOST_MODEL_MODEL_H
 /*
- * What a drop should look like: a ladder of models of rising fidelity behind one call.
+ * What a drop should look like: models behind one call. Three rungs of rising fidelity, of which MODEL_AUTO
+ * takes the least that serves:
  *
- *   paper    the study's equations as printed, for comparison only
- *   steady   equation (17) put right: the steady state of the plate under a half-sine of the box
  *   sdof     half-sine contact, the plate's transient and free decay exact
  *   coupled  box and plate as two masses, skewed contact with restitution (Hunt and Crossley), gravity
  *   planar   rigid box in its plane that strikes with a corner and turns; refinements by name
+ *
+ * and the study's, for comparison, by name only:
+ *
+ *   paper    its equations as printed
+ *   steady   equation (17) put right: the steady state of the plate under a half-sine of the box
  *
  * Time 0 is the first touch. Readings as an accelerometer gives them: 0 in free fall, positive along the body
  * axis away from the mat. X and Y of S1 and S2. What a rung cannot say is NAN.

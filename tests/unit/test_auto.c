@@ -113,6 +113,8 @@ static void test_random_questions(void **unused)
 		assert_int_equal(model_solve(&s, MODEL_AUTO, &o, &least, NULL), 0);
 		apart = auto_apart(&least, &reference, o.asked);
 		good += apart < o.accuracy;
+		assert_true(least.rung >= MODEL_SDOF); /* the study's models are no rungs of it */
+		assert_true(least.next == MODEL_AUTO || least.next > MODEL_SDOF);
 		taken[least.rung]++;
 		cost += least.evaluations;
 		always += full.evaluations;
