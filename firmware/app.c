@@ -21,24 +21,30 @@ enum {
 
 static struct app app;
 
-int app_set_up_bus(struct app *a)
-{
-	bool classic = a->parameters.value[WIRE_PARAMETER_bus_mode] != 0;
-	int result = port_can_setup(classic, a->parameters.value[WIRE_PARAMETER_data_kbit_s]);
-
-	if (result == 0)
-		stream_set_classic(&a->stream, classic);
-	return result;
-}
+static const struct command_scope commands = {
+        .parameters = &app.parameters,
+        .set = &app.set,
+        .counters = app.counters,
+        .hosts = &app.hosts,
+        .sequence = &app.sequence,
+        .capture = &app.capture,
+        .measure = &app.measure,
+        .stream = &app.stream,
+        .acquire = &app.acquire,
+        .input = &app.input,
+        .health = &app.health,
+        .tick_ms = &app.tick_ms,
+        .wire_hash = &app.wire_hash,
+};
 
 /* A bus without FD is told from one with it by the port's refusal. */
 static void start_bus(void)
 {
-	app.bus_ready = app_set_up_bus(&app) == 0;
+	app.bus_ready = stream_set_up(&app.stream, &app.parameters) == 0;
 	if (app.bus_ready)
 		return;
 	app.parameters.value[WIRE_PARAMETER_bus_mode] = 1;
-	app.bus_ready = app_set_up_bus(&app) == 0;
+	app.bus_ready = stream_set_up(&app.stream, &app.parameters) == 0;
 }
 
 void app_init(enum port_reset cause)
@@ -59,28 +65,11 @@ void app_init(enum port_reset cause)
 	start_bus();
 }
 
-/* Outputs as they are, inputs as they are agreed on. */
-static uint16_t io_now(const struct app *a)
+/* Control, or main between port_lock and port_unlock. */
+static struct sequence_view view_now(void)
 {
-	return (uint16_t)((port_io() & WIRE_IO_OUTPUTS) | a->input.agreed);
-}
-
-struct sequence_view app_view(const struct app *a)
-{
-	struct health_view health = {
-	        .io = io_now(a),
-	        .bias_high = port_bias_high(),
-	        .host_good = hosts_here(&a->hosts, a->sequence.session),
-	        .clocks_good = a->acquire.clocks_good,
-	        .brown_out_set = port_brown_out_set(),
-	};
-
-	return (struct sequence_view){
-	        .now_us = port_time_us(),
-	        .io = health.io,
-	        .known = a->input.known,
-	        .checks = health_checks(&a->health, &health),
-	};
+	return health_look(&app.health, &app.input, &app.acquire,
+	                   hosts_here(&app.hosts, app.sequence.session));
 }
 
 /* ---- control interrupt ---- */
@@ -96,12 +85,12 @@ void app_on_tick(void)
 	app.tick_us = port_time_us();
 	input_read(&app.input, port_io() & (uint16_t)~WIRE_IO_OUTPUTS);
 	hosts_tick(&app.hosts, app.tick_ms);
-	view = app_view(&app);
+	view = view_now();
 	sequence_tick(&app.sequence, &view, app.tick_ms);
 	acquire_open(&app.acquire, &(struct acquire_head){
 	                                   .tick_ms = app.tick_ms,
 	                                   .drop_id = app.sequence.drop_id,
-	                                   .io = io_now(&app),
+	                                   .io = input_io(&app.input),
 	                                   .marks = sequence_tick_marks(&app.sequence),
 	                                   .state = app.sequence.state,
 	                           });
@@ -166,7 +155,7 @@ static void send_status(const struct sequence *now)
 	struct frame frame;
 
 	port_lock();
-	view = app_view(&app);
+	view = view_now();
 	port_unlock();
 	status.io = view.io;
 	status.checks = sequence_checks(now, view.checks);
@@ -209,18 +198,18 @@ static void send_emergency(uint8_t fault)
 	stream_send(&app.stream, &frame);
 }
 
-static void send_capture_end(const struct app *a)
+static void send_capture_end(void)
 {
 	struct sequence now = snapshot();
 	struct wire_capture_end end = {
 	        .drop_id = now.drop_id,
-	        .marks = (uint16_t)(now.marks | a->capture.marks | a->measured_marks),
-	        .first_tick_ms = a->capture.first_ms,
-	        .last_tick_ms = a->capture.last_ms,
-	        .trigger_us = a->capture.trigger_us,
-	        .crc32 = a->capture.crc32,
+	        .marks = (uint16_t)(now.marks | app.capture.marks | app.measured_marks),
+	        .first_tick_ms = app.capture.first_ms,
+	        .last_tick_ms = app.capture.last_ms,
+	        .trigger_us = app.capture.trigger_us,
+	        .crc32 = app.capture.crc32,
 	        .frame_speed_mm_s = now.frame_speed_mm_s,
-	        .camera_frame = (int16_t)(a->capture.first_ms - now.released_ms), /* seconds, at most */
+	        .camera_frame = (int16_t)(app.capture.first_ms - now.released_ms), /* seconds, at most */
 	        .parameters_crc32 = now.parameters_crc32,
 	};
 	struct frame frame;
@@ -230,26 +219,26 @@ static void send_capture_end(const struct app *a)
 	stream_send(&app.stream, &frame);
 }
 
-void app_send_capture(struct app *a)
+static void send_capture(void)
 {
 	static const uint16_t indices[WIRE_PARAMETERS] = {
 #define WIRE_PARAMETER(name, index, unit, min, max, initial, doc) index,
 #include "common/wire.def"
 	};
-	struct wire_parameter parameter = {.drop_id = a->measured.drop_id};
+	struct wire_parameter parameter = {.drop_id = app.measured.drop_id};
 	struct frame frame;
 
-	send_capture_end(a);
-	wire_pack_measured(&frame, WIRE_ID_MEASURED, &a->measured);
+	send_capture_end();
+	wire_pack_measured(&frame, WIRE_ID_MEASURED, &app.measured);
 	wire_seal_measured(&frame);
-	stream_send(&a->stream, &frame);
+	stream_send(&app.stream, &frame);
 	for (unsigned i = 0; i < WIRE_PARAMETERS; i++) {
 		parameter.index = indices[i];
-		parameter.value = a->set.value[i];
+		parameter.value = app.set.value[i];
 		wire_pack_parameter(&frame, WIRE_ID_PARAMETER, &parameter);
-		stream_send(&a->stream, &frame);
+		stream_send(&app.stream, &frame);
 	}
-	a->capture_end_ms = a->tick_ms;
+	app.capture_end_ms = app.tick_ms;
 }
 
 /* The window is complete: what the drop says of its tower. */
@@ -279,7 +268,7 @@ static void finish_capture(void)
 	if (capture_zero_shift(&app.capture, app.health.zero, limit))
 		app.capture.marks |= WIRE_MARK_ZERO_SHIFT;
 	measure(&now);
-	app_send_capture(&app);
+	send_capture();
 	stream_upload(&app.stream, &app.capture);
 }
 
@@ -321,7 +310,8 @@ static void receive(void)
 	struct frame frame;
 
 	for (unsigned i = 0; i < FRAMES_PER_POLL && port_can_receive(&frame) == 1; i++)
-		command_handle(&app, &frame);
+		if (command_handle(&commands, &frame))
+			send_capture();
 }
 
 /* A bus-off disarms; in motion the drop goes on without the bus. */
@@ -383,7 +373,7 @@ static void beat(const struct sequence *now, uint32_t tick_ms)
 	if (!app.bus_ready && !sequence_moving(now->state))
 		start_bus();
 	if (sequence_captured(now->state) && tick_ms - app.capture_end_ms >= BEAT_MS)
-		app_send_capture(&app);
+		send_capture();
 	stream_resend(&app.stream, &app.capture);
 }
 

@@ -70,11 +70,4 @@ void app_on_keeper(uint32_t time_us);
 /* Main. */
 void app_poll(void);
 
-/* For command.c, main: what is seen now, between port_lock and port_unlock; the capture end and what
- * follows it, sent; the bus as the parameters want it, at rest, 0 or DT_E_ARGUMENT with everything as it was.
- */
-struct sequence_view app_view(const struct app *app);
-void app_send_capture(struct app *app);
-DT_MUST_USE int app_set_up_bus(struct app *app);
-
 #endif

@@ -18,46 +18,48 @@ enum { /* CiA 301 expedited SDO, four bytes */
        SDO_ABORT = 0x80,
 };
 
-static void count(struct app *app, enum wire_counter_number counter)
+enum { CAPTURE_ASKED = 1 }; /* beside 0 and DT_E_* */
+
+static void count(const struct command_scope *scope, enum wire_counter_number counter)
 {
-	app->counters[counter]++;
+	scope->counters[counter]++;
 }
 
 /* What takes long is done before control is kept off: it is main's alone. */
-static struct sequence_order prepare(struct app *app, const struct wire_command *command)
+static struct sequence_order prepare(const struct command_scope *scope, const struct wire_command *command)
 {
 	struct sequence_order order = {
-	        .command = *command, .hosts = &app->hosts, .capture_crc32 = app->capture.crc32};
+	        .command = *command, .hosts = scope->hosts, .capture_crc32 = scope->capture->crc32};
 
-	if (command->op != WIRE_OP_ARM || sequence_moving(app->sequence.state))
+	if (command->op != WIRE_OP_ARM || sequence_moving(scope->sequence->state))
 		return order;
-	sequence_plan(&app->sequence);
-	order.parameters_crc32 = wire_parameters_crc32(app->parameters.value);
-	order.dropout_us = measure_dropout_us(&app->measure);
+	sequence_plan(scope->sequence);
+	order.parameters_crc32 = wire_parameters_crc32(scope->parameters->value);
+	order.dropout_us = measure_dropout_us(scope->measure);
 	order.nonce_good = port_random(&order.nonce) == 0;
 	return order;
 }
 
 /* What the next answer has to name; again, if need be. */
-static void challenge(struct app *app, const struct wire_challenge *message)
+static void challenge(const struct command_scope *scope, const struct wire_challenge *message)
 {
 	struct frame frame;
 
 	wire_pack_challenge(&frame, WIRE_ID_CHALLENGE, message);
-	stream_send(&app->stream, &frame);
+	stream_send(scope->stream, &frame);
 }
 
 /* The window of the drop before goes. */
-static void armed(struct app *app)
+static void armed(const struct command_scope *scope)
 {
-	app->set = app->parameters;
-	capture_release(&app->capture);
+	*scope->set = *scope->parameters;
+	capture_release(scope->capture);
 }
 
-static void operate(struct app *app, const struct wire_command *command)
+static void operate(const struct command_scope *scope, const struct wire_command *command)
 {
-	const struct sequence *sequence = &app->sequence;
-	struct sequence_order order = prepare(app, command);
+	const struct sequence *sequence = scope->sequence;
+	struct sequence_order order = prepare(scope, command);
 	struct sequence_view view;
 	struct wire_challenge message;
 	struct wire_reply reply = {.op = command->op, .sequence = command->sequence};
@@ -66,9 +68,10 @@ static void operate(struct app *app, const struct wire_command *command)
 	int result;
 
 	port_lock();
-	view = app_view(app);
+	view = health_look(scope->health, scope->input, scope->acquire,
+	                   hosts_here(scope->hosts, sequence->session));
 	was_armed = sequence->state == WIRE_STATE_ARMED;
-	result = sequence_command(&app->sequence, &view, &order);
+	result = sequence_command(scope->sequence, &view, &order);
 	reply.state = sequence->state;
 	message.drop_id = reply.state == WIRE_STATE_ARMED ? sequence_next_drop(sequence) : 0;
 	message.host = command->host;
@@ -76,30 +79,30 @@ static void operate(struct app *app, const struct wire_command *command)
 	reply.checks = sequence_checks(sequence, view.checks);
 	port_unlock();
 	if (!was_armed && reply.state == WIRE_STATE_ARMED)
-		armed(app);
+		armed(scope);
 	if (result != 0)
-		count(app, WIRE_COUNTER_commands_refused);
+		count(scope, WIRE_COUNTER_commands_refused);
 	else if (command->op == WIRE_OP_ARM)
-		challenge(app, &message);
+		challenge(scope, &message);
 	reply.result = (int8_t)result;
 	wire_pack_reply(&frame, WIRE_ID_REPLY, &reply);
-	stream_send(&app->stream, &frame);
+	stream_send(scope->stream, &frame);
 }
 
-static void reset(struct app *app)
+static void reset(const struct command_scope *scope)
 {
 	uint8_t state;
 
 	port_lock();
-	state = app->sequence.state;
+	state = scope->sequence->state;
 	port_unlock();
 	if (sequence_moving(state) || sequence_captured(state)) /* the only copy of a drop */
-		count(app, WIRE_COUNTER_commands_refused);
+		count(scope, WIRE_COUNTER_commands_refused);
 	else
 		port_reset();
 }
 
-static int handle_nmt(struct app *app, const struct frame *frame)
+static int handle_nmt(const struct command_scope *scope, const struct frame *frame)
 {
 	struct wire_nmt nmt;
 	int result = wire_unpack_nmt(frame, &nmt);
@@ -108,11 +111,11 @@ static int handle_nmt(struct app *app, const struct frame *frame)
 		return result;
 	switch (nmt.command) {
 	case NMT_STOP:
-		operate(app, &(struct wire_command){.op = WIRE_OP_ABORT});
+		operate(scope, &(struct wire_command){.op = WIRE_OP_ABORT});
 		return 0;
 	case NMT_RESET_NODE:
 	case NMT_RESET_COMMUNICATION:
-		reset(app);
+		reset(scope);
 		return 0;
 	case NMT_START:
 	case NMT_PRE_OPERATIONAL:
@@ -122,17 +125,17 @@ static int handle_nmt(struct app *app, const struct frame *frame)
 	}
 }
 
-static int handle_command(struct app *app, const struct frame *frame)
+static int handle_command(const struct command_scope *scope, const struct frame *frame)
 {
 	struct wire_command command;
 	int result = wire_unpack_command(frame, &command);
 
 	if (result == 0)
-		operate(app, &command);
+		operate(scope, &command);
 	return result;
 }
 
-static int handle_resend(struct app *app, const struct frame *frame)
+static int handle_resend(const struct command_scope *scope, const struct frame *frame)
 {
 	struct wire_resend request;
 	int result = wire_unpack_resend(frame, &request);
@@ -142,11 +145,11 @@ static int handle_resend(struct app *app, const struct frame *frame)
 	if (request.sensor < 1 || request.sensor > WIRE_SENSORS)
 		return DT_E_RANGE;
 	if (request.count > 0)
-		stream_request(&app->stream, &app->capture, &request);
-	else if (app->capture.phase == CAPTURE_COMPLETE)
-		app_send_capture(app);
+		stream_request(scope->stream, scope->capture, &request);
+	else if (scope->capture->phase == CAPTURE_COMPLETE)
+		return CAPTURE_ASKED;
 	else
-		count(app, WIRE_COUNTER_resends_out_of_range);
+		count(scope, WIRE_COUNTER_resends_out_of_range);
 	return 0;
 }
 
@@ -156,30 +159,30 @@ static bool bus_differs(const struct parameters *a, const struct parameters *b)
 	       a->value[WIRE_PARAMETER_data_kbit_s] != b->value[WIRE_PARAMETER_data_kbit_s];
 }
 
-static uint32_t write_parameter(struct app *app, uint16_t index, uint32_t value)
+static uint32_t write_parameter(const struct command_scope *scope, uint16_t index, uint32_t value)
 {
-	struct sequence *sequence = &app->sequence;
-	struct parameters before = app->parameters;
+	struct sequence *sequence = scope->sequence;
+	struct parameters before = *scope->parameters;
 	uint32_t abort_code = PARAMETER_WRONG_STATE;
 
 	port_lock();
 	if (sequence->state == WIRE_STATE_SAFE || sequence->state == WIRE_STATE_READY ||
 	    sequence->state == WIRE_STATE_FAULT_HELD) {
-		abort_code = parameters_set(&app->parameters, index, value);
+		abort_code = parameters_set(scope->parameters, index, value);
 		sequence_replan(sequence);
 	}
 	port_unlock();
-	if (app->parameters.value[WIRE_PARAMETER_dropout_us] != before.value[WIRE_PARAMETER_dropout_us])
-		measure_forget(&app->measure); /* calibrated anew; written again as it is it stays learned */
-	if (!bus_differs(&before, &app->parameters) || app_set_up_bus(app) == 0)
+	if (scope->parameters->value[WIRE_PARAMETER_dropout_us] != before.value[WIRE_PARAMETER_dropout_us])
+		measure_forget(scope->measure); /* calibrated anew; written again as it is it stays learned */
+	if (!bus_differs(&before, scope->parameters) || stream_set_up(scope->stream, scope->parameters) == 0)
 		return abort_code;
 	port_lock();
-	app->parameters = before;
+	*scope->parameters = before;
 	port_unlock();
 	return PARAMETER_HARDWARE;
 }
 
-static int handle_sdo(struct app *app, const struct frame *frame)
+static int handle_sdo(const struct command_scope *scope, const struct frame *frame)
 {
 	struct wire_sdo sdo;
 	struct frame answer;
@@ -193,9 +196,9 @@ static int handle_sdo(struct app *app, const struct frame *frame)
 	else if (sdo.subindex != 0)
 		abort_code = PARAMETER_NO_SUBINDEX;
 	else if (sdo.specifier == SDO_READ)
-		abort_code = parameters_get(&app->parameters, sdo.index, &sdo.value);
+		abort_code = parameters_get(scope->parameters, sdo.index, &sdo.value);
 	else
-		abort_code = write_parameter(app, sdo.index, sdo.value);
+		abort_code = write_parameter(scope, sdo.index, sdo.value);
 	if (abort_code != 0) {
 		sdo.specifier = SDO_ABORT;
 		sdo.value = abort_code;
@@ -206,11 +209,11 @@ static int handle_sdo(struct app *app, const struct frame *frame)
 		sdo.specifier = SDO_VALUE;
 	}
 	wire_pack_sdo(&answer, WIRE_ID_SDO_REPLY, &sdo);
-	stream_send(&app->stream, &answer);
+	stream_send(scope->stream, &answer);
 	return 0;
 }
 
-static int handle_heartbeat(struct app *app, const struct frame *frame)
+static int handle_heartbeat(const struct command_scope *scope, const struct frame *frame)
 {
 	struct wire_host_heartbeat heartbeat;
 	int result = wire_unpack_host_heartbeat(frame, &heartbeat);
@@ -220,36 +223,41 @@ static int handle_heartbeat(struct app *app, const struct frame *frame)
 	if (heartbeat.session == 0)
 		return DT_E_RANGE;
 	port_lock();
-	hosts_heard(&app->hosts, app->tick_ms, heartbeat.session,
-	            heartbeat.wire_hash_low == (uint16_t)app->wire_hash);
+	hosts_heard(scope->hosts, *scope->tick_ms, heartbeat.session,
+	            heartbeat.wire_hash_low == (uint16_t)*scope->wire_hash);
 	port_unlock();
 	return 0;
 }
 
-static int dispatch(struct app *app, const struct frame *frame)
+static int dispatch(const struct command_scope *scope, const struct frame *frame)
 {
 	switch (frame->id) {
 	case WIRE_ID_NMT:
-		return handle_nmt(app, frame);
+		return handle_nmt(scope, frame);
 	case WIRE_ID_COMMAND:
-		return handle_command(app, frame);
+		return handle_command(scope, frame);
 	case WIRE_ID_RESEND:
-		return handle_resend(app, frame);
+		return handle_resend(scope, frame);
 	case WIRE_ID_SDO_REQUEST:
-		return handle_sdo(app, frame);
+		return handle_sdo(scope, frame);
 	case WIRE_ID_HEARTBEAT_HOST:
-		return handle_heartbeat(app, frame);
+		return handle_heartbeat(scope, frame);
 	default:
-		count(app, WIRE_COUNTER_frames_unknown);
+		count(scope, WIRE_COUNTER_frames_unknown);
 		return 0;
 	}
 }
 
-void command_handle(struct app *app, const struct frame *frame)
+bool command_handle(const struct command_scope *scope, const struct frame *frame)
 {
-	count(app, WIRE_COUNTER_frames_received);
+	int result = 0;
+
+	count(scope, WIRE_COUNTER_frames_received);
 	if (frame->flags & FRAME_EXTENDED)
-		count(app, WIRE_COUNTER_frames_unknown);
-	else if (dispatch(app, frame) != 0)
-		count(app, WIRE_COUNTER_frames_malformed);
+		count(scope, WIRE_COUNTER_frames_unknown);
+	else
+		result = dispatch(scope, frame);
+	if (result < 0)
+		count(scope, WIRE_COUNTER_frames_malformed);
+	return result == CAPTURE_ASKED;
 }

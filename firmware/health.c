@@ -3,7 +3,7 @@
 
 #include "common/memory.h"
 #include "firmware/capture.h"
-#include "firmware/sequence.h"
+#include "firmware/port.h"
 
 void health_init(struct health *health, const struct parameters *parameters, volatile uint32_t *counters)
 {
@@ -147,4 +147,23 @@ uint32_t health_checks(const struct health *health, const struct health_view *vi
 	if (!view->brown_out_set)
 		checks |= WIRE_CHECK_BROWN_OUT_LEVEL;
 	return checks;
+}
+
+struct sequence_view health_look(const struct health *health, const struct input *input,
+                                 const struct acquire *acquire, bool host_good)
+{
+	struct health_view view = {
+	        .io = input_io(input),
+	        .bias_high = port_bias_high(),
+	        .host_good = host_good,
+	        .clocks_good = acquire->clocks_good,
+	        .brown_out_set = port_brown_out_set(),
+	};
+
+	return (struct sequence_view){
+	        .now_us = port_time_us(),
+	        .io = view.io,
+	        .known = input->known,
+	        .checks = health_checks(health, &view),
+	};
 }

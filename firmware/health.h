@@ -17,7 +17,9 @@
 #include <stdint.h>
 
 #include "firmware/acquire.h"
+#include "firmware/input.h"
 #include "firmware/parameter.h"
+#include "firmware/sequence.h"
 
 enum {
 	HEALTH_WINDOW_TICKS = 100,
@@ -58,5 +60,9 @@ void health_samples(struct health *health, struct acquire_tick *tick);
 
 /* WIRE_CHECK_* bits that are not green, those of the sequence apart. */
 uint32_t health_checks(const struct health *health, const struct health_view *view);
+
+/* Everything that is seen now, for the sequence; host_good as in the view. */
+struct sequence_view health_look(const struct health *health, const struct input *input,
+                                 const struct acquire *acquire, bool host_good);
 
 #endif

@@ -2,6 +2,8 @@
 #include "firmware/input.h"
 
 #include "common/memory.h"
+#include "common/wire.h"
+#include "firmware/port.h"
 
 void input_init(struct input *input)
 {
@@ -19,4 +21,9 @@ void input_read(struct input *input, uint16_t pins)
 		return;
 	input->agreed = (input->agreed | all) & any;
 	input->known |= (uint16_t)(all | ~any);
+}
+
+uint16_t input_io(const struct input *input)
+{
+	return (uint16_t)((port_io() & WIRE_IO_OUTPUTS) | input->agreed);
 }

@@ -6,8 +6,8 @@
  * millisecond, agree on its new value. A bit on which no INPUT_READINGS readings have agreed yet is not
  * known, and 0.
  *
- * Context: input_read control; the members may be read under port_lock in main. Bits are those of wire.def's
- * io word.
+ * Context: input_read control; the members may be read, and input_io called, under port_lock in main. Bits
+ * are those of wire.def's io word.
  */
 #include <stdint.h>
 
@@ -24,5 +24,8 @@ void input_init(struct input *input);
 
 /* Each millisecond: the pins as they stand. */
 void input_read(struct input *input, uint16_t pins);
+
+/* Outputs as they are, inputs as they are agreed on. */
+uint16_t input_io(const struct input *input);
 
 #endif

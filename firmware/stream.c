@@ -68,6 +68,16 @@ void stream_set_classic(struct stream *stream, bool classic)
 			stream->counters[WIRE_COUNTER_frames_dropped]++;
 }
 
+int stream_set_up(struct stream *stream, const struct parameters *parameters)
+{
+	bool classic = parameters->value[WIRE_PARAMETER_bus_mode] != 0;
+	int result = port_can_setup(classic, parameters->value[WIRE_PARAMETER_data_kbit_s]);
+
+	if (result == 0)
+		stream_set_classic(stream, classic);
+	return result;
+}
+
 void stream_flush(struct stream *stream)
 {
 	for (unsigned i = 0; i <= STREAM_QUEUE; i++) {

@@ -43,6 +43,9 @@ struct stream {
 
 void stream_init(struct stream *stream, volatile uint32_t *counters);
 
+/* The bus as the parameters want it: 0, or DT_E_ARGUMENT from the port, and all is as it was. At rest. */
+DT_MUST_USE int stream_set_up(struct stream *stream, const struct parameters *parameters);
+
 /* Takes effect at once: what waits and does not fit the new bus is dropped and counted. */
 void stream_set_classic(struct stream *stream, bool classic);
 

@@ -21,6 +21,7 @@
 #include "common/segment.h"
 #include "firmware/app.h"
 #include "firmware/command.h"
+#include "firmware/command.h"
 #include "host/record/join.h"
 #include "tests/unit/fake_port.h"
 
@@ -102,8 +103,8 @@ static struct {
 	struct wire_challenge challenge;
 } host;
 
-static struct join *the_join; /* one for all drops: the tower's boot message parts them */
-static struct app *the_app;   /* seen when the firmware hands it to command_handle */
+static struct join *the_join;               /* one for all drops: the tower's boot message parts them */
+static const struct command_scope *the_app; /* its state, as the firmware hands it to command_handle */
 
 /* True when this call is the one to fail. */
 static bool fails(enum kind kind)
@@ -139,7 +140,7 @@ int __real_port_can_send(const struct frame *frame);
 int __real_port_can_receive(struct frame *frame);
 uint32_t __real_port_can_errors(enum port_bus *state);
 void __real_port_watchdog_kick(void);
-void __real_command_handle(struct app *app, const struct frame *frame);
+bool __real_command_handle(const struct command_scope *scope, const struct frame *frame);
 
 uint32_t __wrap_port_time_us(void);
 uint16_t __wrap_port_io(void);
@@ -152,7 +153,7 @@ int __wrap_port_can_send(const struct frame *frame);
 int __wrap_port_can_receive(struct frame *frame);
 uint32_t __wrap_port_can_errors(enum port_bus *state);
 void __wrap_port_watchdog_kick(void);
-void __wrap_command_handle(struct app *app, const struct frame *frame);
+bool __wrap_command_handle(const struct command_scope *scope, const struct frame *frame);
 
 uint32_t __wrap_port_time_us(void)
 {
@@ -275,10 +276,10 @@ void __wrap_port_watchdog_kick(void)
 		__real_port_watchdog_kick();
 }
 
-void __wrap_command_handle(struct app *app, const struct frame *frame)
+bool __wrap_command_handle(const struct command_scope *scope, const struct frame *frame)
 {
-	the_app = app;
-	__real_command_handle(app, frame);
+	the_app = scope;
+	return __real_command_handle(scope, frame);
 }
 
 /* ---- the world ---- */
@@ -388,8 +389,8 @@ static void make_it_short(void)
 	set(0x2003, 40000);
 	set(0x2005, 20);
 	set(0x2006, 20);
-	the_app->parameters.value[WIRE_PARAMETER_settle_ms] = WAIT_MS; /* less than anybody may set */
-	the_app->parameters.value[WIRE_PARAMETER_warning_ms] = WAIT_MS;
+	the_app->parameters->value[WIRE_PARAMETER_settle_ms] = WAIT_MS; /* less than anybody may set */
+	the_app->parameters->value[WIRE_PARAMETER_warning_ms] = WAIT_MS;
 }
 
 static void ask_again(void)
@@ -413,8 +414,8 @@ static void ask_again(void)
 /* Every 10 ms it says what the state it has been told calls for; what gets lost is said again. */
 static void operate(void)
 {
-	uint8_t state = the_app->sequence.state;
-	uint32_t set_crc32 = wire_parameters_crc32(the_app->parameters.value);
+	uint8_t state = the_app->sequence->state;
+	uint32_t set_crc32 = wire_parameters_crc32(the_app->parameters->value);
 	const struct wire_challenge *challenge = &host.challenge;
 
 	host.complete |= host.ended && join_complete(the_join);
@@ -429,7 +430,7 @@ static void operate(void)
 	if (state != WIRE_STATE_ARMED && (state != WIRE_STATE_READY || world.now_ms % 50 == 0))
 		host.challenge = (struct wire_challenge){.nonce = 0}; /* the answer was lost */
 	if ((state == WIRE_STATE_FAULT_HELD ||
-	     (state == WIRE_STATE_SAFE && !the_app->sequence.acknowledged)) &&
+	     (state == WIRE_STATE_SAFE && !the_app->sequence->acknowledged)) &&
 	    !world.opened)
 		say(WIRE_OP_CLEAR, 0);
 	if (state != WIRE_STATE_CAPTURED || !host.ended)
@@ -463,12 +464,12 @@ static void hosts_part(void)
 
 static bool at_rest(void)
 {
-	return !sequence_moving(the_app->sequence.state);
+	return !sequence_moving(the_app->sequence->state);
 }
 
 static void check_now(void)
 {
-	uint8_t state = the_app->sequence.state;
+	uint8_t state = the_app->sequence->state;
 
 	if (!world.opened)
 		assert_true(fake.outputs & WIRE_IO_MAGNET_HOLD);
@@ -492,7 +493,7 @@ static uint32_t counted(enum wire_counter_number counter)
 
 static void check_counters(void)
 {
-	const struct stream *stream = &the_app->stream;
+	const struct stream *stream = the_app->stream;
 
 	assert_int_equal(stream->waiting, false);
 	assert_int_equal(counted(WIRE_COUNTER_frames_sent), host.sent);
@@ -508,7 +509,7 @@ static void check_counters(void)
 	}
 	if (fault.kind == MAIN_LATE && fault.happened)
 		assert_int_equal(counted(WIRE_COUNTER_ticks_late), 30);
-	if (the_app->stream.classic)
+	if (the_app->stream->classic)
 		return;
 	/* Blocks: every tick that is finished and was not lost before, or counted as dropped. */
 	assert_int_equal(host.blocks[0] + host.blocks[1] + counted(WIRE_COUNTER_frames_dropped) +
@@ -518,7 +519,7 @@ static void check_counters(void)
 
 static void check_end(void)
 {
-	uint8_t state = the_app->sequence.state;
+	uint8_t state = the_app->sequence->state;
 
 	assert_true(at_rest());
 	assert_false(fake.outputs & (WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE | WIRE_IO_CAMERA));
@@ -526,7 +527,7 @@ static void check_end(void)
 	assert_true(world.opened); /* the host went on until it had its drop */
 	assert_true(host.ended && host.complete && host.accepted);
 	assert_int_equal(host.end.last_tick_ms - host.end.first_tick_ms, 39);
-	if (the_app->sequence.fault != WIRE_FAULT_NONE)
+	if (the_app->sequence->fault != WIRE_FAULT_NONE)
 		assert_true(host.end.marks & WIRE_MARK_FAULT);
 	check_counters();
 }
@@ -555,7 +556,7 @@ static void one_ms(void)
 
 static bool over(void)
 {
-	return world.opened && host.accepted && at_rest() && the_app->sequence.state != WIRE_STATE_CAPTURED;
+	return world.opened && host.accepted && at_rest() && the_app->sequence->state != WIRE_STATE_CAPTURED;
 }
 
 static void drop(enum kind kind, unsigned at)
