@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <string.h>
 
-#include "host/report/page.h"
+#include "host/base/html.h"
 
 enum { LINE_MAX_ = 1024, TEXT_WIDTH = 110 };
 
@@ -56,7 +56,7 @@ void sheet_heading(struct sheet *sheet, const char *title)
 {
 	fprintf(sheet->text, "\n%s\n", title);
 	fputs("<h2>", sheet->page);
-	page_text(sheet->page, title);
+	html_text(sheet->page, title);
 	fputs("</h2>\n", sheet->page);
 }
 
@@ -70,7 +70,7 @@ void sheet_say(struct sheet *sheet, const char *format, ...)
 	va_end(arguments);
 	put_wrapped(sheet->text, line);
 	fputs("<p>", sheet->page);
-	page_text(sheet->page, line);
+	html_text(sheet->page, line);
 	fputs("</p>\n", sheet->page);
 }
 
@@ -95,7 +95,7 @@ static void put_groups(const struct sheet *sheet)
 			width += sheet->columns[k].width;
 		fprintf(sheet->text, "%*s", width, sheet->columns[i].group);
 		fprintf(sheet->page, "<th colspan=\"%zu\">", n);
-		page_text(sheet->page, sheet->columns[i].group);
+		html_text(sheet->page, sheet->columns[i].group);
 		fputs("</th>", sheet->page);
 	}
 	fputs("</tr>\n", sheet->page);
@@ -118,7 +118,7 @@ void sheet_table(struct sheet *sheet, const struct sheet_column *columns, size_t
 	for (size_t i = 0; i < count; i++) {
 		fprintf(sheet->text, "%*s", columns[i].width, columns[i].name);
 		fputs("<th>", sheet->page);
-		page_text(sheet->page, columns[i].name);
+		html_text(sheet->page, columns[i].name);
 		fputs("</th>", sheet->page);
 	}
 	fputs("</tr></thead><tbody>\n", sheet->page);
@@ -142,7 +142,7 @@ void sheet_row(struct sheet *sheet, const char *format, ...)
 		fprintf(sheet->text, "%s%*.*s", words ? "  " : "", sheet->columns[i].width, (int)length,
 		        cell);
 		fputs(out ? "<td class=\"out\">" : words ? "<td class=\"words\">" : "<td>", sheet->page);
-		page_text_part(sheet->page, cell, length);
+		html_text_part(sheet->page, cell, length);
 		fputs("</td>", sheet->page);
 		cell += length + (cell[length] == '|');
 	}
@@ -160,8 +160,8 @@ void sheet_picture(struct sheet *sheet, const char *title, const char *text, con
 	const char *start = strstr(svg, "<svg");
 
 	fputs("<h2>", sheet->page);
-	page_text(sheet->page, title);
+	html_text(sheet->page, title);
 	fputs("</h2>\n<p>", sheet->page);
-	page_text(sheet->page, text);
+	html_text(sheet->page, text);
 	fprintf(sheet->page, "</p>\n%s\n", start != NULL ? start : "");
 }

@@ -142,7 +142,7 @@ DT_MUST_USE int archive_calibrate(struct archive *archive, const char *sensor, d
 
 /* What a result says in numbers: the columns of quantity.def. NAN where there is none. */
 enum archive_value {
-#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) ARCHIVE_##NAME,
+#define QUANTITY_COLUMN(NAME, ...) ARCHIVE_##NAME,
 #include "host/result/quantity.def"
 	ARCHIVE_VALUE_COUNT
 };

@@ -255,8 +255,7 @@ static const char drop_columns[] =
         ", d.number, CASE d.proof WHEN '' THEN d.state ELSE d.proof END, d.decision, d.reason, d.operator, "
         "d.note, d.raw, d.sha256,"
         " d.time, d.bytes, d.simulated, v.name, r.not_ok, r.flags, d.entry, d.fault, d.id, r.quantities"
-#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
-	", r." name "_" unit ", r." name "_sigma_" unit
+#define QUANTITY_COLUMN(NAME, name, unit, ...) ", r." name "_" unit ", r." name "_sigma_" unit
 #include "host/result/quantity.def"
         ;
 
@@ -265,8 +264,7 @@ static const char drop_numbers[] =
         "SELECT " SERIES_COLUMNS
         ", d.number, d.proof, d.decision, NULL, NULL, NULL, NULL, substr(d.sha256, 1, 1)"
         ", NULL, NULL, NULL, NULL, r.not_ok, NULL, NULL, NULL, d.id, NULL"
-#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
-	", r." name "_" unit ", NULL"
+#define QUANTITY_COLUMN(NAME, name, unit, ...) ", r." name "_" unit ", NULL"
 #include "host/result/quantity.def"
         ;
 

@@ -1,241 +1,136 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include "common/base/number.h"
 #include "host/archive/print_private.h"
 
-void print_key(char key[PRINT_KEY_MAX], enum archive_value value, const char *part)
+#include <string.h>
+
+int print_done(int result, const struct table *table)
 {
-	snprintf(key, PRINT_KEY_MAX, "%s_%s%s", archive_value_name(value), part, archive_value_unit(value));
+	if (result == 0)
+		result = table->error;
+	return result != 0 || (fflush(table->out) == 0 && !ferror(table->out)) ? result : DT_E_SYSTEM;
 }
 
-int print_done(FILE *out)
+size_t print_narrow(struct table_column column[ARCHIVE_VALUE_COUNT], enum table_kind kind, size_t offset)
 {
-	return fflush(out) == 0 && !ferror(out) ? 0 : DT_E_SYSTEM;
-}
+	size_t count = 0, size = kind == TABLE_VALUE ? sizeof(struct table_value) : sizeof(double);
 
-double print_ratio(const struct archive_mean *a, const struct archive_mean *b)
-{
-	return a->n > 0 && b->n > 0 && fabs(b->mean) > 0 ? a->mean / b->mean : (double)NAN;
-}
+	for (size_t i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		const struct quantity_column *c = &quantity_columns[i];
 
-void put_mean(struct builder *b, cJSON *object, const char *key, enum archive_value value,
-              const struct archive_mean *mean)
-{
-	cJSON *item = put_object(b, object, key);
-	char name[PRINT_KEY_MAX];
-
-	snprintf(name, sizeof(name), "mean_%s", archive_value_unit(value));
-	put_number(b, item, name, mean->mean);
-	snprintf(name, sizeof(name), "sd_%s", archive_value_unit(value));
-	put_number(b, item, name, mean->sd);
-	put_number(b, item, "n", mean->n);
-	put_number(b, item, "not_ok", mean->not_ok);
-}
-
-void csv_text(FILE *out, const char *text)
-{
-	if (strpbrk(text, ",\"\n") == NULL) {
-		fprintf(out, "%s,", text);
-		return;
+		if (c->head[0] == '\0')
+			continue;
+		column[count++] = (struct table_column){.kind = kind,
+		                                        .offset = offset + i * size,
+		                                        .title = c->head,
+		                                        .unit = strcmp(c->shown, "g") != 0 ? c->shown : "",
+		                                        .gap = "",
+		                                        .width = kind == TABLE_VALUE ? 8 : 9,
+		                                        .digits = c->digits,
+		                                        .scale = quantity_column_scale(c)};
 	}
-	fputc('"', out);
-	for (; *text != '\0'; text++)
-		fprintf(out, *text == '"' ? "\"\"" : "%c", *text);
-	fputs("\",", out);
-}
-
-void csv_number(FILE *out, double value)
-{
-	char text[NUMBER_CHARS] = "";
-
-	if (isfinite(value))
-		number_format(text, value, 6);
-	fprintf(out, "%s,", text);
-}
-
-void csv_mean(FILE *out, const struct archive_mean *mean)
-{
-	csv_number(out, mean->mean);
-	csv_number(out, mean->sd);
-	fprintf(out, "%u,", mean->n);
+	return count;
 }
 
 struct archive_filter print_begin(struct print *p, const struct archive_filter *filter)
 {
 	struct archive_filter wider = *filter;
 
-	p->limit = filter->limit;
-	if (p->limit != 0)
+	p->table.limit = filter->limit;
+	if (filter->limit != 0)
 		wider.limit++;
 	return wider;
 }
 
-bool print_is_full(struct print *p)
-{
-	p->more = p->limit != 0 && p->lines == p->limit;
-	return p->more;
-}
-
 void print_more(const struct print *p)
 {
-	if (p->more)
-		fprintf(p->out, "there are more: these are the newest %zu\n", p->lines);
+	if (p->table.more)
+		fprintf(p->table.out, "there are more: these are the newest %zu\n", p->table.rows);
 }
 
 /* ---- series ---- */
 
-void put_series_keys(struct builder *b, cJSON *object, const struct archive_series *series)
-{
-	put_text(b, object, "name", series->name);
-	put_text(b, object, "campaign", series->campaign);
-	put_text(b, object, "scene", series->scene_name);
-	put_number(b, object, "angle_deg", series->angle_deg);
-	put_number(b, object, "height_m", series->height_m);
-	put_number(b, object, "planned", series->planned);
-	put_text(b, object, "created", series->created);
-}
+struct series_row {
+	struct archive_series series;
+	char faulty[48];
+};
+#define COLUMN(KIND, member, ...) TABLE_COLUMN(KIND, struct series_row, series.member, __VA_ARGS__)
 
-static int series_json(void *context, const struct archive_series *series)
-{
-	struct print *p = context;
-	cJSON *item;
+const struct table_column print_series_columns[PRINT_SERIES_COLUMNS] = {
+        COLUMN(WORDS, name, .key = "name", .csv = "series", .title = "series", .width = -20),
+        COLUMN(WORDS, campaign, .key = "campaign", .title = "campaign", .width = -11),
+        COLUMN(WORDS, scene_name, .key = "scene", .title = "scene", .width = -16),
+        COLUMN(NUMBER, angle_deg, .key = "angle_deg", .title = "deg", .width = 5, .digits = TABLE_DIGITS_G),
+        COLUMN(NUMBER, height_m, .key = "height_m"),
+        COLUMN(WHOLE, planned, .key = "planned", .title = "planned", .width = 7),
+        COLUMN(WHOLE, recorded, .key = "recorded", .title = "recorded", .width = 8),
+        COLUMN(WHOLE, accepted, .key = "accepted", .title = "accepted", .width = 8),
+        COLUMN(WHOLE, rejected, .key = "rejected", .title = "rejected", .width = 8),
+        COLUMN(WHOLE, partial, .key = "partial", .title = "partial", .width = 7),
+        COLUMN(WORDS, created, .key = "created"),
+        COLUMN(WORDS, last, .key = "last", .title = "last drop", .gap = "  ", .digits = 10),
+        COLUMN(WHOLE, faulty, .key = "faulty"),
+        TABLE_COLUMN(CHARS, struct series_row, faulty, .title = "", .gap = ""),
+        COLUMN(WORDS, scene, .key = "scene_text", .csv = ""),
+};
+#undef COLUMN
 
-	if (print_is_full(p))
-		return 0;
-	p->lines++;
-	item = put_append(&p->builder, p->array);
-	put_series_keys(&p->builder, item, series);
-	put_number(&p->builder, item, "recorded", series->recorded);
-	put_number(&p->builder, item, "accepted", series->accepted);
-	put_number(&p->builder, item, "rejected", series->rejected);
-	put_number(&p->builder, item, "partial", series->partial);
-	put_number(&p->builder, item, "faulty", series->faulty);
-	put_text(&p->builder, item, "last", series->last);
-	return 0;
-}
-
-static int series_csv(void *context, const struct archive_series *series)
+static int put_series(void *context, const struct archive_series *series)
 {
 	struct print *p = context;
+	struct series_row row = {.series = *series};
 
-	if (print_is_full(p))
-		return 0;
-	p->lines++;
-	csv_text(p->out, series->name);
-	csv_text(p->out, series->campaign);
-	csv_text(p->out, series->scene_name);
-	csv_number(p->out, series->angle_deg);
-	csv_number(p->out, series->height_m);
-	fprintf(p->out, "%u,%u,%u,%u,%u,%s,%s,%u\n", series->planned, series->recorded, series->accepted,
-	        series->rejected, series->partial, series->created, series->last, series->faulty);
-	return 0;
-}
-
-static int series_text(void *context, const struct archive_series *series)
-{
-	struct print *p = context;
-
-	if (print_is_full(p))
-		return 0;
-	if (p->lines++ == 0)
-		fprintf(p->out, "%-20s %-11s %-16s %5s %7s %8s %8s %8s %7s  %s\n", "series", "campaign",
-		        "scene", "deg", "planned", "recorded", "accepted", "rejected", "partial",
-		        "last drop");
-	fprintf(p->out, "%-20s %-11s %-16s %5g %7u %8u %8u %8u %7u  %.10s", series->name, series->campaign,
-	        series->scene_name, series->angle_deg, series->planned, series->recorded, series->accepted,
-	        series->rejected, series->partial, series->last);
 	if (series->faulty > 0)
-		fprintf(p->out, "  %u altered or missing", series->faulty);
-	fputc('\n', p->out);
+		snprintf(row.faulty, sizeof(row.faulty), "  %u altered or missing", series->faulty);
+	table_row(&p->table, &row);
 	return 0;
 }
 
-int print_series(struct archive *archive, const struct archive_filter *filter, enum print_format format,
+int print_series(struct archive *archive, const struct archive_filter *filter, enum table_format format,
                  FILE *out)
 {
-	struct print p = {.out = out, .archive = archive};
+	struct print p = {.table = {.out = out, .format = format}, .archive = archive};
 	struct archive_filter asked = print_begin(&p, filter);
-	cJSON *root;
 	int result;
 
-	if (format == PRINT_CSV) {
-		fputs("series,campaign,scene,angle_deg,height_m,planned,recorded,accepted,rejected,partial,"
-		      "created,last,faulty\n",
-		      out);
-		result = archive_each_series(archive, &asked, series_csv, &p);
-		return result != 0 ? result : print_done(out);
-	}
-	if (format == PRINT_TEXT) {
-		result = archive_each_series(archive, &asked, series_text, &p);
-		if (p.lines == 0 && result == 0)
-			fputs("no series\n", out);
+	fputs(format == TABLE_JSON ? "{\"series\":" : "", out);
+	table_begin(&p.table, print_series_columns, PRINT_SERIES_COLUMNS - 1);
+	result = archive_each_series(archive, &asked, put_series, &p);
+	table_end(&p.table);
+	if (format == TABLE_JSON)
+		fprintf(out, ",\"more\":%s}\n", p.table.more ? "true" : "false");
+	if (format == TABLE_TEXT && p.table.rows == 0 && result == 0)
+		fputs("no series\n", out);
+	if (format == TABLE_TEXT)
 		print_more(&p);
-		return result != 0 ? result : print_done(out);
-	}
-	root = cJSON_CreateObject();
-	p.array = put_array(&p.builder, root, "series");
-	result = archive_each_series(archive, &asked, series_json, &p);
-	put_item(&p.builder, root, "more", cJSON_CreateBool(p.more));
-	if (result == 0)
-		return put_out(&p.builder, root, out);
-	cJSON_Delete(root);
-	return result;
+	return print_done(result, &p.table);
 }
 
 /* ---- calibrations ---- */
 
-static int calibration_json(void *context, const struct archive_calibration *c)
-{
-	struct print *p = context;
-	cJSON *item = put_append(&p->builder, p->array);
+#define COLUMN(KIND, member, ...) TABLE_COLUMN(KIND, struct archive_calibration, member, __VA_ARGS__)
+static const struct table_column calibration_columns[] = {
+        COLUMN(WORDS, sensor, .key = "sensor", .title = "", .width = -12),
+        COLUMN(WORDS, date, .key = "date", .title = ""),
+        COLUMN(NUMBER, gain, .key = "gain", .title = "", .gap = "  ", .digits = TABLE_DIGITS_G),
+        COLUMN(WORDS, note, .key = "note", .title = "", .gap = "  "),
+};
+#undef COLUMN
 
-	put_text(&p->builder, item, "sensor", c->sensor);
-	put_text(&p->builder, item, "date", c->date);
-	put_number(&p->builder, item, "gain", c->gain);
-	put_text(&p->builder, item, "note", c->note);
+static int put_calibration(void *context, const struct archive_calibration *calibration)
+{
+	table_row(context, calibration);
 	return 0;
 }
 
-static int calibration_line(void *context, const struct archive_calibration *c)
+int print_calibrations(struct archive *archive, enum table_format format, FILE *out)
 {
-	struct print *p = context;
-
-	fprintf(p->out, "%-12s %s  %.6g  %s\n", c->sensor, c->date, c->gain, c->note);
-	return 0;
-}
-
-static int calibration_csv(void *context, const struct archive_calibration *c)
-{
-	struct print *p = context;
-
-	csv_text(p->out, c->sensor);
-	csv_text(p->out, c->date);
-	csv_text(p->out, c->note);
-	fprintf(p->out, "%.17g\n", c->gain);
-	return 0;
-}
-
-int print_calibrations(struct archive *archive, enum print_format format, FILE *out)
-{
-	struct print p = {.out = out, .archive = archive};
-	cJSON *root;
+	struct table table = {.out = out, .format = format, .bare = true};
 	int result;
 
-	if (format != PRINT_JSON) {
-		if (format == PRINT_CSV)
-			fputs("sensor,date,note,gain\n", out);
-		result = archive_each_calibration(
-		        archive, format == PRINT_CSV ? calibration_csv : calibration_line, &p);
-		return result != 0 ? result : print_done(out);
-	}
-	root = cJSON_CreateObject();
-	p.array = put_array(&p.builder, root, "calibrations");
-	result = archive_each_calibration(archive, calibration_json, &p);
-	if (result == 0)
-		return put_out(&p.builder, root, out);
-	cJSON_Delete(root);
-	return result;
+	fputs(format == TABLE_JSON ? "{\"calibrations\":" : "", out);
+	table_begin(&table, calibration_columns, TABLE_COUNT(calibration_columns));
+	result = archive_each_calibration(archive, put_calibration, &table);
+	table_end(&table);
+	fputs(format == TABLE_JSON ? "}\n" : "", out);
+	return print_done(result, &table);
 }

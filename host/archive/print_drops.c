@@ -4,357 +4,264 @@
 
 #include "host/archive/print_private.h"
 
-/* ---- JSON ---- */
-
-static int event_json(void *context, const struct archive_event *event)
-{
-	struct print *p = context;
-	cJSON *item = put_append(&p->builder, p->array);
-
-	put_text(&p->builder, item, "time", event->time);
-	put_text(&p->builder, item, "what", event->what);
-	put_text(&p->builder, item, "operator", event->operator_name);
-	put_text(&p->builder, item, "text", event->text);
-	return 0;
-}
-
-static int put_events(struct print *p, cJSON *item, const struct archive_drop *drop)
-{
-	struct print events = {.builder = p->builder};
+struct drop_row {
+	struct archive_drop drop;
+	struct table_value value[ARCHIVE_VALUE_COUNT];
+	cJSON *not_ok, *events;
+	/* of the text */
 	char name[ARCHIVE_NAME_MAX + 16];
-	int result;
+	const char *state;
+	char remarks[ARCHIVE_MESSAGE_MAX + 3 * ARCHIVE_TEXT_MAX + 64];
+};
+#define COLUMN(KIND, member, ...) TABLE_COLUMN(KIND, struct drop_row, member, __VA_ARGS__)
 
-	snprintf(name, sizeof(name), "%s/%u", drop->series.name, drop->number);
-	events.array = put_array(&events.builder, item, "events");
-	result = archive_each_event(p->archive, name, event_json, &events);
-	p->builder = events.builder;
-	return result;
-}
+static const struct table_column first_columns[] = {
+        COLUMN(CHARS, name, .title = "drop", .width = -20),
+        COLUMN(WORDS, drop.time, .title = "time (UTC)", .width = -16, .digits = 16),
+        COLUMN(WORDS, state, .title = "decision", .width = -11),
+        COLUMN(WORDS, drop.series.name, .key = "series"),
+        COLUMN(WHOLE, drop.number, .key = "number"),
+        COLUMN(WORDS, drop.series.campaign, .key = "campaign"),
+        COLUMN(WORDS, drop.series.scene_name, .key = "scene"),
+        COLUMN(NUMBER, drop.series.angle_deg, .key = "angle_deg"),
+        COLUMN(NUMBER, drop.series.height_m, .key = "height_m"),
+        COLUMN(WORDS, drop.time, .key = "time"),
+        COLUMN(WORDS, drop.state, .key = "state"),
+        COLUMN(WORDS, drop.decision, .key = "decision"),
+        COLUMN(WORDS, drop.reason, .key = "reason"),
+        COLUMN(WORDS, drop.operator_name, .key = "operator"),
+        COLUMN(WORDS, drop.note, .key = "note"),
+        COLUMN(WORDS, drop.version, .key = "version"),
+        COLUMN(WORDS, drop.quantities, .key = "quantities"),
+        COLUMN(WORDS, drop.flags, .key = "flags"),
+        COLUMN(KNOWN, drop.simulated, .key = "simulated"),
+};
+static const struct table_column value_columns[] = {
+#define QUANTITY_COLUMN(NAME, name, unit, ...) \
+	COLUMN(VALUE, value[ARCHIVE_##NAME], .key = name "_" unit, .sigma = name "_sigma_" unit),
+#include "host/result/quantity.def"
+};
+static const struct table_column last_columns[] = {
+        COLUMN(YES, drop.sealed, .key = "sealed"),   COLUMN(WORDS, drop.raw, .key = "raw"),
+        COLUMN(WORDS, drop.fault, .key = "fault"),   COLUMN(LARGE, drop.bytes, .key = "bytes", .csv = ""),
+        COLUMN(WORDS, drop.sha256, .key = "sha256"), COLUMN(ITEM, not_ok, .key = "not_ok"),
+        COLUMN(ITEM, events, .key = "events"),       COLUMN(CHARS, remarks, .title = "", .gap = ""),
+};
 
-static void put_values(struct builder *b, cJSON *item, const struct archive_drop *drop)
+enum { COLUMNS_MAX = TABLE_COUNT(first_columns) + 2 * ARCHIVE_VALUE_COUNT + TABLE_COUNT(last_columns) };
+
+static size_t all_columns(struct table_column column[COLUMNS_MAX])
 {
-	char key[PRINT_KEY_MAX];
-	cJSON *not_ok;
+	size_t count = TABLE_COUNT(first_columns);
 
-	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
-		print_key(key, (enum archive_value)i, "");
-		put_number(b, item, key, drop->value[i]);
-		print_key(key, (enum archive_value)i, "sigma_");
-		put_number(b, item, key, drop->sigma[i]);
-	}
-	not_ok = put_array(b, item, "not_ok");
-	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
-		if ((drop->not_ok >> i & 1u) != 0 && !isnan(drop->value[i]))
-			cJSON_AddItemToArray(not_ok,
-			                     cJSON_CreateString(archive_value_name((enum archive_value)i)));
+	memcpy(column, first_columns, sizeof(first_columns));
+	count += print_narrow(column + count, TABLE_VALUE, offsetof(struct drop_row, value));
+	memcpy(column + count, value_columns, sizeof(value_columns));
+	count += TABLE_COUNT(value_columns);
+	memcpy(column + count, last_columns, sizeof(last_columns));
+	return count + TABLE_COUNT(last_columns);
 }
 
-static int drop_json(void *context, const struct archive_drop *drop)
+/* ---- rows ---- */
+
+static int put_event(void *context, const struct archive_event *event)
+{
+	cJSON *item = cJSON_CreateObject();
+	struct builder b = {.failed = item == NULL};
+
+	put_text(&b, item, "time", event->time);
+	put_text(&b, item, "what", event->what);
+	put_text(&b, item, "operator", event->operator_name);
+	put_text(&b, item, "text", event->text);
+	if (!b.failed && cJSON_AddItemToArray(context, item))
+		return 0;
+	cJSON_Delete(item);
+	return DT_E_MEMORY;
+}
+
+static void fill_remarks(struct drop_row *row)
+{
+	const struct archive_drop *d = &row->drop;
+
+	snprintf(row->remarks, sizeof(row->remarks), "%s%s%s%s%s%s%s%s%s%s", d->fault[0] != '\0' ? " " : "",
+	         d->fault, !d->sealed && d->sha256[0] != '\0' ? " not sealed" : "",
+	         d->simulated ? " simulated tower" : "", d->flags[0] != '\0' ? " " : "", d->flags,
+	         d->reason[0] != '\0' ? "; " : "", d->reason, d->note[0] != '\0' ? "; " : "", d->note);
+}
+
+static void fill_values(struct print *p, struct drop_row *row)
+{
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		bool not_ok = (row->drop.not_ok >> i & 1u) != 0 && !isnan(row->drop.value[i]);
+
+		row->value[i] = (struct table_value){row->drop.value[i], row->drop.sigma[i], not_ok};
+		p->marked |= not_ok && quantity_columns[i].head[0] != '\0';
+		if (not_ok && row->not_ok != NULL)
+			cJSON_AddItemToArray(row->not_ok,
+			                     cJSON_CreateString(archive_value_name((enum archive_value)i)));
+	}
+}
+
+static int put_drop(void *context, const struct archive_drop *drop)
 {
 	struct print *p = context;
-	struct builder *b = &p->builder;
-	cJSON *item;
-	int result;
+	struct drop_row row = {.drop = *drop, .state = drop->decision};
+	int result = 0;
 
-	if (print_is_full(p))
+	if (table_is_full(&p->table))
 		return 0;
-	item = cJSON_CreateObject();
 	if (archive_counts(drop, p->undecided))
 		archive_cell_add(&p->total, drop);
 	p->faulty += archive_is_faulty(drop);
-	put_text(b, item, "series", drop->series.name);
-	put_number(b, item, "number", drop->number);
-	put_text(b, item, "campaign", drop->series.campaign);
-	put_text(b, item, "scene", drop->series.scene_name);
-	put_number(b, item, "angle_deg", drop->series.angle_deg);
-	put_number(b, item, "height_m", drop->series.height_m);
-	put_text(b, item, "time", drop->time);
-	put_text(b, item, "state", drop->state);
-	put_text(b, item, "fault", drop->fault);
-	put_item(b, item, "sealed", cJSON_CreateBool(drop->sealed));
-	put_text(b, item, "decision", drop->decision);
-	put_text(b, item, "reason", drop->reason);
-	put_text(b, item, "operator", drop->operator_name);
-	put_text(b, item, "note", drop->note);
-	put_text(b, item, "raw", drop->raw);
-	put_number(b, item, "bytes", (double)drop->bytes);
-	put_text(b, item, "sha256", drop->sha256);
-	put_item(b, item, "simulated", drop->simulated ? cJSON_CreateTrue() : cJSON_CreateNull());
-	if (drop->version != NULL)
-		put_text(b, item, "version", drop->version);
-	else
-		put_item(b, item, "version", cJSON_CreateNull());
-	put_text(b, item, "quantities", drop->quantities);
-	put_text(b, item, "flags", drop->flags);
-	put_values(b, item, drop);
-	result = p->with_events ? put_events(p, item, drop) : 0;
-	if (result != 0) {
-		cJSON_Delete(item);
-		return result;
+	if (drop->sha256[0] == '\0' || archive_is_faulty(drop))
+		row.state = drop->state;
+	snprintf(row.name, sizeof(row.name), "%s/%u", drop->series.name, drop->number);
+	if (p->table.format == TABLE_JSON)
+		row.not_ok = cJSON_CreateArray();
+	if (p->table.format == TABLE_JSON && p->with_events) {
+		row.events = cJSON_CreateArray();
+		result = archive_each_event(p->archive, row.name, put_event, row.events);
 	}
-	if (p->lines++ > 0)
-		fputc(',', p->out);
-	return put_part(b, item, p->out);
-}
-
-static int series_of_drops(void *context, const struct archive_series *series)
-{
-	struct print *p = context;
-	cJSON *object = cJSON_CreateObject();
-
-	put_series_keys(&p->builder, object, series);
-	put_text(&p->builder, object, "scene_text", series->scene);
-	p->lines++;
-	return put_part(&p->builder, object, p->out);
-}
-
-/* What stands for all that the archive holds. */
-static int put_seal(struct print *p)
-{
-	cJSON *object = cJSON_CreateObject();
-	struct archive_seal seal;
-	int result = archive_seal(p->archive, &seal);
-
+	fill_remarks(&row);
+	fill_values(p, &row);
 	if (result == 0) {
-		put_number(&p->builder, object, "entry", (double)seal.entry);
-		put_text(&p->builder, object, "head", seal.head);
-		return put_part(&p->builder, object, p->out);
+		table_row(&p->table, &row);
+	} else {
+		cJSON_Delete(row.events);
+		cJSON_Delete(row.not_ok);
 	}
-	cJSON_Delete(object);
 	return result;
 }
 
-static int put_total(struct print *p)
-{
-	cJSON *means = cJSON_CreateObject();
+/* ---- around them: JSON ---- */
 
-	put_number(&p->builder, means, "drops", p->total.drops);
-	for (int i = 0; i < ARCHIVE_VALUE_COUNT && p->total.drops > 0; i++)
-		put_mean(&p->builder, means, archive_value_name((enum archive_value)i), (enum archive_value)i,
-		         &p->total.value[i]);
-	return put_part(&p->builder, means, p->out);
+static int put_series(void *context, const struct archive_series *series)
+{
+	struct print *p = context;
+
+	p->has_series = true;
+	return table_object(print_series_columns, PRINT_SERIES_COLUMNS, series, p->table.out);
 }
 
-/* One after the other: there may be ten thousand. */
-static int drops_json(struct print *p, const struct archive_filter *filter)
+static const struct table_column total_columns[] = {
+        TABLE_COLUMN(WHOLE, struct archive_cell, drops, .key = "drops"),
+#define QUANTITY_COLUMN(NAME, name, unit, ...) \
+	PRINT_MEAN(struct archive_cell, value[ARCHIVE_##NAME], name, unit),
+#include "host/result/quantity.def"
+};
+static const struct table_column seal_columns[] = {
+        TABLE_COLUMN(LARGE, struct archive_seal, entry, .key = "entry"),
+        TABLE_COLUMN(CHARS, struct archive_seal, head, .key = "head"),
+};
+
+static int begin_json(struct print *p, const struct archive_filter *filter)
 {
 	int result = 0;
 
-	p->with_events = filter->series != NULL;
-	fputc('{', p->out);
+	fputc('{', p->table.out);
 	if (filter->series != NULL) {
-		fputs("\"series\":", p->out);
-		result = archive_each_series(p->archive, filter, series_of_drops, p);
-		fputs(p->lines > 0 ? "," : "{},", p->out);
+		fputs("\"series\":", p->table.out);
+		result = archive_each_series(p->archive, filter, put_series, p);
+		fputs(p->has_series ? "," : "{},", p->table.out);
 	}
-	p->lines = 0;
-	fputs("\"drops\":[", p->out);
-	if (result == 0)
-		result = archive_each_drop(p->archive, filter, drop_json, p);
-	fprintf(p->out, "],\"more\":%s,\"means\":", p->more ? "true" : "false");
-	if (result == 0)
-		result = put_total(p);
-	fputs(",\"seal\":", p->out);
-	if (result == 0)
-		result = put_seal(p);
-	fputs("}\n", p->out);
+	fputs("\"drops\":", p->table.out);
 	return result;
 }
 
-/* ---- CSV ---- */
-
-static int drop_csv(void *context, const struct archive_drop *drop)
+static int end_json(struct print *p)
 {
-	struct print *p = context;
+	FILE *out = p->table.out;
+	struct archive_seal seal;
+	int result;
 
-	if (print_is_full(p))
-		return 0;
-	p->lines++;
-	csv_text(p->out, drop->series.name);
-	fprintf(p->out, "%u,", drop->number);
-	csv_text(p->out, drop->series.campaign);
-	csv_text(p->out, drop->series.scene_name);
-	csv_number(p->out, drop->series.angle_deg);
-	csv_number(p->out, drop->series.height_m);
-	csv_text(p->out, drop->time);
-	csv_text(p->out, drop->state);
-	csv_text(p->out, drop->decision);
-	csv_text(p->out, drop->reason);
-	csv_text(p->out, drop->operator_name);
-	csv_text(p->out, drop->note);
-	csv_text(p->out, drop->version != NULL ? drop->version : "");
-	csv_text(p->out, drop->quantities);
-	csv_text(p->out, drop->flags);
-	fputs(drop->simulated ? "yes," : ",", p->out);
-	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
-		csv_number(p->out, drop->value[i]);
-		csv_number(p->out, drop->sigma[i]);
-	}
-	fprintf(p->out, "%s,%s,", drop->sealed ? "yes" : "", drop->raw);
-	csv_text(p->out, drop->fault);
-	fprintf(p->out, "%s\n", drop->sha256);
-	return 0;
+	fprintf(out, ",\"more\":%s,\"means\":", p->table.more ? "true" : "false");
+	result = table_object(total_columns, p->total.drops > 0 ? TABLE_COUNT(total_columns) : 1, &p->total,
+	                      out);
+	if (result == 0)
+		result = archive_seal(p->archive, &seal);
+	fputs(",\"seal\":", out);
+	if (result == 0)
+		result = table_object(seal_columns, TABLE_COUNT(seal_columns), &seal, out);
+	fputs("}\n", out);
+	return result;
 }
 
-static int drops_csv(struct print *p, const struct archive_filter *filter)
-{
-	char key[PRINT_KEY_MAX];
-
-	fputs("series,number,campaign,scene,angle_deg,height_m,time,state,decision,reason,operator,note,"
-	      "version,"
-	      "quantities,flags,simulated,",
-	      p->out);
-	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
-		print_key(key, (enum archive_value)i, "");
-		fprintf(p->out, "%s,", key);
-		print_key(key, (enum archive_value)i, "sigma_");
-		fprintf(p->out, "%s,", key);
-	}
-	fputs("sealed,raw,fault,sha256\n", p->out);
-	return archive_each_drop(p->archive, filter, drop_csv, p);
-}
-
-/* ---- text ---- */
-
-/* The columns of the table: a value times scale. */
-static const struct column {
-	enum archive_value value;
-	const char *title;
-	double scale;
-	int decimals;
-} columns[] = {
-        {ARCHIVE_S1_X, "S1 X", 1, 1},       {ARCHIVE_S1_Y, "S1 Y", 1, 1},
-        {ARCHIVE_S1_R, "S1 XY", 1, 1},      {ARCHIVE_S1_Z, "S1 Z", 1, 1},
-        {ARCHIVE_S2_X, "S2 X", 1, 1},       {ARCHIVE_S2_Y, "S2 Y", 1, 1},
-        {ARCHIVE_S2_R, "S2 XY", 1, 1},      {ARCHIVE_S2_Z, "S2 Z", 1, 1},
-        {ARCHIVE_LAG, "lag ms", 1000, 2},   {ARCHIVE_FREQUENCY, "plate Hz", 1, 1},
-        {ARCHIVE_DAMPING, "damping", 1, 3},
-};
-enum { COLUMNS = sizeof(columns) / sizeof(columns[0]) };
-
-static void put_cell(FILE *out, double value, int decimals, char mark)
-{
-	if (isnan(value))
-		fprintf(out, "%8s ", "-");
-	else
-		fprintf(out, "%8.*f%c", decimals, value, mark);
-}
-
-static int drop_text(void *context, const struct archive_drop *drop)
-{
-	struct print *p = context;
-	bool partial = drop->sha256[0] == '\0';
-	char name[ARCHIVE_NAME_MAX + 16];
-
-	if (print_is_full(p))
-		return 0;
-	if (archive_counts(drop, p->undecided))
-		archive_cell_add(&p->total, drop);
-	p->faulty += archive_is_faulty(drop);
-	if (p->lines++ == 0) {
-		fprintf(p->out, "%-20s %-16s %-11s", "drop", "time (UTC)", "decision");
-		for (int i = 0; i < COLUMNS; i++)
-			fprintf(p->out, "%8s ", columns[i].title);
-		fputc('\n', p->out);
-	}
-	snprintf(name, sizeof(name), "%s/%u", drop->series.name, drop->number);
-	fprintf(p->out, "%-20s %-16.16s %-11s", name, drop->time,
-	        partial || archive_is_faulty(drop) ? drop->state : drop->decision);
-	for (int i = 0; i < COLUMNS; i++) {
-		bool not_ok = (drop->not_ok >> columns[i].value & 1u) != 0;
-
-		put_cell(p->out, drop->value[columns[i].value] * columns[i].scale, columns[i].decimals,
-		         not_ok ? '*' : ' ');
-		p->marked |= not_ok && !isnan(drop->value[columns[i].value]);
-	}
-	if (drop->fault[0] != '\0')
-		fprintf(p->out, " %s", drop->fault);
-	if (!drop->sealed && !partial)
-		fputs(" not sealed", p->out);
-	if (drop->simulated)
-		fputs(" simulated tower", p->out);
-	fprintf(p->out, "%s%s%s%s%s%s\n", drop->flags[0] != '\0' ? " " : "", drop->flags,
-	        drop->reason[0] != '\0' ? "; " : "", drop->reason, drop->note[0] != '\0' ? "; " : "",
-	        drop->note);
-	return 0;
-}
+/* ---- around them: text ---- */
 
 static void total_text(const struct print *p)
 {
-	FILE *out = p->out;
+	struct drop_row row = {.state = ""};
+	struct table table = p->table;
 
-	fprintf(out, "\n%-49s", "mean");
-	for (int i = 0; i < COLUMNS; i++)
-		put_cell(out, p->total.value[columns[i].value].mean * columns[i].scale, columns[i].decimals,
-		         ' ');
-	fprintf(out, "\n%-49s", "SD");
-	for (int i = 0; i < COLUMNS; i++)
-		put_cell(out, p->total.value[columns[i].value].sd * columns[i].scale, columns[i].decimals + 1,
-		         ' ');
-	fprintf(out, "\n%-49s", p->undecided ? "n, accepted and undecided" : "n, accepted");
-	for (int i = 0; i < COLUMNS; i++)
-		fprintf(out, "%8u ", p->total.value[columns[i].value].n);
-	fputc('\n', out);
-}
+	fputc('\n', table.out);
+	table.limit = 0;
+	for (table.of = TABLE_VALUES; table.of <= TABLE_COUNTS; table.of++) {
+		const char *label = p->undecided ? "n, with undecided" : "n, accepted";
 
-static int seal_text(const struct print *p)
-{
-	struct archive_seal seal;
-	int result = archive_seal(p->archive, &seal);
-
-	if (result == 0 && seal.entry > 0)
-		fprintf(p->out, "chain of the archive: entry %lld, head %s\n", (long long)seal.entry,
-		        seal.head);
-	return result;
+		snprintf(row.name, sizeof(row.name), "%s",
+		         table.of == TABLE_VALUES ? "mean"
+		         : table.of == TABLE_SDS  ? "SD"
+		                                  : label);
+		archive_cell_row(&p->total, table.of, row.value);
+		table_row(&table, &row);
+	}
 }
 
 static int head_text(void *context, const struct archive_series *series)
 {
-	struct print *p = context;
-
-	fprintf(p->out, "%s, campaign %s: %s at %g deg from %g m, %u of %u drops recorded; peaks in g\n\n",
+	fprintf(context, "%s, campaign %s: %s at %g deg from %g m, %u of %u drops recorded; peaks in g\n\n",
 	        series->name, series->campaign, series->scene_name, series->angle_deg, series->height_m,
 	        series->recorded, series->planned);
 	return 0;
 }
 
-static int drops_text(struct print *p, const struct archive_filter *filter)
+static int end_text(const struct print *p, bool of_series)
 {
-	int result = 0;
+	FILE *out = p->table.out;
+	struct archive_seal seal = {.entry = 0};
+	int result = of_series ? archive_seal(p->archive, &seal) : 0;
 
-	if (filter->series != NULL)
-		result = archive_each_series(p->archive, filter, head_text, p);
-	if (result == 0)
-		result = archive_each_drop(p->archive, filter, drop_text, p);
-	if (result != 0)
-		return result;
-	if (p->lines == 0)
-		fputs("no drops\n", p->out);
-	else if (filter->series != NULL && p->total.drops > 0)
+	if (p->table.rows == 0)
+		fputs("no drops\n", out);
+	else if (of_series && p->total.drops > 0)
 		total_text(p);
-	else if (filter->series != NULL)
-		fputs("\nnone accepted yet: no mean\n", p->out);
+	else if (of_series)
+		fputs("\nnone accepted yet: no mean\n", out);
 	if (p->faulty > 0)
-		fprintf(p->out, "%u altered or missing, and in no mean\n", p->faulty);
+		fprintf(out, "%u altered or missing, and in no mean\n", p->faulty);
 	if (p->marked)
-		fputs("* look at its status: 'droptower analyze' on the log says what is the matter\n",
-		      p->out);
+		fputs("* look at its status: 'droptower analyze' on the log says what is the matter\n", out);
 	print_more(p);
-	return filter->series != NULL ? seal_text(p) : 0;
+	if (seal.entry > 0)
+		fprintf(out, "chain of the archive: entry %lld, head %s\n", (long long)seal.entry, seal.head);
+	return result;
 }
 
 int print_drops(struct archive *archive, const struct archive_filter *filter, bool undecided,
-                enum print_format format, FILE *out)
+                enum table_format format, FILE *out)
 {
-	struct print p = {.out = out, .archive = archive, .undecided = undecided};
+	struct print p = {.table = {.out = out, .format = format},
+	                  .archive = archive,
+	                  .undecided = undecided,
+	                  .with_events = filter->series != NULL};
 	struct archive_filter asked = print_begin(&p, filter);
+	struct table_column column[COLUMNS_MAX];
 	int result = 0;
 
 	if (filter->series != NULL)
 		result = archive_verify(archive, filter->series, filter->number, NULL, NULL);
-	if (result >= 0)
-		result = format == PRINT_JSON  ? drops_json(&p, &asked)
-		         : format == PRINT_CSV ? drops_csv(&p, &asked)
-		                               : drops_text(&p, &asked);
-	return result != 0 ? result : print_done(out);
+	if (result >= 0 && format == TABLE_JSON)
+		result = begin_json(&p, filter);
+	else if (result >= 0 && format == TABLE_TEXT && filter->series != NULL)
+		result = archive_each_series(archive, &asked, head_text, out);
+	if (result >= 0) {
+		table_begin(&p.table, column, all_columns(column));
+		result = archive_each_drop(archive, &asked, put_drop, &p);
+		table_end(&p.table);
+	}
+	if (result == 0 && format == TABLE_JSON)
+		result = end_json(&p);
+	else if (result == 0 && format == TABLE_TEXT)
+		result = end_text(&p, filter->series != NULL);
+	return print_done(result, &p.table);
 }

@@ -5,17 +5,12 @@
  * What the printers share.
  */
 #include "host/archive/print.h"
-#include "host/base/put.h"
 
 /* What is being printed, as the context of the archive_each_* calls. */
 struct print {
-	FILE *out;
+	struct table table;
 	struct archive *archive;
-	bool undecided, with_events;
-	struct builder builder;
-	cJSON *array;              /* of what is printed as JSON */
-	size_t lines, limit;       /* limit 0: none */
-	bool more;                 /* than limit */
+	bool undecided, with_events, has_series;
 	bool marked;               /* a value has a star */
 	unsigned faulty;           /* drops whose files are altered or missing */
 	struct archive_cell total; /* of the drops that count */
@@ -24,26 +19,25 @@ struct print {
 /* The filter of a list: one more than its limit is asked for, so that more can be told. */
 struct archive_filter print_begin(struct print *p, const struct archive_filter *filter);
 
-/* There is no room for another: for the head of each call. */
-bool print_is_full(struct print *p);
-
 /* Says in a line of text that there are more. */
 void print_more(const struct print *p);
 
-/* "name_unit", or "name_sigma_unit". */
-enum { PRINT_KEY_MAX = 48 };
-void print_key(char key[PRINT_KEY_MAX], enum archive_value value, const char *part);
+/* result, or what became of the table and of its stream. */
+int print_done(int result, const struct table *table);
 
-void put_mean(struct builder *b, cJSON *object, const char *key, enum archive_value value,
-              const struct archive_mean *mean);
-void put_series_keys(struct builder *b, cJSON *object, const struct archive_series *series);
+/* Of a series; its last, the text of the scene, is not in a list. */
+enum { PRINT_SERIES_COLUMNS = 15 };
+extern const struct table_column print_series_columns[PRINT_SERIES_COLUMNS];
 
-void csv_text(FILE *out, const char *text); /* quoted where it must be; then a comma */
-void csv_number(FILE *out, double value);   /* nothing when NAN; then a comma */
-void csv_mean(FILE *out, const struct archive_mean *mean);
-int print_done(FILE *out);
+/* Mean, SD and counts of a value; name: its group. */
+#define PRINT_MEAN(type, member, name, unit)                                               \
+	TABLE_COLUMN(NUMBER, type, member.mean, .key = "mean_" unit, .group = (name)),     \
+	        TABLE_COLUMN(NUMBER, type, member.sd, .key = "sd_" unit, .group = (name)), \
+	        TABLE_COLUMN(WHOLE, type, member.n, .key = "n", .group = (name)),          \
+	        TABLE_COLUMN(WHOLE, type, member.not_ok, .key = "not_ok", .csv = "", .group = (name))
 
-/* mean a / mean b; NAN where there is none. */
-double print_ratio(const struct archive_mean *a, const struct archive_mean *b);
+/* Text columns of the values that have a head in quantity.def, an array of all of them at offset in the row;
+ * TABLE_VALUE or TABLE_NUMBER. Returns how many. */
+size_t print_narrow(struct table_column column[ARCHIVE_VALUE_COUNT], enum table_kind kind, size_t offset);
 
 #endif

@@ -12,23 +12,16 @@ static const enum archive_value sensor_values[2][AXES] = {
         {ARCHIVE_S1_X, ARCHIVE_S1_Y, ARCHIVE_S1_R, ARCHIVE_S1_Z},
         {ARCHIVE_S2_X, ARCHIVE_S2_Y, ARCHIVE_S2_R, ARCHIVE_S2_Z},
 };
-static const char *const axis_keys[AXES] = {"x", "y", "r", "z"};
-static const char *const sensor_names[2] = {"S1", "S2"};
-
-/* What is not of one sensor. */
-static const enum archive_value others[] = {ARCHIVE_LAG,       ARCHIVE_LAG_FIRST,   ARCHIVE_LAG_DRIVEN,
-                                            ARCHIVE_FREQUENCY, ARCHIVE_THREE_CYCLE, ARCHIVE_DAMPING};
-enum { OTHERS = sizeof(others) / sizeof(others[0]) };
 
 static const struct archive_mean *mean_of(const struct archive_cell *cell, int sensor, int axis)
 {
 	return &cell->value[sensor_values[sensor][axis]];
 }
 
-/* The study's resultant is made of the means of X and Y; ours is the mean of the drops' own. */
-static double resultant_of_means(const struct archive_cell *cell, int sensor)
+/* mean a / mean b; NAN where there is none. */
+static double ratio(const struct archive_mean *a, const struct archive_mean *b)
 {
-	return hypot(mean_of(cell, sensor, X)->mean, mean_of(cell, sensor, Y)->mean);
+	return a->n > 0 && b->n > 0 && fabs(b->mean) > 0 ? a->mean / b->mean : (double)NAN;
 }
 
 static const struct archive_cell *reference_of(const struct archive_table *table,
@@ -40,136 +33,120 @@ static const struct archive_cell *reference_of(const struct archive_table *table
 	return found == cell ? NULL : found;
 }
 
-/* ---- JSON ---- */
+/* ---- JSON and CSV: a row for each sensor ---- */
 
-static void put_ratios(struct builder *b, cJSON *item, const char *key, const struct archive_cell *a,
-                       int of_a, const struct archive_cell *c, int of_c)
-{
-	cJSON *object;
+struct sensor_row {
+	struct archive_cell cell;
+	const char *sensor, *reference;
+	struct archive_mean mean[AXES];
+	double r_of_means_g, ratio[AXES], over[AXES];
+};
+#define COLUMN(KIND, member, ...) TABLE_COLUMN(KIND, struct sensor_row, member, __VA_ARGS__)
 
-	if (c == NULL) {
-		put_item(b, item, key, cJSON_CreateNull());
-		return;
-	}
-	object = put_object(b, item, key);
-	for (int axis = X; axis <= R; axis++)
-		put_number(b, object, axis_keys[axis],
-		           print_ratio(mean_of(a, of_a, axis), mean_of(c, of_c, axis)));
-}
+/* Where a cell stands; then what is of a sensor. */
+static const struct table_column sensor_columns[] = {
+        COLUMN(CHARS, cell.campaign, .key = "campaign"),
+        COLUMN(CHARS, cell.scene_name, .key = "scene"),
+        COLUMN(NUMBER, cell.angle_deg, .key = "angle_deg"),
+        COLUMN(NUMBER, cell.height_m, .key = "height_m"),
+        COLUMN(WORDS, sensor, .key = "sensor"),
+        COLUMN(WHOLE, cell.drops, .key = "drops"),
+        PRINT_MEAN(struct sensor_row, mean[X], "x", "g"),
+        PRINT_MEAN(struct sensor_row, mean[Y], "y", "g"),
+        PRINT_MEAN(struct sensor_row, mean[R], "r", "g"),
+        PRINT_MEAN(struct sensor_row, mean[Z], "z", "g"),
+        COLUMN(NUMBER, r_of_means_g, .key = "r_of_means_g"),
+        COLUMN(NUMBER, ratio[X], .key = "x", .group = "s1_over_s2"),
+        COLUMN(NUMBER, ratio[Y], .key = "y", .group = "s1_over_s2"),
+        COLUMN(NUMBER, ratio[R], .key = "r", .group = "s1_over_s2"),
+        COLUMN(NUMBER, over[X], .key = "x", .group = "over_reference"),
+        COLUMN(NUMBER, over[Y], .key = "y", .group = "over_reference"),
+        COLUMN(NUMBER, over[R], .key = "r", .group = "over_reference"),
+        COLUMN(WORDS, reference, .key = "reference"),
+        COLUMN(WHOLE, cell.faulty, .key = "faulty"),
+};
+#undef COLUMN
 
-static void put_place(struct builder *b, cJSON *item, const struct archive_cell *cell)
-{
-	put_text(b, item, "campaign", cell->campaign);
-	put_text(b, item, "scene", cell->scene_name);
-	put_number(b, item, "angle_deg", cell->angle_deg);
-	put_number(b, item, "height_m", cell->height_m);
-	put_number(b, item, "drops", cell->drops);
-	put_number(b, item, "faulty", cell->faulty);
-}
-
-static void put_sensor(struct builder *b, cJSON *array, const struct archive_cell *cell, int sensor,
+/* The study's resultant is made of the means of X and Y; ours is the mean of the drops' own. */
+static void put_sensor(struct table *table, const struct archive_cell *cell, int sensor,
                        const struct archive_cell *reference)
 {
-	cJSON *item = put_append(b, array);
+	struct sensor_row row = {.cell = *cell,
+	                         .sensor = sensor == 0 ? "S1" : "S2",
+	                         .reference = reference != NULL ? reference->scene_name : ""};
 
-	put_place(b, item, cell);
-	put_text(b, item, "sensor", sensor_names[sensor]);
-	for (int axis = X; axis < AXES; axis++)
-		put_mean(b, item, axis_keys[axis], sensor_values[sensor][axis], mean_of(cell, sensor, axis));
-	put_number(b, item, "r_of_means_g", resultant_of_means(cell, sensor));
-	put_ratios(b, item, "s1_over_s2", cell, 0, cell, 1);
-	put_text(b, item, "reference", reference != NULL ? reference->scene_name : "");
-	put_ratios(b, item, "over_reference", cell, sensor, reference, sensor);
-}
-
-static int tables_json(const struct archive_table *table, const char *reference, FILE *out)
-{
-	struct builder b = {false};
-	cJSON *root = cJSON_CreateObject(), *array = put_array(&b, root, "tables");
-
-	for (size_t i = 0; i < table->count; i++)
-		for (int sensor = 0; sensor < 2; sensor++)
-			put_sensor(&b, array, &table->cell[i], sensor,
-			           reference_of(table, &table->cell[i], reference));
-	array = put_array(&b, root, "plates");
-	for (size_t i = 0; i < table->count; i++) {
-		cJSON *item = put_append(&b, array);
-
-		put_place(&b, item, &table->cell[i]);
-		for (int k = 0; k < OTHERS; k++)
-			put_mean(&b, item, archive_value_name(others[k]), others[k],
-			         &table->cell[i].value[others[k]]);
+	for (int axis = X; axis < AXES; axis++) {
+		row.mean[axis] = *mean_of(cell, sensor, axis);
+		row.ratio[axis] = ratio(mean_of(cell, 0, axis), mean_of(cell, 1, axis));
+		row.over[axis] = reference != NULL ? ratio(&row.mean[axis], mean_of(reference, sensor, axis))
+		                                   : (double)NAN;
 	}
-	return put_out(&b, root, out);
+	row.r_of_means_g = hypot(row.mean[X].mean, row.mean[Y].mean);
+	table_row(table, &row);
 }
 
-/* ---- CSV ---- */
-
-static void sensor_csv(FILE *out, const struct archive_cell *cell, int sensor,
-                       const struct archive_cell *reference)
+static int put_sensors(struct table *out, const struct archive_table *table, const char *reference)
 {
-	csv_text(out, cell->campaign);
-	csv_text(out, cell->scene_name);
-	csv_number(out, cell->angle_deg);
-	csv_number(out, cell->height_m);
-	fprintf(out, "%s,%u,", sensor_names[sensor], cell->drops);
-	for (int axis = X; axis < AXES; axis++)
-		csv_mean(out, mean_of(cell, sensor, axis));
-	csv_number(out, resultant_of_means(cell, sensor));
-	for (int axis = X; axis <= R; axis++)
-		csv_number(out, print_ratio(mean_of(cell, 0, axis), mean_of(cell, 1, axis)));
-	for (int axis = X; axis <= R; axis++)
-		csv_number(out, reference != NULL ? print_ratio(mean_of(cell, sensor, axis),
-		                                                mean_of(reference, sensor, axis))
-		                                  : (double)NAN);
-	csv_text(out, reference != NULL ? reference->scene_name : "");
-	fprintf(out, "%u\n", cell->faulty);
-}
-
-static int tables_csv(const struct archive_table *table, const char *reference, FILE *out)
-{
-	fputs("campaign,scene,angle_deg,height_m,sensor,drops,", out);
-	for (int axis = X; axis < AXES; axis++)
-		fprintf(out, "%s_mean_g,%s_sd_g,%s_n,", axis_keys[axis], axis_keys[axis], axis_keys[axis]);
-	fputs("r_of_means_g,s1_over_s2_x,s1_over_s2_y,s1_over_s2_r,over_reference_x,over_reference_y,"
-	      "over_reference_r,reference,faulty\n",
-	      out);
+	table_begin(out, sensor_columns, TABLE_COUNT(sensor_columns));
 	for (size_t i = 0; i < table->count; i++)
 		for (int sensor = 0; sensor < 2; sensor++)
-			sensor_csv(out, &table->cell[i], sensor,
+			put_sensor(out, &table->cell[i], sensor,
 			           reference_of(table, &table->cell[i], reference));
-	return print_done(out);
+	return table_end(out);
+}
+
+/* ---- JSON: all that is of a cell ---- */
+
+#define COLUMN(KIND, member, ...) TABLE_COLUMN(KIND, struct archive_cell, member, __VA_ARGS__)
+#define MEAN(NAME, name, unit) PRINT_MEAN(struct archive_cell, value[ARCHIVE_##NAME], name, unit)
+static const struct table_column plate_columns[] = {
+        COLUMN(CHARS, campaign, .key = "campaign"),    COLUMN(CHARS, scene_name, .key = "scene"),
+        COLUMN(NUMBER, angle_deg, .key = "angle_deg"), COLUMN(NUMBER, height_m, .key = "height_m"),
+        COLUMN(WHOLE, drops, .key = "drops"),          COLUMN(WHOLE, faulty, .key = "faulty"),
+#define QUANTITY_COLUMN(NAME, name, unit, ...) MEAN(NAME, name, unit),
+#include "host/result/quantity.def"
+};
+#undef MEAN
+#undef COLUMN
+
+static int tables_json(struct table *out, const struct archive_table *table, const char *reference)
+{
+	int result;
+
+	fputs("{\"tables\":", out->out);
+	result = put_sensors(out, table, reference);
+	fputs(",\"plates\":", out->out);
+	table_begin(out, plate_columns, TABLE_COUNT(plate_columns));
+	for (size_t i = 0; i < table->count; i++)
+		table_row(out, &table->cell[i]);
+	result = table_end(out);
+	fputs("}\n", out->out);
+	return result;
 }
 
 /* ---- text ---- */
 
-static void number_text(FILE *out, double value, int width, int decimals)
-{
-	if (isnan(value))
-		fprintf(out, "%*s", width, "-");
-	else
-		fprintf(out, "%*.*f", width, decimals, value);
-}
+struct text_row {
+	char label[24];
+	double value[ARCHIVE_VALUE_COUNT];
+};
 
-/* A row of means, and one of SDs with a decimal more: they are small against their means. */
-static void cell_text(FILE *out, const struct archive_cell *cell)
+static void cell_text(struct table *table, const struct archive_cell *cell)
 {
+	struct text_row row;
 	char n[16];
 
-	fprintf(out, "%5g  mean", cell->angle_deg);
-	for (int k = 0; k < 2 * AXES; k++)
-		number_text(out, mean_of(cell, k / AXES, k % AXES)->mean, 9, 1);
-	number_text(out, cell->value[ARCHIVE_LAG].mean * 1000, 9, 2);
-	number_text(out, cell->value[ARCHIVE_FREQUENCY].mean, 9, 1);
-	number_text(out, cell->value[ARCHIVE_DAMPING].mean, 9, 3);
 	snprintf(n, sizeof(n), "n=%u", cell->drops);
-	fprintf(out, "\n%5s  SD  ", n);
-	for (int k = 0; k < 2 * AXES; k++)
-		number_text(out, mean_of(cell, k / AXES, k % AXES)->sd, 9, 2);
-	number_text(out, cell->value[ARCHIVE_LAG].sd * 1000, 9, 3);
-	number_text(out, cell->value[ARCHIVE_FREQUENCY].sd, 9, 2);
-	number_text(out, cell->value[ARCHIVE_DAMPING].sd, 9, 4);
-	fputc('\n', out);
+	snprintf(row.label, sizeof(row.label), "%5g  mean", cell->angle_deg);
+	for (table->of = TABLE_VALUES; table->of <= TABLE_SDS; table->of++) {
+		struct table_value value[ARCHIVE_VALUE_COUNT];
+
+		archive_cell_row(cell, table->of, value);
+		for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
+			row.value[i] = value[i].value;
+		table_row(table, &row);
+		snprintf(row.label, sizeof(row.label), "%5s  SD", n);
+	}
 }
 
 static bool same_scene(const struct archive_cell *a, const struct archive_cell *b)
@@ -180,21 +157,32 @@ static bool same_scene(const struct archive_cell *a, const struct archive_cell *
 
 static void means_text(const struct archive_table *table, FILE *out)
 {
+	struct table_column column[ARCHIVE_VALUE_COUNT + 1] = {
+	        TABLE_COLUMN(CHARS, struct text_row, label, .title = "  deg", .width = -11)};
+	size_t count = 1 + print_narrow(column + 1, TABLE_NUMBER, offsetof(struct text_row, value));
+	struct table means = {.out = out};
+
 	for (size_t i = 0; i < table->count; i++) {
 		const struct archive_cell *cell = &table->cell[i];
 
-		if (i == 0 || !same_scene(cell, cell - 1))
-			fprintf(out,
-			        "%s%s from %g m, campaign %s: peaks in g\n"
-			        "%5s      %9s%9s%9s%9s%9s%9s%9s%9s%9s%9s%9s\n",
-			        i > 0 ? "\n" : "", cell->scene_name, cell->height_m, cell->campaign, "deg",
-			        "S1 X", "S1 Y", "S1 XY", "S1 Z", "S2 X", "S2 Y", "S2 XY", "S2 Z", "lag ms",
-			        "plate Hz", "damping");
-		cell_text(out, cell);
+		if (i == 0 || !same_scene(cell, cell - 1)) {
+			fprintf(out, "%s%s from %g m, campaign %s: peaks in g\n", i > 0 ? "\n" : "",
+			        cell->scene_name, cell->height_m, cell->campaign);
+			table_begin(&means, column, count);
+		}
+		cell_text(&means, cell);
 		if (cell->faulty > 0)
 			fprintf(out, "%5s  %u accepted, but altered or missing, and in no mean\n", "",
 			        cell->faulty);
 	}
+}
+
+static void ratio_text(FILE *out, double value)
+{
+	if (isnan(value))
+		fprintf(out, "%7s", "-");
+	else
+		fprintf(out, "%7.2f", value);
 }
 
 static void ratios_text(const struct archive_table *table, const char *name, FILE *out)
@@ -207,36 +195,33 @@ static void ratios_text(const struct archive_table *table, const char *name, FIL
 
 		fprintf(out, "%-16s %7g %5g ", cell->scene_name, cell->height_m, cell->angle_deg);
 		for (int axis = X; axis <= R; axis++)
-			number_text(out, print_ratio(mean_of(cell, 0, axis), mean_of(cell, 1, axis)), 7, 2);
+			ratio_text(out, ratio(mean_of(cell, 0, axis), mean_of(cell, 1, axis)));
 		for (int k = 0; k < 6 && reference != NULL; k++)
-			number_text(
-			        out,
-			        print_ratio(mean_of(cell, k / 3, k % 3), mean_of(reference, k / 3, k % 3)), 7,
-			        2);
+			ratio_text(out, ratio(mean_of(cell, k / 3, k % 3), mean_of(reference, k / 3, k % 3)));
 		fprintf(out, "  %s\n", reference != NULL ? reference->scene_name : "");
 	}
 }
 
 int print_tables(struct archive *archive, const struct archive_filter *filter, bool undecided,
-                 const char *reference, enum print_format format, FILE *out)
+                 const char *reference, enum table_format format, FILE *out)
 {
+	struct table to = {.out = out, .format = format};
 	struct archive_table table;
 	int result = archive_table(archive, filter, undecided, &table);
 
 	if (result != 0)
 		return result;
-	if (format == PRINT_JSON) {
-		result = tables_json(&table, reference, out);
-	} else if (format == PRINT_CSV) {
-		result = tables_csv(&table, reference, out);
+	if (format == TABLE_JSON) {
+		result = tables_json(&to, &table, reference);
+	} else if (format == TABLE_CSV) {
+		result = put_sensors(&to, &table, reference);
 	} else {
 		means_text(&table, out);
 		if (table.count > 0)
 			ratios_text(&table, reference, out);
 		else
 			fputs("no accepted drop\n", out);
-		result = print_done(out);
 	}
 	archive_table_free(&table);
-	return result;
+	return print_done(result, &to);
 }

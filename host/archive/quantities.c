@@ -125,14 +125,9 @@ int quantities_shape(struct archive *archive)
 	for (int p = 0; p < QUANTITY_PLACES && result == 0; p++)
 		result = need_table(archive, &quantity_homes[p]);
 	for (int i = 0; i < QUANTITY_COLUMNS && result == 0; i++) {
-		const struct quantity_column *c = &quantity_columns[i];
-		char column[80];
-
-		snprintf(column, sizeof(column), "%s_%s", c->name, c->unit);
-		result = need_column(archive, "results", column);
-		snprintf(column, sizeof(column), "%s_sigma_%s", c->name, c->unit);
+		result = need_column(archive, "results", quantity_columns[i].value);
 		if (result == 0)
-			result = need_column(archive, "results", column);
+			result = need_column(archive, "results", quantity_columns[i].sigma);
 	}
 	return result;
 }

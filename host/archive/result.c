@@ -53,8 +53,7 @@ static void take(struct numbers *n, int which, struct result *said)
 static int update_columns(struct archive *archive, int64_t row, struct result *said)
 {
 	static const char text[] = "UPDATE results SET not_ok = ?"
-#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
-	", " name "_" unit " = ?, " name "_sigma_" unit " = ?"
+#define QUANTITY_COLUMN(NAME, name, unit, ...) ", " name "_" unit " = ?, " name "_sigma_" unit " = ?"
 #include "host/result/quantity.def"
 	                           " WHERE id = ?";
 	struct numbers n = {.not_ok = 0};

@@ -41,6 +41,20 @@ void archive_cell_add(struct archive_cell *cell, const struct archive_drop *drop
 		mean_add(&cell->value[i], drop->value[i], (drop->not_ok >> i & 1u) != 0);
 }
 
+void archive_cell_row(const struct archive_cell *cell, enum table_of of,
+                      struct table_value value[ARCHIVE_VALUE_COUNT])
+{
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		const struct archive_mean *m = &cell->value[i];
+
+		value[i] = (struct table_value){.value = of == TABLE_VALUES ? m->mean
+		                                         : of == TABLE_SDS  ? m->sd
+		                                                            : m->n,
+		                                .sigma = (double)NAN,
+		                                .marked = of == TABLE_VALUES && m->not_ok > 0};
+	}
+}
+
 bool archive_is_faulty(const struct archive_drop *drop)
 {
 	return strcmp(drop->state, "altered") == 0 || strcmp(drop->state, "missing") == 0;

@@ -5,6 +5,7 @@
  * Means and standard deviations of drops, by campaign, scene, height and angle.
  */
 #include "host/archive/archive.h"
+#include "host/base/table.h"
 
 struct archive_mean {
 	unsigned n;      /* drops that have the value */
@@ -22,6 +23,11 @@ struct archive_cell {
 	unsigned faulty; /* accepted, and left out since their files are altered or missing */
 	struct archive_mean value[ARCHIVE_VALUE_COUNT];
 };
+
+/* Means, SDs or counts of a cell, as a row of a table has them; a mean is marked when one of its values is.
+ */
+void archive_cell_row(const struct archive_cell *cell, enum table_of of,
+                      struct table_value value[ARCHIVE_VALUE_COUNT]);
 
 struct archive_table {
 	struct archive_cell *cell; /* in the order of campaign, scene, height and angle */

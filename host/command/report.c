@@ -64,7 +64,7 @@ static int write_csv(const struct series_report *request, const char *file)
 	if (result == 0)
 		result = whole_close(
 		        &whole,
-		        print_drops(request->archive, &filter, request->undecided, PRINT_CSV, whole.out),
+		        print_drops(request->archive, &filter, request->undecided, TABLE_CSV, whole.out),
 		        message, sizeof(message));
 	return result == 0 ? COMMAND_DONE : failed(message);
 }

@@ -34,7 +34,7 @@ static int print_failed(const struct archive *archive, int result)
 struct job {
 	struct archive *archive;
 	struct series_arguments *arguments;
-	int (*print)(struct job *job, enum print_format format, FILE *out);
+	int (*print)(struct job *job, enum table_format format, FILE *out);
 };
 
 static int print(struct job *job)
@@ -45,12 +45,12 @@ static int print(struct job *job)
 	int result;
 
 	if (a->csv == NULL) {
-		result = job->print(job, a->json ? PRINT_JSON : PRINT_TEXT, stdout);
+		result = job->print(job, a->json ? TABLE_JSON : TABLE_TEXT, stdout);
 		return result == 0 ? COMMAND_DONE : print_failed(job->archive, result);
 	}
 	result = whole_open(&whole, a->csv, message, sizeof(message));
 	if (result == 0)
-		result = whole_close(&whole, job->print(job, PRINT_CSV, whole.out), message, sizeof(message));
+		result = whole_close(&whole, job->print(job, TABLE_CSV, whole.out), message, sizeof(message));
 	if (result == 0)
 		return COMMAND_DONE;
 	command_error("%s",
@@ -58,23 +58,23 @@ static int print(struct job *job)
 	return COMMAND_INPUT;
 }
 
-static int print_list(struct job *job, enum print_format format, FILE *out)
+static int print_list(struct job *job, enum table_format format, FILE *out)
 {
 	return print_series(job->archive, &job->arguments->filter, format, out);
 }
 
-static int print_all(struct job *job, enum print_format format, FILE *out)
+static int print_all(struct job *job, enum table_format format, FILE *out)
 {
 	return print_drops(job->archive, &job->arguments->filter, job->arguments->undecided, format, out);
 }
 
-static int print_table(struct job *job, enum print_format format, FILE *out)
+static int print_table(struct job *job, enum table_format format, FILE *out)
 {
 	return print_tables(job->archive, &job->arguments->filter, job->arguments->undecided,
 	                    job->arguments->reference, format, out);
 }
 
-static int print_gains(struct job *job, enum print_format format, FILE *out)
+static int print_gains(struct job *job, enum table_format format, FILE *out)
 {
 	return print_calibrations(job->archive, format, out);
 }

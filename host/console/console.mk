@@ -11,7 +11,8 @@ CONSOLE_IN = host/console
 CONSOLE = $(BUILD)/droptower-console
 CONSOLE_ARCHIVE ?= $(BUILD)/console
 
-PAGE_FILES = $(filter-out %.json %.md,$(wildcard $(CONSOLE_IN)/page/*))
+COLUMNS_JS = $(BUILD)/generated/columns.js
+PAGE_FILES = $(filter-out %.json %.md %.in,$(wildcard $(CONSOLE_IN)/page/*)) $(COLUMNS_JS)
 UPLOT_FILES = $(BUILD)/npm/uplot.js $(BUILD)/npm/uplot.css
 PAGE_C = $(BUILD)/generated/page_parts.c
 PAGE_O = $(BUILD)/obj/page_parts.o
@@ -22,6 +23,11 @@ $(UPLOT_FILES) &: $(CONSOLE_IN)/page/package.json $(CONSOLE_IN)/page/package-loc
 	$(Q)cd $(BUILD)/npm && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error >/dev/null
 	$(Q)cp $(BUILD)/npm/node_modules/uplot/dist/uPlot.esm.js $(BUILD)/npm/uplot.js
 	$(Q)cp $(BUILD)/npm/node_modules/uplot/dist/uPlot.min.css $(BUILD)/npm/uplot.css
+
+$(COLUMNS_JS): $(CONSOLE_IN)/page/columns.js.in host/result/quantity.def
+	$(call say,CPP,$@)
+	$(Q)mkdir -p $(@D)
+	$(Q)$(CPP) -P -I. -x c $< >$@.new && mv $@.new $@
 
 $(PAGE_C): $(CONSOLE_IN)/embed $(PAGE_FILES) $(UPLOT_FILES)
 	$(call say,EMBED,$@)

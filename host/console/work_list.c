@@ -98,22 +98,22 @@ static void answer(struct job *job,
 
 static int series_json(struct archive *archive, const struct wanted *w, FILE *out)
 {
-	return print_series(archive, &w->filter, PRINT_JSON, out);
+	return print_series(archive, &w->filter, TABLE_JSON, out);
 }
 
 static int drops_json(struct archive *archive, const struct wanted *w, FILE *out)
 {
-	return print_drops(archive, &w->filter, w->undecided, PRINT_JSON, out);
+	return print_drops(archive, &w->filter, w->undecided, TABLE_JSON, out);
 }
 
 static int drops_csv(struct archive *archive, const struct wanted *w, FILE *out)
 {
-	return print_drops(archive, &w->filter, w->undecided, PRINT_CSV, out);
+	return print_drops(archive, &w->filter, w->undecided, TABLE_CSV, out);
 }
 
 static int tables_json(struct archive *archive, const struct wanted *w, FILE *out)
 {
-	return print_tables(archive, &w->filter, w->undecided, NULL, PRINT_JSON, out);
+	return print_tables(archive, &w->filter, w->undecided, NULL, TABLE_JSON, out);
 }
 
 void work_series(struct job *job)

@@ -37,7 +37,7 @@ static void head(struct page *page)
 		fprintf(out, ", frame %.3f m/s between the light gates", r->frame_speed_m_s);
 	fputs(r->is_drop ? ". " : "", out);
 	fputs("<span class=\"soft file\">", out);
-	page_text(out, r->file);
+	html_text(out, r->file);
 	fprintf(out, " (%s%s)</span></p>\n<div class=\"verdict %s\">%s %s</div>\n", r->format,
 	        record_lacks_seal(r) ? ", not sealed" : "", good ? "good" : "bad",
 	        good ? "&#10003;" : "&#9888;", verdict);
@@ -62,7 +62,7 @@ static void band(struct page *page)
 	if (!page->error) {
 		fprintf(page->out, "<div><div class=\"verdict %s\">%s ", band->verdict.pass ? "good" : "bad",
 		        band->verdict.pass ? "&#10003;" : "&#9888;");
-		page_text(page->out, line.bytes);
+		html_text(page->out, line.bytes);
 		fputs("</div></div>\n", page->out);
 	}
 	free(line.bytes);
@@ -94,25 +94,25 @@ static void cards(struct page *page)
 
 		snprintf(label, sizeof(label), "%s, resultant peak", r->sensor);
 		page_begin_card(out, label);
-		page_with_sigma(out, 1, r->peak_g, r->sigma_g);
+		html_with_sigma(out, 1, r->peak_g, r->sigma_g);
 		page_end_card(out, "g", unless_ok(r->how.status, axes_note(r)));
 	}
 	if (a->has_lag) {
 		page_begin_card(out, "S1 after S2");
 		if (report_driven(page->report)) {
-			page_with_sigma(out, 3, a->lag.driven_s * 1e3, a->lag.sigma_driven_s * 1e3);
+			html_with_sigma(out, 3, a->lag.driven_s * 1e3, a->lag.sigma_driven_s * 1e3);
 			page_end_card(out, "ms", "as a driven oscillator");
 		} else {
-			page_number(out, 3, a->lag.largest_peak_s * 1e3);
+			html_number(out, 3, a->lag.largest_peak_s * 1e3);
 			page_end_card(out, "ms", unless_ok(a->lag.status, "between largest peaks"));
 		}
 	}
 	if (a->has_plate) {
 		page_begin_card(out, "Plate frequency, damped");
-		page_number(out, 1, a->plate.frequency_hz);
+		html_number(out, 1, a->plate.frequency_hz);
 		page_end_card(out, "Hz", unless_ok(a->plate.how.status, "ring-down of S1"));
 		page_begin_card(out, "Plate damping ratio");
-		page_number(out, 3, a->plate.damping_ratio);
+		html_number(out, 3, a->plate.damping_ratio);
 		page_end_card(out, "", unless_ok(a->plate.how.status, "of critical"));
 	}
 	fputs("</div>\n", out);
@@ -126,7 +126,7 @@ static void notes(struct page *page, const struct report_note *note, size_t coun
 
 		if (first)
 			fprintf(page->out, "<li><b>%s</b>: ", estimate_flag_name(note[i].flag));
-		page_text(page->out, note[i].of);
+		html_text(page->out, note[i].of);
 		if (last)
 			fprintf(page->out, ": %s.</li>", report_note_words(note[i].flag));
 		else

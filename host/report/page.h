@@ -3,8 +3,9 @@
 #define DT_HOST_REPORT_PAGE_H
 /*
  * HTML pages while they are written: what the page of a drop (html.c, page_*.c) and that of a series
- * (series*.c) share. page_text is for everybody who writes HTML.
+ * (series*.c) share.
  */
+#include "host/base/html.h"
 #include "host/record/text.h"
 #include "host/report/facts.h"
 
@@ -18,14 +19,6 @@ struct page {
 	char *message;
 	size_t size;
 };
-
-/* A text of the user's, escaped: harmless between tags and within a quoted attribute. */
-void page_text(FILE *out, const char *text);
-void page_text_part(FILE *out, const char *text, size_t length);
-
-/* A dash when it is not known. */
-void page_number(FILE *out, int decimals, double value);
-void page_with_sigma(FILE *out, int decimals, double value, double sigma);
 
 /* A row of model against measured: up to the measured value's cell, which is open, and from its end on. */
 void page_begin_compared(FILE *out, const struct report_row *row);

@@ -21,7 +21,7 @@ static void inline_svg(FILE *out, const char *svg, bool first, const char *label
 	if (!s)
 		return;
 	fputs("<svg role=\"img\" aria-label=\"", out);
-	page_text(out, label);
+	html_text(out, label);
 	fputc('"', out);
 	s += strlen("<svg");
 	while (*s) {

@@ -20,9 +20,9 @@ static void picture_of_channel(struct page *page, size_t channel)
 	page_channel_name(page->out, c->name);
 	fputs("</b><span>", page->out);
 	if (isfinite(e->peak.value_g)) {
-		page_with_sigma(page->out, 1, e->peak.value_g, e->peak.sigma_g);
+		html_with_sigma(page->out, 1, e->peak.value_g, e->peak.sigma_g);
 		fputs(" g at ", page->out);
-		page_number(page->out, 3, (e->peak.time_s - page->zero.time_s) * 1e3);
+		html_number(page->out, 3, (e->peak.time_s - page->zero.time_s) * 1e3);
 		fputs(" ms ", page->out);
 	}
 	if (strcmp(report_channel_status(e, status, sizeof(status)), "ok") != 0)
@@ -99,7 +99,7 @@ static void traces(struct page *page)
 	fputs("<h2>Traces around the impact</h2>\n<p class=\"soft\">Baselines taken off, otherwise as "
 	      "recorded. Time 0: ",
 	      page->out);
-	page_text(page->out, page->zero.name);
+	html_text(page->out, page->zero.name);
 	if (report_video(page->report, &page->zero, video, sizeof(video)))
 		fprintf(page->out, ". %s", video);
 	fputs(any_model(page->report) ? ". The model is laid so that its S2 peaks where S2 did.</p>\n"

@@ -17,17 +17,17 @@ static void result_row(struct page *page, size_t i)
 	fputs("<tr><td>", out);
 	page_channel_name(out, c->name);
 	fputs("</td><td>", out);
-	page_number(out, 1, c->rate_hz);
+	html_number(out, 1, c->rate_hz);
 	fputs("</td><td>", out);
-	page_with_sigma(out, 2, e->peak.value_g, e->peak.sigma_g);
+	html_with_sigma(out, 2, e->peak.value_g, e->peak.sigma_g);
 	fputs("</td><td>", out);
-	page_with_sigma(out, 4, (e->peak.time_s - page->zero.time_s) * 1e3, e->peak.sigma_time_s * 1e3);
+	html_with_sigma(out, 4, (e->peak.time_s - page->zero.time_s) * 1e3, e->peak.sigma_time_s * 1e3);
 	fputs("</td><td>", out);
-	page_with_sigma(out, 3, e->pulse.duration_s * 1e3, e->pulse.sigma_duration_s * 1e3);
+	html_with_sigma(out, 3, e->pulse.duration_s * 1e3, e->pulse.sigma_duration_s * 1e3);
 	fputs("</td><td>", out);
-	page_with_sigma(out, 3, e->pulse.velocity_change_m_s, e->pulse.sigma_velocity_m_s);
+	html_with_sigma(out, 3, e->pulse.velocity_change_m_s, e->pulse.sigma_velocity_m_s);
 	fputs("</td><td>", out);
-	page_number(out, 2, e->baseline.noise_g);
+	html_number(out, 2, e->baseline.noise_g);
 	fprintf(out, "</td><td class=\"text\">%s</td></tr>\n",
 	        report_channel_status(e, status, sizeof(status)));
 }
@@ -47,9 +47,9 @@ static void results(struct page *page)
 		const struct estimate_resultant *r = &a->resultants[i];
 
 		fprintf(out, "<tr><td>%s X, Y</td><td></td><td>", r->sensor);
-		page_with_sigma(out, 2, r->peak_g, r->sigma_g);
+		html_with_sigma(out, 2, r->peak_g, r->sigma_g);
 		fputs("</td><td>", out);
-		page_with_sigma(out, 4, (r->time_s - page->zero.time_s) * 1e3, r->sigma_time_s * 1e3);
+		html_with_sigma(out, 4, (r->time_s - page->zero.time_s) * 1e3, r->sigma_time_s * 1e3);
 		fputs("</td><td colspan=\"3\" class=\"text soft\">", out);
 		if (isfinite(r->axes_apart_s))
 			fprintf(out, "Y peaks %.3f ms %s X", fabs(r->axes_apart_s) * 1e3,
@@ -73,7 +73,7 @@ static void joint_rows(FILE *out, enum quantity_object which, const void *object
 		if (!q->label[0] || (optional && !isfinite(value)))
 			continue;
 		fprintf(out, "<tr><td>%s</td><td>", q->label + optional);
-		page_with_sigma(out, q->digits, value * scale, quantity_sigma(q, object) * scale);
+		html_with_sigma(out, q->digits, value * scale, quantity_sigma(q, object) * scale);
 		fprintf(out, " %s</td><td class=\"text\">%s</td></tr>\n", q->shown,
 		        estimate_status_name(quantity_status(q, object)));
 	}
@@ -110,16 +110,16 @@ static void model(struct page *page)
 	if (!count)
 		return;
 	fputs("<h2>Model against drop</h2>\n<p class=\"soft\">Model ", out);
-	page_text(out, page->report->prediction->fidelity);
+	html_text(out, page->report->prediction->fidelity);
 	fputs(", ", out);
-	page_text(out, page->report->prediction->reason);
+	html_text(out, page->report->prediction->reason);
 	fputs(".</p>\n<div class=\"scroll\"><table "
 	      "class=\"small\"><tr><th>quantity</th><th>model</th><th>measured</th>"
 	      "<th>difference</th></tr>\n",
 	      out);
 	for (size_t i = 0; i < count; i++) {
 		page_begin_compared(out, &rows[i]);
-		page_with_sigma(out, rows[i].decimals, rows[i].measured * rows[i].scale,
+		html_with_sigma(out, rows[i].decimals, rows[i].measured * rows[i].scale,
 		                rows[i].sigma * rows[i].scale);
 		page_end_compared(out, &rows[i]);
 	}

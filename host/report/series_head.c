@@ -152,7 +152,7 @@ static void card(struct series_page *page, const char *label, enum archive_value
 	if (!page->cell.drops || !m->n)
 		return;
 	page_begin_card(page->page.out, label);
-	page_number(page->page.out, decimals, m->mean * scale);
+	html_number(page->page.out, decimals, m->mean * scale);
 	if (m->n > 1)
 		snprintf(note, sizeof(note), "SD %.*f, %u drops%s", decimals, m->sd * scale, m->n,
 		         m->not_ok ? ", see remarks" : "");
@@ -190,10 +190,10 @@ void series_head(struct series_page *page)
 	page_begin(out, scene->title[0] ? scene->title : scene->name, more.bytes);
 	free(more.bytes);
 	fputs("<p>Drop series <b>", out);
-	page_text(out, page->series.name);
+	html_text(out, page->series.name);
 	fprintf(out, "</b>: dropped from %g m at %g&deg;. <span class=\"soft\">Campaign ",
 	        scene->drop_height_m, scene->drop_angle_deg);
-	page_text(out, page->series.campaign);
+	html_text(out, page->series.campaign);
 	fprintf(out, "</span></p>\n<div class=\"verdict %s\">%s %s</div>\n", good ? "good" : "bad",
 	        good ? "&#10003;" : "&#9888;", line);
 	simulated(page);
@@ -220,7 +220,7 @@ static void subject_product(const struct series_page *page)
 
 	fputs("<div><table class=\"facts\">", out);
 	begin_fact(out, "geometry");
-	page_text(out, s->name);
+	html_text(out, s->name);
 	end_fact(out);
 	begin_fact(out, "outside");
 	fprintf(out, "%g &times; %g &times; %g mm", s->product_length_m * 1e3, s->product_width_m * 1e3,
@@ -342,7 +342,7 @@ static void fact_operators(const struct series_page *page)
 		if (before < i || !name[0])
 			continue;
 		fputs(named++ ? ", " : "", out);
-		page_text(out, name);
+		html_text(out, name);
 	}
 	fputs(named ? "" : "&ndash;", out);
 	end_fact(out);
@@ -357,7 +357,7 @@ void series_time(FILE *out, const char *time)
 		return;
 	}
 	snprintf(text, sizeof(text), "%.10s %.5s", time, time + 11);
-	page_text(out, text);
+	html_text(out, text);
 }
 
 static void fact_when(const struct series_page *page)

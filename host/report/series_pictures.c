@@ -63,15 +63,15 @@ static void drop_heading(FILE *out, const struct series_drop *drop)
 	series_time(out, drop->a.time);
 	if (isfinite(drop->a.value[ARCHIVE_S1_R]) || isfinite(drop->a.value[ARCHIVE_S2_R])) {
 		fputs(", resultants: S1 ", out);
-		page_with_sigma(out, 1, drop->a.value[ARCHIVE_S1_R], drop->a.sigma[ARCHIVE_S1_R]);
+		html_with_sigma(out, 1, drop->a.value[ARCHIVE_S1_R], drop->a.sigma[ARCHIVE_S1_R]);
 		fputs(" g, S2 ", out);
-		page_with_sigma(out, 1, drop->a.value[ARCHIVE_S2_R], drop->a.sigma[ARCHIVE_S2_R]);
+		html_with_sigma(out, 1, drop->a.value[ARCHIVE_S2_R], drop->a.sigma[ARCHIVE_S2_R]);
 		fputs(" g", out);
 	}
 	fputs("</span></h3>\n", out);
 	if (drop->a.note[0]) {
 		fputs("<p>Note: ", out);
-		page_text(out, drop->a.note);
+		html_text(out, drop->a.note);
 		fputs("</p>\n", out);
 	}
 }
@@ -99,7 +99,7 @@ static void excluded_reason(FILE *out, const struct series_drop *drop)
 	fprintf(out, "<p><b>%c%s</b>", decision[0] - 'a' + 'A', decision + 1);
 	if (!strcmp(decision, "rejected")) {
 		fputs(": ", out);
-		page_text(out, drop->a.reason[0] ? drop->a.reason : "no reason was noted");
+		html_text(out, drop->a.reason[0] ? drop->a.reason : "no reason was noted");
 	} else if (archive_is_faulty(&drop->a)) {
 		fputs(": what is kept of it is not what was recorded, or is not there", out);
 	} else if (!strcmp(decision, "undecided")) {

@@ -150,7 +150,7 @@ static void tell(FILE *out, struct remarks *remarks, size_t first, size_t counte
 		if (r->flag != flag || r->kind != kind)
 			continue;
 		fputs(told++ ? "; " : "", out);
-		page_text(out, r->of);
+		html_text(out, r->of);
 		fputs(r->of[0] ? " of " : "", out);
 		if (r->count == counted)
 			fputs("all drops", out);
@@ -199,13 +199,13 @@ static void record_row(FILE *out, const struct series_drop *drop)
 	fprintf(out, "<tr><td>%u</td><td class=\"text\">", drop->a.number);
 	series_time(out, drop->a.time);
 	fputs("</td><td class=\"text\">", out);
-	page_text(out, drop->a.operator_name);
+	html_text(out, drop->a.operator_name);
 	fputs("</td><td>", out);
-	page_number(out, 3, r->frame_speed_m_s > 0.0 ? r->frame_speed_m_s : (double)NAN);
+	html_number(out, 3, r->frame_speed_m_s > 0.0 ? r->frame_speed_m_s : (double)NAN);
 	fputs("</td><td class=\"text wrap\">", out);
-	page_text(out, drop->no_log[0] ? drop->no_log : verdict[0] ? verdict : "no result");
+	html_text(out, drop->no_log[0] ? drop->no_log : verdict[0] ? verdict : "no result");
 	fputs("</td><td class=\"text\">", out);
-	page_text(out, drop->a.version ? drop->a.version : "no result");
+	html_text(out, drop->a.version ? drop->a.version : "no result");
 	fputs("</td></tr>\n", out);
 }
 
@@ -228,9 +228,9 @@ static void logs(const struct series_page *page)
 		const struct series_drop *d = page->drop[i];
 
 		fprintf(out, "<tr><td>%u</td><td class=\"text wrap hash\">", d->a.number);
-		page_text(out, d->a.raw);
+		html_text(out, d->a.raw);
 		fputs("<br>", out);
-		page_text(out, d->a.sha256[0] ? d->a.sha256 : "none: never finished");
+		html_text(out, d->a.sha256[0] ? d->a.sha256 : "none: never finished");
 		fprintf(out, "</td><td>%" PRId64 "</td></tr>\n", d->a.bytes);
 	}
 	fputs("</tbody></table></div>\n", out);
@@ -279,11 +279,11 @@ static int history_row(void *context, const struct archive_event *event)
 	fprintf(h->out, "<tr><td>%u</td><td class=\"text\">", h->drop);
 	series_time(h->out, event->time);
 	fputs("</td><td class=\"text\">", h->out);
-	page_text(h->out, event->what);
+	html_text(h->out, event->what);
 	fputs("</td><td class=\"text\">", h->out);
-	page_text(h->out, event->operator_name);
+	html_text(h->out, event->operator_name);
 	fputs("</td><td class=\"text wrap\">", h->out);
-	page_text(h->out, event->text);
+	html_text(h->out, event->text);
 	fputs("</td></tr>\n", h->out);
 	return 0;
 }
@@ -311,11 +311,11 @@ static int calibration_row(void *context, const struct archive_calibration *c)
 
 	fputs(h->rows++ ? "" : "<ul>", h->out);
 	fputs("<li><b>", h->out);
-	page_text(h->out, c->sensor);
+	html_text(h->out, c->sensor);
 	fprintf(h->out, "</b>: gain %.6g on ", c->gain);
-	page_text(h->out, c->date);
+	html_text(h->out, c->date);
 	fputs(c->note[0] ? ", " : "", h->out);
-	page_text(h->out, c->note);
+	html_text(h->out, c->note);
 	fputs("</li>\n", h->out);
 	return 0;
 }

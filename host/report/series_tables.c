@@ -4,28 +4,6 @@
 
 #include "host/report/series_private.h"
 
-struct column {
-	enum archive_value value;
-	const char *title;
-	double scale;
-	int decimals;
-};
-
-static const struct column peaks[] = {
-        {ARCHIVE_S1_X, "S1 X", 1.0, 1},  {ARCHIVE_S1_Y, "S1 Y", 1.0, 1}, {ARCHIVE_S1_R, "S1 XY", 1.0, 1},
-        {ARCHIVE_S1_Z, "S1 Z", 1.0, 1},  {ARCHIVE_S2_X, "S2 X", 1.0, 1}, {ARCHIVE_S2_Y, "S2 Y", 1.0, 1},
-        {ARCHIVE_S2_R, "S2 XY", 1.0, 1}, {ARCHIVE_S2_Z, "S2 Z", 1.0, 1},
-};
-static const struct column others[] = {
-        {ARCHIVE_LAG, "lag, largest peaks, ms", 1e3, 3},
-        {ARCHIVE_LAG_FIRST, "first peaks, ms", 1e3, 3},
-        {ARCHIVE_LAG_DRIVEN, "driven, ms", 1e3, 3},
-        {ARCHIVE_FREQUENCY, "plate, Hz", 1.0, 2},
-        {ARCHIVE_THREE_CYCLE, "counted over three cycles, Hz", 1.0, 2},
-        {ARCHIVE_DAMPING, "damping ratio", 1.0, 4},
-};
-enum { PEAKS = sizeof(peaks) / sizeof(peaks[0]), OTHERS = sizeof(others) / sizeof(others[0]) };
-
 const char *series_decision(const struct series_drop *drop)
 {
 	if (!drop->a.sha256[0] || archive_is_faulty(&drop->a))
@@ -35,85 +13,73 @@ const char *series_decision(const struct series_drop *drop)
 
 /* ---- drops, mean, SD, n ---- */
 
-static void drop_row(FILE *out, const struct series_drop *drop, const struct column *column, size_t count)
-{
-	fprintf(out, "<tr%s><td>%u</td><td class=\"text\">%s</td>", drop->counts ? "" : " class=\"out\"",
-	        drop->a.number, series_decision(drop));
-	for (size_t i = 0; i < count; i++) {
-		const struct column *c = &column[i];
+struct drop_row {
+	char name[16];
+	const char *decision;
+	struct table_value value[ARCHIVE_VALUE_COUNT];
+};
 
-		fputs("<td>", out);
-		page_with_sigma(out, c->decimals, drop->a.value[c->value] * c->scale,
-		                drop->a.sigma[c->value] * c->scale);
-		if (isfinite(drop->a.value[c->value]) && (drop->a.not_ok >> c->value & 1u))
-			fputc('*', out);
-		fputs("</td>", out);
-	}
-	fputs("</tr>\n", out);
+static void put_drop(struct table *table, const struct series_drop *drop)
+{
+	struct drop_row row = {.decision = series_decision(drop)};
+
+	snprintf(row.name, sizeof(row.name), "%u", drop->a.number);
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
+		row.value[i] = (struct table_value){drop->a.value[i], drop->a.sigma[i],
+		                                    (drop->a.not_ok >> i & 1u) != 0};
+	table->row_class = drop->counts ? "" : " class=\"out\"";
+	table_row(table, &row);
 }
 
-static void mean_row(FILE *out, const char *label, bool first)
+static void put_total(struct table *table, const struct archive_cell *cell)
 {
-	fprintf(out, "<tr class=\"mean%s\"><td>%s</td><td></td>", first ? " first" : "", label);
+	static const char *const names[] = {"mean", "SD", "n"};
+	struct drop_row row = {.decision = ""};
+
+	for (table->of = TABLE_VALUES; table->of <= TABLE_COUNTS; table->of++) {
+		snprintf(row.name, sizeof(row.name), "%s", names[table->of]);
+		table->row_class = table->of == TABLE_VALUES ? " class=\"mean first\"" : " class=\"mean\"";
+		archive_cell_row(cell, table->of, row.value);
+		table_row(table, &row);
+	}
 }
 
-static void mean_rows(const struct series_page *page, const struct column *column, size_t count)
+static bool is_filled(const struct series_page *page, int value)
 {
-	const struct archive_mean *m = page->cell.value;
-	FILE *out = page->page.out;
-
-	mean_row(out, "mean", true);
-	for (size_t i = 0; i < count; i++) {
-		fputs("<td>", out);
-		page_number(out, column[i].decimals, m[column[i].value].mean * column[i].scale);
-		fputs(m[column[i].value].not_ok ? "*</td>" : "</td>", out);
-	}
-	fputs("</tr>\n", out);
-	mean_row(out, "SD", false);
-	for (size_t i = 0; i < count; i++) {
-		fputs("<td>", out);
-		page_number(out, column[i].decimals + 1, m[column[i].value].sd * column[i].scale);
-		fputs("</td>", out);
-	}
-	fputs("</tr>\n", out);
-	mean_row(out, "n", false);
-	for (size_t i = 0; i < count; i++)
-		fprintf(out, "<td>%u</td>", m[column[i].value].n);
-	fputs("</tr>\n", out);
-}
-
-/* Those of the columns that any drop has a value for; how many. */
-static size_t filled(const struct series_page *page, const struct column *all, size_t count,
-                     struct column *column)
-{
-	size_t kept = 0;
-
-	for (size_t i = 0; i < count; i++) {
-		bool any = false;
-
-		for (size_t k = 0; k < page->count; k++)
-			any |= isfinite(page->drop[k]->a.value[all[i].value]);
-		if (any)
-			column[kept++] = all[i];
-	}
-	return kept;
-}
-
-static void table(const struct series_page *page, const struct column *all, size_t most)
-{
-	struct column column[ARCHIVE_VALUE_COUNT];
-	size_t count = filled(page, all, most, column);
-	FILE *out = page->page.out;
-
-	fputs("<div class=\"scroll\"><table><thead><tr><th>drop</th><th class=\"text\"></th>", out);
-	for (size_t i = 0; i < count; i++)
-		fprintf(out, "<th>%s</th>", column[i].title);
-	fputs("</tr></thead><tbody>\n", out);
 	for (size_t i = 0; i < page->count; i++)
-		drop_row(out, page->drop[i], column, count);
+		if (isfinite(page->drop[i]->a.value[value]))
+			return true;
+	return false;
+}
+
+/* Those columns of quantity.def, in g or in other units, that any drop has a value for. */
+static void put_table(const struct series_page *page, bool in_g)
+{
+	struct table_column column[ARCHIVE_VALUE_COUNT + 2] = {
+	        TABLE_COLUMN(CHARS, struct drop_row, name, .title = "drop"),
+	        TABLE_COLUMN(WORDS, struct drop_row, decision, .title = "", .width = -1)};
+	struct table table = {.out = page->page.out, .format = TABLE_HTML};
+	size_t count = 2;
+
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		const struct quantity_column *c = &quantity_columns[i];
+
+		if ((strcmp(c->shown, "g") == 0) == in_g && is_filled(page, i))
+			column[count++] =
+			        (struct table_column){.kind = TABLE_VALUE,
+			                              .offset = offsetof(struct drop_row, value) +
+			                                        (size_t)i * sizeof(struct table_value),
+			                              .title = c->title,
+			                              .unit = in_g ? "" : c->shown,
+			                              .digits = c->digits,
+			                              .scale = quantity_column_scale(c)};
+	}
+	table_begin(&table, column, count);
+	for (size_t i = 0; i < page->count; i++)
+		put_drop(&table, page->drop[i]);
 	if (page->cell.drops)
-		mean_rows(page, column, count);
-	fputs("</tbody></table></div>\n", out);
+		put_total(&table, &page->cell);
+	(void)table_end(&table);
 }
 
 void series_results(struct series_page *page)
@@ -125,14 +91,14 @@ void series_results(struct series_page *page)
 		fputs("<p class=\"soft\">No drop was made yet.</p>\n", out);
 		return;
 	}
-	table(page, peaks, PEAKS);
+	put_table(page, true);
 	fputs("<p class=\"note\">&plusmn; is one standard uncertainty of that drop. XY: largest resultant of "
 	      "X "
 	      "and "
 	      "Y. SD: standard deviation of a single drop, over n &minus; 1. Struck through: in no mean. "
 	      "*: see the remarks.</p>\n<h2>Lag of S1 behind S2, and the plate</h2>\n",
 	      out);
-	table(page, others, OTHERS);
+	put_table(page, false);
 	fputs("<p class=\"note\">Lag between the largest and between the first peaks, and as that of an "
 	      "oscillator which S2 drives. Frequency and damping from the free ring-down of S1.</p>\n",
 	      out);
@@ -209,9 +175,9 @@ static void model_reason(const struct series_page *page)
 	FILE *out = page->page.out;
 
 	fputs("<p>Taken: <b>", out);
-	page_text(out, p->fidelity);
+	html_text(out, p->fidelity);
 	fputs("</b>, ", out);
-	page_text(out, p->reason);
+	html_text(out, p->reason);
 	fputs(". ", out);
 	if (p->next != MODEL_AUTO && isfinite(p->next_change))
 		fprintf(out, "The next rung, %s, would change it by %.1f %%. ", model_fidelity_name(p->next),
@@ -220,7 +186,7 @@ static void model_reason(const struct series_page *page)
 		fputs("There is no rung above it. ", out);
 	if (page->has_below) {
 		fputs("The next simpler one is ", out);
-		page_text(out, page->below.fidelity);
+		html_text(out, page->below.fidelity);
 		fputs(".", out);
 	}
 	fputs("</p>\n", out);
@@ -250,9 +216,9 @@ static void model_rows(const struct series_page *page)
 	      out);
 	for (size_t i = 0; i < count; i++) {
 		page_begin_compared(out, &rows[i]);
-		page_number(out, rows[i].decimals, rows[i].measured * rows[i].scale);
+		html_number(out, rows[i].decimals, rows[i].measured * rows[i].scale);
 		fputs("</td><td>", out);
-		page_number(out, rows[i].decimals,
+		html_number(out, rows[i].decimals,
 		            row_sd(&means, page->cell.value, &rows[i]) * rows[i].scale);
 		page_end_compared(out, &rows[i]);
 	}

@@ -111,10 +111,16 @@ const struct quantity_home quantity_homes[QUANTITY_PLACES] = {
 };
 
 const struct quantity_column quantity_columns[QUANTITY_COLUMNS] = {
-#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
-	{name, unit, QUANTITY_AT_##PLACE, subject, key, title, shown, digits},
+#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, head, shown, digits)          \
+	{name, unit,  name "_" unit, name "_sigma_" unit, QUANTITY_AT_##PLACE, subject, key, title, \
+	 head, shown, digits},
 #include "host/result/quantity.def"
 };
+
+double quantity_column_scale(const struct quantity_column *column)
+{
+	return quantity_scale(quantity_find(quantity_homes[column->place].object, column->key));
+}
 
 /* ---- texts ---- */
 

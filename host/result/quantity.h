@@ -51,13 +51,14 @@ extern const struct quantity_home quantity_homes[QUANTITY_PLACES];
 
 /* A value of a drop in tables of drops: column NAME_UNIT, and NAME_sigma_UNIT. */
 struct quantity_column {
-	const char *name, *unit;
+	const char *name, *unit, *value, *sigma;
 	enum quantity_place place;
-	const char *subject, *key, *title, *shown;
+	const char *subject, *key, *title, *head, *shown;
 	int digits;
 };
 enum {
-#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) QUANTITY_COLUMN_##NAME,
+#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, head, shown, digits) \
+	QUANTITY_COLUMN_##NAME,
 #include "host/result/quantity.def"
 	QUANTITY_COLUMNS
 };
@@ -87,6 +88,7 @@ void quantity_clear(enum quantity_object which, void *object);
 
 /* What a number is times to be shown: 1000 for s as ms. */
 double quantity_scale(const struct quantity *quantity);
+double quantity_column_scale(const struct quantity_column *column);
 
 /* Status of an object; ok where it has none. */
 enum estimate_status quantity_object_status(enum quantity_object which, const void *object);

@@ -68,7 +68,7 @@ void bench_archive_list(void *context)
 	struct archive *archive = open_it(ARCHIVE_READ);
 
 	(void)context;
-	must(archive, print_series(archive, &filter, PRINT_TEXT, nowhere));
+	must(archive, print_series(archive, &filter, TABLE_TEXT, nowhere));
 }
 
 void bench_archive_filter(void *context)
@@ -80,7 +80,7 @@ void bench_archive_filter(void *context)
 	filter.angle_deg = 25;
 	filter.from = "2026-05-02";
 	filter.to = "2026-05-04";
-	must(archive, print_drops(archive, &filter, false, PRINT_TEXT, nowhere));
+	must(archive, print_drops(archive, &filter, false, TABLE_TEXT, nowhere));
 }
 
 void bench_archive_text(void *context)
@@ -90,7 +90,7 @@ void bench_archive_text(void *context)
 
 	(void)context;
 	filter.text = "CABLE bench";
-	must(archive, print_drops(archive, &filter, false, PRINT_JSON, nowhere));
+	must(archive, print_drops(archive, &filter, false, TABLE_JSON, nowhere));
 }
 
 void bench_archive_newest(void *context)
@@ -101,7 +101,7 @@ void bench_archive_newest(void *context)
 	(void)context;
 	filter.text = "cable";
 	filter.limit = 100;
-	must(archive, print_series(archive, &filter, PRINT_JSON, nowhere));
+	must(archive, print_series(archive, &filter, TABLE_JSON, nowhere));
 }
 
 void bench_archive_tables(void *context)
@@ -110,5 +110,5 @@ void bench_archive_tables(void *context)
 	struct archive *archive = open_it(ARCHIVE_READ);
 
 	(void)context;
-	must(archive, print_tables(archive, &filter, false, NULL, PRINT_JSON, nowhere));
+	must(archive, print_tables(archive, &filter, false, NULL, TABLE_JSON, nowhere));
 }

@@ -18,12 +18,11 @@ static const char drops[] =
         " FROM series, n WHERE name LIKE 'bulk-%%'";
 static const char results[] = "INSERT OR IGNORE INTO versions (name, first_used) VALUES ('bulk', '2026');"
                               "INSERT INTO results (drop_id, version_id, time, not_ok, flags"
-#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
-	"," name "_" unit "," name "_sigma_" unit
+#define QUANTITY_COLUMN(NAME, name, unit, ...) "," name "_" unit "," name "_sigma_" unit
 #include "host/result/quantity.def"
                               ") SELECT d.id, v.id, d.time, 0, ''"
-#define QUANTITY_COLUMN(NAME, name, unit, PLACE, subject, key, title, shown, digits) \
-	",CASE '" name                                                               \
+#define QUANTITY_COLUMN(NAME, name, unit, ...) \
+	",CASE '" name                         \
 	"' WHEN 's1_x' THEN 290 + 10 * number WHEN 's2_x' THEN 580 + 20 * number ELSE 1 END, 0.5"
 #include "host/result/quantity.def"
                               " FROM drops d, versions v WHERE v.name = 'bulk' AND raw LIKE 'raw/bulk-%%';"

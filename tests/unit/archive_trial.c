@@ -131,7 +131,7 @@ struct trial_seen trial_look(struct archive *archive, const char *series, unsign
 	return seen;
 }
 
-char *trial_printed(struct archive *archive, const struct archive_filter *filter, enum print_format format,
+char *trial_printed(struct archive *archive, const struct archive_filter *filter, enum table_format format,
                     bool drops)
 {
 	char *text = NULL;

@@ -50,7 +50,7 @@ struct trial_seen trial_look(struct archive *archive, const char *series, unsign
                              const char *version);
 
 /* What `series drops` prints, else `series list`; to be freed. */
-char *trial_printed(struct archive *archive, const struct archive_filter *filter, enum print_format format,
+char *trial_printed(struct archive *archive, const struct archive_filter *filter, enum table_format format,
                     bool drops);
 
 sqlite3 *trial_index(void); /* to be closed */

@@ -109,13 +109,13 @@ static void test_a_simulated_drop_says_so(void **state)
 	assert_int_equal(archive_finish(archive, &r, 0, ""), 0);
 	assert_false(trial_look(archive, "one", 1, NULL).simulated);
 	assert_true(trial_look(archive, "one", 2, NULL).simulated);
-	text = trial_printed(archive, &filter, PRINT_JSON, true);
+	text = trial_printed(archive, &filter, TABLE_JSON, true);
 	root = cJSON_Parse(text);
 	assert_true(cJSON_IsNull(nth(root, "drops", 0, "simulated")));
 	assert_true(cJSON_IsTrue(nth(root, "drops", 1, "simulated")));
 	cJSON_Delete(root);
 	free(text);
-	text = trial_printed(archive, &filter, PRINT_TEXT, true);
+	text = trial_printed(archive, &filter, TABLE_TEXT, true);
 	assert_non_null(strstr(text, "simulated tower"));
 	assert_null(strstr(strstr(text, "simulated tower") + 1, "simulated tower"));
 	free(text);

@@ -114,14 +114,14 @@ static char *listing(void)
 	FILE *out = open_memstream(&text, &size);
 
 	assert_non_null(out);
-	assert_int_equal(print_series(archive, &filter, PRINT_JSON, out), 0);
-	assert_int_equal(print_drops(archive, &filter, true, PRINT_JSON, out), 0);
-	assert_int_equal(print_drops(archive, &filter, true, PRINT_CSV, out), 0);
-	assert_int_equal(print_calibrations(archive, PRINT_JSON, out), 0);
+	assert_int_equal(print_series(archive, &filter, TABLE_JSON, out), 0);
+	assert_int_equal(print_drops(archive, &filter, true, TABLE_JSON, out), 0);
+	assert_int_equal(print_drops(archive, &filter, true, TABLE_CSV, out), 0);
+	assert_int_equal(print_calibrations(archive, TABLE_JSON, out), 0);
 	filter.series = "one"; /* with the history of each drop */
-	assert_int_equal(print_drops(archive, &filter, true, PRINT_JSON, out), 0);
+	assert_int_equal(print_drops(archive, &filter, true, TABLE_JSON, out), 0);
 	filter.version = "v1";
-	assert_int_equal(print_drops(archive, &filter, true, PRINT_JSON, out), 0);
+	assert_int_equal(print_drops(archive, &filter, true, TABLE_JSON, out), 0);
 	fclose(out);
 	archive_close(archive);
 	return text;

@@ -158,7 +158,7 @@ static void test_json_of_nothing(void **state)
 
 		filter.angle_deg = i == 2 ? 80 : NAN;
 		filter.number = i == 1 ? 7 : 0;
-		text = trial_printed(archive, &filter, PRINT_JSON, true);
+		text = trial_printed(archive, &filter, TABLE_JSON, true);
 		tree = cJSON_Parse(text);
 		assert_non_null(tree);
 		assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(tree, "drops")), i == 0);
@@ -182,7 +182,7 @@ static void check_found(struct archive *archive, const char *text, unsigned limi
 
 	filter.text = text;
 	filter.limit = limit;
-	json = trial_printed(archive, &filter, PRINT_JSON, drops);
+	json = trial_printed(archive, &filter, TABLE_JSON, drops);
 	root = cJSON_Parse(json);
 	assert_non_null(root);
 	cJSON_ArrayForEach(item, cJSON_GetObjectItem(root, list))
@@ -291,7 +291,7 @@ static void test_a_limit_takes_the_newest_and_tells_of_more(void **state)
 	trial_sql("UPDATE drops SET time = '2026-01-09T08:00:00Z' WHERE id = 3");
 	check_found(archive, NULL, 2, "drops", "rig_b/1 box/1 more");
 	filter.limit = 2;
-	text = trial_printed(archive, &filter, PRINT_TEXT, false);
+	text = trial_printed(archive, &filter, TABLE_TEXT, false);
 	assert_non_null(strstr(text, "there are more: these are the newest 2"));
 	free(text);
 	archive_close(archive);

@@ -552,10 +552,10 @@ static void check_list(void (*run)(struct job *job), const char *asked, const ch
 	FILE *out = open_memstream(&text, &size);
 
 	assert_non_null(out);
-	assert_int_equal(what == 0   ? print_series(archive, filter, PRINT_JSON, out)
-	                 : what == 1 ? print_drops(archive, filter, undecided, PRINT_JSON, out)
-	                 : what == 2 ? print_tables(archive, filter, undecided, NULL, PRINT_JSON, out)
-	                             : print_drops(archive, filter, undecided, PRINT_CSV, out),
+	assert_int_equal(what == 0   ? print_series(archive, filter, TABLE_JSON, out)
+	                 : what == 1 ? print_drops(archive, filter, undecided, TABLE_JSON, out)
+	                 : what == 2 ? print_tables(archive, filter, undecided, NULL, TABLE_JSON, out)
+	                             : print_drops(archive, filter, undecided, TABLE_CSV, out),
 	                 0);
 	fclose(out);
 	assert_int_equal(job.status, 200);

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* What was dropped before: search, decide, lay any drops over each other, take tables and reports home. */
 import { download, getJson } from "./api.js";
+import { COLUMNS } from "./columns.js";
 import { attempt, button, byId, el, setText, show, table } from "./dom.js";
 import { Overlay } from "./overlay.js";
 import { dropTable, isBusy } from "./table.js";
-import { COLUMNS, degrees, number, time, withSigma } from "./words.js";
+import { degrees, number, time, withSigma } from "./words.js";
 
 const ROWS = 100; /* of series, the newest, then a button for more */
-const PLATE = COLUMNS.slice(8); /* what is not of one sensor */
+const PLATE = COLUMNS.filter(({ unit }) => unit !== "g"); /* what is not of one sensor */
 
 const chosen = new Set();
 let overlay = null;

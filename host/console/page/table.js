@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Drops in a table, with what can be decided and noted of each. */
 import { post } from "./api.js";
+import { COLUMNS } from "./columns.js";
 import { attempt, button, el, table } from "./dom.js";
 import { holding } from "./hold.js";
-import { COLUMNS, decimalsOf, number, plain, time } from "./words.js";
+import { decimalsOf, number, plain, time } from "./words.js";
 
 export const REASONS = [
 	"hit the wrong corner",

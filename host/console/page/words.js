@@ -120,30 +120,6 @@ export const FAULTS = {
 	short_s2: "S2 cable shorted",
 };
 
-/* The columns of every table of drops: JSON key of a drop, key of the means, unit of both, head, scale, decimals. */
-const column = (mean, unit, head, shown, scale = 1, decimals = 1) => ({
-	mean,
-	unit,
-	head,
-	shown,
-	scale,
-	decimals,
-	key: `${mean}_${unit}`,
-});
-export const COLUMNS = [
-	column("s1_x", "g", "S1 X", "g"),
-	column("s1_y", "g", "S1 Y", "g"),
-	column("s1_r", "g", "S1 XY", "g"),
-	column("s1_z", "g", "S1 Z", "g"),
-	column("s2_x", "g", "S2 X", "g"),
-	column("s2_y", "g", "S2 Y", "g"),
-	column("s2_r", "g", "S2 XY", "g"),
-	column("s2_z", "g", "S2 Z", "g"),
-	column("lag_largest_peak", "s", "lag", "ms", 1000, 3),
-	column("frequency", "hz", "plate", "Hz"),
-	column("damping", "ratio", "damping", "", 1, 4),
-];
-
 export function number(value, decimals = 1) {
 	if (value === null || value === undefined || !Number.isFinite(value)) return "–";
 	const text = value.toFixed(decimals);

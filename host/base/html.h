@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_BASE_HTML_H
+#define DT_HOST_BASE_HTML_H
+/*
+ * Texts and numbers within HTML.
+ */
+#include <stddef.h>
+#include <stdio.h>
+
+/* A text of the user's, escaped: harmless between tags and within a quoted attribute. */
+void html_text(FILE *out, const char *text);
+void html_text_part(FILE *out, const char *text, size_t length);
+
+/* A dash when it is not known. */
+void html_number(FILE *out, int decimals, double value);
+void html_with_sigma(FILE *out, int decimals, double value, double sigma);
+
+#endif
