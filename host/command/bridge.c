@@ -9,12 +9,12 @@
 #include "common/wire_table.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
-#include "host/command/journal.h"
+#include "host/session/journal.h"
 #include "host/command/notify.h"
-#include "host/command/mac.h"
-#include "host/command/publish.h"
-#include "host/command/session.h"
-#include "host/command/tower_setup.h"
+#include "host/session/mac.h"
+#include "host/session/publish.h"
+#include "host/session/session.h"
+#include "host/session/tower_setup.h"
 
 enum {
 	SAY_EVERY_MS = 1000,
@@ -309,7 +309,7 @@ static int serve(struct bridge *bridge)
 	int result = 0;
 
 	notify("READY=1");
-	while (result == 0 && !command_interrupted()) {
+	while (result == 0 && !interrupt_came()) {
 		notify_alive();
 		result = session_poll(bridge->session, 5);
 		while (result == 0 && lcm_handle_timeout(bridge->publisher->lcm, 0) > 0)
@@ -342,11 +342,12 @@ static int bridge_session(struct bridge *bridge)
 		code = COMMAND_LINK;
 	}
 	if (code == COMMAND_DONE && bridge->scene_file != NULL) {
-		code = tower_setup_hear(bridge->session, message);
-		if (code == COMMAND_DONE)
-			code = tower_setup_write(bridge->session, &bridge->scene, message);
-		if (code != COMMAND_DONE)
-			command_error("%s", message);
+		int result = tower_setup_hear(bridge->session, message);
+
+		if (result == 0)
+			result = tower_setup_write(bridge->session, &bridge->scene, message);
+		if (result != 0)
+			code = command_tower_failed(result, message);
 	}
 	if (code == COMMAND_DONE)
 		code = serve(bridge);
@@ -383,7 +384,7 @@ int command_bridge(int argc, char **argv)
 		code = read_key(&bridge);
 	if (code != COMMAND_DONE)
 		return code;
-	command_catch_signals();
+	interrupt_catch();
 	bridge.publisher = publisher_open(bridge.lcm, message);
 	if (bridge.publisher == NULL) {
 		command_error("%s", message);

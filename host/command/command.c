@@ -1,17 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/command/command.h"
 
-#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
-#include <string.h>
 #include <sys/stat.h>
 
 #include "common/base/number.h"
 #include "common/error.h"
 #include "common/scenes/scene.h"
-
-static volatile sig_atomic_t interrupted;
 
 void command_error(const char *format, ...)
 {
@@ -52,26 +48,15 @@ int command_link_failed(const char *doing, int result)
 	return COMMAND_LINK;
 }
 
-static void on_signal(int number)
+int command_tower_failed(int result, const char *message)
 {
-	interrupted = number;
-}
+	static const int refusals[] = {DT_E_STATE, DT_E_RANGE, DT_E_HASH, DT_E_PARAMETERS};
+	bool refused = interrupt_came();
 
-void command_catch_signals(void)
-{
-	struct sigaction action;
-
-	memset(&action, 0, sizeof(action));
-	action.sa_handler = on_signal;
-	sigemptyset(&action.sa_mask);
-	sigaction(SIGINT, &action, NULL);
-	sigaction(SIGTERM, &action, NULL);
-	signal(SIGPIPE, SIG_IGN);
-}
-
-int command_interrupted(void)
-{
-	return interrupted != 0;
+	command_error("%s", message);
+	for (size_t i = 0; i < sizeof(refusals) / sizeof(refusals[0]); i++)
+		refused |= result == refusals[i];
+	return refused ? COMMAND_REFUSED : COMMAND_LINK;
 }
 
 int command_stopped(void)

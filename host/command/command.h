@@ -8,6 +8,7 @@
 #include <stdbool.h>
 
 #include "common/base/option.h"
+#include "host/base/interrupt.h"
 
 enum command_exit {
 	COMMAND_DONE = 0,
@@ -49,9 +50,8 @@ bool command_is_input(const char *name, const char *out, const char *in);
 /* A call on a session or link failed with result: says so and returns COMMAND_LINK. */
 int command_link_failed(const char *doing, int result);
 
-/* Set by SIGINT and SIGTERM once command_catch_signals was called. */
-void command_catch_signals(void);
-int command_interrupted(void);
+/* A tower that was not heard, or not set up (tower_setup.h): says why, returns COMMAND_LINK or _REFUSED. */
+int command_tower_failed(int result, const char *message);
 
 /* Interrupted before anything was released: says so and returns COMMAND_REFUSED. */
 int command_stopped(void);

@@ -9,7 +9,7 @@
 #include "common/wire_table.h"
 #include "host/command/command.h"
 #include "host/command/release.h"
-#include "host/command/tower_setup.h"
+#include "host/session/tower_setup.h"
 
 enum { STATUS_WAIT_MS = 1500, COUNTERS_WAIT_MS = 5000, FALL_MS = 20000 };
 
@@ -45,7 +45,7 @@ static int wait_for_status(struct session *session, bool counters)
 	const struct session_view *view = session_view(session);
 	int64_t start_ms = session_now_ms();
 
-	while (!command_interrupted() && (!view->seen || (counters && !all_counters(view)))) {
+	while (!interrupt_came() && (!view->seen || (counters && !all_counters(view)))) {
 		int64_t waited_ms = session_now_ms() - start_ms;
 		int result;
 
@@ -107,9 +107,9 @@ static int follow_fall(struct session *session)
 		if (!wire_state_moving(view->state) && view->state != WIRE_STATE_ARMED)
 			return aborted || view->state == WIRE_STATE_FAULT_HELD ? COMMAND_REFUSED
 			                                                       : COMMAND_DONE;
-		if (result == 0 && command_interrupted() && !aborted)
+		if (result == 0 && interrupt_came() && !aborted)
 			result = session_command(session, WIRE_OP_ABORT);
-		aborted |= command_interrupted() != 0;
+		aborted |= interrupt_came() != 0;
 	}
 	return command_link_failed("following the fall", result != 0 ? result : DT_E_TIMEOUT);
 }
@@ -119,13 +119,11 @@ static int arm(struct session *session, bool unattended)
 	struct release release = {.session = session, .unattended = unattended, .say = say};
 	const struct session_view *view = session_view(session);
 	char message[SESSION_MESSAGE_MAX];
-	int code = tower_setup_hear(session, message);
-	int result = code == COMMAND_DONE ? session_read_parameters(session) : 0;
+	int result = tower_setup_hear(session, message), code;
 
-	if (code != COMMAND_DONE) {
-		command_error("%s", message);
-		return code;
-	}
+	if (result != 0)
+		return command_tower_failed(result, message);
+	result = session_read_parameters(session);
 	if (result == 0)
 		fprintf(stderr, "tower     separation at %u mm, dampers at %u mm, drop-out %.1f ms\n",
 		        view->parameters[WIRE_PARAMETER_separation_um] / 1000,
@@ -351,7 +349,7 @@ int command_ctl(int argc, char **argv)
 		return command_usage("ctl", "--unattended goes with arm");
 	if (arguments.url == NULL)
 		arguments.url = "can:can0";
-	command_catch_signals();
+	interrupt_catch();
 	if (strcmp(order.verb, "arm") == 0)
 		code = release_consent("ctl", arguments.unattended);
 	return code == COMMAND_DONE ? with_session(&arguments, &order) : code;

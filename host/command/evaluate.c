@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "common/units.h"
-#include "host/command/beside.h"
+#include "host/base/beside.h"
 #include "host/command/command.h"
 #include "host/estimate/cfc.h"
 #include "host/estimate/filter.h"

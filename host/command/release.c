@@ -8,7 +8,7 @@
 #include "common/wire_table.h"
 #include "host/command/command.h"
 #include "host/command/terminal.h"
-#include "host/command/tower_setup.h"
+#include "host/session/tower_setup.h"
 
 enum {
 	READY_STATUSES = 60 * SESSION_STATUSES_HZ, /* unattended: somebody may have to close a door */
@@ -189,7 +189,7 @@ static int arm(struct release *release)
 {
 	int result = session_command(release->session, WIRE_OP_ARM);
 
-	if (command_interrupted())
+	if (interrupt_came())
 		return stop(release, true);
 	return sent(release, result);
 }
@@ -206,7 +206,7 @@ static int let_fall(struct release *release)
 	if (result == DT_E_STATE && release->unattended)
 		return COMMAND_DONE; /* it has disarmed: why is seen in its next status */
 	/* an interrupted release may have worked: what follows aborts it and looks */
-	if (result != 0 && !command_interrupted())
+	if (result != 0 && !interrupt_came())
 		return refused(release, result);
 	say(release, "released");
 	return COMMAND_DONE;
@@ -256,7 +256,7 @@ static int turn(struct release *release)
 	int result = session_poll(release->session, 20);
 	enum release_phase phase;
 
-	if (command_interrupted())
+	if (interrupt_came())
 		return stop(release, false);
 	if (result != 0)
 		return command_link_failed("waiting for the checks", result);

@@ -12,7 +12,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "host/command/session.h"
+#include "host/session/session.h"
 
 enum release_phase {
 	RELEASE_HEARD,

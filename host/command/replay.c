@@ -12,8 +12,8 @@
 #include "common/wire.h"
 #include "common/wire_table.h"
 #include "host/command/command.h"
-#include "host/command/publish.h"
-#include "host/command/session.h"
+#include "host/session/publish.h"
+#include "host/session/session.h"
 #include "host/record/lcm_log.h"
 
 static const double CENTURY_S = 3.15e9;
@@ -61,7 +61,7 @@ static void keep_pace(struct pace *pace, int64_t time_us)
 	whole_s = floor(after_s);
 	due.tv_sec = pace->start.tv_sec + (time_t)whole_s;
 	due.tv_nsec = (long)((after_s - whole_s) * 1e9);
-	while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, NULL) == EINTR && !command_interrupted())
+	while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, NULL) == EINTR && !interrupt_came())
 		continue;
 }
 
@@ -105,7 +105,7 @@ static int listen_on_link(const struct replay *replay, struct link *to, int64_t 
 			return refuse(replay);
 		if (result == 0 && left_ms <= 0)
 			return COMMAND_DONE;
-	} while (!command_interrupted());
+	} while (!interrupt_came());
 	return COMMAND_DONE;
 }
 
@@ -154,8 +154,7 @@ static int replay_frames(struct replay *replay, struct link *from, struct link *
 	struct frame frame;
 	int result = 1;
 
-	while (code == COMMAND_DONE && !command_interrupted() &&
-	       (result = link_receive(from, &frame, 0)) == 1) {
+	while (code == COMMAND_DONE && !interrupt_came() && (result = link_receive(from, &frame, 0)) == 1) {
 		if ((frame.flags & FRAME_ERROR) != 0)
 			replay->skipped++; /* a report of the bus, not a frame anybody sent */
 		else if (is_hosts(&frame) && !copies && !replay->as_host)
@@ -224,7 +223,7 @@ static int listen_on_lcm(struct replay *replay, struct publisher *publisher, int
 			return command_link_failed(replay->to, DT_E_LINK);
 		if (replay->states_heard > replay->states_sent)
 			return refuse(replay);
-	} while (session_now_ms() < until_ms && !command_interrupted());
+	} while (session_now_ms() < until_ms && !interrupt_came());
 	return COMMAND_DONE;
 }
 
@@ -256,7 +255,7 @@ static int replay_events(struct replay *replay, struct log_file *log, struct pub
 		               ? listen_on_lcm(replay, publisher, LISTEN_MS)
 		               : command_link_failed(replay->to, DT_E_LINK);
 	}
-	while (code == COMMAND_DONE && !command_interrupted() && lcm_log_next(log, &walk, &event)) {
+	while (code == COMMAND_DONE && !interrupt_came() && lcm_log_next(log, &walk, &event)) {
 		if (event.cut)
 			continue;       /* counted as skipped */
 		if (event.data == NULL) /* beyond what LCM sends */
@@ -305,7 +304,7 @@ static int replay_file(struct replay *replay)
 		code = COMMAND_INPUT;
 	}
 	log_file_close(&log);
-	if (code == COMMAND_DONE && replay->sent + replay->withheld == 0 && !command_interrupted()) {
+	if (code == COMMAND_DONE && replay->sent + replay->withheld == 0 && !interrupt_came()) {
 		command_error("%s: no frame, expected candump text or an LCM event log", replay->file);
 		code = COMMAND_INPUT;
 	}
@@ -361,7 +360,7 @@ int command_replay(int argc, char **argv)
 	replay.file = argv[optind];
 	if (strncmp(replay.to, "log:", 4) == 0 && command_is_input("replay", replay.to + 4, replay.file))
 		return COMMAND_USAGE;
-	command_catch_signals();
+	interrupt_catch();
 	code = replay_file(&replay);
 	if (code == COMMAND_DONE && replay.skipped > 0)
 		command_error("%s: %" PRIu64 " sent, %" PRIu64 " skipped that are no frame to send",

@@ -98,8 +98,8 @@ static int write_pdf(const struct text *page, const char *file)
 	     *pdf = NULL;
 	struct text sealed = {.bytes = NULL};
 	size_t length = 0;
-	int result = pdf_print(page->bytes, page->size, command_interrupted, &pdf, &length, message,
-	                       sizeof(message));
+	int result =
+	        pdf_print(page->bytes, page->size, interrupt_came, &pdf, &length, message, sizeof(message));
 
 	if (result == 0)
 		result = text_open(&sealed);
@@ -195,7 +195,7 @@ int command_report(int argc, char **argv)
 	archive = archive_open(archived_folder(a.archive), ARCHIVE_READ, message);
 	if (archive == NULL)
 		return failed(message);
-	command_catch_signals();
+	interrupt_catch();
 	code = write_all(archive, argv[optind], &a);
 	archive_close(archive);
 	return code;

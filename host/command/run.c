@@ -9,11 +9,11 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "host/command/beside.h"
+#include "host/base/beside.h"
 #include "host/command/command.h"
 #include "host/command/release.h"
 #include "host/command/run_private.h"
-#include "host/command/simulated.h"
+#include "host/session/simulated.h"
 
 static const struct option_row rows[] = {
         OPTION_TEXT("link", "URL", struct run, link,
@@ -149,7 +149,7 @@ static int run_drop(struct run *run)
 	if (run->link == NULL) {
 		say_to_bench(run, seed, angle);
 		if (simulated_start(&tower, run->bench.word, message, sizeof(message)) != 0) {
-			if (command_interrupted())
+			if (interrupt_came())
 				return command_stopped();
 			command_error("%s", message);
 			return COMMAND_LINK;
@@ -175,7 +175,7 @@ int command_run(int argc, char **argv)
 	code = check(&run);
 	if (code != COMMAND_DONE)
 		return code;
-	command_catch_signals();
+	interrupt_catch();
 	if (run.link != NULL)
 		code = release_consent("run", run.unattended);
 	run.start_ms = session_now_ms();

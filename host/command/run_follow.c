@@ -9,7 +9,7 @@
 #include "host/command/command.h"
 #include "host/command/release.h"
 #include "host/command/run_private.h"
-#include "host/command/tower_setup.h"
+#include "host/session/tower_setup.h"
 
 enum {
 	DROP_STATUSES = 20 * SESSION_STATUSES_HZ, /* fall, capture and upload take about one second */
@@ -127,7 +127,7 @@ static int follow_to_end(struct run *run, struct record *record)
 			              wire_fault_text(view->fault));
 			return COMMAND_REFUSED;
 		}
-		if (command_interrupted() && !run->aborted) {
+		if (interrupt_came() && !run->aborted) {
 			run->aborted = true;
 			run_progress(run, "abort");
 			result = session_command(run->session, WIRE_OP_ABORT);
@@ -166,12 +166,9 @@ static void tell_losses(const struct run *run)
 static int release_and_follow(struct run *run, struct record *record)
 {
 	char message[SESSION_MESSAGE_MAX];
-	int code = tower_setup_write(run->session, &run->scene, message);
+	int result = tower_setup_write(run->session, &run->scene, message);
+	int code = result == 0 ? run_keep_room(run) : command_tower_failed(result, message);
 
-	if (code != COMMAND_DONE)
-		command_error("%s", message);
-	if (code == COMMAND_DONE)
-		code = run_keep_room(run);
 	if (code == COMMAND_DONE)
 		code = let_fall(run);
 	return code == COMMAND_DONE ? follow_to_end(run, record) : code;
@@ -184,7 +181,7 @@ static void see_it_leave(struct run *run)
 	int64_t start_ms = session_now_ms();
 
 	while (!run->log_failed && session_drops(view->state) && session_poll(run->session, 50) == 0 &&
-	       !command_interrupted() && session_now_ms() - start_ms < LEAVE_MS)
+	       !interrupt_came() && session_now_ms() - start_ms < LEAVE_MS)
 		continue;
 	if (view->state == WIRE_STATE_KEEP_OUT)
 		command_error("%s", wire_state_text(view->state));
@@ -196,11 +193,10 @@ static int drop(struct run *run, struct record *record)
 {
 	const struct session_view *view = session_view(run->session);
 	char message[SESSION_MESSAGE_MAX];
-	int code = tower_setup_hear(run->session, message);
-	int taken = code == COMMAND_DONE ? session_take_drop(run->session, record) : 0;
+	int result = tower_setup_hear(run->session, message);
+	int code = result == 0 ? COMMAND_DONE : command_tower_failed(result, message);
+	int taken = result == 0 ? session_take_drop(run->session, record) : 0;
 
-	if (code != COMMAND_DONE)
-		command_error("%s", message);
 	run->earlier = code == COMMAND_DONE && (taken == 1 || session_drops(view->state));
 	if (run->earlier)
 		run_progress(run, "held      drop of an earlier run, to be fetched first");

@@ -12,7 +12,7 @@
 
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
-#include "host/command/room.h"
+#include "host/base/room.h"
 #include "host/command/run_private.h"
 #include "host/record/write.h"
 

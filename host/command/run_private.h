@@ -13,7 +13,7 @@
 #include "common/base/option.h"
 #include "common/scenes/scene.h"
 #include "host/command/archived.h"
-#include "host/command/session.h"
+#include "host/session/session.h"
 #include "host/record/record.h"
 
 enum { RUN_BENCH_WORDS_MAX = 24 };

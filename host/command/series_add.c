@@ -18,7 +18,7 @@
 #include "host/command/archived.h"
 #include "host/command/command.h"
 #include "host/command/series_private.h"
-#include "host/command/tower_setup.h"
+#include "host/session/tower_setup.h"
 #include "host/record/log_capture.h"
 #include "host/record/drop.h"
 #include "host/record/read.h"
@@ -361,7 +361,7 @@ static int add_drop(void *context, const struct log_capture *capture, struct rec
 	}
 	add_record(adding, capture, record);
 	record_free(record);
-	return command_interrupted();
+	return interrupt_came();
 }
 
 static void add_log(struct adding *adding, const char *file)
@@ -394,8 +394,8 @@ int series_verb_add(struct archive *archive, struct series_arguments *a)
 	if (archive_scene(archive, a->word[0], &adding.scene) != 0 ||
 	    archive_ask_captures(archive, key_of) != 0)
 		return archived_failed(archive);
-	command_catch_signals();
-	for (int i = 1; i < a->count && !command_interrupted(); i++)
+	interrupt_catch();
+	for (int i = 1; i < a->count && !interrupt_came(); i++)
 		add_log(&adding, a->word[i]);
-	return command_interrupted() ? COMMAND_REFUSED : adding.code;
+	return interrupt_came() ? COMMAND_REFUSED : adding.code;
 }

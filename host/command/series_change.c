@@ -9,7 +9,7 @@
 
 #include "common/base/number.h"
 #include "host/command/archived.h"
-#include "host/command/beside.h"
+#include "host/base/beside.h"
 #include "host/command/command.h"
 #include "host/command/series_private.h"
 
@@ -77,16 +77,16 @@ static int analyse_chosen(struct archive *archive, struct chosen *chosen)
 {
 	int code = COMMAND_DONE;
 
-	for (size_t i = 0; i < chosen->count && !command_interrupted(); i++) {
+	for (size_t i = 0; i < chosen->count && !interrupt_came(); i++) {
 		int one = archived_analyse(archive, chosen->drop[i].series, chosen->drop[i].number);
 
 		if (one != COMMAND_DONE)
 			code = one;
 	}
-	if (command_interrupted())
+	if (interrupt_came())
 		command_error("interrupted; the rest keeps the results it had");
 	free(chosen->drop);
-	return command_interrupted() ? COMMAND_REFUSED : code;
+	return interrupt_came() ? COMMAND_REFUSED : code;
 }
 
 /* ---- decisions and notes ---- */
@@ -185,7 +185,7 @@ int series_verb_reanalyse(struct archive *archive, struct series_arguments *a)
 {
 	int code = COMMAND_DONE;
 
-	command_catch_signals();
+	interrupt_catch();
 	for (int i = 0; i < a->count && code == COMMAND_DONE; i++) {
 		struct chosen chosen = {0};
 
@@ -209,7 +209,7 @@ int series_rebuild(const struct series_arguments *a)
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}
-	command_catch_signals();
+	interrupt_catch();
 	code = choose(archive, NULL, &chosen);
 	if (code == COMMAND_DONE)
 		code = analyse_chosen(archive, &chosen);

@@ -4,7 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "host/command/beside.h"
+#include "host/base/beside.h"
 #include "host/command/command.h"
 #include "host/command/serve.h"
 

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "host/command/archived.h"
-#include "host/command/beside.h"
+#include "host/base/beside.h"
 #include "host/command/command.h"
 
 /* One that is not there yet is waited for; one that can never be is not. */

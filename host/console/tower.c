@@ -8,8 +8,7 @@
 #include <string.h>
 
 #include "common/wire_table.h"
-#include "host/command/command.h"
-#include "host/command/tower_setup.h"
+#include "host/session/tower_setup.h"
 #include "host/console/tower_private.h"
 
 enum {
@@ -100,17 +99,18 @@ static bool takes_parameters(const struct tower *tower)
 
 int tower_set_up(struct tower *tower)
 {
+	int result;
+
 	if (!tower->setup_due || tower->session == NULL || session_now_ms() < tower->setup_due_ms ||
 	    !takes_parameters(tower))
-		return COMMAND_DONE;
+		return 0;
 	tower->wanted = atomic_load(&tower->aborts);
 	tower->setup_due_ms = session_now_ms() + SETUP_AGAIN_MS;
 	tower->setup_trouble[0] = '\0';
 	tower->setup_due = false;
-	if (tower_setup_write(tower->session, &tower->scene, tower->setup_trouble) == COMMAND_DONE)
-		return COMMAND_DONE;
-	tower->setup_due = true;
-	return COMMAND_REFUSED;
+	result = tower_setup_write(tower->session, &tower->scene, tower->setup_trouble);
+	tower->setup_due |= result != 0;
+	return result;
 }
 
 /* ---- what others see ---- */

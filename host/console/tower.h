@@ -22,7 +22,7 @@
 
 #include "common/scenes/scene.h"
 #include "host/archive/archive.h"
-#include "host/command/session.h"
+#include "host/session/session.h"
 #include "host/console/job.h"
 #include "host/console/live.h"
 

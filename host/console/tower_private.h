@@ -12,7 +12,7 @@
 #include <stdatomic.h>
 #include <sys/un.h>
 
-#include "host/command/simulated.h"
+#include "host/session/simulated.h"
 #include "host/console/console.h"
 #include "host/console/tower.h"
 

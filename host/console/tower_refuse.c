@@ -5,7 +5,7 @@
 #include <stdio.h>
 
 #include "common/wire_table.h"
-#include "host/command/tower_setup.h"
+#include "host/session/tower_setup.h"
 #include "host/console/tower_private.h"
 
 static void refuse_checks(struct job *job, uint32_t checks)

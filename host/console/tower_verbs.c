@@ -9,7 +9,6 @@
 #include <string.h>
 
 #include "common/wire_table.h"
-#include "host/command/command.h"
 #include "host/console/tower_private.h"
 
 enum { LINE_MAX_CHARACTERS = 150 };
@@ -297,7 +296,7 @@ static void select_series(struct job *job, const struct tower_scene *scene)
 	tower->setup_trouble[0] = '\0';
 	tower->setup_due = true;
 	tower->setup_due_ms = 0;
-	if (tower_set_up(tower) == COMMAND_DONE)
+	if (tower_set_up(tower) == 0)
 		answer_empty(job);
 	else
 		job_refuse(job, 409, "%s is selected, but %s", tower->series, tower->setup_trouble);

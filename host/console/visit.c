@@ -2,7 +2,7 @@
 #include <stdlib.h>
 #include <sys/socket.h>
 
-#include "host/command/session.h"
+#include "host/session/session.h"
 #include "host/console/http_private.h"
 
 enum {

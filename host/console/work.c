@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/command/room.h"
+#include "host/base/room.h"
 #include "host/console/work.h"
 
 #include <math.h>

@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #include "common/link/link.h"
-#include "host/command/room.h"
+#include "host/base/room.h"
 #include "host/command/archived.h"
 #include "host/console/work_private.h"
 #include "host/record/write.h"

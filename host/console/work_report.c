@@ -16,7 +16,7 @@
 #include "common/base/process.h"
 #include "common/wire_table.h"
 #include "host/archive/durable.h"
-#include "host/command/beside.h"
+#include "host/base/beside.h"
 #include "host/console/work_private.h"
 
 enum { NICE = 10 };

@@ -10,7 +10,7 @@
 
 #include <stdlib.h>
 
-#include "host/command/clocks.h"
+#include "host/session/clocks.h"
 
 /* Seconds until two clocks so far apart are told, of TIMEs of which one in a hundred x percent is lost; 0:
  * never. */

@@ -17,7 +17,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "host/command/journal.h"
+#include "host/session/journal.h"
 
 static char folder[64];
 

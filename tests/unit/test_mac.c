@@ -17,9 +17,9 @@
 #include <unistd.h>
 
 #include "common/wire.h"
-#include "host/command/loopback.h"
-#include "host/command/mac.h"
-#include "host/command/publish.h"
+#include "host/session/loopback.h"
+#include "host/session/mac.h"
+#include "host/session/publish.h"
 
 enum {
 	SIZE = 114,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/command/beside.h"
+#include "host/base/beside.h"
 
 #include <errno.h>
 #include <stdio.h>

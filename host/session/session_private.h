@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_COMMAND_SESSION_PRIVATE_H
-#define DT_HOST_COMMAND_SESSION_PRIVATE_H
+#ifndef DT_HOST_SESSION_SESSION_PRIVATE_H
+#define DT_HOST_SESSION_SESSION_PRIVATE_H
 /*
  * What session.c asks of a way to the tower. Two of them: session_can.c and session_lcm.c. A way keeps
  * its own state behind `way` and updates `view`.
  */
-#include "host/command/session.h"
+#include "host/session/session.h"
 
 struct session;
 

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_COMMAND_SESSION_CAN_H
-#define DT_HOST_COMMAND_SESSION_CAN_H
+#ifndef DT_HOST_SESSION_SESSION_CAN_H
+#define DT_HOST_SESSION_SESSION_CAN_H
 /*
  * What the files of a session over CAN share: session_can.c has the link and follows the tower, session_ask.c
  * sends commands and parameters and waits for the answers, session_collect.c fetches a drop.
  */
 #include "common/segment.h"
-#include "host/command/clocks.h"
-#include "host/command/session_private.h"
+#include "host/session/clocks.h"
+#include "host/session/session_private.h"
 #include "host/record/join.h"
 
 struct can_way {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_COMMAND_SESSION_H
-#define DT_HOST_COMMAND_SESSION_H
+#ifndef DT_HOST_SESSION_SESSION_H
+#define DT_HOST_SESSION_SESSION_H
 /*
  * The host's end of a tower: keeps the heartbeat going, follows the tower's state, sends commands and
  * waits for their replies, collects a drop and asks for what is missing until its CRC-32 agrees, then

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_COMMAND_LOOPBACK_H
-#define DT_HOST_COMMAND_LOOPBACK_H
+#ifndef DT_HOST_SESSION_LOOPBACK_H
+#define DT_HOST_SESSION_LOOPBACK_H
 /*
  * LCM receives on every interface of the machine, whatever the time to live it sends with. Here its socket is
  * told to take only what this machine sent itself, unless the URL says ttl=1 or more: then what is sent

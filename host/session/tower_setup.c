@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/command/tower_setup.h"
+#include "host/session/tower_setup.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "common/wire_table.h"
-#include "host/command/command.h"
+#include "host/base/interrupt.h"
 
 enum { HEAR_MS = 5000 }; /* a tower sends two thousand frames a second */
 
@@ -19,7 +19,7 @@ static bool passing(unsigned state)
 static int stopped(char message[SESSION_MESSAGE_MAX])
 {
 	snprintf(message, SESSION_MESSAGE_MAX, "interrupted, nothing was released");
-	return COMMAND_REFUSED;
+	return DT_E_STATE;
 }
 
 int tower_setup_hear(struct session *session, char message[SESSION_MESSAGE_MAX])
@@ -30,20 +30,20 @@ int tower_setup_hear(struct session *session, char message[SESSION_MESSAGE_MAX])
 	while (!view->seen || !view->hash_known || passing(view->state)) {
 		int result = session_poll(session, 50);
 
-		if (command_interrupted())
+		if (interrupt_came())
 			return stopped(message);
 		if (result == 0 && session_now_ms() - start_ms > HEAR_MS)
 			result = DT_E_TIMEOUT;
 		if (result != 0) {
 			snprintf(message, SESSION_MESSAGE_MAX, "no tower heard: %s", error_text(result));
-			return COMMAND_LINK;
+			return result;
 		}
 	}
 	if (view->hash_agrees)
-		return COMMAND_DONE;
+		return 0;
 	snprintf(message, SESSION_MESSAGE_MAX, "the tower's wire hash is %08x, ours is %08x: %s",
 	         view->wire_hash, wire_hash(), error_text(DT_E_HASH));
-	return COMMAND_REFUSED;
+	return DT_E_HASH;
 }
 
 void tower_setup_settings(const struct scene *scene, struct tower_setting settings[TOWER_SETTINGS])
@@ -123,7 +123,7 @@ static int refused(const struct tower_setting *setting, int result, char message
 	else
 		snprintf(message, SESSION_MESSAGE_MAX, "the tower refuses %s = %.0f: %s", parameter->name,
 		         setting->value, error_text(result));
-	return result == DT_E_STATE || result == DT_E_RANGE ? COMMAND_REFUSED : COMMAND_LINK;
+	return result;
 }
 
 /* The set that ARM will name; what was written is in it, or another writes as well. */
@@ -133,12 +133,12 @@ static int read_back(struct session *session, const struct tower_setting *settin
 	const struct session_view *view = session_view(session);
 	int result = session_read_parameters(session);
 
-	if (result != 0 && command_interrupted())
+	if (result != 0 && interrupt_came())
 		return stopped(message);
 	if (result != 0) {
 		snprintf(message, SESSION_MESSAGE_MAX, "the tower's parameters cannot be read: %s",
 		         error_text(result));
-		return COMMAND_LINK;
+		return result;
 	}
 	for (size_t i = 0; i < count; i++) {
 		uint32_t value = view->parameters[settings[i].number];
@@ -147,9 +147,9 @@ static int read_back(struct session *session, const struct tower_setting *settin
 			continue;
 		snprintf(message, SESSION_MESSAGE_MAX, "the tower has %s = %u just after %.0f was written",
 		         wire_parameters[settings[i].number].name, value, settings[i].value);
-		return COMMAND_REFUSED;
+		return DT_E_PARAMETERS;
 	}
-	return COMMAND_DONE;
+	return 0;
 }
 
 int tower_setup_write(struct session *session, const struct scene *scene, char message[SESSION_MESSAGE_MAX])
@@ -167,10 +167,10 @@ int tower_setup_write(struct session *session, const struct scene *scene, char m
 	memcpy(settings, wanted, sizeof(settings));
 	result = write_all(session, settings, count);
 	if (result == DT_E_UNKNOWN) /* over LCM: the bridge has set them */
-		return COMMAND_DONE;
+		return 0;
 	if (result == 0)
 		return read_back(session, wanted, count, message);
-	return command_interrupted() ? stopped(message) : refused(&settings[0], result, message);
+	return interrupt_came() ? stopped(message) : refused(&settings[0], result, message);
 }
 
 bool tower_setup_difference(struct session *session, char message[SESSION_MESSAGE_MAX])

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_COMMAND_MAC_H
-#define DT_HOST_COMMAND_MAC_H
+#ifndef DT_HOST_SESSION_MAC_H
+#define DT_HOST_SESSION_MAC_H
 /*
  * That a message on LCM comes from somebody who has the key, and a command from somebody who has it now.
  *

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/command/session_can.h"
+#include "host/session/session_can.h"
 
 enum {
 	HEARTBEAT_MS = 100,

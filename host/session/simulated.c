@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/command/simulated.h"
+#include "host/session/simulated.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -14,8 +14,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "host/command/beside.h"
-#include "host/command/command.h"
+#include "host/base/beside.h"
+#include "host/base/interrupt.h"
 
 enum { START_MS = 5000, END_MS = 1000, TURN_MS = 10, ARGUMENTS_MAX = 40 };
 
@@ -45,7 +45,7 @@ static int wait_ready(int fd)
 	struct pollfd poller = {.fd = fd, .events = POLLIN};
 	char byte;
 
-	for (int waited_ms = 0; waited_ms < START_MS && !command_interrupted(); waited_ms += TURN_MS) {
+	for (int waited_ms = 0; waited_ms < START_MS && !interrupt_came(); waited_ms += TURN_MS) {
 		int got = poll(&poller, 1, TURN_MS);
 
 		if (got > 0)

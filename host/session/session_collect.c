@@ -4,7 +4,7 @@
  */
 #include <stdio.h>
 
-#include "host/command/session_can.h"
+#include "host/session/session_can.h"
 
 enum {
 	RESEND_TICKS = 32,  /* asked for in one frame */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/command/loopback.h"
+#include "host/session/loopback.h"
 
 #include <arpa/inet.h>
 #include <dirent.h>

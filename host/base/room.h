@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_COMMAND_ROOM_H
-#define DT_HOST_COMMAND_ROOM_H
+#ifndef DT_HOST_BASE_ROOM_H
+#define DT_HOST_BASE_ROOM_H
 /*
  * Room on the disk for a drop: `run` and the console look before they arm.
  */

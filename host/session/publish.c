@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/command/publish.h"
+#include "host/session/publish.h"
 
 #include <droptower_result.h>
 #include <stdio.h>
@@ -7,8 +7,8 @@
 #include <string.h>
 
 #include "common/wire.h"
-#include "host/command/loopback.h"
-#include "host/command/session.h"
+#include "host/session/loopback.h"
+#include "host/session/session.h"
 #include "host/record/lcm_codec.h"
 
 bool publisher_wants(const char *url)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_COMMAND_SIMULATED_H
-#define DT_HOST_COMMAND_SIMULATED_H
+#ifndef DT_HOST_SESSION_SIMULATED_H
+#define DT_HOST_SESSION_SIMULATED_H
 /*
  * A simulated tower for a command that was given no link: droptower-bench, found beside this program, on a
  * bus of its own in a temporary directory.

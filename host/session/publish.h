@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_COMMAND_PUBLISH_H
-#define DT_HOST_COMMAND_PUBLISH_H
+#ifndef DT_HOST_SESSION_PUBLISH_H
+#define DT_HOST_SESSION_PUBLISH_H
 /*
  * What the host publishes on LCM: DT_BLOCK, DT_STATE, DT_DROP, DT_RESULT; and DT_COMMAND, which it takes.
  * One thread. The bridge, the replay and a session over LCM use it.
@@ -16,7 +16,7 @@
 #include <droptower_state.h>
 
 #include "common/frame.h"
-#include "host/command/mac.h"
+#include "host/session/mac.h"
 #include "host/record/record.h"
 
 #define PUBLISH_STATE "DT_STATE"

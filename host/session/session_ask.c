@@ -3,7 +3,7 @@
  * Commands and parameters: sent again until they are answered.
  */
 #include "common/wire_table.h"
-#include "host/command/session_can.h"
+#include "host/session/session_can.h"
 
 enum {
 	REPLY_MS = 300, /* a reply takes a millisecond; then it or the command was lost */

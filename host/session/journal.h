@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_COMMAND_JOURNAL_H
-#define DT_HOST_COMMAND_JOURNAL_H
+#ifndef DT_HOST_SESSION_JOURNAL_H
+#define DT_HOST_SESSION_JOURNAL_H
 /*
  * One file of every verb that somebody gave a tower on this machine, taken or refused, with who and when.
  * `ctl`, `run`, the page and the bridge write it; nothing ever shortens it.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_COMMAND_BESIDE_H
-#define DT_HOST_COMMAND_BESIDE_H
+#ifndef DT_HOST_BASE_BESIDE_H
+#define DT_HOST_BASE_BESIDE_H
 /*
  * Where what was installed together is found: seen from the folder of this program, wherever that was put.
  */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/command/session.h"
+#include "host/session/session.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,9 +8,9 @@
 #include <time.h>
 
 #include "common/wire_table.h"
-#include "host/command/command.h"
-#include "host/command/journal.h"
-#include "host/command/session_private.h"
+#include "host/base/interrupt.h"
+#include "host/session/journal.h"
+#include "host/session/session_private.h"
 
 enum { SILENT_MS = 20000 };
 
@@ -98,7 +98,7 @@ bool session_cancelled(struct session *session)
 {
 	const struct session_options *options = &session->options;
 
-	return command_interrupted() || (options->cancelled != NULL && options->cancelled(options->user));
+	return interrupt_came() || (options->cancelled != NULL && options->cancelled(options->user));
 }
 
 int session_read_parameters(struct session *session)

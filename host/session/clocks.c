@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/command/clocks.h"
+#include "host/session/clocks.h"
 
 enum { DAY_MS = 86400000 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/command/mac.h"
+#include "host/session/mac.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -12,7 +12,7 @@
 #include <nettle/hmac.h>
 #include <nettle/memops.h>
 
-#include "host/command/publish.h"
+#include "host/session/publish.h"
 
 /* ---- the key ---- */
 

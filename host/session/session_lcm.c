@@ -14,9 +14,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/command/journal.h"
-#include "host/command/publish.h"
-#include "host/command/session_private.h"
+#include "host/session/journal.h"
+#include "host/session/publish.h"
+#include "host/session/session_private.h"
 #include "host/record/lcm_codec.h"
 #include "host/record/write.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_COMMAND_CLOCKS_H
-#define DT_HOST_COMMAND_CLOCKS_H
+#ifndef DT_HOST_SESSION_CLOCKS_H
+#define DT_HOST_SESSION_CLOCKS_H
 /*
  * Whether more than one tower talks on a bus: their identifiers are the same, but a tower's TIME messages
  * only grow, and those of two stand between each other. A tower that starts again begins anew once; a frame

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/command/journal.h"
+#include "host/session/journal.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -12,8 +12,6 @@
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
-
-#include "host/command/command.h"
 
 enum { LINE_MAX_BYTES = 512, WORD_MAX_BYTES = 64 };
 
@@ -126,8 +124,8 @@ void journal_write(const struct journal_line *entry)
 		written = write(fd, line, length);
 	if (written != (ssize_t)length && !told) {
 		told = true;
-		command_error("%s: cannot write the journal: %s", path,
-		              written >= 0 ? "no room" : strerror(errno));
+		fprintf(stderr, "droptower: %s: cannot write the journal: %s\n", path,
+		        written >= 0 ? "no room" : strerror(errno));
 	}
 	if (fd >= 0)
 		close(fd);
