@@ -3,10 +3,11 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "host/chart/campaign.h"
+#include "host/chart/compare.h"
 #include "host/chart/chart.h"
 #include "host/chart/file.h"
 
+/* Over the sensor's own. */
 static const double noises[] = {0.3, 1, 3, 10};
 
 enum { NOISES = sizeof(noises) / sizeof(noises[0]), WIDTH = 1500, HEIGHT = 560 };
@@ -20,7 +21,8 @@ static const struct {
 enum { MARKS = sizeof(marks) / sizeof(marks[0]) };
 
 struct panel {
-	const struct campaign *campaign;
+	const struct chart_options *options;
+	const struct compare *compare;
 	enum quantity quantity;
 	const struct method *method; /* [methods], all quantities' */
 	size_t methods;
@@ -35,16 +37,18 @@ static int write_csv(const struct chart_options *options, const struct panel *p,
 
 	if (status)
 		return status;
-	fprintf(text.out, "# %s, SI units; seed %lu\n", quantity_text(p->quantity)->title, options->seed);
+	fprintf(text.out, "# %s, SI units; seed %lu; %s\n", quantity_text(p->quantity)->title, options->seed,
+	        options->about);
 	fputs("method,of,family_told,noise_g,drops,values,gross,bias,rmse,bound,ratio,cost_us\n", text.out);
 	for (size_t m = 0; m < p->methods; m++)
 		for (size_t i = 0; i < NOISES && p->method[m].quantity == p->quantity; i++) {
-			const struct campaign_tally *t = &p->campaign->cells[i].tally[m];
+			const struct tally *t = &p->compare->cells[i].tally[m];
 
 			fprintf(text.out, "\"%s\",%s,%d,%g,%u,%u,%u,%.9g,%.9g,%.9g,%.6g,%.4g\n",
 			        p->method[m].name, p->method[m].ours ? "droptower" : "others",
-			        p->method[m].told, noises[i], p->campaign->drops, t->values, t->gross,
-			        campaign_bias(t), campaign_rms(t), t->bound, campaign_ratio(t), t->cost_us);
+			        p->method[m].told, p->compare->cells[i].scene.noise_g, p->compare->drops,
+			        t->values, compare_gross(p->compare, t), tally_bias(t), tally_rms(t),
+			        t->bound, tally_ratio(t), p->compare->cells[i].cost_us[m]);
 		}
 	status = file_write(&text, options->folder, "accuracy", quantity_text(p->quantity)->name, "csv",
 	                    message);
@@ -63,15 +67,15 @@ static void find_ranges(struct panel *p)
 	p->high = p->dearest = 0;
 	for (size_t m = 0; m < p->methods; m++)
 		for (size_t i = 0; i < NOISES && p->method[m].quantity == p->quantity; i++) {
-			const struct campaign_tally *t = &p->campaign->cells[i].tally[m];
+			const struct tally *t = &p->compare->cells[i].tally[m];
 
 			p->low = fmin(p->low, t->bound * shown);
-			p->cheapest = fmin(p->cheapest, t->cost_us);
-			p->dearest = fmax(p->dearest, t->cost_us);
+			p->cheapest = fmin(p->cheapest, p->compare->cells[i].cost_us[m]);
+			p->dearest = fmax(p->dearest, p->compare->cells[i].cost_us[m]);
 			if (t->values == 0)
 				continue;
-			p->low = fmin(p->low, campaign_rms(t) * shown);
-			p->high = fmax(p->high, campaign_rms(t) * shown);
+			p->low = fmin(p->low, tally_rms(t) * shown);
+			p->high = fmax(p->high, tally_rms(t) * shown);
 		}
 }
 
@@ -80,7 +84,7 @@ static void draw_bounds(FILE *out, const struct panel *p, size_t i)
 	double shown = quantity_text(p->quantity)->shown, last = NAN;
 
 	for (size_t m = 0; m < p->methods; m++) {
-		double bound = p->campaign->cells[i].tally[m].bound * shown;
+		double bound = p->compare->cells[i].tally[m].bound * shown;
 
 		if (p->method[m].quantity != p->quantity || fabs(bound - last) < 1e-12 * bound)
 			continue;
@@ -99,12 +103,12 @@ static void draw_panel(FILE *out, const struct panel *p, size_t i)
 
 	fprintf(out, "unset arrow\nunset label\nset lmargin at screen %.4f\nset rmargin at screen %.4f\n",
 	        left, left + 0.186);
-	fprintf(out, "set title 'noise %g g' font ',15' offset 0,-0.5\n", noises[i]);
+	fprintf(out, "set title 'noise %g g' font ',15' offset 0,-0.5\n", p->compare->cells[i].scene.noise_g);
 	if (i > 0)
 		fputs("set format y ''\nunset ylabel\n", out);
 	draw_bounds(out, p, i);
 	for (size_t m = 0; m < p->methods; m++) {
-		const struct campaign_tally *t = &p->campaign->cells[i].tally[m];
+		const struct tally *t = &p->compare->cells[i].tally[m];
 		size_t k = kind % MARKS;
 
 		if (p->method[m].quantity != p->quantity)
@@ -115,8 +119,8 @@ static void draw_panel(FILE *out, const struct panel *p, size_t i)
 		fprintf(out,
 		        "%s '+' using (%.5g):(%.6g) every ::0::0 with points pt %d ps %s lw 2 lc rgb '%s' "
 		        "notitle",
-		        drawn++ ? ", \\\n" : "plot", t->cost_us,
-		        campaign_rms(t) * quantity_text(p->quantity)->shown,
+		        drawn++ ? ", \\\n" : "plot", p->compare->cells[i].cost_us[m],
+		        tally_rms(t) * quantity_text(p->quantity)->shown,
 		        p->method[m].ours ? marks[k].filled : marks[k].open,
 		        p->method[m].ours ? "1.5" : "1.1", marks[k].colour);
 	}
@@ -156,11 +160,10 @@ static void draw_legend(FILE *out, const struct panel *p)
 	fprintf(out, "set label \"%s: error against cost\" at screen 0.012,0.965 font ',18'\n",
 	        quantity_text(p->quantity)->title);
 	fprintf(out,
-	        "set label 'Root mean square error over %u drops of known truth: half-sine of 485 g, 3 ms, 7 "
-	        "kHz, "
-	        "plate of 129 Hz. Down and left is better; no unbiased method lies below the line.' "
-	        "at screen 0.012,0.92 font ',12'\n",
-	        p->campaign->drops);
+	        "set label \"Root mean square error over %u drops of known truth: %s. Down and left is "
+	        "better; no "
+	        "unbiased method lies below the line.\" at screen 0.012,0.92 font ',12'\n",
+	        p->compare->drops, p->options->about);
 	for (int ours = 1; ours >= 0; ours--) {
 		kind = 0;
 		fprintf(out, "set label '%s' at screen 0.858,%.3f font ',14'\n",
@@ -235,7 +238,7 @@ static void print_table(FILE *out, const struct panel *p)
 
 	fprintf(out, "\n%-46s", text->title);
 	for (size_t i = 0; i < NOISES; i++)
-		fprintf(out, " %6g g", noises[i]);
+		fprintf(out, " %6g g", p->compare->cells[i].scene.noise_g);
 	fprintf(out, "  us a call\n");
 	for (size_t m = 0; m < p->methods; m++) {
 		if (p->method[m].quantity != p->quantity)
@@ -243,41 +246,44 @@ static void print_table(FILE *out, const struct panel *p)
 		fprintf(out, "  %-10s %-24s %-8s", p->method[m].ours ? "droptower" : "others",
 		        p->method[m].name, p->method[m].told ? "told" : "");
 		for (size_t i = 0; i < NOISES; i++)
-			fprintf(out, " %8.2f", campaign_ratio(&p->campaign->cells[i].tally[m]));
-		fprintf(out, " %10.2f\n", p->campaign->cells[1].tally[m].cost_us);
+			fprintf(out, " %8.2f", tally_ratio(&p->compare->cells[i].tally[m]));
+		fprintf(out, " %10.2f\n", p->compare->cells[1].cost_us[m]);
 	}
 }
 
 int chart_accuracy(const struct chart_options *options, FILE *out, char *message)
 {
-	struct campaign campaign = {
-	        .drops = options->drops, .seed = options->seed, .timed = true, .count = NOISES};
-	struct panel panel = {.campaign = &campaign};
+	struct compare compare = {.drops = options->drops, .timed = true, .count = NOISES};
+	struct panel panel = {.options = options, .compare = &compare};
 	int status;
 
 	panel.method = method_table(&panel.methods);
-	campaign.cells = campaign_cells(NOISES);
-	if (!campaign.cells) {
+	compare.cells = compare_cells(NOISES);
+	if (!compare.cells) {
 		snprintf(message, CHART_MESSAGE_MAX, "%s", error_text(DT_E_MEMORY));
 		return DT_E_MEMORY;
 	}
 	for (size_t i = 0; i < NOISES; i++) {
-		campaign.cells[i].scene = synthetic_scene();
-		campaign.cells[i].scene.noise_g = noises[i];
+		compare.cells[i].scene = options->drop;
+		compare.cells[i].scene.seed = 7919 * options->seed;
+		compare.cells[i].scene.noise_g *= noises[i];
 	}
-	status = campaign_run(&campaign);
+	status = compare_run(&compare);
 	if (status)
 		snprintf(message, CHART_MESSAGE_MAX, "the simulated drops failed: %s", error_text(status));
 	else
-		fprintf(out, "Error over the Cramer-Rao bound; %u drops of known truth a figure, seed %lu\n",
-		        options->drops, options->seed);
+		fprintf(out,
+		        "Error over the Cramer-Rao bound; %u drops of known truth a figure, seed %lu; %s\n",
+		        options->drops, options->seed, options->about);
 	for (int q = 0; q < QUANTITIES && !status; q++) {
 		panel.quantity = (enum quantity)q;
+		if (options->no_plate && quantity_text(panel.quantity)->of_plate)
+			continue;
 		print_table(out, &panel);
 		status = write_csv(options, &panel, message);
 		if (!status)
 			status = draw(options, &panel, message);
 	}
-	campaign_free(campaign.cells, NOISES);
+	compare_free(compare.cells, NOISES);
 	return status;
 }

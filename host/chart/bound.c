@@ -12,19 +12,26 @@
 
 /* A signal's parameters, in the order of struct synthetic_axis from peak_g on. */
 enum { PEAK, ONSET, CONTACT, GAIN, DELAY, HZ, DAMPING, SECOND_GAIN, SECOND_DELAY, SECOND_HZ, SECOND_DAMPING };
-enum { PARAMETERS = SECOND_DAMPING + 1, ONSETS = 4 };
+enum { PARAMETERS = SECOND_DAMPING + 1, ONSETS = 6, OUTCOMES = 3 };
 
 static const double steps[PARAMETERS] = {0.05, 1e-6, 1e-6, 1e-3, 1e-6, 1e-2, 1e-4, 1e-3, 1e-6, 1e-2, 1e-4};
 
-/* Which samples count. */
+/* Which samples count: S2's, S1's from the contact's end on, all. */
 enum part { PULSE, DECAY, WHOLE };
 
-/* Of one axis: Jacobian over the parameters from..until, and gradients of what is asked. */
+/* Of one axis: covariance of the parameters from..until. */
 struct fisher {
 	struct synthetic *synthetic;
 	int axis;
+	enum part part;
 	unsigned from, until;
 	double covariance[PARAMETERS][PARAMETERS];
+};
+
+/* A signal with one parameter moved. */
+struct moved {
+	struct synthetic_signal signal;
+	bool owned; /* else its tables are the drop's own */
 };
 
 static double *parameter(struct synthetic_axis *axis, unsigned i)
@@ -37,38 +44,52 @@ static double *parameter(struct synthetic_axis *axis, unsigned i)
 	return all[i];
 }
 
-/* The signal with one parameter moved. */
-static int moved(const struct fisher *fisher, unsigned i, double by, struct synthetic_signal *signal)
+/* Whether the oscillator's response, of unit gain and counted from its start, is another then. */
+static bool is_response(const struct fisher *fisher, unsigned i)
 {
-	struct synthetic_axis axis = fisher->synthetic->signal[fisher->axis].axis;
-
-	*parameter(&axis, i) += by * steps[i];
-	return synthetic_signal_open(signal, fisher->synthetic->scene.family, &axis);
+	return fisher->part != PULSE && (i == CONTACT || i == HZ || i == DAMPING || i >= SECOND_HZ);
 }
 
-/* Samples of S2, then of S1, as far as they count; others are 0. */
-static void sample(const struct fisher *fisher, enum part part, const struct synthetic_signal *signal,
-                   double *out)
+static int move(const struct fisher *fisher, unsigned i, double by, struct moved *moved)
+{
+	const struct synthetic_signal *from = &fisher->synthetic->signal[fisher->axis];
+	struct synthetic_axis axis = from->axis;
+
+	*parameter(&axis, i) += by * steps[i];
+	moved->owned = is_response(fisher, i);
+	if (moved->owned)
+		return synthetic_signal_open(&moved->signal, from->family, &axis);
+	moved->signal = *from;
+	moved->signal.axis = axis;
+	return 0;
+}
+
+static void let_go(struct moved *moved)
+{
+	if (moved->owned)
+		synthetic_signal_close(&moved->signal);
+}
+
+/* Samples of S1, then of S2, as far as they count; others are 0. */
+static void sample(const struct fisher *fisher, const struct synthetic_signal *signal, double *out)
 {
 	const struct synthetic *s = fisher->synthetic;
 	const struct synthetic_axis *axis = &s->signal[fisher->axis].axis;
 	double decays = s->onset_s + axis->onset_s + axis->contact_s + axis->delay_s;
 
-	for (unsigned c = 0; c < SYNTHETIC_CHANNELS; c++) {
-		bool plate = c < SYNTHETIC_S2X;
-		size_t count = s->record.channels[c].count;
+	for (int sensor = 0; sensor < 2; sensor++) {
+		enum synthetic_channel c =
+		        (enum synthetic_channel)((sensor ? SYNTHETIC_S2X : SYNTHETIC_S1X) + fisher->axis);
+		double from = fisher->part == DECAY ? decays : s->onset_s - 2e-3;
+		bool counts = fisher->part == WHOLE || (fisher->part == DECAY) == (sensor == 0);
 
-		if ((int)(c & 1u) != fisher->axis)
-			continue;
-		for (size_t k = 0; k < count; k++, out++) {
+		for (size_t k = 0; k < s->record.channels[c].count; k++, out++) {
 			double t = (double)k / axis->rate_hz;
-			bool counts = plate ? part == WHOLE || (part == DECAY && t >= decays) : part != DECAY;
 
 			*out = 0;
-			if (t > s->onset_s - 2e-3 && counts &&
-			    synthetic_keeps(s, (enum synthetic_channel)c, k))
-				*out = plate ? synthetic_plate(signal, t - s->onset_s)
-				             : synthetic_box(signal, t - s->onset_s);
+			if (counts && t >= from && synthetic_keeps(s, c, k))
+				*out = sensor ? synthetic_box(signal, t - s->onset_s)
+				              : synthetic_plate(signal, t - s->onset_s);
 		}
 	}
 }
@@ -90,7 +111,7 @@ static int invert(double m[PARAMETERS][PARAMETERS], unsigned size)
 	return 0;
 }
 
-static int fill(struct fisher *fisher, enum part part, double *jacobian, double *low, size_t n)
+static int fill(struct fisher *fisher, double *jacobian, double *low, size_t n)
 {
 	const struct synthetic_scene *scene = &fisher->synthetic->scene;
 	double weight = (1 - scene->missing) / (gsl_pow_2(scene->noise_g) + gsl_pow_2(scene->step_g) / 12);
@@ -100,12 +121,12 @@ static int fill(struct fisher *fisher, enum part part, double *jacobian, double 
 		double *row = jacobian + i * n;
 
 		for (int side = -1; side <= 1; side += 2) {
-			struct synthetic_signal signal;
+			struct moved moved;
 
-			if (moved(fisher, fisher->from + i, side, &signal))
+			if (move(fisher, fisher->from + i, side, &moved))
 				return DT_E_MEMORY;
-			sample(fisher, part, &signal, side < 0 ? low : row);
-			synthetic_signal_close(&signal);
+			sample(fisher, &moved.signal, side < 0 ? low : row);
+			let_go(&moved);
 		}
 		for (size_t k = 0; k < n; k++)
 			row[k] = (row[k] - low[k]) / (2 * steps[fisher->from + i]);
@@ -128,10 +149,13 @@ static int fisher_open(struct fisher *fisher, struct synthetic *synthetic, int a
 	unsigned last = synthetic->signal[axis].second ? PARAMETERS : (unsigned)SECOND_GAIN;
 	int status = DT_E_MEMORY;
 
-	*fisher = (struct fisher){
-	        synthetic, axis, part == DECAY ? GAIN : PEAK, part == PULSE ? GAIN : last, {{0}}};
+	*fisher = (struct fisher){.synthetic = synthetic,
+	                          .axis = axis,
+	                          .part = part,
+	                          .from = part == DECAY ? GAIN : PEAK,
+	                          .until = part == PULSE ? GAIN : last};
 	if (jacobian && low)
-		status = fill(fisher, part, jacobian, low, n);
+		status = fill(fisher, jacobian, low, n);
 	free(jacobian);
 	free(low);
 	return status;
@@ -148,37 +172,45 @@ static double variance(const struct fisher *fisher, const double *gradient)
 	return sum;
 }
 
-/* Variance of a function of both axes' signals, as far as this axis' parameters move it. */
-static int variance_of(const struct fisher *fisher, double (*f)(const struct synthetic_signal signal[2]),
-                       double *result)
+/* Adds the variances of functions of both axes' signals, as far as this axis' parameters move them. */
+static int add_variances(const struct fisher *fisher,
+                         void (*f)(const struct synthetic_signal signal[2], int axis, double *out),
+                         unsigned count, double *const sum[])
 {
-	double gradient[PARAMETERS] = {0};
+	double gradient[OUTCOMES][PARAMETERS] = {{0}};
 
 	for (unsigned i = fisher->from; i < fisher->until; i++) {
-		double value[2];
+		double value[2][OUTCOMES];
 
 		for (int side = 0; side < 2; side++) {
 			struct synthetic_signal pair[2] = {fisher->synthetic->signal[0],
 			                                   fisher->synthetic->signal[1]};
+			struct moved moved;
 
-			if (moved(fisher, i, side ? 1 : -1, &pair[fisher->axis]))
+			/* wide steps: a summit is found to the root of rounding */
+			if (move(fisher, i, side ? 4 : -4, &moved))
 				return DT_E_MEMORY;
-			value[side] = f(pair);
-			synthetic_signal_close(&pair[fisher->axis]);
+			pair[fisher->axis] = moved.signal;
+			f(pair, fisher->axis, value[side]);
+			let_go(&moved);
 		}
-		gradient[i] = (value[1] - value[0]) / (2 * steps[i]);
+		for (unsigned o = 0; o < count; o++)
+			gradient[o][i] = (value[1][o] - value[0][o]) / (8 * steps[i]);
 	}
-	*result += variance(fisher, gradient);
+	for (unsigned o = 0; o < count; o++)
+		*sum[o] += variance(fisher, gradient[o]);
 	return 0;
 }
 
-static double lag_of_x(const struct synthetic_signal signal[2])
+static void resultant_of(const struct synthetic_signal signal[2], int axis, double *out)
 {
-	return synthetic_lag(&signal[0]);
+	(void)axis;
+	out[0] = synthetic_resultant(signal, &out[1]);
 }
 
 static int add_pulses(struct synthetic *synthetic, struct bound *sum)
 {
+	double *const resultant[] = {&sum->resultant_g, &sum->resultant_s};
 	double summit = synthetic_pulse_summit(synthetic->scene.family);
 	double area = synthetic_pulse_area(synthetic->scene.family) * UNITS_G_M_S2;
 
@@ -189,63 +221,92 @@ static int add_pulses(struct synthetic *synthetic, struct bound *sum)
 		struct fisher fisher;
 		int status = fisher_open(&fisher, synthetic, axis, PULSE);
 
-		if (status || variance_of(&fisher, synthetic_resultant, &sum->resultant_g))
-			return status ? status : DT_E_MEMORY;
-		if (axis > 0)
-			continue;
-		sum->peak_g += fisher.covariance[PEAK][PEAK];
-		sum->contact_s += fisher.covariance[CONTACT][CONTACT];
-		sum->peak_s += variance(&fisher, instant);
-		sum->velocity_m_s += variance(&fisher, velocity);
+		if (!status)
+			status = add_variances(&fisher, resultant_of, 2, resultant);
+		if (status)
+			return status;
+		sum->peak_g[axis] += fisher.covariance[PEAK][PEAK];
+		sum->contact_s[axis] += fisher.covariance[CONTACT][CONTACT];
+		sum->peak_s[axis] += variance(&fisher, instant);
+		sum->velocity_m_s[axis] += variance(&fisher, velocity);
 	}
 	return 0;
+}
+
+static void invert2(double m[2][2])
+{
+	double determinant = m[0][0] * m[1][1] - m[0][1] * m[1][0], swap = m[0][0];
+
+	m[0][0] = m[1][1] / determinant;
+	m[1][1] = swap / determinant;
+	m[0][1] = m[1][0] = -m[0][1] / determinant;
+}
+
+/* Natural frequency is damped / sqrt(1 - damping^2). */
+static void decay_variances(const struct synthetic_scene *scene, double c[2][2], double *hz, double *damping,
+                            double *natural)
+{
+	double rest = 1 - gsl_pow_2(scene->damping);
+	double n[2] = {1 / sqrt(rest), scene->damped_hz * scene->damping / (rest * sqrt(rest))};
+
+	*hz += c[0][0];
+	*damping += c[1][1];
+	*natural += n[0] * n[0] * c[0][0] + 2 * n[0] * n[1] * c[0][1] + n[1] * n[1] * c[1][1];
 }
 
 /* X and Y share frequency and damping: the information of both adds up, 2 by 2. */
 static int add_decays(struct synthetic *synthetic, struct bound *sum)
 {
-	double both[3] = {0}, determinant;
+	double pair[2][2] = {{0}};
 
 	for (int axis = 0; axis < 2; axis++) {
 		struct fisher fisher;
+		double own[2][2];
 		int status = fisher_open(&fisher, synthetic, axis, DECAY);
-		double hz = fisher.covariance[HZ - GAIN][HZ - GAIN];
-		double damping = fisher.covariance[DAMPING - GAIN][DAMPING - GAIN];
-		double cross = fisher.covariance[HZ - GAIN][DAMPING - GAIN];
 
 		if (status)
 			return status;
-		if (axis == 0) {
-			sum->damped_hz += hz;
-			sum->damping += damping;
-		}
-		determinant = hz * damping - cross * cross;
-		both[0] += damping / determinant;
-		both[1] += hz / determinant;
-		both[2] -= cross / determinant;
+		for (int i = 0; i < 4; i++)
+			own[i / 2][i % 2] = fisher.covariance[HZ - GAIN + i / 2][HZ - GAIN + i % 2];
+		decay_variances(&synthetic->scene, own, &sum->damped_hz[axis], &sum->damping[axis],
+		                &sum->natural_hz[axis]);
+		invert2(own);
+		for (int i = 0; i < 4; i++)
+			pair[i / 2][i % 2] += own[i / 2][i % 2];
 	}
-	determinant = both[0] * both[1] - both[2] * both[2];
-	sum->pair_hz += both[1] / determinant;
-	sum->pair_damping += both[0] / determinant;
+	invert2(pair);
+	decay_variances(&synthetic->scene, pair, &sum->pair_hz, &sum->pair_damping, &sum->pair_natural_hz);
 	return 0;
 }
 
-static double plate_peak_of_x(const struct synthetic_signal signal[2])
+static void plate_of(const struct synthetic_signal signal[2], int axis, double *out)
 {
-	return synthetic_plate_peak(&signal[0]);
+	out[0] = synthetic_lag(&signal[axis]);
+	out[1] = synthetic_plate_summit(&signal[axis]);
+	out[2] = synthetic_plate(&signal[axis], out[1]);
 }
 
-static int add_lag(struct synthetic *synthetic, struct bound *sum)
+static int add_lags(struct synthetic *synthetic, struct bound *sum)
 {
-	struct fisher fisher;
-	int status = fisher_open(&fisher, synthetic, 0, WHOLE);
+	double weight = 0;
 
-	if (!status)
-		status = variance_of(&fisher, lag_of_x, &sum->lag_s);
-	return status ? status : variance_of(&fisher, plate_peak_of_x, &sum->plate_peak_g);
+	for (int axis = 0; axis < 2; axis++) {
+		double before = sum->lag_s[axis];
+		double *const all[] = {&sum->lag_s[axis], &sum->plate_s[axis], &sum->plate_g[axis]};
+		struct fisher fisher;
+		int status = fisher_open(&fisher, synthetic, axis, WHOLE);
+
+		if (!status)
+			status = add_variances(&fisher, plate_of, 3, all);
+		if (status)
+			return status;
+		weight += 1 / (sum->lag_s[axis] - before);
+	}
+	sum->pair_lag_s += 1 / weight;
+	return 0;
 }
 
-int bound_find(struct synthetic *synthetic, struct bound *bound)
+int bound_find(struct synthetic *synthetic, bool lags, struct bound *bound)
 {
 	struct bound sum = {0};
 	double *value = (double *)&sum;
@@ -256,8 +317,8 @@ int bound_find(struct synthetic *synthetic, struct bound *bound)
 		status = add_pulses(synthetic, &sum);
 		if (!status)
 			status = add_decays(synthetic, &sum);
-		if (!status)
-			status = add_lag(synthetic, &sum);
+		if (!status && lags)
+			status = add_lags(synthetic, &sum);
 	}
 	if (status)
 		return status;

@@ -7,15 +7,24 @@
 #include <stddef.h>
 #include <stdio.h>
 
-#include "common/error.h"
+#include "common/scenes/scene.h"
+#include "host/chart/synthetic.h"
 
-enum { CHART_MESSAGE_MAX = 512 };
+enum { CHART_MESSAGE_MAX = 512, CHART_ABOUT_MAX = 160 };
 
 struct chart_options {
 	const char *folder; /* must exist */
 	unsigned drops;     /* of each scene */
 	unsigned long seed;
+	/* accuracy and stability: */
+	struct synthetic_scene drop; /* nothing wrong with it */
+	bool no_plate;               /* what needs one is left out */
+	char about[CHART_ABOUT_MAX]; /* of the drop, for titles */
 };
+
+/* The drop that they take: of a scene, as host/model predicts its peaks, times and ring-down, with the
+ * scene's noise and range; NULL: synthetic_scene(). 0, or DT_E_* with a line in message. */
+DT_MUST_USE int chart_drop(const struct scene *scene, struct chart_options *options, char *message);
 
 /* Error against cost of every method at four noise levels, accuracy-QUANTITY.svg and .csv; ratios to the
  * bound as a table to out. 0, or DT_E_* with a line in message. */

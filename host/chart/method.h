@@ -28,6 +28,7 @@ struct quantity_text {
 	const char *unit;  /* as shown */
 	double shown;      /* times the SI value */
 	double fails;      /* ratio from which a method counts as failing */
+	bool of_plate;     /* it needs a plate on mounts */
 };
 
 const struct quantity_text *quantity_text(enum quantity quantity);

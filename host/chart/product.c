@@ -44,7 +44,7 @@ static void prepare(struct product *product)
 		peak_find(&product->trace[i], &options, &product->peak[i]);
 	for (int i = 0; i < 2; i++) {
 		struct lag_sensor *sensor = &product->sensor[i];
-		int x = 2 * i, y = x + 1;
+		int x = i == 0 ? SYNTHETIC_S1X : SYNTHETIC_S2X, y = x + 1;
 
 		decay(product, i, &product->ringdown[i]);
 		sensor->axes = (struct resultant_axes){.trace = {&product->trace[x], &product->trace[y]},
@@ -149,9 +149,10 @@ void product_lag(struct product *product)
 	struct estimate_lag lag;
 
 	for (int i = 0; i < 2; i++) {
-		const struct driven_axis axis = {{&product->trace[i], &product->trace[2 + i]},
-		                                 {&product->peak[i], &product->peak[2 + i]},
-		                                 &product->ringdown[i]};
+		const struct driven_axis axis = {
+		        {&product->trace[SYNTHETIC_S1X + i], &product->trace[SYNTHETIC_S2X + i]},
+		        {&product->peak[SYNTHETIC_S1X + i], &product->peak[SYNTHETIC_S2X + i]},
+		        &product->ringdown[i]};
 
 		driven_find(&axis, &driven[i], &curve);
 	}

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "host/chart/campaign.h"
+#include "host/chart/compare.h"
 #include "host/chart/chart.h"
 #include "host/chart/file.h"
 
@@ -10,6 +10,10 @@
 #define GROSS_MOST 0.01
 
 enum { VALUES_MAX = 7, ROW = 36, COLUMN = 15, LEFT = 235, TOP = 150, BOTTOM = 120, RIGHT = 20 };
+
+#define PLAY_S 1e-3 /* of a drop's onset */
+
+enum { PEAK_LOST_MOST = 8 }; /* more, and nothing is left of the pulse */
 
 /* What grows from left to right. */
 struct sweep {
@@ -21,7 +25,7 @@ struct sweep {
 
 static void noise(struct synthetic_scene *scene, double value)
 {
-	scene->noise_g = value;
+	scene->noise_g *= value; /* over the sensor's own */
 }
 
 static void damping(struct synthetic_scene *scene, double value)
@@ -31,7 +35,7 @@ static void damping(struct synthetic_scene *scene, double value)
 
 static void length(struct synthetic_scene *scene, double value)
 {
-	scene->decay_s = value / scene->damped_hz;
+	scene->post_s = scene->contact_s + value / scene->damped_hz + PLAY_S;
 }
 
 static void rate(struct synthetic_scene *scene, double value)
@@ -57,12 +61,13 @@ static void missing(struct synthetic_scene *scene, double value)
 
 static void lost(struct synthetic_scene *scene, double value)
 {
-	scene->lost = (unsigned)value;
+	scene->gap = (unsigned)value;
+	scene->lost_at_peak = value < PEAK_LOST_MOST ? (unsigned)value : PEAK_LOST_MOST;
 }
 
 static void offset(struct synthetic_scene *scene, double value)
 {
-	scene->offset_g = value;
+	scene->shift_g = value;
 }
 
 static void hum(struct synthetic_scene *scene, double value)
@@ -114,7 +119,7 @@ enum { SWEEPS = sizeof(sweeps) / sizeof(sweeps[0]), CELLS_MAX = SWEEPS * VALUES_
 enum { CLEAN = 2 };
 
 struct map {
-	const struct campaign *campaign;
+	const struct compare *compare;
 	enum quantity quantity;
 	const struct method *method;
 	size_t methods;
@@ -128,10 +133,10 @@ static const char *value_text(const struct sweep *sweep, size_t i, char text[32]
 	return text;
 }
 
-static bool fails(const struct map *map, const struct campaign_tally *t)
+static bool fails(const struct map *map, const struct tally *t)
 {
-	return !(campaign_ratio(t) <= quantity_text(map->quantity)->fails) ||
-	       t->gross > GROSS_MOST * map->campaign->drops;
+	return !(tally_ratio(t) <= quantity_text(map->quantity)->fails) ||
+	       compare_gross(map->compare, t) > GROSS_MOST * map->compare->drops;
 }
 
 static int write_csv(const struct chart_options *options, const struct map *map, char *message)
@@ -148,20 +153,20 @@ static int write_csv(const struct chart_options *options, const struct map *map,
 	      "fails\n",
 	      text.out);
 	for (size_t m = 0; m < map->methods; m++) {
-		const struct campaign_cell *cell = map->campaign->cells;
+		const struct compare_cell *cell = map->compare->cells;
 
 		for (size_t s = 0; s < SWEEPS && map->method[m].quantity == map->quantity; s++)
 			for (size_t i = 0; i < sweeps[s].count; i++, cell++) {
-				const struct campaign_tally *t = &cell->tally[m];
+				const struct tally *t = &cell->tally[m];
 				char value[32];
 
 				fprintf(text.out,
 				        "\"%s\",%s,%d,%s,%s,\"%s\",%u,%u,%u,%u,%.9g,%.9g,%.9g,%.6g,%d\n",
 				        map->method[m].name, map->method[m].ours ? "droptower" : "others",
 				        map->method[m].told, sweeps[s].name, value_text(&sweeps[s], i, value),
-				        sweeps[s].unit, map->campaign->drops, t->values, t->gross, t->doubted,
-				        campaign_bias(t), campaign_rms(t), t->bound, campaign_ratio(t),
-				        fails(map, t));
+				        sweeps[s].unit, map->compare->drops, t->values,
+				        compare_gross(map->compare, t), t->doubted, tally_bias(t),
+				        tally_rms(t), t->bound, tally_ratio(t), fails(map, t));
 			}
 	}
 	status = file_write(&text, options->folder, "stability", quantity_text(map->quantity)->name, "csv",
@@ -185,9 +190,9 @@ enum { SHADES = sizeof(shades) / sizeof(shades[0]) };
 #define CROSS "#d55e00"
 
 /* Index of the cell's shade; SHADES: no value at all. */
-static int shade_of(const struct campaign_tally *t)
+static int shade_of(const struct tally *t)
 {
-	double ratio = campaign_ratio(t);
+	double ratio = tally_ratio(t);
 	int i = 0;
 
 	while (i < SHADES && !(ratio <= shades[i].ratio))
@@ -208,18 +213,18 @@ static double column(size_t s)
 /* What a data block holds of each cell. */
 enum layer { LAYER_FAILS = SHADES + 1, LAYER_SAYS_SO, LAYERS };
 
-static bool in_layer(const struct map *map, const struct campaign_tally *t, int layer)
+static bool in_layer(const struct map *map, const struct tally *t, int layer)
 {
 	if (layer == LAYER_FAILS)
 		return fails(map, t);
 	if (layer == LAYER_SAYS_SO)
-		return fails(map, t) && 2 * t->doubted >= map->campaign->drops;
+		return fails(map, t) && 2 * t->doubted >= map->compare->drops;
 	return shade_of(t) == layer;
 }
 
 static void write_cells(FILE *out, const struct map *map, size_t m, double row, int layer)
 {
-	const struct campaign_cell *cell = map->campaign->cells;
+	const struct compare_cell *cell = map->compare->cells;
 
 	for (size_t s = 0; s < SWEEPS; s++)
 		for (size_t i = 0; i < sweeps[s].count; i++, cell++)
@@ -362,11 +367,10 @@ static int draw(const struct chart_options *options, const struct map *map, char
 	fprintf(out, "set label \"%s: where methods fail\" at screen 0.01,%.4f font ',18'\n", text->title,
 	        1 - 24 / height);
 	fprintf(out,
-	        "set label 'One trouble at a time on a drop of 485 g, 3 ms half-sine, 7 kHz, noise 1 g, "
-	        "plate 129 Hz; "
-	        "%u drops a cell. * is told that it is a half-sine.' at screen 0.01,%.4f "
-	        "font ',12'\n",
-	        map->campaign->drops, 1 - 50 / height);
+	        "set label \"One trouble at a time on a drop of %s, noise %g g; %u drops a cell. * is told "
+	        "that it is "
+	        "a half-sine.\" at screen 0.01,%.4f font ',12'\n",
+	        options->about, options->drop.noise_g, map->compare->drops, 1 - 50 / height);
 	draw_names(out, map);
 	draw_heads(out, rows);
 	draw_legend(out, map, height);
@@ -381,7 +385,7 @@ static void print_table(FILE *out, const struct map *map)
 {
 	fprintf(out, "\n%s\n", quantity_text(map->quantity)->title);
 	for (size_t m = 0; m < map->methods; m++) {
-		const struct campaign_cell *cell = map->campaign->cells;
+		const struct compare_cell *cell = map->compare->cells;
 		unsigned failing = 0;
 
 		if (map->method[m].quantity != map->quantity)
@@ -410,13 +414,14 @@ static void print_table(FILE *out, const struct map *map)
 	}
 }
 
-static size_t make_scenes(struct campaign_cell *cells)
+static size_t make_scenes(const struct chart_options *options, struct compare_cell *cells)
 {
 	size_t n = 0;
 
 	for (size_t s = 0; s < SWEEPS; s++)
 		for (size_t i = 0; i < sweeps[s].count; i++) {
-			cells[n].scene = synthetic_scene();
+			cells[n].scene = options->drop;
+			cells[n].scene.seed = 7919 * options->seed;
 			sweeps[s].apply(&cells[n++].scene, sweeps[s].value[i]);
 		}
 	return n;
@@ -424,30 +429,33 @@ static size_t make_scenes(struct campaign_cell *cells)
 
 int chart_stability(const struct chart_options *options, FILE *out, char *message)
 {
-	struct campaign campaign = {.drops = options->drops, .seed = options->seed};
-	struct map map = {.campaign = &campaign};
+	struct compare compare = {.drops = options->drops};
+	struct map map = {.compare = &compare};
 	int status;
 
 	map.method = method_table(&map.methods);
-	campaign.cells = campaign_cells(CELLS_MAX);
-	if (!campaign.cells) {
+	compare.cells = compare_cells(CELLS_MAX);
+	if (!compare.cells) {
 		snprintf(message, CHART_MESSAGE_MAX, "%s", error_text(DT_E_MEMORY));
 		return DT_E_MEMORY;
 	}
-	campaign.count = make_scenes(campaign.cells);
-	status = campaign_run(&campaign);
+	compare.count = make_scenes(options, compare.cells);
+	status = compare_run(&compare);
 	if (status)
 		snprintf(message, CHART_MESSAGE_MAX, "the simulated drops failed: %s", error_text(status));
 	else
-		fprintf(out, "What each method fails at first; %u drops of known truth a cell, seed %lu\n",
-		        options->drops, options->seed);
+		fprintf(out,
+		        "What each method fails at first; %u drops of known truth a cell, seed %lu; %s\n",
+		        options->drops, options->seed, options->about);
 	for (int q = 0; q < QUANTITIES && !status; q++) {
 		map.quantity = (enum quantity)q;
+		if (options->no_plate && quantity_text(map.quantity)->of_plate)
+			continue;
 		print_table(out, &map);
 		status = write_csv(options, &map, message);
 		if (!status)
 			status = draw(options, &map, message);
 	}
-	campaign_free(campaign.cells, CELLS_MAX);
+	compare_free(compare.cells, CELLS_MAX);
 	return status;
 }

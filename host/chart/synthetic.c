@@ -11,8 +11,12 @@
 
 #include "common/units.h"
 
-#define LOST_S 8e-3
-#define PEAK_LOST_MOST 8.0 /* more, and nothing is left of the pulse */
+#define GAP_S 5e-3     /* after the contact */
+#define SPIKES_S 35e-3 /* the span that they fall in, from SPIKES_LATE_S after the contact */
+#define SPIKES_LATE_S 2e-3
+#define SPIKE_EARLY_S 10e-3
+#define CUT_S 1e-3
+#define PLAY_S 1e-3 /* of the onset */
 
 struct synthetic_scene synthetic_scene(void)
 {
@@ -20,12 +24,13 @@ struct synthetic_scene synthetic_scene(void)
 	                                .peak_g = {485.1, 218.4},
 	                                .plate_g = {310.1, 133.0},
 	                                .rate_hz = {7000, 10000},
+	                                .z_part = 0.0412, /* 20 g on S2 */
 	                                .contact_s = 3e-3,
 	                                .interval_s = 2e-3,
 	                                .damped_hz = 129,
 	                                .damping = 0.1,
 	                                .pre_s = 0.15,
-	                                .decay_s = 45e-3,
+	                                .post_s = 0.06,
 	                                .noise_g = 1,
 	                                .step_g = 1.0 / 32,
 	                                .hum_hz = 50,
@@ -80,18 +85,18 @@ static double felt(const struct step *step, const double state[2])
 static double *respond(const struct synthetic_signal *signal, double damped_hz, double damping,
                        double state[2])
 {
-	double *out = malloc((signal->steps + 1) * sizeof(*out)),
-	       h = signal->axis.contact_s / (double)signal->steps;
+	double *out = malloc((SYNTHETIC_STEPS + 1) * sizeof(*out));
+	double h = signal->axis.contact_s / SYNTHETIC_STEPS, before = 0;
 	struct step step = step_of(damped_hz, damping, h);
 
 	state[0] = state[1] = 0;
-	for (size_t i = 0; out && i <= signal->steps; i++) {
-		double s = (double)i / (double)signal->steps;
+	for (int i = 0; out && i <= SYNTHETIC_STEPS; i++) {
+		double pulse = synthetic_pulse(signal->family, (double)i / SYNTHETIC_STEPS);
 
 		if (i > 0)
-			drive(&step, state, synthetic_pulse(signal->family, s - 1 / (double)signal->steps),
-			      synthetic_pulse(signal->family, s), h);
+			drive(&step, state, before, pulse, h);
 		out[i] = felt(&step, state);
+		before = pulse;
 	}
 	return out;
 }
@@ -99,13 +104,13 @@ static double *respond(const struct synthetic_signal *signal, double damped_hz, 
 static double response_at(const struct synthetic_signal *signal, const double *response,
                           const double state[2], double damped_hz, double damping, double t)
 {
-	double place = t / signal->axis.contact_s * (double)signal->steps, moved[2] = {state[0], state[1]};
+	double place = t / signal->axis.contact_s * SYNTHETIC_STEPS, moved[2] = {state[0], state[1]};
 	struct step step;
 
 	if (!(t > 0))
 		return 0;
-	if (place < (double)signal->steps)
-		return synthetic_between(response, signal->steps, place);
+	if (place < SYNTHETIC_STEPS)
+		return synthetic_between(response, SYNTHETIC_STEPS, place);
 	step = step_of(damped_hz, damping, t - signal->axis.contact_s);
 	glide(&step, moved);
 	return felt(&step, moved);
@@ -115,7 +120,6 @@ int synthetic_signal_open(struct synthetic_signal *signal, enum synthetic_family
                           const struct synthetic_axis *axis)
 {
 	*signal = (struct synthetic_signal){.family = family, .axis = *axis};
-	signal->steps = (size_t)(axis->contact_s / SYNTHETIC_STEP_S + 0.5);
 	signal->response = respond(signal, axis->damped_hz, axis->damping, signal->state);
 	if (fabs(axis->second_gain) > 0)
 		signal->second = respond(signal, axis->second_hz, axis->second_damping, signal->second_state);
@@ -174,75 +178,138 @@ static double summit_of(double (*f)(const void *context, double t), const void *
 	return (a + b) / 2;
 }
 
-static double plate_of(const void *signal, double t)
+/* Upwards whatever its sign. */
+static double plate_of(const void *context, double t)
 {
-	return synthetic_plate(signal, t);
+	const struct synthetic_signal *signal = context;
+
+	return signal->axis.gain < 0 ? -synthetic_plate(signal, t) : synthetic_plate(signal, t);
 }
 
-static double resultant_of(const void *context, double t)
+static double box_magnitude(const void *context, double t)
 {
 	const struct synthetic_signal *signal = context;
 
 	return hypot(synthetic_box(&signal[0], t), synthetic_box(&signal[1], t));
 }
 
-/* The first swing has one maximum between the onset and a period of the plate after it. */
-static double plate_summit(const struct synthetic_signal *signal)
+static double plate_magnitude(const void *context, double t)
 {
-	const struct synthetic_axis *axis = &signal->axis;
-	double from = axis->onset_s + axis->delay_s, step = 0.01 / axis->damped_hz, at = from;
+	const struct synthetic_signal *signal = context;
 
-	for (double t = from; t < from + axis->contact_s + 1 / axis->damped_hz; t += step)
-		if (synthetic_plate(signal, t) > synthetic_plate(signal, at))
-			at = t;
-	return summit_of(plate_of, signal, at - step, at + step);
+	return hypot(synthetic_plate(&signal[0], t), synthetic_plate(&signal[1], t));
 }
 
-double synthetic_plate_peak(const struct synthetic_signal *signal)
+/* The same where there may be several: the surroundings of the largest of steps in a..b. */
+static double highest_of(double (*f)(const void *context, double t), const void *context, double a, double b,
+                         double step)
 {
-	return synthetic_plate(signal, plate_summit(signal));
+	double at = a;
+
+	for (double t = a; t < b; t += step)
+		if (f(context, t) > f(context, at))
+			at = t;
+	return summit_of(f, context, at - step, at + step);
+}
+
+/* The first swing has one maximum between the onset and a period of the plate after it. */
+double synthetic_plate_summit(const struct synthetic_signal *signal)
+{
+	const struct synthetic_axis *axis = &signal->axis;
+	double from = axis->onset_s + axis->delay_s;
+
+	return highest_of(plate_of, signal, from, from + axis->contact_s + 1 / axis->damped_hz,
+	                  0.02 / axis->damped_hz);
+}
+
+static double box_summit(const struct synthetic_signal *signal)
+{
+	return signal->axis.onset_s + synthetic_pulse_summit(signal->family) * signal->axis.contact_s;
 }
 
 double synthetic_lag(const struct synthetic_signal *signal)
 {
-	const struct synthetic_axis *axis = &signal->axis;
-
-	return plate_summit(signal) - axis->onset_s -
-	       synthetic_pulse_summit(signal->family) * axis->contact_s;
+	return synthetic_plate_summit(signal) - box_summit(signal);
 }
 
-double synthetic_resultant(const struct synthetic_signal signal[2])
+double synthetic_resultant(const struct synthetic_signal signal[2], double *at)
 {
-	double apart = synthetic_pulse_summit(signal[0].family), a = INFINITY, b = -INFINITY;
+	double x = box_summit(&signal[0]), y = box_summit(&signal[1]);
 
-	for (int i = 0; i < 2; i++) {
-		double at = signal[i].axis.onset_s + apart * signal[i].axis.contact_s;
+	*at = summit_of(box_magnitude, signal, fmin(x, y) - 1e-4, fmax(x, y) + 1e-4);
+	return box_magnitude(signal, *at);
+}
 
-		a = fmin(a, at - 1e-4);
-		b = fmax(b, at + 1e-4);
+double synthetic_plate_resultant(const struct synthetic_signal signal[2], double *at)
+{
+	double x = synthetic_plate_summit(&signal[0]), y = synthetic_plate_summit(&signal[1]);
+
+	*at = highest_of(plate_magnitude, signal, fmin(x, y), fmax(x, y) + 1e-5, 1e-5);
+	return plate_magnitude(signal, *at);
+}
+
+/* Of base 1, at a tenth of the height. */
+static double width_of(enum synthetic_family family)
+{
+	double edge[2];
+
+	for (int side = 0; side < 2; side++) {
+		double inside = synthetic_pulse_summit(family), outside = side;
+
+		for (int i = 0; i < 60; i++) {
+			double middle = (inside + outside) / 2;
+
+			if (synthetic_pulse(family, middle) > 0.1)
+				inside = middle;
+			else
+				outside = middle;
+		}
+		edge[side] = inside;
 	}
-	return resultant_of(signal, summit_of(resultant_of, signal, a, b));
+	return edge[1] - edge[0];
+}
+
+static void find_truth(struct synthetic *synthetic)
+{
+	const struct synthetic_scene *scene = &synthetic->scene;
+	const struct synthetic_signal *signal = synthetic->signal;
+	struct synthetic_truth *truth = &synthetic->at_zero;
+
+	*truth =
+	        (struct synthetic_truth){.z_peak_g = scene->z_part * scene->peak_g[0],
+	                                 .damped_hz = scene->damped_hz,
+	                                 .natural_hz = scene->damped_hz / sqrt(1 - gsl_pow_2(scene->damping)),
+	                                 .damping = scene->damping,
+	                                 .contact_s = scene->contact_s,
+	                                 .width_s = width_of(scene->family) * scene->contact_s,
+	                                 .velocity_m_s = synthetic_pulse_area(scene->family) *
+	                                                 scene->contact_s * scene->peak_g[0] * UNITS_G_M_S2};
+	for (int i = 0; i < 2; i++) {
+		truth->peak_g[i] = scene->peak_g[i];
+		truth->peak_s[i] = box_summit(&signal[i]);
+		truth->plate_s[i] = synthetic_plate_summit(&signal[i]);
+		truth->plate_g[i] = synthetic_plate(&signal[i], truth->plate_s[i]);
+		truth->lag_s[i] = truth->plate_s[i] - truth->peak_s[i];
+	}
+	truth->resultant_g = synthetic_resultant(signal, &truth->resultant_s);
+	truth->plate_resultant_g = synthetic_plate_resultant(signal, &truth->plate_resultant_s);
 }
 
 struct synthetic_truth synthetic_truth(const struct synthetic *synthetic)
 {
-	const struct synthetic_axis *x = &synthetic->signal[0].axis;
-	enum synthetic_family family = synthetic->scene.family;
+	struct synthetic_truth truth = synthetic->at_zero;
 
-	return (struct synthetic_truth){
-	        .peak_g = x->peak_g,
-	        .peak_s = synthetic->onset_s + x->onset_s + synthetic_pulse_summit(family) * x->contact_s,
-	        .resultant_g = synthetic_resultant(synthetic->signal),
-	        .plate_peak_g = synthetic_plate_peak(&synthetic->signal[0]),
-	        .lag_s = synthetic_lag(&synthetic->signal[0]),
-	        .damped_hz = x->damped_hz,
-	        .damping = x->damping,
-	        .contact_s = x->contact_s,
-	        .velocity_m_s = synthetic_pulse_area(family) * x->contact_s * x->peak_g * UNITS_G_M_S2};
+	for (int i = 0; i < 2; i++) {
+		truth.peak_s[i] += synthetic->onset_s;
+		truth.plate_s[i] += synthetic->onset_s;
+	}
+	truth.resultant_s += synthetic->onset_s;
+	truth.plate_resultant_s += synthetic->onset_s;
+	return truth;
 }
 
-/* ---- a drop
- * ------------------------------------------------------------------------------------------------ */
+/* ---- a drop ---------------------------------------------------------------------------------------------
+ */
 
 /* Gain and delay from the plate's peak and the interval asked for. A second mode goes with the first's. */
 static int make_axis(struct synthetic *synthetic, int i)
@@ -274,22 +341,18 @@ static int make_axis(struct synthetic *synthetic, int i)
 
 static double rate_of(const struct synthetic *synthetic, enum synthetic_channel channel)
 {
-	return synthetic->scene.rate_hz[channel & 1u];
+	return synthetic->scene.rate_hz[channel != SYNTHETIC_S1X && channel != SYNTHETIC_S2X];
 }
 
-/* Up to a millisecond of the onset's play comes on top. */
-static size_t count_of(const struct synthetic *synthetic, enum synthetic_channel channel)
+/* Axis 0: X and Z. */
+static int axis_of(enum synthetic_channel channel)
 {
-	const struct synthetic_scene *scene = &synthetic->scene;
-	double end = scene->pre_s + scene->contact_s + scene->skew_s +
-	             fmax(0, synthetic->signal[0].axis.delay_s) + scene->decay_s + 1e-3;
-
-	return (size_t)(end * rate_of(synthetic, channel));
+	return channel == SYNTHETIC_S1Y || channel == SYNTHETIC_S2Y;
 }
 
 int synthetic_open(struct synthetic *synthetic, const struct synthetic_scene *scene)
 {
-	static const char *const names[SYNTHETIC_CHANNELS] = {"S1X", "S1Y", "S2X", "S2Y"};
+	static const char *const names[SYNTHETIC_CHANNELS] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
 	bool failed;
 
 	*synthetic = (struct synthetic){.scene = *scene, .onset_s = scene->pre_s};
@@ -298,13 +361,17 @@ int synthetic_open(struct synthetic *synthetic, const struct synthetic_scene *sc
 	strcpy(synthetic->record.file, "synthetic");
 	strcpy(synthetic->record.format, "csv");
 	failed = !synthetic->random || make_axis(synthetic, 0) || make_axis(synthetic, 1);
-	for (unsigned i = 0; i < SYNTHETIC_CHANNELS && !failed; i++)
-		failed = !record_add_channel(&synthetic->record, names[i],
-		                             rate_of(synthetic, (enum synthetic_channel)i),
-		                             count_of(synthetic, (enum synthetic_channel)i));
+	for (unsigned i = 0; i < SYNTHETIC_CHANNELS && !failed; i++) {
+		double rate = rate_of(synthetic, (enum synthetic_channel)i);
+
+		failed = !record_add_channel(&synthetic->record, names[i], rate,
+		                             (size_t)((scene->pre_s + scene->post_s) * rate));
+	}
 	drop_set_axes(&synthetic->record);
-	if (!failed)
+	if (!failed) {
+		find_truth(synthetic);
 		return 0;
+	}
 	synthetic_close(synthetic);
 	return DT_E_MEMORY;
 }
@@ -317,36 +384,33 @@ void synthetic_close(struct synthetic *synthetic)
 		synthetic_signal_close(&synthetic->signal[i]);
 }
 
-static bool plate_channel(enum synthetic_channel channel)
-{
-	return channel == SYNTHETIC_S1X || channel == SYNTHETIC_S1Y;
-}
-
 static double signal_at(const struct synthetic *synthetic, enum synthetic_channel channel, double time_s)
 {
-	const struct synthetic_signal *signal = &synthetic->signal[channel & 1u];
+	const struct synthetic_signal *signal = &synthetic->signal[axis_of(channel)];
+	double t = time_s - synthetic->onset_s;
+	double value = channel < SYNTHETIC_S2X ? synthetic_plate(signal, t) : synthetic_box(signal, t);
 
-	return plate_channel(channel) ? synthetic_plate(signal, time_s - synthetic->onset_s)
-	                              : synthetic_box(signal, time_s - synthetic->onset_s);
+	return channel == SYNTHETIC_S1Z || channel == SYNTHETIC_S2Z ? synthetic->scene.z_part * value : value;
 }
 
-/* Whether sample k belongs to the run of lost ones. */
-static bool in_run(const struct synthetic *synthetic, enum synthetic_channel channel, size_t k)
+/* Whether sample k is among the count nearest the peak of S2's X or Y. */
+static bool near_peak(const struct synthetic *synthetic, enum synthetic_channel channel, size_t k,
+                      unsigned count)
 {
-	const struct synthetic_axis *axis = &synthetic->signal[channel & 1u].axis;
-	double lost =
-	        plate_channel(channel) ? synthetic->scene.lost : fmin(synthetic->scene.lost, PEAK_LOST_MOST);
-	double from = synthetic->onset_s + axis->onset_s;
+	double peak;
 
-	if (synthetic->scene.lost == 0)
+	if (count == 0 || (channel != SYNTHETIC_S2X && channel != SYNTHETIC_S2Y))
 		return false;
-	if (plate_channel(channel))
-		from = (from + LOST_S) * axis->rate_hz;
-	else
-		from = rint((from + synthetic_pulse_summit(synthetic->scene.family) * axis->contact_s) *
-		                    axis->rate_hz -
-		            lost / 2);
-	return (double)k >= from && (double)k < from + lost;
+	peak = synthetic->onset_s + synthetic->at_zero.peak_s[axis_of(channel)];
+	return fabs((double)k - floor(peak * rate_of(synthetic, channel) - count / 2.0 + 1) -
+	            (count - 1) / 2.0) < count / 2.0;
+}
+
+static bool in_gap(const struct synthetic *synthetic, enum synthetic_channel channel, size_t k)
+{
+	double from = (synthetic->onset_s + synthetic->scene.contact_s + GAP_S) * rate_of(synthetic, channel);
+
+	return channel < SYNTHETIC_S2X && (double)k >= from && (double)k < from + synthetic->scene.gap;
 }
 
 bool synthetic_keeps(const struct synthetic *synthetic, enum synthetic_channel channel, size_t k)
@@ -354,73 +418,100 @@ bool synthetic_keeps(const struct synthetic *synthetic, enum synthetic_channel c
 	const struct synthetic_scene *scene = &synthetic->scene;
 	double t = (double)k / rate_of(synthetic, channel);
 
-	return !in_run(synthetic, channel, k) &&
+	return !near_peak(synthetic, channel, k, scene->lost_at_peak) &&
+	       !near_peak(synthetic, channel, k, scene->zeroed_at_peak) &&
+	       !near_peak(synthetic, channel, k, scene->nan_at_peak) && !in_gap(synthetic, channel, k) &&
+	       !(scene->cut && t > synthetic->onset_s + CUT_S) &&
 	       !(scene->clip_g > 0 && fabs(signal_at(synthetic, channel, t)) >= scene->clip_g);
 }
 
-static double sample_at(struct synthetic *synthetic, enum synthetic_channel channel, size_t k, double phase)
+static double disturbance(const struct synthetic *synthetic, double time_s, double phase)
 {
 	const struct synthetic_scene *scene = &synthetic->scene;
-	double t = (double)k / rate_of(synthetic, channel), value;
+	double value = scene->offset_g + scene->drift_g_s * time_s;
 
-	value = gsl_ran_gaussian_ziggurat(synthetic->random, scene->noise_g);
 	if (scene->hum_g > 0)
-		value += scene->hum_g * sin(2 * M_PI * scene->hum_hz * t + phase);
-	if (t > synthetic->onset_s + scene->contact_s)
-		value += scene->offset_g;
-	if (scene->jitter_s > 0)
-		t += gsl_ran_gaussian_ziggurat(synthetic->random, scene->jitter_s);
-	return value + signal_at(synthetic, channel, t);
+		value += scene->hum_g * sin(2 * M_PI * scene->hum_hz * time_s + phase);
+	return time_s > synthetic->onset_s + scene->contact_s ? value + scene->shift_g : value;
 }
 
-static void add_spikes(struct synthetic *synthetic, const struct channel *channel)
-{
-	const struct synthetic_scene *scene = &synthetic->scene;
-
-	for (unsigned i = 0; i < scene->spikes; i++) {
-		double t = synthetic->onset_s + 2 * scene->contact_s +
-		           fmax(0, scene->decay_s - scene->contact_s) * gsl_rng_uniform(synthetic->random);
-		size_t k = (size_t)(t * channel->rate_hz);
-
-		if (k < channel->count)
-			channel->value_g[k] +=
-			        gsl_rng_uniform(synthetic->random) < 0.5 ? -scene->spike_g : scene->spike_g;
-	}
-}
-
-static void finish_sample(struct synthetic *synthetic, enum synthetic_channel c, size_t k)
+static void add_spikes(struct synthetic *synthetic, enum synthetic_channel c)
 {
 	const struct synthetic_scene *scene = &synthetic->scene;
 	struct channel *channel = &synthetic->record.channels[c];
-	double value = channel->value_g[k];
-	bool lost = in_run(synthetic, c, k) ||
-	            (scene->missing > 0 && gsl_rng_uniform(synthetic->random) < scene->missing);
+	double from = scene->contact_s + SPIKES_LATE_S, span = fmin(SPIKES_S, scene->post_s - PLAY_S - from);
 
-	if (scene->clip_g > 0)
-		value = fmax(-scene->clip_g, fmin(scene->clip_g, value));
-	if (scene->step_g > 0)
-		value = scene->step_g * rint(value / scene->step_g);
-	channel->value_g[k] = lost ? (double)NAN : value;
-	channel->sample[k] = lost ? SAMPLE_LOST : 0;
+	for (unsigned i = 0; i < scene->spikes && (c == SYNTHETIC_S1X || c == SYNTHETIC_S1Y) && span > 0;
+	     i++) {
+		double t = synthetic->onset_s + from + span * gsl_rng_uniform(synthetic->random);
+
+		channel->value_g[(size_t)(t * channel->rate_hz)] +=
+		        gsl_rng_uniform(synthetic->random) < 0.5 ? -scene->spike_g : scene->spike_g;
+	}
+	if (scene->spikes > 0 && (c == SYNTHETIC_S2X || c == SYNTHETIC_S2Y))
+		channel->value_g[(size_t)((synthetic->onset_s - SPIKE_EARLY_S) * channel->rate_hz)] +=
+		        scene->spike_g;
 }
 
-void synthetic_drop(struct synthetic *synthetic, unsigned long seed, unsigned long drop)
+static double converted(const struct synthetic_scene *scene, double value)
 {
+	if (scene->clip_g > 0)
+		value = fmax(-scene->clip_g, fmin(scene->clip_g, value));
+	return scene->step_g > 0 ? scene->step_g * rint(value / scene->step_g) : value;
+}
+
+static void damage(struct synthetic *synthetic, enum synthetic_channel c, size_t k)
+{
+	const struct synthetic_scene *scene = &synthetic->scene;
+	struct channel *channel = &synthetic->record.channels[c];
+
+	if (near_peak(synthetic, c, k, scene->zeroed_at_peak))
+		channel->value_g[k] = 0;
+	if (near_peak(synthetic, c, k, scene->nan_at_peak))
+		channel->value_g[k] = NAN;
+	if (near_peak(synthetic, c, k, scene->lost_at_peak) || in_gap(synthetic, c, k) ||
+	    (scene->missing > 0 && gsl_rng_uniform(synthetic->random) < scene->missing)) {
+		channel->value_g[k] = NAN;
+		channel->sample[k] = SAMPLE_LOST;
+	}
+}
+
+static void fill(struct synthetic *synthetic, enum synthetic_channel c, double phase)
+{
+	const struct synthetic_scene *scene = &synthetic->scene;
+	struct channel *channel = &synthetic->record.channels[c];
+
+	for (size_t k = 0; k < channel->count; k++) {
+		double t = (double)k / channel->rate_hz, value = disturbance(synthetic, t, phase);
+
+		value += gsl_ran_gaussian_ziggurat(synthetic->random, scene->noise_g);
+		if (scene->jitter_s > 0)
+			t += gsl_ran_gaussian_ziggurat(synthetic->random, scene->jitter_s);
+		channel->value_g[k] = value + signal_at(synthetic, c, t);
+		channel->sample[k] = 0;
+	}
+	add_spikes(synthetic, c);
+	for (size_t k = 0; k < channel->count; k++) {
+		channel->value_g[k] = converted(scene, channel->value_g[k]);
+		damage(synthetic, c, k);
+	}
+}
+
+void synthetic_drop(struct synthetic *synthetic, unsigned long drop)
+{
+	const struct synthetic_scene *scene = &synthetic->scene;
 	double phase;
 
-	gsl_rng_set(synthetic->random, seed * 7919 + drop * 104729 + 1);
-	synthetic->onset_s = synthetic->scene.pre_s + 1e-3 * gsl_rng_uniform(synthetic->random);
+	gsl_rng_set(synthetic->random, scene->seed + 1000003 * (drop + 1));
+	synthetic->onset_s = scene->pre_s + PLAY_S * gsl_rng_uniform(synthetic->random);
 	phase = 2 * M_PI * gsl_rng_uniform(synthetic->random);
 	for (unsigned i = 0; i < SYNTHETIC_CHANNELS; i++) {
 		struct channel *channel = &synthetic->record.channels[i];
+		double end_s = scene->cut ? synthetic->onset_s + CUT_S : scene->pre_s + scene->post_s;
 
+		channel->count = (size_t)(end_s * channel->rate_hz);
 		channel->flags = 0;
-		for (size_t k = 0; k < channel->count; k++)
-			channel->value_g[k] = sample_at(synthetic, (enum synthetic_channel)i, k, phase);
-		if (plate_channel((enum synthetic_channel)i))
-			add_spikes(synthetic, channel);
-		for (size_t k = 0; k < channel->count; k++)
-			finish_sample(synthetic, (enum synthetic_channel)i, k);
+		fill(synthetic, (enum synthetic_channel)i, phase);
 	}
 	record_finish(&synthetic->record);
 }

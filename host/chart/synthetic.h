@@ -2,14 +2,14 @@
 #ifndef DT_HOST_CHART_SYNTHETIC_H
 #define DT_HOST_CHART_SYNTHETIC_H
 /*
- * A drop whose truth is known, as a record, with everything that can be wrong with one. S2 is a contact
- * pulse of a family; S1 the exact response of a damped oscillator to it, scaled and delayed so that its
- * peak follows S2's by the interval asked for. X at 7 kHz and Y at 10 kHz unless asked otherwise, onset
- * uniform over the sample grid, white Gaussian noise, quantisation. Formulae of its own: shares nothing with
- * host/estimate or host/model.
+ * A drop whose truth is known, as a record, with everything that can be wrong with one: the one generator of
+ * `droptower chart` and of tests/accuracy. S2 is a contact pulse of a family; S1 the exact response of a
+ * damped oscillator to it, scaled and delayed so that its peak follows S2's by the interval asked for; Z a
+ * part of X. Onset uniform over the millisecond in which both rates' grids repeat, white Gaussian noise,
+ * quantisation. Formulae of its own: shares nothing with host/estimate, host/model or hil.
  *
- * The oscillator is carried exactly (state transition, input linear between steps of 1 us) through the
- * contact and in closed form afterwards. Times in s after the record's first instant.
+ * The oscillator is carried exactly (state transition, input linear between SYNTHETIC_STEPS of the contact)
+ * through the contact and in closed form afterwards. Times in s after the record's first instant.
  */
 #include <stdbool.h>
 
@@ -25,12 +25,22 @@ enum synthetic_family {
 	SYNTHETIC_FAMILIES
 };
 
-enum synthetic_channel { SYNTHETIC_S1X, SYNTHETIC_S1Y, SYNTHETIC_S2X, SYNTHETIC_S2Y, SYNTHETIC_CHANNELS };
+enum synthetic_channel {
+	SYNTHETIC_S1X,
+	SYNTHETIC_S1Y,
+	SYNTHETIC_S1Z,
+	SYNTHETIC_S2X,
+	SYNTHETIC_S2Y,
+	SYNTHETIC_S2Z,
+	SYNTHETIC_CHANNELS
+};
+
+enum { SYNTHETIC_STEPS = 2000 };
 
 /* What a drop is; the parameters of one axis that a bound counts as unknown. */
 struct synthetic_axis {
 	double rate_hz;
-	double peak_g;    /* of S2 */
+	double peak_g;    /* of S2, signed */
 	double onset_s;   /* after the drop's */
 	double contact_s; /* foot to foot */
 	double gain;      /* S1 over the response to a pulse of height 1 */
@@ -40,20 +50,25 @@ struct synthetic_axis {
 };
 
 struct synthetic_scene {
+	unsigned long seed; /* scenes with one seed share their chances */
 	enum synthetic_family family;
-	double peak_g[2], plate_g[2]; /* X, Y: of S2, of S1 */
-	double rate_hz[2];
+	double peak_g[2], plate_g[2]; /* X, Y: of S2, of S1; signed */
+	double rate_hz[2];            /* of X; of Y and Z */
+	double z_part;                /* Z over X */
 	double contact_s, interval_s, damped_hz, damping;
-	double skew_s; /* Y's onset after X's */
-	double pre_s, decay_s;
+	double skew_s;        /* Y's onset after X's */
+	double pre_s, post_s; /* the record, before and after the earliest onset */
 	double noise_g, step_g;
-	double offset_g;      /* zero shift that the impact leaves behind */
-	double hum_g, hum_hz; /* its phase by chance */
-	unsigned spikes;      /* in each decay */
+	double offset_g, drift_g_s; /* of the whole record */
+	double shift_g;             /* zero shift that the impact leaves behind */
+	double hum_g, hum_hz;       /* its phase by chance, the same on all channels, as from one supply */
+	unsigned spikes;            /* in the decay of S1 X and Y; one before S2's pulse */
 	double spike_g;
-	double clip_g;  /* 0: none */
-	double missing; /* part of all samples, by chance */
-	unsigned lost;  /* run of samples lost: 8 ms after the onset in S1, and, at most 8, at S2's peak */
+	double clip_g;                                      /* 0: none */
+	double missing;                                     /* part of all samples, by chance */
+	unsigned gap;                                       /* samples lost from 5 ms after the contact, S1 */
+	unsigned lost_at_peak, zeroed_at_peak, nan_at_peak; /* samples of S2 X and Y nearest the peak */
+	bool cut;                                           /* the record ends 1 ms after the onset */
 	double second_part; /* a second mode, its size and distance from the first */
 	double second_apart_hz;
 	double jitter_s; /* standard deviation of each sample's instant */
@@ -62,40 +77,41 @@ struct synthetic_scene {
 /* The study's box at 25 degrees, plate of 129 Hz; noise 1 g, nothing wrong. */
 struct synthetic_scene synthetic_scene(void);
 
+/* X and Y where there are two. */
 struct synthetic_truth {
-	double peak_g, peak_s; /* S2 X */
-	double resultant_g;    /* S2 */
-	double plate_peak_g;   /* S1 X */
-	double lag_s;          /* X */
-	double damped_hz, damping;
-	double contact_s, velocity_m_s; /* S2 X */
+	double peak_g[2], peak_s[2]; /* S2 */
+	double z_peak_g;
+	double resultant_g, resultant_s;
+	double plate_g[2], plate_s[2]; /* S1 */
+	double plate_resultant_g, plate_resultant_s;
+	double lag_s[2];
+	double damped_hz, natural_hz, damping;
+	double contact_s, width_s, velocity_m_s; /* S2 X; the width at a tenth of the height */
 };
 
 /* One axis ready to be looked at. */
 struct synthetic_signal {
 	enum synthetic_family family;
 	struct synthetic_axis axis;
-	double *response, *second; /* during the contact, steps of SYNTHETIC_STEP_S; second NULL without */
+	double *response, *second;        /* [SYNTHETIC_STEPS + 1] during the contact; second NULL without */
 	double state[2], second_state[2]; /* where the contact ends: displacement and velocity */
-	size_t steps;
 };
 
 struct synthetic {
 	struct synthetic_scene scene;
 	struct synthetic_signal signal[2];
 	gsl_rng *random;
-	double onset_s; /* of the present drop */
+	double onset_s; /* of the present drop, X */
 	struct record record;
+	struct synthetic_truth at_zero; /* truth of a drop whose onset is 0 */
 };
-
-#define SYNTHETIC_STEP_S 1e-6
 
 /* DT_E_MEMORY. */
 DT_MUST_USE int synthetic_open(struct synthetic *synthetic, const struct synthetic_scene *scene);
 void synthetic_close(struct synthetic *synthetic);
 
-/* That drop of that seed, always the same: fills synthetic->record and onset_s. */
-void synthetic_drop(struct synthetic *synthetic, unsigned long seed, unsigned long drop);
+/* That drop of the scene's seed, always the same: fills synthetic->record and onset_s. */
+void synthetic_drop(struct synthetic *synthetic, unsigned long drop);
 
 /* Of the present drop. */
 struct synthetic_truth synthetic_truth(const struct synthetic *synthetic);
@@ -112,14 +128,15 @@ void synthetic_signal_close(struct synthetic_signal *signal);
 double synthetic_box(const struct synthetic_signal *signal, double time_s);
 double synthetic_plate(const struct synthetic_signal *signal, double time_s);
 
-/* S1's peak, and its time after S2's. */
-double synthetic_plate_peak(const struct synthetic_signal *signal);
+/* When S1 peaks after the drop's onset, and how long after S2. */
+double synthetic_plate_summit(const struct synthetic_signal *signal);
 double synthetic_lag(const struct synthetic_signal *signal);
 
-/* The largest hypot of the two axes' pulses. */
-double synthetic_resultant(const struct synthetic_signal signal[2]);
+/* The largest hypot of the two axes' pulses, or plates, and when. */
+double synthetic_resultant(const struct synthetic_signal signal[2], double *at);
+double synthetic_plate_resultant(const struct synthetic_signal signal[2], double *at);
 
-/* Pulse of base 1 and height 1. */
+/* Pulse of base 1 and height 1; 0 outside. */
 double synthetic_pulse(enum synthetic_family family, double s);
 double synthetic_pulse_summit(enum synthetic_family family);
 double synthetic_pulse_area(enum synthetic_family family);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <errno.h>
 #include <getopt.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -10,13 +11,14 @@
 
 static const struct subject {
 	const char *name;
+	bool of_drops; /* simulated ones, which may be of a scene */
 	int (*draw)(const struct chart_options *options, FILE *out, char *message);
 	unsigned drops;
 } subjects[] = {
-        {"accuracy", chart_accuracy, 1000},
-        {"stability", chart_stability, 100},
-        {"model", chart_model, 1},
-        {"model-stability", chart_model_stability, 40},
+        {"accuracy", true, chart_accuracy, 1000},
+        {"stability", true, chart_stability, 100},
+        {"model", false, chart_model, 1},
+        {"model-stability", false, chart_model_stability, 40},
 };
 enum { SUBJECTS = sizeof(subjects) / sizeof(subjects[0]) };
 
@@ -24,11 +26,16 @@ struct arguments {
 	const char *folder;
 	unsigned drops; /* 0: the chart's own */
 	uint64_t seed;
+	const char *scene_file;
 };
 
 static const struct option_row rows[] = {
         OPTION_TEXT("out", "DIR", struct arguments, folder,
                     "where SUBJECT-*.svg, SUBJECT-*.csv are written; made if missing; default: here"),
+        OPTION_TEXT(
+                "scene", "FILE", struct arguments, scene_file,
+                "accuracy, stability: of this product: its pulse, plate and sensors as predicted; default: "
+                "the study's, 485 g in 3 ms, plate of 129 Hz"),
         OPTION_UNSIGNED("drops", "N", struct arguments, drops, 2, 1e6,
                         "drops for each figure; default 1000 (accuracy), 100 (stability) or 40 "
                         "(model-stability, its decrement); model drops the study's once"),
@@ -60,11 +67,32 @@ static const struct option_table known_options = {
         .words = true,
 };
 
+/* The drop that accuracy and stability simulate. */
+static int take_scene(const struct arguments *arguments, struct chart_options *options)
+{
+	char message[CHART_MESSAGE_MAX];
+	struct scene scene;
+
+	if (arguments->scene_file && scene_read(&scene, arguments->scene_file, message)) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	if (chart_drop(arguments->scene_file ? &scene : NULL, options, message)) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	return COMMAND_DONE;
+}
+
 static int draw(const struct arguments *arguments, const struct subject *subject)
 {
 	char message[CHART_MESSAGE_MAX];
 	struct chart_options options = {.folder = arguments->folder, .seed = arguments->seed};
 
+	if (arguments->scene_file && !subject->of_drops)
+		return command_usage("chart", "--scene goes with accuracy and stability only");
+	if (take_scene(arguments, &options) != COMMAND_DONE)
+		return COMMAND_INPUT;
 	options.drops = arguments->drops > 0 ? arguments->drops : subject->drops;
 	if (mkdir(options.folder, 0777) != 0 && errno != EEXIST) {
 		command_error("%s: %s", options.folder, strerror(errno));

@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include <gsl/gsl_errno.h>
 
@@ -30,7 +29,6 @@ int main(int argc, char **argv)
 	struct cells_options options = {.drops = 10000, .all = true};
 	struct cells cells;
 	enum cells_print print = CELLS_ALL;
-	long processors = sysconf(_SC_NPROCESSORS_ONLN);
 	int code;
 
 	for (int i = 1; i < argc; i++) {
@@ -44,7 +42,6 @@ int main(int argc, char **argv)
 			return fprintf(stderr, "accuracy [--drops N] [--only TEXT] [--quiet]\n"), 2;
 	}
 	gsl_set_error_handler_off();
-	options.jobs = processors > 0 ? (unsigned)processors : 1;
 	printf("%u drops a scene; ratio is the error over the Cramer-Rao bound (limit), covers is what two "
 	       "reported sigma cover\n",
 	       options.drops);

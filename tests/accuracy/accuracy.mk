@@ -4,7 +4,7 @@
 
 ACCURACY_C = $(wildcard tests/accuracy/*.c)
 KNOCKOUT_C = $(wildcard tests/accuracy/knockout*.c)
-ACCURACY_O = $(call obj,$(filter-out %/accuracy.c %/test_accuracy.c $(KNOCKOUT_C),$(ACCURACY_C))) $(BUILD)/obj/tests/unit/synth.o
+ACCURACY_O = $(call obj,$(filter-out %/accuracy.c %/test_accuracy.c $(KNOCKOUT_C),$(ACCURACY_C)))
 ALL_O += $(call obj,$(ACCURACY_C))
 $(call obj,$(ACCURACY_C)): CPPFLAGS += $(LINUX)
 

@@ -5,11 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#define G_M_S2 9.80665
 #define GROSS 0.15
 
 enum { SCENES_MAX = 200 };
@@ -22,55 +18,62 @@ enum { A = 1, B = 2, AB = A | B };
 
 static const double noises[NOISES] = {0.3, 1, 3, 10, 30, 100};
 
+/* Of the scene, what it has beyond a geometry's drop. */
 struct row {
 	enum group group;
 	unsigned noise, geometry; /* N*, A and B */
-	struct scene scene;
+	const char *name;
+	enum synthetic_family shape;
+	enum estimate_family family;
+	struct synthetic_scene scene;
+	double x_peak_g; /* of S2; 0: the geometry's */
 };
 
-#define HALF .shape = SYNTH_HALF_SINE
-#define HAVER .shape = SYNTH_HAVERSINE
-#define HERTZ .shape = SYNTH_HERTZ
-#define SKEWED .shape = SYNTH_HUNT_CROSSLEY
+#define HALF .shape = SYNTHETIC_HALF_SINE
+#define HAVER .shape = SYNTHETIC_HAVERSINE
+#define HERTZ .shape = SYNTHETIC_HERTZ
+#define SKEWED .shape = SYNTHETIC_HUNT_CROSSLEY
 #define TOLD_HALF .family = ESTIMATE_FAMILY_HALF_SINE
 #define TOLD_HAVER .family = ESTIMATE_FAMILY_HAVERSINE
+#define WITH(...) .scene = {__VA_ARGS__}
 
 static const struct row rows[] = {
-        {GROUP_KNOWN, NALL, AB, {"half-sine", HALF, TOLD_HALF}},
-        {GROUP_KNOWN, NALL, AB, {"haversine", HAVER, TOLD_HAVER}},
-        {GROUP_UNKNOWN, NALL, AB, {"half-sine", HALF}},
-        {GROUP_UNKNOWN, NALL, AB, {"haversine", HAVER}},
-        {GROUP_UNKNOWN, NALL, AB, {"hertz", HERTZ}},
-        {GROUP_SKEWED, NALL, AB, {"hunt-crossley", SKEWED}},
-        {GROUP_APART_KNOWN, NALL, A, {"half-sine, 0.2 ms", HALF, TOLD_HALF, .skew_s = 0.2e-3}},
-        {GROUP_APART_KNOWN, NALL, A, {"half-sine, 0.5 ms", HALF, TOLD_HALF, .skew_s = 0.5e-3}},
-        {GROUP_APART, NALL, A, {"half-sine, 0.2 ms", HALF, .skew_s = 0.2e-3}},
-        {GROUP_APART, NALL, A, {"half-sine, 0.5 ms", HALF, .skew_s = 0.5e-3}},
-        {GROUP_DISTURBED, NALL, AB, {"offset 10 g", HALF, .offset_g = 10}},
-        {GROUP_DISTURBED, NALL, AB, {"hum 5 g", HALF, .hum_g = 5}},
-        {GROUP_DISTURBED, NALL, AB, {"3 spikes of 300 g", HALF, .spikes = 3}},
-        {GROUP_DISTURBED, NALL, AB, {"20 % missing", HALF, .missing = 0.2}},
-        {GROUP_DISTURBED, NALL, AB, {"20 samples missing", HALF, .gap = 20}},
-        {GROUP_TWO_MODES, N03 | N1, AB, {"+20 Hz at 10 %", HALF, .second_part = 0.1, .second_hz = 20}},
-        {GROUP_LOUD, N30 | N100, AB, {"half-sine", HALF}},
-        {GROUP_CLIPPED, N03 | N1 | N3, A, {"520 g", HALF, TOLD_HALF, .x_peak_g = 520, .clip_g = 500}},
-        {GROUP_CLIPPED, N03 | N1 | N3, A, {"560 g", HALF, TOLD_HALF, .x_peak_g = 560, .clip_g = 500}},
-        {GROUP_CLIPPED, N03 | N1 | N3, A, {"627 g", HALF, TOLD_HALF, .x_peak_g = 627, .clip_g = 500}},
-        {GROUP_CLIPPED, N03 | N1 | N3, A, {"696 g", HALF, TOLD_HALF, .x_peak_g = 696, .clip_g = 500}},
-        {GROUP_HOLE, N03 | N1, A, {"half-sine, told", HALF, TOLD_HALF, .lost_at_peak = 4}},
-        {GROUP_HOLE, N03 | N1, A, {"half-sine", HALF, .lost_at_peak = 4}},
-        {GROUP_WRONG, NALL, A, {"half-sine on haversine", HAVER, TOLD_HALF}},
-        {GROUP_WRONG, N03 | N1 | N3, A, {"half-sine on hertz", HERTZ, TOLD_HALF}},
-        {GROUP_WRONG, NALL, A, {"half-sine on hunt-crossley", SKEWED, TOLD_HALF}},
-        {GROUP_WRONG, NALL, A, {"haversine on half-sine", HALF, TOLD_HAVER}},
-        {GROUP_FAULT, N1, A, {"nan", HALF, .nan_at_peak = 1}},
-        {GROUP_FAULT, N1, A, {"offset", HALF, .offset_g = 20}},
-        {GROUP_FAULT, N1, A, {"drift", HALF, .drift_g_s = 100}},
-        {GROUP_FAULT, N1, A, {"spike", HALF, .spikes = 1}},
-        {GROUP_FAULT, N1, A, {"clipped", HALF, .clip_g = 400}},
-        {GROUP_FAULT, N1, A, {"zeroed", HALF, .zeroed_at_peak = 6}},
-        {GROUP_FAULT, N1, A, {"missing", HALF, .lost_at_peak = 6}},
-        {GROUP_FAULT, N1, A, {"too short", HALF, .cut = true}},
+        {GROUP_KNOWN, NALL, AB, "half-sine", HALF, TOLD_HALF},
+        {GROUP_KNOWN, NALL, AB, "haversine", HAVER, TOLD_HAVER},
+        {GROUP_UNKNOWN, NALL, AB, "half-sine", HALF},
+        {GROUP_UNKNOWN, NALL, AB, "haversine", HAVER},
+        {GROUP_UNKNOWN, NALL, AB, "hertz", HERTZ},
+        {GROUP_SKEWED, NALL, AB, "hunt-crossley", SKEWED},
+        {GROUP_APART_KNOWN, NALL, A, "half-sine, 0.2 ms", HALF, TOLD_HALF, WITH(.skew_s = 0.2e-3)},
+        {GROUP_APART_KNOWN, NALL, A, "half-sine, 0.5 ms", HALF, TOLD_HALF, WITH(.skew_s = 0.5e-3)},
+        {GROUP_APART, NALL, A, "half-sine, 0.2 ms", HALF, WITH(.skew_s = 0.2e-3)},
+        {GROUP_APART, NALL, A, "half-sine, 0.5 ms", HALF, WITH(.skew_s = 0.5e-3)},
+        {GROUP_DISTURBED, NALL, AB, "offset 10 g", HALF, WITH(.offset_g = 10)},
+        {GROUP_DISTURBED, NALL, AB, "hum 5 g", HALF, WITH(.hum_g = 5)},
+        {GROUP_DISTURBED, NALL, AB, "3 spikes of 300 g", HALF, WITH(.spikes = 3)},
+        {GROUP_DISTURBED, NALL, AB, "20 % missing", HALF, WITH(.missing = 0.2)},
+        {GROUP_DISTURBED, NALL, AB, "20 samples missing", HALF, WITH(.gap = 20)},
+        {GROUP_TWO_MODES, N03 | N1, AB, "+20 Hz at 10 %", HALF,
+         WITH(.second_part = 0.1, .second_apart_hz = 20)},
+        {GROUP_LOUD, N30 | N100, AB, "half-sine", HALF},
+        {GROUP_CLIPPED, N03 | N1 | N3, A, "520 g", HALF, TOLD_HALF, WITH(.clip_g = 500), .x_peak_g = 520},
+        {GROUP_CLIPPED, N03 | N1 | N3, A, "560 g", HALF, TOLD_HALF, WITH(.clip_g = 500), .x_peak_g = 560},
+        {GROUP_CLIPPED, N03 | N1 | N3, A, "627 g", HALF, TOLD_HALF, WITH(.clip_g = 500), .x_peak_g = 627},
+        {GROUP_CLIPPED, N03 | N1 | N3, A, "696 g", HALF, TOLD_HALF, WITH(.clip_g = 500), .x_peak_g = 696},
+        {GROUP_HOLE, N03 | N1, A, "half-sine, told", HALF, TOLD_HALF, WITH(.lost_at_peak = 4)},
+        {GROUP_HOLE, N03 | N1, A, "half-sine", HALF, WITH(.lost_at_peak = 4)},
+        {GROUP_WRONG, NALL, A, "half-sine on haversine", HAVER, TOLD_HALF},
+        {GROUP_WRONG, N03 | N1 | N3, A, "half-sine on hertz", HERTZ, TOLD_HALF},
+        {GROUP_WRONG, NALL, A, "half-sine on hunt-crossley", SKEWED, TOLD_HALF},
+        {GROUP_WRONG, NALL, A, "haversine on half-sine", HALF, TOLD_HAVER},
+        {GROUP_FAULT, N1, A, "nan", HALF, WITH(.nan_at_peak = 1)},
+        {GROUP_FAULT, N1, A, "offset", HALF, WITH(.offset_g = 20)},
+        {GROUP_FAULT, N1, A, "drift", HALF, WITH(.drift_g_s = 100)},
+        {GROUP_FAULT, N1, A, "spike", HALF, WITH(.spikes = 1)},
+        {GROUP_FAULT, N1, A, "clipped", HALF, WITH(.clip_g = 400)},
+        {GROUP_FAULT, N1, A, "zeroed", HALF, WITH(.zeroed_at_peak = 6)},
+        {GROUP_FAULT, N1, A, "missing", HALF, WITH(.lost_at_peak = 6)},
+        {GROUP_FAULT, N1, A, "too short", HALF, WITH(.cut = true)},
 };
 
 enum { ROWS = sizeof(rows) / sizeof(rows[0]) };
@@ -102,8 +105,8 @@ static struct reading in_order(double value, double sigma)
 
 static void read_sensor(const struct analysis *analysis, struct reading *reading)
 {
-	static const enum stage_channel channel[3] = {STAGE_S2X, STAGE_S2Y, STAGE_S2Z};
-	const struct estimate_pulse *pulse = &analysis->channels[STAGE_S2X].pulse;
+	static const enum synthetic_channel channel[3] = {SYNTHETIC_S2X, SYNTHETIC_S2Y, SYNTHETIC_S2Z};
+	const struct estimate_pulse *pulse = &analysis->channels[SYNTHETIC_S2X].pulse;
 
 	for (int i = 0; i < 3; i++) {
 		const struct estimate_peak *peak = &analysis->channels[channel[i]].peak;
@@ -129,13 +132,14 @@ static void read_plate(const struct analysis *analysis, struct reading *reading)
 {
 	for (int i = 0; i < 2; i++) {
 		const struct estimate_ringdown *r =
-		        &analysis->channels[i == 0 ? STAGE_S1X : STAGE_S1Y].ringdown;
+		        &analysis->channels[i == 0 ? SYNTHETIC_S1X : SYNTHETIC_S1Y].ringdown;
 
 		reading[QUANTITY_FREQUENCY_X + i] = in_order(r->frequency_hz, r->sigma_hz);
 		reading[QUANTITY_DAMPING_X + i] = in_order(r->damping_ratio, r->sigma_damping);
 	}
 	for (int i = 0; i < 2; i++) {
-		const struct estimate_peak *peak = &analysis->channels[i == 0 ? STAGE_S1X : STAGE_S1Y].peak;
+		const struct estimate_peak *peak =
+		        &analysis->channels[i == 0 ? SYNTHETIC_S1X : SYNTHETIC_S1Y].peak;
 
 		reading[QUANTITY_PLATE_PEAK_X + i] = in_order(peak->value_g, peak->sigma_g);
 		reading[QUANTITY_PLATE_TIME_X + i] = in_order(peak->time_s, peak->sigma_time_s);
@@ -163,70 +167,31 @@ static void read_plate(const struct analysis *analysis, struct reading *reading)
 	}
 }
 
-static void find_truth(const struct stage *stage, double *truth)
+static void find_truth(const struct synthetic *synthetic, double *out)
 {
-	const struct stage_axis *axis = stage->axis;
-	double area = synth_pulse_area(stage->scene.shape) * STAGE_CONTACT_S * axis[0].s2_g * G_M_S2;
-	double natural = stage->damped_hz / sqrt(1 - STAGE_DAMPING * STAGE_DAMPING), height;
+	const struct synthetic_truth truth = synthetic_truth(synthetic);
 
 	for (int i = 0; i < 2; i++) {
-		truth[QUANTITY_PEAK_X + i] = axis[i].s2_g;
-		truth[QUANTITY_PEAK_TIME_X + i] = stage->onset_s + axis[i].skew_s +
-		                                  synth_pulse_summit(stage->scene.shape) * STAGE_CONTACT_S;
+		out[QUANTITY_PEAK_X + i] = truth.peak_g[i];
+		out[QUANTITY_PEAK_TIME_X + i] = truth.peak_s[i];
+		out[QUANTITY_LAG_X + i] = truth.lag_s[i];
+		out[QUANTITY_PLATE_PEAK_X + i] = truth.plate_g[i];
+		out[QUANTITY_PLATE_TIME_X + i] = truth.plate_s[i];
 	}
-	truth[QUANTITY_PEAK_Z] = stage_signal(stage, STAGE_S2Z, truth[QUANTITY_PEAK_TIME_X]);
-	truth[QUANTITY_WIDTH_X] = NAN; /* the scene's, not the drop's */
-	truth[QUANTITY_VELOCITY_X] = truth[QUANTITY_FITTED_VELOCITY_X] = area;
-	truth[QUANTITY_CONTACT_X] = STAGE_CONTACT_S;
-	truth[QUANTITY_RESULTANT] = stage_resultant(stage, &truth[QUANTITY_RESULTANT_TIME]);
+	out[QUANTITY_LAG] = truth.lag_s[0];
+	out[QUANTITY_PEAK_Z] = truth.z_peak_g;
+	out[QUANTITY_WIDTH_X] = truth.width_s;
+	out[QUANTITY_VELOCITY_X] = out[QUANTITY_FITTED_VELOCITY_X] = truth.velocity_m_s;
+	out[QUANTITY_CONTACT_X] = truth.contact_s;
+	out[QUANTITY_RESULTANT] = truth.resultant_g;
+	out[QUANTITY_RESULTANT_TIME] = truth.resultant_s;
 	for (int i = QUANTITY_FREQUENCY_X; i <= QUANTITY_FREQUENCY; i++)
-		truth[i] = stage->damped_hz;
-	truth[QUANTITY_NATURAL] = natural;
+		out[i] = truth.damped_hz;
+	out[QUANTITY_NATURAL] = truth.natural_hz;
 	for (int i = QUANTITY_DAMPING_X; i <= QUANTITY_DAMPING; i++)
-		truth[i] = STAGE_DAMPING;
-	for (int i = QUANTITY_LAG_X; i <= QUANTITY_LAG; i++)
-		truth[i] = stage->interval_s;
-	synth_plate_peak(stage->plate, STAGE_TABLE, &height);
-	for (int i = 0; i < 2; i++) {
-		truth[QUANTITY_PLATE_PEAK_X + i] = axis[i].gain * height;
-		truth[QUANTITY_PLATE_TIME_X + i] = stage->onset_s + axis[i].skew_s + axis[i].s1_peak_s;
-	}
-	truth[QUANTITY_PLATE_RESULTANT] = stage_plate_resultant(stage, &truth[QUANTITY_PLATE_RESULTANT_TIME]);
-}
-
-/* Base of the pulse at 10 % of its height. */
-static double true_width(const struct stage *stage)
-{
-	double edge[2];
-
-	for (int side = 0; side < 2; side++) {
-		double inside = synth_pulse_summit(stage->scene.shape), outside = side;
-
-		for (int i = 0; i < 60; i++) {
-			double middle = (inside + outside) / 2;
-
-			if (synth_pulse(stage->scene.shape, middle) > 0.1)
-				inside = middle;
-			else
-				outside = middle;
-		}
-		edge[side] = inside;
-	}
-	return (edge[1] - edge[0]) * STAGE_CONTACT_S;
-}
-
-static void count(struct tally *tally, struct reading reading, double truth)
-{
-	double error = reading.value - truth;
-
-	if (!isfinite(reading.value))
-		return;
-	tally->gross += fabs(error) > GROSS * fabs(truth);
-	tally->values++;
-	tally->error += error;
-	tally->square += error * error;
-	if (isfinite(reading.sigma))
-		tally->covered += fabs(error) <= 2 * reading.sigma;
+		out[i] = truth.damping;
+	out[QUANTITY_PLATE_RESULTANT] = truth.plate_resultant_g;
+	out[QUANTITY_PLATE_RESULTANT_TIME] = truth.plate_resultant_s;
 }
 
 /* ---- what a scene must be flagged as ------------------------------------------------------------------- */
@@ -238,9 +203,9 @@ static bool doubtful(const struct estimate_how *how)
 
 static bool marked(const struct cell_scene *cell, const struct analysis *analysis)
 {
-	const struct scene *scene = &cell->scene;
-	const struct estimate_channel *x = &analysis->channels[STAGE_S2X];
-	const struct estimate_channel *plate = &analysis->channels[STAGE_S1X];
+	const struct synthetic_scene *scene = &cell->scene;
+	const struct estimate_channel *x = &analysis->channels[SYNTHETIC_S2X];
+	const struct estimate_channel *plate = &analysis->channels[SYNTHETIC_S1X];
 
 	if (cell->group == GROUP_CLIPPED)
 		return (x->flags & RECORD_FLAG_CLIPPED) && (x->peak.how.flags & ESTIMATE_FLAG_EXTRAPOLATED);
@@ -272,137 +237,136 @@ static bool marked(const struct cell_scene *cell, const struct analysis *analysi
 
 static bool second_mode(const struct analysis *analysis)
 {
-	return isfinite(analysis->channels[STAGE_S1X].ringdown.second_frequency_hz) ||
-	       isfinite(analysis->channels[STAGE_S1Y].ringdown.second_frequency_hz) ||
+	return isfinite(analysis->channels[SYNTHETIC_S1X].ringdown.second_frequency_hz) ||
+	       isfinite(analysis->channels[SYNTHETIC_S1Y].ringdown.second_frequency_hz) ||
 	       (analysis->has_plate && isfinite(analysis->plate.second_frequency_hz));
 }
 
-static void run_drop(struct cell_scene *cell, struct stage *stage, unsigned drop, double width_s)
+/* Of a campaign: its context. */
+struct run {
+	struct cells *cells;
+	const struct cells *bounds;
+};
+
+static int run_drop(void *context, size_t i, const struct synthetic *synthetic, unsigned drop)
 {
-	struct estimate_options options = {.family = cell->scene.family};
+	const struct run *run = context;
+	struct cell_scene *cell = &run->cells->scene[i];
+	struct estimate_options options = {.family = cell->family};
 	struct reading reading[QUANTITIES];
 	struct analysis analysis;
 	double truth[QUANTITIES];
 
-	stage_drop(stage, drop);
+	(void)drop;
 	cell->drops++;
-	if (estimate_record(&stage->record, &options, &analysis)) {
+	if (estimate_record(&synthetic->record, &options, &analysis)) {
 		cell->refused++;
-		return;
+		return 0;
 	}
-	for (int i = 0; i < QUANTITIES; i++)
-		reading[i] = in_order(NAN, NAN);
+	for (int q = 0; q < QUANTITIES; q++)
+		reading[q] = in_order(NAN, NAN);
 	read_sensor(&analysis, reading);
 	read_plate(&analysis, reading);
-	find_truth(stage, truth);
-	truth[QUANTITY_WIDTH_X] = width_s;
-	for (int i = 0; i < QUANTITIES; i++)
-		count(&cell->tally[i], reading[i], truth[i]);
+	find_truth(synthetic, truth);
+	for (int q = 0; q < QUANTITIES; q++)
+		tally_add(&cell->tally[q], reading[q].value, truth[q], reading[q].sigma,
+		          GROSS * fabs(truth[q]));
 	cell->marked += marked(cell, &analysis);
 	cell->second += second_mode(&analysis);
 	estimate_free(&analysis);
+	return 0;
 }
 
-/* The bounds grow as the noise, with what the converter's steps add, and know nothing else of it, nor of
- * what the estimators are told. */
-static bool same_signal(const struct scene *a, const struct scene *b)
-{
-	struct scene like = *a;
-
-	like.name = b->name;
-	like.noise_g = b->noise_g;
-	like.family = b->family;
-	return memcmp(&like, b, sizeof(like)) == 0;
-}
-
-static void find_bounds(const struct cell_scene *cell, double *bound)
+static int find_bounds(struct cell_scene *cell, struct synthetic *synthetic)
 {
 	bool lags = cell->group == GROUP_KNOWN || cell->group == GROUP_UNKNOWN;
-	struct stage stage;
-	struct bounds b;
+	double missing = synthetic->scene.missing;
+	struct tally *t = cell->tally;
+	struct bound b;
+	int status;
 
-	stage_open(&stage, &cell->scene);
-	bounds_find(&stage, lags, &b);
-	stage_close(&stage);
-	for (int i = 0; i < QUANTITIES; i++)
-		bound[i] = NAN;
+	synthetic->scene.missing = 0; /* what is lost by chance is not taken out of these bounds */
+	status = bound_find(synthetic, lags, &b);
+	synthetic->scene.missing = missing;
 	for (int i = 0; i < 2; i++) {
-		bound[QUANTITY_PEAK_X + i] = b.peak_g[i];
-		bound[QUANTITY_PEAK_TIME_X + i] = b.peak_s[i];
-		bound[QUANTITY_FREQUENCY_X + i] = b.frequency_hz[i];
-		bound[QUANTITY_DAMPING_X + i] = b.damping[i];
-		bound[QUANTITY_LAG_X + i] = lags ? b.lag_s[i] : (double)NAN;
-		bound[QUANTITY_PLATE_PEAK_X + i] = lags ? b.plate_g[i] : (double)NAN;
-		bound[QUANTITY_PLATE_TIME_X + i] = lags ? b.plate_s[i] : (double)NAN;
+		t[QUANTITY_PEAK_X + i].bound = b.peak_g[i];
+		t[QUANTITY_PEAK_TIME_X + i].bound = b.peak_s[i];
+		t[QUANTITY_FREQUENCY_X + i].bound = b.damped_hz[i];
+		t[QUANTITY_DAMPING_X + i].bound = b.damping[i];
+		t[QUANTITY_LAG_X + i].bound = lags ? b.lag_s[i] : (double)NAN;
+		t[QUANTITY_PLATE_PEAK_X + i].bound = lags ? b.plate_g[i] : (double)NAN;
+		t[QUANTITY_PLATE_TIME_X + i].bound = lags ? b.plate_s[i] : (double)NAN;
 	}
-	bound[QUANTITY_CONTACT_X] = b.contact_s[0];
-	bound[QUANTITY_FITTED_VELOCITY_X] = bound[QUANTITY_VELOCITY_X] = b.velocity_m_s[0];
-	bound[QUANTITY_RESULTANT] = b.resultant_g;
-	bound[QUANTITY_RESULTANT_TIME] = b.resultant_s;
-	bound[QUANTITY_FREQUENCY] = b.joint_hz;
-	bound[QUANTITY_NATURAL] = b.joint_natural_hz;
-	bound[QUANTITY_DAMPING] = b.joint_damping;
-	bound[QUANTITY_LAG] = lags ? b.joint_lag_s : (double)NAN;
+	t[QUANTITY_CONTACT_X].bound = b.contact_s[0];
+	t[QUANTITY_FITTED_VELOCITY_X].bound = t[QUANTITY_VELOCITY_X].bound = b.velocity_m_s[0];
+	t[QUANTITY_RESULTANT].bound = b.resultant_g;
+	t[QUANTITY_RESULTANT_TIME].bound = b.resultant_s;
+	t[QUANTITY_FREQUENCY].bound = b.pair_hz;
+	t[QUANTITY_NATURAL].bound = b.pair_natural_hz;
+	t[QUANTITY_DAMPING].bound = b.pair_damping;
+	t[QUANTITY_LAG].bound = lags ? b.pair_lag_s : (double)NAN;
+	return status;
 }
 
-/* Of every scene, each signal once. */
-static void compute_bounds(struct cells *cells)
+static int begin(void *context, size_t i, struct synthetic *synthetic)
 {
-	for (unsigned i = 0; i < cells->count; i++) {
-		struct cell_scene *cell = &cells->scene[i];
-		double noise = stage_noise(&cell->scene), bound[QUANTITIES];
-		unsigned like = 0;
+	const struct run *run = context;
+	struct cell_scene *cell = &run->cells->scene[i];
 
-		while (like < i && !(same_signal(&cells->scene[like].scene, &cell->scene)))
-			like++;
-		if (like == i && cell->group != GROUP_FAULT)
-			find_bounds(cell, bound);
-		for (int q = 0; q < QUANTITIES; q++) {
-			double as = cells->scene[like].tally[q].bound;
-
-			cell->tally[q].bound = cell->group == GROUP_FAULT ? (double)NAN
-			                       : like == i
-			                               ? bound[q]
-			                               : as * noise / stage_noise(&cells->scene[like].scene);
-		}
-	}
+	for (int q = 0; q < QUANTITIES; q++)
+		cell->tally[q].bound = run->bounds ? run->bounds->scene[i].tally[q].bound : (double)NAN;
+	return run->bounds || cell->group == GROUP_FAULT ? 0 : find_bounds(cell, synthetic);
 }
 
-static void take_bounds(struct cells *cells, const struct cells *from)
-{
-	for (unsigned i = 0; from && i < cells->count; i++)
-		for (int q = 0; q < QUANTITIES; q++)
-			cells->scene[i].tally[q].bound = from->scene[i].tally[q].bound;
-	if (!from)
-		compute_bounds(cells);
-}
-
-static void run_scene(struct cell_scene *cell, unsigned drops)
-{
-	struct stage stage;
-	double width_s;
-
-	stage_open(&stage, &cell->scene);
-	width_s = true_width(&stage);
-	for (unsigned drop = 0; drop < drops; drop++)
-		run_drop(cell, &stage, drop, width_s);
-	stage_close(&stage);
-}
-
-/* ---- all of them, a share for each process --------------------------------------------------------------
- */
+/* ---- all of them --------------------------------------------------------------------------------------- */
 
 static bool wanted(const struct row *row, unsigned noise, const struct cells_options *options)
 {
 	if (!(row->noise & 1u << noise))
 		return false;
-	if (options->only && !strstr(row->scene.name, options->only) &&
+	if (options->only && !strstr(row->name, options->only) &&
 	    !strstr(group_name(row->group), options->only))
 		return false;
 	return options->all || noises[noise] == 1 || row->group == GROUP_LOUD; /* exact: from the table */
 }
 
-static unsigned spread(const struct cells_options *options, struct cell_scene *scene)
+/* Scenes that differ in what they are, not in what the estimators are told, get chances of their own. */
+static struct synthetic_scene drop_of(const struct row *row, enum geometry geometry, double noise_g)
+{
+	static const struct {
+		double damped_hz, interval_s, plate_g[2], sign;
+	} geometries[] = {
+	        [GEOMETRY_2A] = {129, 2.0e-3, {310.1, 133.0}, 1},
+	        [GEOMETRY_2B] = {177, 1.2e-3, {401.0, 225.9}, -1},
+	};
+	const struct synthetic_scene usual = synthetic_scene();
+	struct synthetic_scene scene = row->scene;
+
+	scene.family = row->shape;
+	scene.seed = 131ul * (2 * (unsigned long)row->shape + (unsigned long)geometry) +
+	             1009ul * (unsigned long)(10 * noise_g);
+	for (int i = 0; i < 2; i++) {
+		double peak_g = i == 0 && row->x_peak_g > 0 ? row->x_peak_g : usual.peak_g[i];
+
+		scene.peak_g[i] = geometries[geometry].sign * peak_g;
+		scene.plate_g[i] = geometries[geometry].sign * geometries[geometry].plate_g[i];
+		scene.rate_hz[i] = usual.rate_hz[i];
+	}
+	scene.damped_hz = geometries[geometry].damped_hz;
+	scene.interval_s = geometries[geometry].interval_s;
+	scene.z_part = usual.z_part;
+	scene.contact_s = usual.contact_s;
+	scene.damping = usual.damping;
+	scene.pre_s = usual.pre_s;
+	scene.post_s = usual.post_s;
+	scene.noise_g = noise_g;
+	scene.step_g = usual.step_g;
+	scene.hum_hz = usual.hum_hz;
+	scene.spike_g = usual.spike_g;
+	return scene;
+}
+
+static unsigned spread(const struct cells_options *options, struct cell_scene *cell)
 {
 	unsigned n = 0;
 
@@ -412,41 +376,36 @@ static unsigned spread(const struct cells_options *options, struct cell_scene *s
 				if (!(rows[r].geometry & 1u << g) || !wanted(&rows[r], i, options) ||
 				    n == SCENES_MAX)
 					continue;
-				scene[n].scene = rows[r].scene;
-				scene[n].scene.noise_g = noises[i];
-				scene[n].scene.geometry = g == 0 ? STAGE_2A : STAGE_2B;
-				scene[n++].group = rows[r].group;
+				cell[n].name = rows[r].name;
+				cell[n].family = rows[r].family;
+				cell[n].group = rows[r].group;
+				cell[n].geometry = (enum geometry)g;
+				cell[n++].scene = drop_of(&rows[r], (enum geometry)g, noises[i]);
 			}
 	return n;
 }
 
+static const struct synthetic_scene *scene_of(void *context, size_t i)
+{
+	const struct run *run = context;
+
+	return &run->cells->scene[i].scene;
+}
+
 void cells_run(const struct cells_options *options, struct cells *cells)
 {
-	size_t bytes = SCENES_MAX * sizeof(*cells->scene);
-	bool failed = false;
+	struct run run = {.cells = cells, .bounds = options->bounds};
+	struct campaign campaign = {.drops = options->drops,
+	                            .context = &run,
+	                            .scene = scene_of,
+	                            .begin = begin,
+	                            .drop = run_drop};
 
-	cells->scene = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-	if (cells->scene == MAP_FAILED)
+	cells->scene = campaign_memory(SCENES_MAX * sizeof(*cells->scene));
+	if (!cells->scene)
 		abort();
-	cells->count = spread(options, cells->scene);
-	take_bounds(cells, options->bounds);
-	for (unsigned job = 0; job < options->jobs; job++) {
-		pid_t child = fork();
-
-		if (child < 0)
-			abort();
-		if (child > 0)
-			continue;
-		for (unsigned i = job; i < cells->count; i += options->jobs)
-			run_scene(&cells->scene[i], options->drops);
-		_exit(0);
-	}
-	for (unsigned job = 0; job < options->jobs; job++) {
-		int status = 1;
-
-		failed |= wait(&status) < 0 || status != 0;
-	}
-	if (failed) {
+	campaign.count = cells->count = spread(options, cells->scene);
+	if (campaign_run(&campaign)) {
 		fputs("a process of the Monte Carlo died\n", stderr);
 		exit(1);
 	}
@@ -454,5 +413,5 @@ void cells_run(const struct cells_options *options, struct cells *cells)
 
 void cells_free(struct cells *cells)
 {
-	munmap(cells->scene, SCENES_MAX * sizeof(*cells->scene));
+	campaign_free(cells->scene, SCENES_MAX * sizeof(*cells->scene));
 }

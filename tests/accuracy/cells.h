@@ -14,7 +14,8 @@
  * All limits are two-sided where both sides mean something: an error below the bound is a mistake of the
  * test or an estimator that knows the answer.
  */
-#include "tests/accuracy/bound.h"
+#include "host/chart/campaign.h"
+#include "host/estimate/estimate.h"
 
 enum quantity {
 	QUANTITY_PEAK_X,
@@ -64,14 +65,14 @@ enum group {
 	GROUPS
 };
 
-struct tally {
-	double bound; /* NAN: none is stated */
-	double error, square;
-	unsigned values, covered, gross;
-};
+/* The study's means at 25 degrees. */
+enum geometry { GEOMETRY_2A, GEOMETRY_2B };
 
 struct cell_scene {
-	struct scene scene;
+	const char *name;
+	struct synthetic_scene scene;
+	enum estimate_family family; /* what the estimators are told */
+	enum geometry geometry;
 	enum group group;
 	unsigned drops, refused; /* estimate_record failed */
 	unsigned marked;         /* as flagged as the scene asks for */
@@ -87,7 +88,6 @@ struct cells {
 struct cells_options {
 	unsigned drops;             /* of each scene */
 	bool all;                   /* else the short set: sigma 1 g and what must never fail */
-	unsigned jobs;              /* processes */
 	const char *only;           /* part of a scene's name; NULL: all of them */
 	const struct cells *bounds; /* of the same scenes, to take the bounds from; NULL: they are computed */
 };

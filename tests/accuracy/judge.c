@@ -112,8 +112,8 @@ static void say(struct judgement *j, const struct cell_scene *cell, const char *
 	j->failed += !ok;
 	if (j->print == CELLS_NOTHING || (j->print == CELLS_FAILURES && ok))
 		return;
-	printf("# %-17s %-26s %s %5.1f g  %-12s %s  %s\n", group_name(cell->group), cell->scene.name,
-	       cell->scene.geometry == STAGE_2A ? "2A" : "2B", cell->scene.noise_g, what, figures,
+	printf("# %-17s %-26s %s %5.1f g  %-12s %s  %s\n", group_name(cell->group), cell->name,
+	       cell->geometry == GEOMETRY_2A ? "2A" : "2B", cell->scene.noise_g, what, figures,
 	       ok ? "ok" : "FAIL");
 }
 
@@ -181,7 +181,7 @@ static void judge_part(struct judgement *j, const struct cell_scene *cell, const
 
 static void judge_scene(struct judgement *j, const struct cell_scene *cell)
 {
-	const struct scene *scene = &cell->scene;
+	const struct synthetic_scene *scene = &cell->scene;
 
 	for (unsigned i = 0; i < sizeof(limits) / sizeof(limits[0]); i++)
 		for (enum quantity q = limits[i].from; limits[i].group == cell->group && q <= limits[i].to;

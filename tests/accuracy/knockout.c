@@ -203,7 +203,7 @@ static void compare_cells(const struct cells *with, const struct cells *without,
 			held->better += ratio < 1 / WORSE;
 			if (ratio > held->most) {
 				held->most = ratio;
-				held->where = with->scene[i].scene.name;
+				held->where = with->scene[i].name;
 				held->noise_g = with->scene[i].scene.noise_g;
 			}
 		}
@@ -326,7 +326,6 @@ int main(int argc, char **argv)
 	struct cells_options options = {.drops = 20, .all = true};
 	const char *only = "";
 	bool figures = false;
-	long processors = sysconf(_SC_NPROCESSORS_ONLN);
 	struct cells cells;
 	unsigned count = 0;
 
@@ -345,7 +344,6 @@ int main(int argc, char **argv)
 			                       "[FILE[=COLUMNS]]...\n"),
 			       2;
 	}
-	options.jobs = processors > 0 ? (unsigned)processors : 1;
 	if (figures) {
 		options.bounds = &cells; /* none are asked for */
 		cells_run(&options, &cells);
