@@ -139,8 +139,13 @@ char *process_read(int fd, size_t *size)
 
 		if (n < 0 && errno == EINTR)
 			continue;
-		if (n <= 0)
-			break;
+		if (n <= 0) { /* not all of it is nothing */
+			int error = n < 0 ? errno : EIO;
+
+			free(bytes);
+			errno = error;
+			return NULL;
+		}
 		have += (size_t)n;
 	}
 	if (bytes != NULL)

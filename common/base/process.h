@@ -39,7 +39,8 @@ void process_streams_close(struct process_streams *streams);
  */
 int process_filter(const char *const *words, const struct process_streams *streams);
 
-/* All that a stream holds with a NUL behind, to be freed; NULL without memory. */
+/* All that a stream holds with a NUL behind, to be freed; NULL with errno when not all of it could be read.
+ */
 char *process_read(int fd, size_t *size);
 
 /* All bytes to fd. An errno. */

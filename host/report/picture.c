@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/report/picture.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,8 +31,8 @@ static int collect(const struct process_streams *streams, int status, char **svg
 	}
 	text = process_read(streams->fd[1], &length);
 	if (!text) {
-		snprintf(message, size, "%s", error_text(DT_E_MEMORY));
-		return DT_E_MEMORY;
+		snprintf(message, size, "gnuplot's picture: %s", strerror(errno));
+		return DT_E_SYSTEM;
 	}
 	if (status > 0 || !strstr(text, "</svg>")) {
 		complain(streams->fd[2], message, size);

@@ -8,9 +8,12 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include "common/base/process.h"
@@ -29,6 +32,25 @@ static int run_shell(const char *script, const char *input, char *output[2])
 		assert_non_null(output[i] = process_read(streams.fd[i + 1], &size));
 	process_streams_close(&streams);
 	return status;
+}
+
+/* What cannot be read is nothing, and not an empty text. */
+static void a_stream_that_cannot_be_read(void **state)
+{
+	size_t size;
+	int fd = memfd_create("unread", 0), closed;
+	char path[64];
+
+	(void)state;
+	assert_int_equal(write(fd, "abc", 3), 3);
+	snprintf(path, sizeof(path), "/proc/self/fd/%d", fd);
+	closed = open(path, O_WRONLY | O_CLOEXEC);
+	assert_true(closed >= 0);
+	errno = 0;
+	assert_null(process_read(closed, &size));
+	assert_int_equal(errno, EBADF);
+	close(closed);
+	close(fd);
 }
 
 static void streams_are_the_childs(void **state)
@@ -86,6 +108,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(streams_are_the_childs),
+	        cmocka_unit_test(a_stream_that_cannot_be_read),
 	        cmocka_unit_test(a_program_that_is_none_has_an_errno),
 	        cmocka_unit_test(alone_it_has_nothing_of_ours),
 	};
