@@ -351,37 +351,53 @@ static int solve(const struct drop *drop, enum model_fidelity rung, const struct
 	return rung_solve(drop, rung, &o, why, p, message);
 }
 
-/* sdof when its predicted difference is small enough and coupled does not contradict it. */
-static bool sdof_serves(const struct drop *drop, const struct model_options *options, const char *why,
-                        struct model_prediction *p)
+/* What no rung above can mend: the answer must not depend on it. */
+static bool ends(int error)
+{
+	return error == DT_E_MEMORY;
+}
+
+/* sdof when its predicted difference is small enough and coupled does not contradict it: 1, 0, DT_E_MEMORY.
+ */
+static int sdof_serves(const struct drop *drop, const struct model_options *options, const char *why,
+                       struct model_prediction *p)
 {
 	double off = auto_difference(drop, MODEL_SDOF, options->asked), apart;
 	struct model_prediction above;
+	int error;
 
-	if (!(off <= options->accuracy) || solve(drop, MODEL_SDOF, options, why, p, NULL) != 0)
-		return false;
+	if (!(off <= options->accuracy))
+		return 0;
+	error = solve(drop, MODEL_SDOF, options, why, p, NULL);
+	if (error)
+		return ends(error) ? error : 0;
 	p->difference = p->next_change = off;
 	p->next = MODEL_COUPLED;
 	if (off <= CHECK_SHARE * options->accuracy)
-		return true;
-	if (solve(drop, MODEL_COUPLED, options, why, &above, NULL) != 0)
-		return false;
+		return 1;
+	error = solve(drop, MODEL_COUPLED, options, why, &above, NULL);
+	if (error)
+		return ends(error) ? error : 0;
 	apart = auto_apart(p, &above, options->asked);
 	p->evaluations += above.evaluations;
 	p->next_change = apart;
 	return apart <= options->accuracy;
 }
 
-static bool coupled_serves(const struct drop *drop, const struct model_options *options, const char *why,
-                           struct model_prediction *p)
+static int coupled_serves(const struct drop *drop, const struct model_options *options, const char *why,
+                          struct model_prediction *p)
 {
 	double off = auto_difference(drop, MODEL_COUPLED, options->asked);
+	int error;
 
-	if (!(off <= options->accuracy) || solve(drop, MODEL_COUPLED, options, why, p, NULL) != 0)
-		return false;
+	if (!(off <= options->accuracy))
+		return 0;
+	error = solve(drop, MODEL_COUPLED, options, why, p, NULL);
+	if (error)
+		return ends(error) ? error : 0;
 	p->difference = p->next_change = off;
 	p->next = MODEL_PLANAR;
-	return true;
+	return 1;
 }
 
 /* planar; sdof, which says what it can, where planar has no answer. */
@@ -390,6 +406,8 @@ static int planar_or_sdof(const struct drop *drop, const struct model_options *o
 {
 	int error = solve(drop, MODEL_PLANAR, options, why, p, message);
 
+	if (ends(error))
+		return error;
 	if (error)
 		return solve(drop, MODEL_SDOF, options, "planar has no answer here", p, message);
 	p->difference = 0.0;
@@ -402,15 +420,20 @@ int auto_solve(const struct drop *drop, const struct model_options *options,
 	struct model_options o = *options;
 	struct model_prediction p;
 	char why[64];
-	int error = 0;
+	int error = 0, serves;
 
 	if (!(o.accuracy > 0.0))
 		o.accuracy = MODEL_ACCURACY;
 	if (!o.asked || !(o.refinements & MODEL_OF_RUNG))
 		return planar_or_sdof(drop, &o, "answers every question asked", prediction, message);
 	snprintf(why, sizeof(why), "the least that answers within %.4g %%", 100.0 * o.accuracy);
-	if (!sdof_serves(drop, &o, why, &p) && !coupled_serves(drop, &o, why, &p))
+	serves = sdof_serves(drop, &o, why, &p);
+	if (serves == 0)
+		serves = coupled_serves(drop, &o, why, &p);
+	if (serves == 0)
 		error = planar_or_sdof(drop, &o, why, &p, message);
+	if (serves < 0)
+		error = drop_refuse(message, serves, "%s", error_text(serves));
 	if (!error)
 		*prediction = p;
 	return error;

@@ -235,7 +235,7 @@ static int sdof_of(const struct drop *drop, struct sdof *sdof, char *message)
 	if (drop->has_plate)
 		error = sdof_init(sdof, drop->plate_omega / (2.0 * UNITS_PI), drop->plate_zeta,
 		                  half_sine(drop), drop->scene->contact_duration_s);
-	return error ? drop_refuse(message, DT_E_NUMERIC,
+	return error ? drop_refuse(message, error == DT_E_MEMORY ? error : DT_E_NUMERIC,
 	                           "the plate's response is beyond the range of numbers")
 	             : 0;
 }
