@@ -188,8 +188,9 @@ int archive_each_series(struct archive *archive, const struct archive_filter *fi
 	int result = 0;
 
 	add(&q,
-	    "SELECT " SERIES_COLUMNS ", s.scene, SUM(d.state <> 'recording'), SUM(d.decision = 'accepted'),"
-	    " SUM(d.decision = 'rejected'), SUM(d.state = 'recording'), SUM(d.proof <> ''), MAX(d.time)"
+	    "SELECT " SERIES_COLUMNS ", s.scene, SUM(d.state <> 'recording'),"
+	    " SUM(d.decision = 'accepted' AND d.proof = ''), SUM(d.decision = 'rejected' AND d.proof = ''),"
+	    " SUM(d.state = 'recording'), SUM(d.proof <> ''), MAX(d.time)"
 	    " FROM series s JOIN campaigns c ON c.id = s.campaign_id LEFT JOIN drops d ON d.series_id = s.id",
 	    NULL);
 	add_conditions(&q, filter);

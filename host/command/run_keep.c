@@ -117,7 +117,8 @@ static int tell_series(void *context, const struct archive_series *series)
 
 	fprintf(out,
 	        "series   %u of %u planned accepted, %u to decide: 'droptower series accept' or 'reject'\n",
-	        series->accepted, series->planned, series->recorded - series->accepted - series->rejected);
+	        series->accepted, series->planned,
+	        series->recorded - series->accepted - series->rejected - series->faulty);
 	return 0;
 }
 

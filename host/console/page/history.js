@@ -44,7 +44,7 @@ function seriesRow(one) {
 		number(one.height_m, 3),
 		`${one.accepted} of ${one.planned}`,
 		String(one.rejected),
-		String(one.recorded - one.accepted - one.rejected),
+		String(one.recorded - one.accepted - one.rejected - one.faulty),
 		[one.partial, one.faulty && `${one.faulty} altered or missing`].filter((text) => text !== 0).join(", ") || "0",
 		one.last ? time(one.last) : "–",
 	];

@@ -22,7 +22,7 @@ export function showHead(series, underWay) {
 	show(byId("series"), series !== null);
 	if (!series) return;
 	const partial = series.partial - (underWay.startsWith(`${series.name}/`) ? 1 : 0);
-	const open = series.recorded - series.accepted - series.rejected;
+	const open = series.recorded - series.accepted - series.rejected - series.faulty;
 	const counts = [
 		`${series.accepted} of ${series.planned} accepted`,
 		series.rejected && `${series.rejected} rejected`,
