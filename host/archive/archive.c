@@ -34,6 +34,11 @@ const char *archive_message(const struct archive *archive)
 	return archive->message;
 }
 
+const char *archive_unread(const struct archive *archive)
+{
+	return archive->unread;
+}
+
 const char *archive_folder(const struct archive *archive)
 {
 	return archive->folder;

@@ -38,6 +38,10 @@ enum { ARCHIVE_MESSAGE_MAX = 640, ARCHIVE_PATH_MAX = 4300, ARCHIVE_NAME_MAX = 60
 struct archive *archive_open(const char *folder, enum archive_mode mode, char message[ARCHIVE_MESSAGE_MAX]);
 void archive_close(struct archive *archive);
 const char *archive_message(const struct archive *archive);
+
+/* The first file that was there and could not be read while drops were verified, in one line; "" there is
+ * none. */
+const char *archive_unread(const struct archive *archive);
 const char *archive_folder(const struct archive *archive);
 
 /* ---- series ---- */
@@ -49,7 +53,7 @@ struct archive_series {
 	double angle_deg, height_m, plate_mass_kg;
 	unsigned planned;
 	const char *created; /* UTC, ISO 8601 */
-	/* of its drops */
+	/* of its drops; one that is altered or missing is faulty, whatever was decided on it */
 	unsigned recorded, accepted, rejected, partial, faulty;
 	const char *last; /* time of the last drop; "" when there is none */
 };

@@ -18,6 +18,7 @@ struct archive {
 	struct archive_mark *mark; /* of drops, where the index could not take them */
 	int64_t marked;            /* marks that changed since it was opened, in the index or here */
 	size_t marks;
+	char unread[ARCHIVE_MESSAGE_MAX]; /* the first file that a proof could not read; "" none */
 };
 
 struct archive_mark {

@@ -106,6 +106,16 @@ static void tell_kind(struct proof *proof, enum proof_part part, const char *fil
 		            found, hash);
 }
 
+/* Says nothing of what the file is: who asked gets no answer, and the index keeps what it knew. */
+static void tell_unread(struct proof *proof, enum proof_part part, const char *file, const char *why)
+{
+	proof_fault(proof, part, false, "%.200s: cannot be read: %s", file, why);
+	proof->unread = true;
+	if (proof->archive->unread[0] == '\0')
+		snprintf(proof->archive->unread, sizeof(proof->archive->unread), "%.200s: cannot be read: %s",
+		         file, why);
+}
+
 bool proof_of_file(struct proof *proof, enum proof_part part, const char *file, int64_t bytes,
                    const char *hash, int copy)
 {
@@ -117,7 +127,7 @@ bool proof_of_file(struct proof *proof, enum proof_part part, const char *file, 
 		if (errno == ENOENT || errno == ENOTDIR)
 			proof_fault(proof, part, true, "%.200s: missing", file);
 		else
-			proof_fault(proof, part, false, "%.200s: cannot be read: %s", file, strerror(errno));
+			tell_unread(proof, part, file, strerror(errno));
 		return false;
 	}
 	if (strcmp(found, hash) == 0)
@@ -186,7 +196,7 @@ static char *sealed_text(struct proof *proof, const struct chain_entry *entry)
 		text = proof_text(proof, entry);
 	}
 	if (text == NULL && proof_of_file(proof, PROOF_SIDECAR, proof->file, entry->bytes, entry->hash, -1))
-		proof_fault(proof, PROOF_SIDECAR, false, "%s: cannot be read", proof->file);
+		tell_unread(proof, PROOF_SIDECAR, proof->file, "a second look finds it whole");
 	if (!entry->sound)
 		proof_fault(proof, PROOF_CHAIN, false, CHAIN_FILE ": broken at entry %lld, of %s",
 		            (long long)entry->number, proof->file);
@@ -204,9 +214,10 @@ static char *unsealed_text(struct proof *proof)
 
 	snprintf(path, sizeof(path), "%s/%.200s", proof->archive->folder, proof->file);
 	text = durable_read(path, &size);
-	if (text == NULL)
-		proof_fault(proof, PROOF_SIDECAR, errno == ENOENT, "%s: %s", proof->file,
-		            errno == ENOENT ? "missing" : strerror(errno));
+	if (text == NULL && errno == ENOENT)
+		proof_fault(proof, PROOF_SIDECAR, true, "%s: missing", proof->file);
+	else if (text == NULL)
+		tell_unread(proof, PROOF_SIDECAR, proof->file, strerror(errno));
 	else if (size == 0)
 		proof_fault(proof, PROOF_SIDECAR, false, "%s: emptied", proof->file);
 	if (proof->entry != 0)
@@ -331,7 +342,7 @@ static int read_row(struct proof *proof, int64_t drop)
 }
 
 /* A folder that cannot be written is verified, too: its marks live as long as it is open. */
-static void remember(struct proof *proof)
+static int remember(struct proof *proof)
 {
 	struct archive *archive = proof->archive;
 	struct archive_mark *mark = archive->mark, *more;
@@ -341,7 +352,7 @@ static void remember(struct proof *proof)
 	if (mark == archive->mark + archive->marks) {
 		more = realloc(archive->mark, (archive->marks + 1) * sizeof(*more));
 		if (more == NULL)
-			return;
+			return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
 		archive->mark = more;
 		mark = &more[archive->marks++];
 		mark->fault[0] = '\0';
@@ -349,12 +360,15 @@ static void remember(struct proof *proof)
 	archive->marked += strcmp(mark->fault, proof->fault) != 0;
 	*mark = (struct archive_mark){.drop = proof->drop, .missing = !proof->altered};
 	memcpy(mark->fault, proof->fault, sizeof(mark->fault));
+	return 0;
 }
 
-static void mark(struct proof *proof)
+static int mark(struct proof *proof)
 {
 	char before[ARCHIVE_MESSAGE_MAX];
 
+	if (proof->unread)
+		return remember(proof);
 	memcpy(before, proof->archive->message, sizeof(before));
 	if (sql_run(proof->archive,
 	            "UPDATE drops SET proof = ?1, fault = ?2 WHERE id = ?3 AND (proof <> ?1 OR fault <> ?2)",
@@ -364,11 +378,10 @@ static void mark(struct proof *proof)
 	                             : "",
 	            proof->fault, proof->drop) == 0) {
 		proof->archive->marked += sqlite3_changes(proof->archive->index) > 0;
-		return;
+		return 0;
 	}
 	memcpy(proof->archive->message, before, sizeof(before));
-	if (proof->fault[0] != '\0')
-		remember(proof);
+	return proof->fault[0] != '\0' ? remember(proof) : 0;
 }
 
 int proof_of_drop(struct proof *proof, int64_t drop)
@@ -379,7 +392,7 @@ int proof_of_drop(struct proof *proof, int64_t drop)
 
 	if (result != 0)
 		return result;
-	proof->log_or_sidecar = proof->missing = proof->altered = false;
+	proof->log_or_sidecar = proof->missing = proof->altered = proof->unread = false;
 	proof->fault[0] = '\0';
 	entry = chain_find(&proof->chain, proof->file);
 	proof->sealed = entry != NULL;
@@ -388,7 +401,7 @@ int proof_of_drop(struct proof *proof, int64_t drop)
 		result = hold_text(proof, text);
 	if (result == 0) {
 		proof_of_file(proof, PROOF_LOG, proof->raw, proof->bytes, proof->hash, proof->copy);
-		mark(proof);
+		result = mark(proof);
 	}
 	return result;
 }
@@ -408,6 +421,8 @@ int proof_look(struct archive *archive, const char *drop, char fault[ARCHIVE_MES
 	if (result != 0)
 		return result;
 	result = proof_of_drop(&proof, place.drop);
+	if (result == 0 && proof.unread)
+		result = archive_refuse(archive, DT_E_SYSTEM, "%.100s: %.500s", drop, archive->unread);
 	if (result == 0)
 		snprintf(fault, ARCHIVE_MESSAGE_MAX, "%s", proof.fault);
 	proof_close(&proof);

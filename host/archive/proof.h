@@ -21,6 +21,7 @@ struct proof {
 	int copy;                /* gets the bytes of the log; -1: nobody does */
 	bool log_or_sidecar;     /* is wrong, rather than a result */
 	bool missing, altered, sealed;
+	bool unread; /* a file is there and could not be read: it may be what was recorded */
 	char fault[ARCHIVE_MESSAGE_MAX]; /* the first; "": none */
 };
 

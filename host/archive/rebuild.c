@@ -45,7 +45,10 @@ static int take(struct rebuild *rebuild, const char *file)
 	if (taken == DT_E_MEMORY) /* says nothing of the file, and so nothing of what the index would lack */
 		return taken;
 	if (taken != 0) {
-		snprintf(text, sizeof(text), "%.200s: %s", file, archive->message);
+		bool named = strncmp(archive->message, file, strlen(file)) == 0;
+
+		snprintf(text, sizeof(text), "%.200s%s%s", named ? "" : file, named ? "" : ": ",
+		         archive->message);
 		rebuild->wrong(rebuild->context, text);
 	}
 	if (taken < 0)

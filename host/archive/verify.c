@@ -63,11 +63,14 @@ int proof_of_rest(struct proof *proof, bool drops)
 
 	for (size_t i = 0; i < chain->count && result == 0; i++) {
 		const struct chain_entry *entry = &chain->entry[chain->by_path[i]];
+		char *text;
 
 		if (entry != chain_find(chain, entry->path) || strcmp(entry->hash, CHAIN_REMOVED) == 0)
 			continue;
 		if (sidecar_is_of_drop(entry->path))
 			result = !drops ? 0 : hold_unknown(proof, entry);
+		else if ((text = proof_text(proof, entry)) != NULL)
+			free(text);
 		else
 			proof_of_file(proof, PROOF_SIDECAR, entry->path, entry->bytes, entry->hash, -1);
 	}

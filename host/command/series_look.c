@@ -122,6 +122,10 @@ int series_verb_show(struct archive *archive, struct series_arguments *a)
 		code = print(&(struct job){archive, a, print_all});
 	if (code == COMMAND_DONE && a->csv == NULL && !a->json)
 		code = print_trends(archive, a->word[0]);
+	if (code == COMMAND_DONE && archive_unread(archive)[0] != '\0') {
+		command_error("%s", archive_unread(archive));
+		code = COMMAND_INPUT;
+	}
 	return code;
 }
 

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <cmocka.h>
 
@@ -202,6 +203,21 @@ static void test_a_damaged_sidecar_is_left_out_and_told(void **state)
 	archive_close(archive);
 }
 
+static int copy_series(void *context, const struct archive_series *series)
+{
+	*(struct archive_series *)context = *series;
+	return 0;
+}
+
+static struct archive_series the_series(struct archive *archive)
+{
+	struct archive_filter filter = archive_filter_none();
+	struct archive_series series = {0};
+
+	assert_int_equal(archive_each_series(archive, &filter, copy_series, &series), 0);
+	return series;
+}
+
 static void test_raw_files_are_verified(void **state)
 {
 	struct archive *archive = trial_with_series("one");
@@ -213,6 +229,9 @@ static void test_raw_files_are_verified(void **state)
 	trial_record(archive, "one", "abc");
 	trial_record(archive, "one", "def");
 	assert_int_equal(archive_verify(archive, NULL, 0, trial_count, &wrong), 0);
+	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "Ann", ""), 0);
+	assert_int_equal(archive_decide(archive, "one/2", ARCHIVE_REJECTED, "Ann", "cable"), 0);
+	assert_int_equal(the_series(archive).accepted, 1);
 	snprintf(path, sizeof(path), "%s/%s", trial_folder, trial_look(archive, "one", 1, NULL).raw);
 	out = fopen(path, "r+");
 	assert_non_null(out);
@@ -220,11 +239,59 @@ static void test_raw_files_are_verified(void **state)
 	fclose(out);
 	assert_int_equal(archive_verify(archive, NULL, 0, trial_count, &wrong), 1);
 	assert_string_equal(trial_look(archive, "one", 1, NULL).state, "altered");
+	assert_int_equal(the_series(archive).accepted, 0); /* as it is in no mean */
+	assert_int_equal(the_series(archive).rejected, 1);
+	assert_int_equal(the_series(archive).faulty, 1);
 	assert_int_equal(archive_decide(archive, "one/1", ARCHIVE_ACCEPTED, "Ann", ""), DT_E_CORRUPT);
 	assert_int_equal(unlink(path), 0);
 	assert_int_equal(archive_verify(archive, NULL, 0, trial_count, &wrong), 1);
 	assert_int_equal(wrong, 2);
 	assert_string_equal(trial_look(archive, "one", 1, NULL).state, "missing");
+	archive_close(archive);
+}
+
+/* It may be what was recorded: nothing is said of it, nothing done to it, and the index keeps what it knew.
+ */
+static void test_a_file_that_cannot_be_read(void **state)
+{
+	struct archive *archive = trial_with_series("one");
+	char path[256];
+	int wrong = 0;
+
+	(void)state;
+	trial_record(archive, "one", "abc");
+	assert_string_equal(archive_unread(archive), "");
+	snprintf(path, sizeof(path), "%s/%s", trial_folder, trial_look(archive, "one", 1, NULL).raw);
+	assert_int_equal(unlink(path), 0);
+	assert_int_equal(mkdir(path, 0777), 0);
+	assert_int_equal(archive_verify(archive, NULL, 0, trial_count, &wrong), 1);
+	assert_non_null(strstr(archive_unread(archive), "0001.log: cannot be read: Is a directory"));
+	assert_string_equal(trial_look(archive, "one", 1, NULL).state, "altered");
+	assert_int_equal(archive_note(archive, "one/1", "Ann", "why"), DT_E_SYSTEM);
+	archive_close(archive);
+	archive = trial_open(ARCHIVE_READ);
+	assert_string_equal(trial_look(archive, "one", 1, NULL).state, "recorded");
+	archive_close(archive);
+}
+
+/* Its writer ended between the chain's entry and the sidecar's place: whole all the same. */
+static void test_a_series_staged_but_not_in_its_place(void **state)
+{
+	struct archive *archive = trial_with_series("one");
+	char path[256], part[264], *end;
+	int wrong = 0;
+
+	(void)state;
+	trial_record(archive, "one", "abc");
+	snprintf(path, sizeof(path), "%s/%s", trial_folder, trial_look(archive, "one", 1, NULL).raw);
+	end = strrchr(path, '/');
+	assert_non_null(end);
+	strcpy(end, "/series.ini");
+	snprintf(part, sizeof(part), "%s.part", path);
+	assert_int_equal(rename(path, part), 0);
+	assert_int_equal(archive_verify(archive, NULL, 0, trial_count, &wrong), 0);
+	assert_int_equal(unlink(part), 0);
+	assert_int_equal(archive_verify(archive, NULL, 0, trial_count, &wrong), 1);
 	archive_close(archive);
 }
 
@@ -290,6 +357,8 @@ int main(void)
 	        IN_A_TRIAL(test_the_index_can_be_made_again),
 	        IN_A_TRIAL(test_a_damaged_sidecar_is_left_out_and_told),
 	        IN_A_TRIAL(test_raw_files_are_verified),
+	        IN_A_TRIAL(test_a_file_that_cannot_be_read),
+	        IN_A_TRIAL(test_a_series_staged_but_not_in_its_place),
 	        IN_A_TRIAL(test_a_series_from_another_height),
 	};
 
