@@ -33,24 +33,31 @@ $(BUILD)/mutate/mutant.o: tests/fault/mutant.c Makefile
 	$(Q)mkdir -p $(@D)
 	$(Q)$(CC) $(CFLAGS) $(LINUX) -c $< -o $@
 
-$(MUTATED_UNITS): $(BUILD)/mutate/%: $(BUILD)/obj/tests/unit/%.o $(call obj,$(UNIT_HELPER_C)) $(MUTATED_O) \
-		$(BUILD)/mutate/mutant.o $(foreach l,host hil firmware link common,$(call lib,$l))
+# As the unit tests are linked, but for the mutated sources.
+$(BUILD)/mutate/unit: $(DISPATCH_O) $(UNITS_TOGETHER:$(BUILD)/tests/%=$(BUILD)/obj/tests/unit/%.part) \
+		$(call obj,$(UNIT_HELPER_C)) $(MUTATED_O) $(BUILD)/mutate/mutant.o $(UNIT_LIBRARIES) $(call lib,stm32g474)
 	$(call say,LINK,$@)
-	$(Q)$(CC) $(LDFLAGS) $(filter %.o,$^) -Wl,--start-group $(filter %.a,$^) -Wl,--end-group $(LIBRARIES) -lcmocka -o $@
+	$(link_units)
+
+$(MUTATED_UNITS): $(BUILD)/mutate/unit
+	$(Q)ln -sf unit $@
 
 .SECONDARY: $(MUTATED_O:.o=.i) $(MUTATED_O:.o=.src.i)
 
-# What tests/system/test_mutants is to run; only the plain build has it.
-$(BUILD)/mutate/tests: $(MUTATED_UNITS)
-	$(Q)echo $^ >$@
-ifeq ($(SANITIZE)$(COVERAGE),)
-tests: $(BUILD)/mutate/tests
-endif
+# changed tells which sources are to be judged; system/test_mutants calls mutate-changed.
+MUTATE = tests/fault/mutate $(BUILD)/mutate tests/fault/survivors $(MUTATED_UNITS)
+CHANGED = $(BUILD) tests/fault/judged $(MUTATED_C)
 
-.PHONY: mutate
-mutate: setup-test ## make every small mistake in the heart of the firmware and see a unit test fail
-	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(BUILD)/mutate/tests
-	@tests/fault/mutate $(BUILD)/mutate tests/fault/survivors $(MUTATED_UNITS)
+.PHONY: mutate mutate-changed
+mutate: setup-test ## make every small mistake in the heart of the firmware, see a unit test fail, renew tests/fault/judged
+	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(MUTATED_UNITS)
+	@$(MUTATE); judged=$$?; tests/fault/changed --renew $(CHANGED) && exit $$judged
+
+mutate-changed: units ## the same for the sources that tests/fault/judged does not know as they are
+	@changed=$$(tests/fault/changed $(CHANGED)) || exit 1; \
+	[ -n "$$changed" ] || { echo "no source with mutants has changed since they were judged"; exit 0; }; \
+	echo "changed since their mutants were judged: $$changed"; \
+	$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(MUTATED_UNITS) && $(MUTATE) -- $$changed
 
 -include $(MUTATED_O:.o=.src.d)
 
