@@ -115,7 +115,7 @@ async function warningByKey() {
 	desk.page.on("request", listen);
 	const early = await desk.again(async () => {
 		await armByKey();
-		const found = await desk.page.waitForFunction(tooEarly, null, { polling: 20, timeout: 4000 });
+		const found = await desk.page.waitForFunction(tooEarly, null, { polling: 20, timeout: 15000 });
 		await desk.picture("5-warning");
 		return found.jsonValue();
 	});

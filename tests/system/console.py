@@ -17,7 +17,6 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from tap import *
 
 ME, OTHER = "a" * 16, "b" * 16
-PATIENCE_S = 40  # whatever is slower is a hang
 
 
 def wait_for(condition, what):
@@ -39,7 +38,7 @@ class Stream(threading.Thread):
     def __init__(self, console, name=ME):
         super().__init__(daemon=True)
         self.console, self.state, self.events, self.ended, self.bad = console, None, [], False, []
-        self.connection = http.client.HTTPConnection("127.0.0.1", console.port, timeout=10)
+        self.connection = http.client.HTTPConnection("127.0.0.1", console.port, timeout=PATIENCE_S)
         self.connection.request("GET", "/api/stream", headers=console.headers(name))
         self.socket = self.connection.sock
         self.answer = self.connection.getresponse()
@@ -112,7 +111,7 @@ class Console:
         headers.update({key.replace("_", "-"): value for key, value in more.items()})
         return headers
 
-    def ask(self, method, path, body=None, headers=None, name=ME, connection=None, timeout=30):
+    def ask(self, method, path, body=None, headers=None, name=ME, connection=None, timeout=PATIENCE_S):
         """Status, headers and bytes of the answer."""
         own = connection is None
         connection = connection or http.client.HTTPConnection("127.0.0.1", self.port, timeout=timeout)
@@ -149,7 +148,7 @@ class Console:
         self.holding = threading.Event()
 
         def renew(ended):
-            connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=10)
+            connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
             try:
                 while not ended.wait(2):
                     self.ask("POST", "/api/hold", {"take": True}, name=name, connection=connection)

@@ -12,7 +12,6 @@ import time
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from tap import *
 
-PATIENCE_S = 60  # whatever is slower is a hang
 
 
 class Person:

@@ -9,12 +9,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import traceback
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 BUILD = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else "build")
 SANITIZED = os.path.abspath(sys.argv[2] if len(sys.argv) > 2 else "build/sanitize")
 SHARED_DATA = os.path.join(ROOT, "..", "shared", "data")
+PATIENCE_S = 1500  # what takes longer hangs, on a busy machine too; tests/run ends a suite that does nothing earlier
 SCENE = "common/scenes/geometry-2A.ini"
 os.environ.setdefault("DROPTOWER_JOURNAL", os.path.join(BUILD, "tests", "journal.log"))  # not the one of who runs this
 
@@ -27,7 +29,7 @@ def skip(why):
     raise Skip(why)
 
 
-def run(*words, build=None, expect=0, timeout=120, **more):
+def run(*words, build=None, expect=0, timeout=PATIENCE_S, **more):
     """Runs build/<words[0]> with the other words; fails unless it exits with expect (None: any)."""
     command = [os.path.join(build or BUILD, words[0])] + [str(w) for w in words[1:]]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, timeout=timeout, stdin=subprocess.DEVNULL, **more)
@@ -51,6 +53,14 @@ def equal(got, wanted, what=""):
 def within(value, low, high, what=""):
     if value is None or not low <= value <= high:
         raise AssertionError(f"{what}: {value} is not within {low} to {high}")
+
+
+def stretch():
+    """How many times longer than on an idle machine things take now: wall time over processor time, 1 at least."""
+    begun, spent = time.monotonic(), time.process_time()
+    while time.process_time() - spent < 0.05:
+        pass
+    return max(1, (time.monotonic() - begun) / 0.05)
 
 
 def main(namespace):

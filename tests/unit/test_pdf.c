@@ -167,10 +167,15 @@ static void test_stopped(void **state)
 	size_t length = 0;
 
 	(void)state;
-	snprintf(script, sizeof(script), "(sleep 1; touch '%s/late') & sleep 100", folder);
+	snprintf(script, sizeof(script),
+	         "(while [ ! -e '%s/ended' ]; do sleep 0.1; done; touch '%s/late') & sleep 1000", folder,
+	         folder);
 	browser("chromium", script);
 	assert_fails(print(at_once, &pdf, &length), DT_E_CLOSED, "interrupted");
-	sleep(2);
+	snprintf(script, sizeof(script), "%s/ended", folder);
+	assert_int_equal(mkdir(script, 0700), 0);
+	sleep(1);
+	assert_int_equal(rmdir(script), 0);
 	snprintf(script, sizeof(script), "%s/late", folder);
 	assert_int_equal(access(script, F_OK), -1);
 }
