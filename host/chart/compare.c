@@ -2,12 +2,13 @@
 #include "host/chart/compare.h"
 
 #include <math.h>
-#include <time.h>
 
 #include <gsl/gsl_sort.h>
 #include <gsl/gsl_statistics_double.h>
 
-/* Each call is repeated until a batch takes this long; the least of the batches counts. */
+#include "host/chart/timing.h"
+
+/* Of timing_us, for each of many drops. */
 #define BATCH_US 20.0
 
 enum { BATCHES = 3 };
@@ -27,37 +28,22 @@ unsigned compare_gross(const struct compare *compare, const struct tally *tally)
 	return tally->gross + compare->drops - tally->values;
 }
 
-static double now_us(void)
+struct call {
+	const struct method *method;
+	const struct trial *trial;
+};
+
+static void work(const void *context)
 {
-	struct timespec now;
+	const struct call *call = context;
+	volatile double sink;
 
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (double)now.tv_sec * 1e6 + (double)now.tv_nsec * 1e-3;
-}
-
-static double batch(const struct method *method, const struct trial *trial, unsigned repeats)
-{
-	volatile double sink = 0;
-	double start = now_us();
-
-	for (unsigned i = 0; i < repeats; i++) {
-		if (method->work)
-			method->work(trial);
-		else
-			sink = method->value(trial);
+	if (call->method->work) {
+		call->method->work(call->trial);
+		return;
 	}
+	sink = call->method->value(call->trial);
 	(void)sink;
-	return now_us() - start;
-}
-
-static double cost_of(const struct method *method, const struct trial *trial)
-{
-	double once = batch(method, trial, 1), least = INFINITY;
-	unsigned repeats = once < BATCH_US ? (unsigned)(BATCH_US / fmax(once, 0.02)) + 1 : 1;
-
-	for (int i = 0; i < BATCHES; i++)
-		least = fmin(least, batch(method, trial, repeats) / repeats);
-	return least;
 }
 
 static bool doubts(const struct estimate_how *how)
@@ -103,7 +89,8 @@ static int look(void *context, size_t i, const struct synthetic *synthetic, unsi
 		          (double)NAN, method_gross(&method[m], &trial));
 		cell->tally[m].doubted += method[m].how && doubts(method[m].how(&trial));
 		if (compare->timed && drop < COMPARE_TIMED)
-			cell->drop_us[m][drop] = cost_of(&method[m], &trial);
+			cell->drop_us[m][drop] =
+			        timing_us(work, &(struct call){&method[m], &trial}, BATCH_US, BATCHES);
 	}
 	trial_close(&trial);
 	return 0;

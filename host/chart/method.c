@@ -119,27 +119,19 @@ void trial_close(struct trial *trial)
 	memset(trial, 0, sizeof(*trial));
 }
 
+/* What a method makes of trial t; of its own, what it says of that. */
+#define VALUE(name, value)                        \
+	static double name(const struct trial *t) \
+	{                                         \
+		return value;                     \
+	}
+#define HOW(name, how)                                                \
+	static const struct estimate_how *name(const struct trial *t) \
+	{                                                             \
+		return how;                                           \
+	}
+
 /* ---- others' methods ----------------------------------------------------------------------------------- */
-
-static double largest(const struct trial *t)
-{
-	return reference_maximum(&t->series[SYNTHETIC_S2X]).value;
-}
-
-static double largest_time(const struct trial *t)
-{
-	return reference_maximum(&t->series[SYNTHETIC_S2X]).time_s;
-}
-
-static double parabola(const struct trial *t)
-{
-	return reference_parabola(&t->series[SYNTHETIC_S2X]).value;
-}
-
-static double parabola_time(const struct trial *t)
-{
-	return reference_parabola(&t->series[SYNTHETIC_S2X]).time_s;
-}
 
 static struct reference_pulse gsl_pulse(const struct trial *t)
 {
@@ -150,113 +142,34 @@ static struct reference_pulse gsl_pulse(const struct trial *t)
 	return pulse;
 }
 
-static double gsl_peak(const struct trial *t)
-{
-	return gsl_pulse(t).value;
-}
-
-static double gsl_peak_time(const struct trial *t)
-{
-	return gsl_pulse(t).time_s;
-}
-
-static double gsl_contact(const struct trial *t)
-{
-	return gsl_pulse(t).base_s;
-}
-
-static double two_maxima(const struct trial *t)
-{
-	return hypot(reference_maximum(&t->series[SYNTHETIC_S2X]).value,
-	             reference_maximum(&t->series[SYNTHETIC_S2Y]).value);
-}
-
-static double drawn(const struct trial *t)
-{
-	return reference_resultant(&t->series[SYNTHETIC_S2X], &t->series[SYNTHETIC_S2Y]);
-}
-
-static double plate_largest(const struct trial *t)
-{
-	return reference_maximum(&t->series[SYNTHETIC_S1X]).value;
-}
-
-static double plate_parabola(const struct trial *t)
-{
-	return reference_parabola(&t->series[SYNTHETIC_S1X]).value;
-}
-
-static double maxima_apart(const struct trial *t)
-{
-	return reference_maximum(&t->series[SYNTHETIC_S1X]).time_s -
-	       reference_maximum(&t->series[SYNTHETIC_S2X]).time_s;
-}
-
-static double parabolas_apart(const struct trial *t)
-{
-	return reference_parabola(&t->series[SYNTHETIC_S1X]).time_s -
-	       reference_parabola(&t->series[SYNTHETIC_S2X]).time_s;
-}
-
-static double correlation(const struct trial *t)
-{
-	return reference_correlation(&t->series[SYNTHETIC_S2X], &t->series[SYNTHETIC_S1X]);
-}
-
-static double crossings(const struct trial *t)
-{
-	return reference_crossings(&t->decay).hz;
-}
-
-static double spectrum_hz(const struct trial *t)
-{
-	return reference_spectrum(&t->decay).hz;
-}
-
-static double spectrum_damping(const struct trial *t)
-{
-	return reference_spectrum(&t->decay).damping;
-}
-
-static double decrement(const struct trial *t)
-{
-	return reference_decrement(&t->decay).damping;
-}
-
-static double pencil_hz(const struct trial *t)
-{
-	return reference_pencil(&t->decay).hz;
-}
-
-static double pencil_damping(const struct trial *t)
-{
-	return reference_pencil(&t->decay).damping;
-}
-
-static double gsl_hz(const struct trial *t)
-{
-	return reference_fit_decay(&t->decay).hz;
-}
-
-static double gsl_damping(const struct trial *t)
-{
-	return reference_fit_decay(&t->decay).damping;
-}
-
-static double width(const struct trial *t)
-{
-	return reference_width(&t->series[SYNTHETIC_S2X]);
-}
-
-static double area_width(const struct trial *t)
-{
-	return reference_area_width(&t->series[SYNTHETIC_S2X]);
-}
-
-static double long_sum(const struct trial *t)
-{
-	return reference_velocity(&t->series[SYNTHETIC_S2X], t->truth.contact_s);
-}
+VALUE(largest, reference_maximum(&t->series[SYNTHETIC_S2X]).value)
+VALUE(largest_time, reference_maximum(&t->series[SYNTHETIC_S2X]).time_s)
+VALUE(parabola, reference_parabola(&t->series[SYNTHETIC_S2X]).value)
+VALUE(parabola_time, reference_parabola(&t->series[SYNTHETIC_S2X]).time_s)
+VALUE(gsl_peak, gsl_pulse(t).value)
+VALUE(gsl_peak_time, gsl_pulse(t).time_s)
+VALUE(gsl_contact, gsl_pulse(t).base_s)
+VALUE(two_maxima, hypot(reference_maximum(&t->series[SYNTHETIC_S2X]).value,
+                        reference_maximum(&t->series[SYNTHETIC_S2Y]).value))
+VALUE(drawn, reference_resultant(&t->series[SYNTHETIC_S2X], &t->series[SYNTHETIC_S2Y]))
+VALUE(plate_largest, reference_maximum(&t->series[SYNTHETIC_S1X]).value)
+VALUE(plate_parabola, reference_parabola(&t->series[SYNTHETIC_S1X]).value)
+VALUE(maxima_apart, reference_maximum(&t->series[SYNTHETIC_S1X]).time_s -
+                            reference_maximum(&t->series[SYNTHETIC_S2X]).time_s)
+VALUE(parabolas_apart, reference_parabola(&t->series[SYNTHETIC_S1X]).time_s -
+                               reference_parabola(&t->series[SYNTHETIC_S2X]).time_s)
+VALUE(correlation, reference_correlation(&t->series[SYNTHETIC_S2X], &t->series[SYNTHETIC_S1X]))
+VALUE(crossings, reference_crossings(&t->decay).hz)
+VALUE(spectrum_hz, reference_spectrum(&t->decay).hz)
+VALUE(spectrum_damping, reference_spectrum(&t->decay).damping)
+VALUE(decrement, reference_decrement(&t->decay).damping)
+VALUE(pencil_hz, reference_pencil(&t->decay).hz)
+VALUE(pencil_damping, reference_pencil(&t->decay).damping)
+VALUE(gsl_hz, reference_fit_decay(&t->decay).hz)
+VALUE(gsl_damping, reference_fit_decay(&t->decay).damping)
+VALUE(width, reference_width(&t->series[SYNTHETIC_S2X]))
+VALUE(area_width, reference_area_width(&t->series[SYNTHETIC_S2X]))
+VALUE(long_sum, reference_velocity(&t->series[SYNTHETIC_S2X], t->truth.contact_s))
 
 /* ---- the product's --------------------------------------------------------------------------------------
  */
@@ -295,25 +208,10 @@ TOLD(our_area, TELL_NOTHING, ESTIMATE_FAMILY_AUTO, pulse.fitted_velocity_m_s, pu
 TOLD(our_told_area, TELL_HALF_SINE, ESTIMATE_FAMILY_HALF_SINE, pulse.fitted_velocity_m_s, pulse.contact,
      product_pulse)
 
-static double our_resultant(const struct trial *t)
-{
-	return t->analysis[TELL_NOTHING].resultants[1].peak_g;
-}
-
-static double our_told_resultant(const struct trial *t)
-{
-	return t->analysis[TELL_HALF_SINE].resultants[1].peak_g;
-}
-
-static const struct estimate_how *our_resultant_how(const struct trial *t)
-{
-	return &t->analysis[TELL_NOTHING].resultants[1].how;
-}
-
-static const struct estimate_how *our_told_resultant_how(const struct trial *t)
-{
-	return &t->analysis[TELL_HALF_SINE].resultants[1].how;
-}
+VALUE(our_resultant, t->analysis[TELL_NOTHING].resultants[1].peak_g)
+VALUE(our_told_resultant, t->analysis[TELL_HALF_SINE].resultants[1].peak_g)
+HOW(our_resultant_how, &t->analysis[TELL_NOTHING].resultants[1].how)
+HOW(our_told_resultant_how, &t->analysis[TELL_HALF_SINE].resultants[1].how)
 
 /* Both axes' peaks are part of it. */
 static void our_resultant_work(const struct trial *t)
@@ -330,40 +228,18 @@ static void our_told_resultant_work(const struct trial *t)
 	product_resultant(t->product);
 }
 
-static double our_smooth_plate_peak(const struct trial *t)
-{
-	return product_plate_peak(t->product);
-}
+VALUE(our_smooth_plate_peak, product_plate_peak(t->product))
 
 static const struct estimate_channel *plate_x(const struct trial *t)
 {
 	return &t->analysis[TELL_NOTHING].channels[SYNTHETIC_S1X];
 }
 
-static double our_plate_peak(const struct trial *t)
-{
-	return plate_x(t)->peak.value_g;
-}
-
-static const struct estimate_how *our_plate_peak_how(const struct trial *t)
-{
-	return &plate_x(t)->peak.how;
-}
-
-static double our_peaks_apart(const struct trial *t)
-{
-	return t->analysis[TELL_NOTHING].lag.largest_peak_s;
-}
-
-static double our_driven(const struct trial *t)
-{
-	return t->analysis[TELL_NOTHING].lag.driven_axis_s[0];
-}
-
-static const struct estimate_how *our_driven_how(const struct trial *t)
-{
-	return &t->analysis[TELL_NOTHING].lag.driven;
-}
+VALUE(our_plate_peak, plate_x(t)->peak.value_g)
+HOW(our_plate_peak_how, &plate_x(t)->peak.how)
+VALUE(our_peaks_apart, t->analysis[TELL_NOTHING].lag.largest_peak_s)
+VALUE(our_driven, t->analysis[TELL_NOTHING].lag.driven_axis_s[0])
+HOW(our_driven_how, &t->analysis[TELL_NOTHING].lag.driven)
 
 static void our_lag_work(const struct trial *t)
 {
@@ -375,42 +251,21 @@ static const struct estimate_ringdown *decay_of(const struct trial *t)
 	return &plate_x(t)->ringdown;
 }
 
-static double our_hz(const struct trial *t)
-{
-	return decay_of(t)->frequency_hz;
-}
-
-static double our_damping(const struct trial *t)
-{
-	return decay_of(t)->damping_ratio;
-}
-
-static const struct estimate_how *our_decay_how(const struct trial *t)
-{
-	return &decay_of(t)->how;
-}
+VALUE(our_hz, decay_of(t)->frequency_hz)
+VALUE(our_damping, decay_of(t)->damping_ratio)
+HOW(our_decay_how, &decay_of(t)->how)
 
 static void our_decay_work(const struct trial *t)
 {
 	product_decay(t->product);
 }
 
-static double our_plate_hz(const struct trial *t)
-{
-	return t->analysis[TELL_NOTHING].has_plate ? t->analysis[TELL_NOTHING].plate.frequency_hz
-	                                           : (double)NAN;
-}
-
-static double our_plate_damping(const struct trial *t)
-{
-	return t->analysis[TELL_NOTHING].has_plate ? t->analysis[TELL_NOTHING].plate.damping_ratio
-	                                           : (double)NAN;
-}
-
-static const struct estimate_how *our_plate_how(const struct trial *t)
-{
-	return t->analysis[TELL_NOTHING].has_plate ? &t->analysis[TELL_NOTHING].plate.how : our_decay_how(t);
-}
+VALUE(our_plate_hz,
+      t->analysis[TELL_NOTHING].has_plate ? t->analysis[TELL_NOTHING].plate.frequency_hz : (double)NAN)
+VALUE(our_plate_damping,
+      t->analysis[TELL_NOTHING].has_plate ? t->analysis[TELL_NOTHING].plate.damping_ratio : (double)NAN)
+HOW(our_plate_how,
+    t->analysis[TELL_NOTHING].has_plate ? &t->analysis[TELL_NOTHING].plate.how : our_decay_how(t))
 
 static void our_plate_work(const struct trial *t)
 {

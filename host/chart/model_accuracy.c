@@ -10,7 +10,7 @@
 
 #include "host/chart/chart.h"
 #include "host/chart/model_study.h"
-#include "host/chart/model_timing.h"
+#include "host/chart/timing.h"
 #include "host/chart/plot.h"
 #include "host/model/model.h"
 
@@ -110,7 +110,7 @@ static int ask_drop(size_t rung, enum study_product product, size_t angle, struc
 	truth = (struct answer){fabs(truth.s1_r), fabs(truth.s2_x), fabs(truth.s2_y)};
 	add_answer(finest, product, &a, &truth);
 	if (cost_us)
-		*cost_us = timing_us(ask, &question);
+		*cost_us = timing_us(ask, &question, TIMING_BATCH_US, TIMING_BATCHES);
 	return 0;
 }
 

@@ -6,7 +6,7 @@
 #include "host/chart/chart.h"
 #include "host/chart/model_numerics.h"
 #include "host/chart/model_study.h"
-#include "host/chart/model_timing.h"
+#include "host/chart/timing.h"
 #include "host/chart/plot.h"
 #include "host/model/coupled.h"
 #include "host/model/planar.h"
@@ -216,7 +216,7 @@ static void measure(const struct problem *problem, enum way way, struct curve *c
 
 		work(&run);
 		curve->error[i] = error_of(&run);
-		curve->cost_us[i] = timing_us(work, &run);
+		curve->cost_us[i] = timing_us(work, &run, TIMING_BATCH_US, TIMING_BATCHES);
 	}
 }
 
