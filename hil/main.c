@@ -11,6 +11,7 @@
 
 #include "common/base/number.h"
 #include "common/base/option.h"
+#include "common/base/text.h"
 #include "common/wire_table.h"
 #include "hil/bench.h"
 #include "hil/scenario.h"
@@ -241,25 +242,28 @@ static void name_of(const char *file, char *name, size_t size)
  * firmware's frames, what failed. Then an expectation a line. */
 static int judge(const struct scenario *scenario, const struct line *line, const struct bench_watch *watch)
 {
-	char name[64], failed[300], title[600], *report = NULL;
-	size_t size = 0;
-	FILE *out = open_memstream(&report, &size);
-	unsigned failures;
+	char name[64], failed[300], title[600];
+	struct text report;
+	unsigned failures = 0;
+	int result = text_open(&report);
 
-	if (out == NULL) {
-		bench_say("out of memory");
+	if (result == 0) {
+		failures = verdict_print(scenario, &watch->observe, watch->results, report.out, failed,
+		                         sizeof(failed));
+		result = text_close(&report, 0);
+	}
+	if (result != 0) {
+		bench_say("%s", error_text(result));
 		return BENCH_LINK;
 	}
-	failures = verdict_print(scenario, &watch->observe, watch->results, out, failed, sizeof(failed));
-	fclose(out);
 	name_of(line->scenario_file, name, sizeof(name));
 	printf("%s %s %s %.3f %.2f %016" PRIx64 " %s\n%s", failures ? "FAIL" : "PASS", name,
 	       wire_state_name(watch->observe.state), watch->virtual_s, watch->wall_s, watch->observe.hash,
-	       failures ? failed : "-", report);
+	       failures ? failed : "-", report.bytes);
 	if (watch->observe.hazard.first != NULL)
 		printf("  unsafe at %.3f s: %s\n", watch->observe.hazard.first_s,
 		       watch->observe.hazard.first);
-	free(report);
+	free(report.bytes);
 	snprintf(title, sizeof(title), "%s: %s (%s%s)", name, scenario->title, failures ? "FAIL " : "PASS",
 	         failures ? failed : "");
 	if (line->timeline_file != NULL &&

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "common/base/process.h"
+#include "common/base/text.h"
 #include "common/sensorbus.h"
 #include "common/wire.h"
 #include "common/wire_table.h"
@@ -256,9 +257,7 @@ int timeline_draw(const struct timeline *timeline, const struct observe *observe
 {
 	static const char *const gnuplot[] = {"gnuplot", "--default-settings", NULL};
 	struct process_streams streams;
-	char *script = NULL;
-	size_t size = 0;
-	FILE *out;
+	struct text script;
 	int result;
 
 	if (timeline == NULL || timeline->count == 0)
@@ -267,12 +266,15 @@ int timeline_draw(const struct timeline *timeline, const struct observe *observe
 		errno = ENOMEM;
 		return DT_E_SYSTEM;
 	}
-	out = open_memstream(&script, &size);
-	if (out == NULL)
-		return DT_E_SYSTEM;
-	put_picture(timeline, observe, title, file, out);
-	result = fclose(out) == 0 ? process_streams_open(&streams, script, size) : ENOMEM;
-	free(script);
+	result = text_open(&script);
+	if (result != 0)
+		return result;
+	put_picture(timeline, observe, title, file, script.out);
+	result = text_close(&script, 0);
+	if (result != 0)
+		return result;
+	result = process_streams_open(&streams, script.bytes, script.size);
+	free(script.bytes);
 	if (result != 0)
 		return DT_E_SYSTEM;
 	result = process_filter(gnuplot, &streams);

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/text.h"
 #include "hil/study/tables.h"
 #include "host/record/read.h"
 #include "host/report/picture.h"
@@ -207,21 +208,17 @@ int study_draw(const struct study *study, enum study_figure figure, char **svg,
 {
 	static const int rows[STUDY_FIGURES] = {1, 1, 2, 3};
 	struct drawing drawing = {.study = study, .message = message};
-	char *script = NULL;
-	size_t length = 0;
-	int status;
+	struct text script;
+	int status = text_open(&script);
 
-	drawing.script = open_memstream(&script, &length);
-	if (drawing.script == NULL) {
-		snprintf(message, STUDY_MESSAGE_MAX, "%s", error_text(DT_E_MEMORY));
-		return DT_E_MEMORY;
-	}
+	snprintf(message, STUDY_MESSAGE_MAX, "%s", error_text(DT_E_MEMORY));
+	if (status != 0)
+		return status;
+	drawing.script = script.out;
 	begin(drawing.script, rows[figure]);
-	status = draw_panels(&drawing, figure);
-	if (fclose(drawing.script) != 0 && status == 0)
-		status = DT_E_MEMORY;
+	status = text_close(&script, draw_panels(&drawing, figure));
 	if (status == 0)
-		status = picture_draw(script, length, svg, message, STUDY_MESSAGE_MAX);
-	free(script);
+		status = picture_draw(script.bytes, script.size, svg, message, STUDY_MESSAGE_MAX);
+	free(script.bytes);
 	return status;
 }

@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 #include "common/plain.h"
-#include "host/archive/durable.h"
+#include "host/base/durable.h"
 #include "host/archive/private.h"
 #include "common/base/number.h"
 

@@ -237,7 +237,7 @@ static int finish_last(struct archive *archive, const struct chain_entry *entry)
 
 	path_of(archive, path, entry->path);
 	snprintf(part, sizeof(part), "%s.part", path);
-	if (durable_hash(part, hash, &bytes, -1) != 0 || strcmp(hash, entry->hash) != 0)
+	if (digest_file(part, hash, &bytes, -1) != 0 || strcmp(hash, entry->hash) != 0)
 		return 0;
 	return durable_publish(path) == 0 ? 0 : refuse_file(archive, path);
 }

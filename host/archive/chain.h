@@ -10,7 +10,8 @@
  * for all that came before. A sidecar holds the SHA-256 of its log and of its results. Written within the
  * transaction that writes the sidecar: one writer at a time.
  */
-#include "host/archive/durable.h"
+#include "host/base/durable.h"
+#include "host/record/digest.h"
 #include "host/archive/private.h"
 
 #define CHAIN_FILE "raw/chain"

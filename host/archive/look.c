@@ -9,7 +9,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-#include "host/archive/durable.h"
+#include "host/record/digest.h"
 #include "host/archive/quantities.h"
 
 struct archive_filter archive_filter_none(void)
@@ -494,7 +494,7 @@ int archive_find(struct archive *archive, const char *file, char drop[ARCHIVE_NA
 	char hash[DIGEST_CHARS];
 	int64_t bytes;
 
-	if (durable_hash(file, hash, &bytes, -1) != 0)
+	if (digest_file(file, hash, &bytes, -1) != 0)
 		return archive_refuse(archive, DT_E_SYSTEM, "%.500s: cannot be read", file);
 	return archive_first_drop(
 	        archive,

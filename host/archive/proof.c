@@ -123,7 +123,7 @@ bool proof_of_file(struct proof *proof, enum proof_part part, const char *file, 
 	int64_t found_bytes = 0;
 
 	snprintf(path, sizeof(path), "%s/%.200s", proof->archive->folder, file);
-	if (durable_hash(path, found, &found_bytes, copy) != 0) {
+	if (digest_file(path, found, &found_bytes, copy) != 0) {
 		if (errno == ENOENT || errno == ENOTDIR)
 			proof_fault(proof, part, true, "%.200s: missing", file);
 		else

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "host/archive/quantities.h"
-#include "host/record/text.h"
+#include "common/base/text.h"
 
 static bool is_kept(const struct quantity *q)
 {

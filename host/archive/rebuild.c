@@ -215,11 +215,9 @@ static int move(struct archive *archive, const char *from, const char *to)
 	for (size_t i = 0; i < sizeof(endings) / sizeof(endings[0]); i++) {
 		path_of(archive, old, from, endings[i]);
 		path_of(archive, new, to, endings[i]);
-		if (rename(old, new) != 0 && errno != ENOENT)
+		if (durable_replace(old, new) != 0 && errno != ENOENT)
 			return archive_refuse(archive, DT_E_SYSTEM, "%.400s: %s", new, strerror(errno));
 	}
-	if (durable_sync_folder(new) != 0)
-		return archive_refuse(archive, DT_E_SYSTEM, "%.400s: %s", new, strerror(errno));
 	return 0;
 }
 

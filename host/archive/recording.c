@@ -331,7 +331,7 @@ int archive_finish(struct archive *archive, struct archive_recording *recording,
 
 	archive_time(when, time_s);
 	if (result == 0 &&
-	    (durable_sync(recording->log) != 0 || durable_hash(recording->log, hash, &bytes, -1) != 0))
+	    (durable_sync(recording->log) != 0 || digest_file(recording->log, hash, &bytes, -1) != 0))
 		result = refuse_file(archive, recording->log);
 	if (result == 0)
 		result = archive_start(archive);

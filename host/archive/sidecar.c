@@ -8,7 +8,7 @@
 
 #include "host/archive/chain.h"
 #include "host/archive/sidecar.h"
-#include "host/record/text.h"
+#include "common/base/text.h"
 
 #define SERIES_COLUMNS "s.scene, s.name, c.name, s.angle_deg, s.height_m, s.planned, s.created"
 #define SERIES_TABLES " FROM series s JOIN campaigns c ON c.id = s.campaign_id "

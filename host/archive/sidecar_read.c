@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "host/archive/durable.h"
+#include "host/base/durable.h"
 #include "host/archive/sidecar.h"
 #include "common/base/number.h"
 

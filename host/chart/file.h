@@ -5,7 +5,7 @@
  * The files of a chart. A file is whole or not there: text is made in memory, written beside, renamed.
  */
 #include "host/chart/chart.h"
-#include "host/record/text.h"
+#include "common/base/text.h"
 
 /* A text is freed with file_drop. */
 DT_MUST_USE int file_begin(struct text *text, char *message);

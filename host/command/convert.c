@@ -9,7 +9,7 @@
 #include "host/record/log_capture.h"
 #include "host/record/dbc.h"
 #include "host/record/read.h"
-#include "host/record/whole.h"
+#include "host/base/whole.h"
 #include "host/record/write.h"
 
 enum { CONVERT_TOLD = 1 }; /* what was wrong was printed */

@@ -14,8 +14,8 @@
 #include "host/estimate/cfc.h"
 #include "host/estimate/filter.h"
 #include "host/record/drop.h"
-#include "host/record/text.h"
-#include "host/record/whole.h"
+#include "common/base/text.h"
+#include "host/base/whole.h"
 #include "host/report/report.h"
 #include "host/shock/free_fall.h"
 

@@ -11,7 +11,7 @@
 
 #include "host/command/command.h"
 #include "host/command/model_private.h"
-#include "host/record/whole.h"
+#include "host/base/whole.h"
 #include "host/report/forecast.h"
 
 #define HISTORY_BEFORE_S 0.002

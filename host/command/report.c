@@ -10,8 +10,8 @@
 #include "host/command/archived.h"
 #include "host/command/command.h"
 #include "host/record/seal.h"
-#include "host/record/text.h"
-#include "host/record/whole.h"
+#include "common/base/text.h"
+#include "host/base/whole.h"
 #include "host/report/pdf.h"
 #include "host/report/series.h"
 

@@ -11,7 +11,7 @@
 #include "host/command/archived.h"
 #include "host/command/command.h"
 #include "host/command/series_private.h"
-#include "host/record/whole.h"
+#include "host/base/whole.h"
 
 int series_must_be(struct archive *archive, const char *name)
 {

@@ -6,7 +6,7 @@
 
 #include "host/command/command.h"
 #include "host/record/read.h"
-#include "host/record/whole.h"
+#include "host/base/whole.h"
 #include "host/report/spectrum.h"
 #include "host/shock/signal.h"
 

@@ -11,7 +11,7 @@
 #include "common/base/number.h"
 #include "host/archive/print.h"
 #include "host/console/work_private.h"
-#include "host/record/text.h"
+#include "common/base/text.h"
 
 enum { COUNT_MAX = 1000000 };
 

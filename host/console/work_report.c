@@ -15,8 +15,8 @@
 
 #include "common/base/process.h"
 #include "common/wire_table.h"
-#include "host/archive/durable.h"
 #include "host/base/beside.h"
+#include "host/base/durable.h"
 #include "host/console/work_private.h"
 
 enum { NICE = 10 };

@@ -1,7 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/digest.h"
 
-#include <stdint.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "common/base/process.h"
 
 void digest_end(struct sha256_ctx *context, char text[DIGEST_CHARS])
 {
@@ -23,4 +27,33 @@ void digest_of(const void *bytes, size_t size, char text[DIGEST_CHARS])
 	sha256_init(&context);
 	sha256_update(&context, size, bytes);
 	digest_end(&context, text);
+}
+
+int digest_file(const char *path, char text[DIGEST_CHARS], int64_t *bytes, int copy)
+{
+	struct sha256_ctx context;
+	uint8_t block[32768];
+	int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY), result = 0, failed;
+	int64_t total = 0;
+	ssize_t n = 0;
+
+	if (fd < 0)
+		return DT_E_SYSTEM;
+	sha256_init(&context);
+	while (result == 0 && ((n = read(fd, block, sizeof(block))) > 0 || (n < 0 && errno == EINTR))) {
+		if (n < 0)
+			continue;
+		sha256_update(&context, (size_t)n, block);
+		total += n;
+		if (copy >= 0)
+			result = process_write(copy, block, (size_t)n);
+	}
+	failed = errno;
+	close(fd); /* what was read loses nothing by it */
+	errno = failed;
+	if (result != 0 || n != 0)
+		return DT_E_SYSTEM;
+	digest_end(&context, text);
+	*bytes = total;
+	return 0;
 }

@@ -6,6 +6,9 @@
  */
 #include <nettle/sha2.h>
 #include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
 
 enum { DIGEST_CHARS = 65 };
 
@@ -13,5 +16,9 @@ enum { DIGEST_CHARS = 65 };
 void digest_end(struct sha256_ctx *context, char text[DIGEST_CHARS]);
 
 void digest_of(const void *bytes, size_t size, char text[DIGEST_CHARS]);
+
+/* Of a file, and its size. copy: a descriptor that gets the same bytes, or -1. 0, or DT_E_SYSTEM with errno
+ * set. */
+DT_MUST_USE int digest_file(const char *path, char text[DIGEST_CHARS], int64_t *bytes, int copy);
 
 #endif

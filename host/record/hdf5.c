@@ -9,7 +9,7 @@
 
 #include "common/base/process.h"
 #include "host/record/seal.h"
-#include "host/record/text.h"
+#include "common/base/text.h"
 #include "host/record/write.h"
 
 static const char HELPER[] = "droptower-hdf5";

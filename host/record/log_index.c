@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 
 #include "common/wire_table.h"
-#include "host/record/whole.h"
+#include "host/base/whole.h"
 
 #define HEAD "# droptower index "
 

@@ -18,9 +18,9 @@
 #include "common/base/number.h"
 #include "host/record/lcm_log.h"
 #include "host/record/seal.h"
-#include "host/record/text.h"
+#include "common/base/text.h"
 #include "host/record/uff58.h"
-#include "host/record/whole.h"
+#include "host/base/whole.h"
 
 /* ---- frames ---- */
 

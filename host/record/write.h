@@ -13,7 +13,7 @@
 
 #include "common/frame.h"
 #include "host/record/read.h"
-#include "host/record/text.h"
+#include "common/base/text.h"
 
 /* Writes file in the format its name ends in: .csv, .lcm, .log or .candump, .unv or .uff,
  * .h5 or .hdf5. 0 or DT_E_* with one line in

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/record/whole.h"
+#include "host/base/whole.h"
 #include "host/result/measured.h"
 #include "host/report/page.h"
 #include "host/report/shock.h"

@@ -6,7 +6,7 @@
  * (series*.c) share.
  */
 #include "host/base/html.h"
-#include "host/record/text.h"
+#include "common/base/text.h"
 #include "host/report/facts.h"
 
 /* The first picture that fails is remembered and the rest are left out. */

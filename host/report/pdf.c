@@ -13,8 +13,8 @@
 
 #include "common/base/process.h"
 #include "common/link/temporary.h"
-#include "host/archive/durable.h"
-#include "host/record/whole.h"
+#include "host/base/durable.h"
+#include "host/base/whole.h"
 
 enum { LIMIT_MS = 60000, ASK_MS = 100, FOLDER_MAX = TEMPORARY_PATH_MAX, PROGRAM_MAX = 4096 };
 

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/record/text.h"
+#include "common/base/text.h"
 #include "host/report/picture.h"
 #include "host/base/put.h"
 #include "host/shock/signal.h"

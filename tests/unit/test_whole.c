@@ -13,7 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "host/record/whole.h"
+#include "host/base/whole.h"
 
 static char folder[] = "/tmp/droptower-whole-XXXXXX";
 

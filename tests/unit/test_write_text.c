@@ -15,8 +15,8 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include "host/archive/durable.h"
-#include "host/record/text.h"
+#include "host/base/durable.h"
+#include "common/base/text.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 #define SANITIZED 1

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_ARCHIVE_DURABLE_H
-#define DT_HOST_ARCHIVE_DURABLE_H
+#ifndef DT_HOST_BASE_DURABLE_H
+#define DT_HOST_BASE_DURABLE_H
 /*
  * Files that stay: on success they are on the disk, and so are the folders that name them. 0 or DT_E_SYSTEM
  * with errno set, DT_E_MEMORY.
@@ -9,7 +9,6 @@
 #include <stdint.h>
 
 #include "common/error.h"
-#include "host/record/digest.h"
 
 /* Makes the folders of path, up to its last slash. */
 DT_MUST_USE int durable_folders(const char *path);
@@ -20,6 +19,9 @@ DT_MUST_USE int durable_write(const char *path, const void *bytes, size_t size);
 DT_MUST_USE int durable_stage(const char *path, const void *bytes, size_t size);
 DT_MUST_USE int durable_publish(const char *path);
 
+/* Renames a file that is on the disk; the folder that holds `to` is, too, behind it. */
+DT_MUST_USE int durable_replace(const char *from, const char *to);
+
 /* Writes bytes into path from byte `at` on, and nothing is behind them; path is made when it is not there. */
 DT_MUST_USE int durable_append(const char *path, int64_t at, const void *bytes, size_t size);
 
@@ -28,9 +30,6 @@ DT_MUST_USE int durable_sync(const char *path);
 
 /* The folder that holds path to the disk. */
 DT_MUST_USE int durable_sync_folder(const char *path);
-
-/* SHA-256 and size. copy: a descriptor that gets the same bytes, or -1. */
-DT_MUST_USE int durable_hash(const char *path, char hash[DIGEST_CHARS], int64_t *bytes, int copy);
 
 /* The whole file with a NUL behind, to be freed; NULL with errno set. size may be NULL. */
 char *durable_read(const char *path, size_t *size);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/archive/durable.h"
+#include "host/base/durable.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -113,13 +113,18 @@ int durable_stage(const char *path, const void *bytes, size_t size)
 	return result;
 }
 
+int durable_replace(const char *from, const char *to)
+{
+	return rename(from, to) == 0 ? durable_sync_folder(to) : DT_E_SYSTEM;
+}
+
 int durable_publish(const char *path)
 {
 	char *part = part_of(path);
-	int result = part == NULL ? DT_E_MEMORY : rename(part, path) == 0 ? 0 : DT_E_SYSTEM;
+	int result = part == NULL ? DT_E_MEMORY : durable_replace(part, path);
 
 	free(part);
-	return result != 0 ? result : durable_sync_folder(path);
+	return result;
 }
 
 int durable_write(const char *path, const void *bytes, size_t size)
@@ -141,33 +146,6 @@ int durable_append(const char *path, int64_t at, const void *bytes, size_t size)
 		result = DT_E_SYSTEM; /* half a line stays: the next one takes its place */
 	result = shut(fd, result);
 	return result == 0 && at == 0 ? durable_sync_folder(path) : result;
-}
-
-int durable_hash(const char *path, char hash[DIGEST_CHARS], int64_t *bytes, int copy)
-{
-	struct sha256_ctx context;
-	uint8_t block[32768];
-	int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY), result = 0;
-	int64_t total = 0;
-	ssize_t n = 0;
-
-	if (fd < 0)
-		return DT_E_SYSTEM;
-	sha256_init(&context);
-	while (result == 0 && ((n = read(fd, block, sizeof(block))) > 0 || (n < 0 && errno == EINTR))) {
-		if (n < 0)
-			continue;
-		sha256_update(&context, (size_t)n, block);
-		total += n;
-		if (copy >= 0)
-			result = process_write(copy, block, (size_t)n);
-	}
-	(void)shut(fd, DT_E_SYSTEM); /* closing what was read loses nothing */
-	if (result != 0 || n != 0)
-		return DT_E_SYSTEM;
-	digest_end(&context, hash);
-	*bytes = total;
-	return 0;
 }
 
 char *durable_read(const char *path, size_t *size)

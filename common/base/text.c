@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/record/text.h"
+#include "common/base/text.h"
 
 #include <errno.h>
 #include <stdbool.h>

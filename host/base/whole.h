@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_RECORD_WHOLE_H
-#define DT_HOST_RECORD_WHOLE_H
+#ifndef DT_HOST_BASE_WHOLE_H
+#define DT_HOST_BASE_WHOLE_H
 /*
- * A result file that is whole or not there: written beside its place and renamed over it. What is no regular
- * file (a device, a pipe) is never replaced but written to; a link stays, its target is written.
+ * A result file that is whole or not there: written beside its place, brought to the disk and renamed over
+ * it, which is on the disk when whole_close returns 0. What is no regular file (a device, a pipe) is never
+ * replaced but written to; a link stays, its target is written.
  *
  * whole_open, write to ->out, whole_close in any case.
  */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_RECORD_TEXT_H
-#define DT_HOST_RECORD_TEXT_H
+#ifndef DT_COMMON_BASE_TEXT_H
+#define DT_COMMON_BASE_TEXT_H
 /*
  * Text made in memory, and the one way to close what was written: nothing that lacks a byte passes for whole.
  * open_memstream(3) cannot say that it ran out of memory on the way; this can.

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/record/whole.h"
+#include "host/base/whole.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -9,7 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "host/record/text.h"
+#include "common/base/text.h"
+#include "host/base/durable.h"
 
 static int refuse(char *message, size_t size, const char *file, int result)
 {
@@ -72,12 +73,17 @@ int whole_close(struct whole *whole, int result, char *message, size_t size)
 {
 	int before = errno; /* of the writer, who may know why */
 
+	if (result == 0 && whole->beside != NULL &&
+	    (fflush(whole->out) != 0 || fsync(fileno(whole->out)) != 0)) {
+		result = DT_E_SYSTEM;
+		before = errno;
+	}
 	if (stream_close(whole->out) != 0 && result == 0) {
 		result = DT_E_SYSTEM;
 		before = errno;
 	}
-	if (result == 0 && whole->beside != NULL && rename(whole->beside, whole->place) != 0) {
-		result = DT_E_SYSTEM;
+	if (result == 0 && whole->beside != NULL) {
+		result = durable_replace(whole->beside, whole->place);
 		before = errno;
 	}
 	if (result != 0 && whole->beside != NULL)
