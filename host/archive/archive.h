@@ -279,19 +279,14 @@ DT_MUST_USE int archive_rebuild(const char *folder, bool fewer,
 
 /* ---- the tower over a series ---- */
 
-enum archive_trend_of {
-	ARCHIVE_TREND_DROPOUT,
-	ARCHIVE_TREND_SEPARATION,
-	ARCHIVE_TREND_ACCELERATION,
-	ARCHIVE_TRENDS
-};
-
 /* A straight line through what the drops measured: at the first and at the last of them. NAN of no drop. */
 struct archive_trend {
 	unsigned drops;  /* that measured it */
-	double from, to; /* s, m, m/s2 */
+	double from, to; /* in the unit of the quantity's key */
 };
-DT_MUST_USE int archive_trends(struct archive *archive, const char *series,
-                               struct archive_trend trend[ARCHIVE_TRENDS]);
+
+/* Of a QUANTITY_TOWER, in the newest result of each drop. */
+DT_MUST_USE int archive_trend(struct archive *archive, const char *series, const struct quantity *quantity,
+                              struct archive_trend *trend);
 
 #endif

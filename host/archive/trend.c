@@ -7,12 +7,6 @@
 
 #include "host/archive/private.h"
 
-/* A value of the newest result of each drop. */
-#define QUERY(key)                                                                             \
-	"SELECT d.number, t." key " FROM drops d JOIN series g ON g.id = d.series_id"          \
-	" JOIN of_tower t ON t.result_id = (SELECT max(id) FROM results WHERE drop_id = d.id)" \
-	" WHERE g.name = ? AND t." key " IS NOT NULL ORDER BY d.number"
-
 /* Sums of a least-squares line of y over x. */
 struct line {
 	double n, x, y, xx, xy;
@@ -35,13 +29,21 @@ static double at(const struct line *line, double x)
 	return (line->y + slope * (line->n * x - line->x)) / line->n;
 }
 
-static int one(struct archive *archive, const char *series, const char *query, struct archive_trend *trend)
+int archive_trend(struct archive *archive, const char *series, const struct quantity *quantity,
+                  struct archive_trend *trend)
 {
 	struct line line = {0};
 	double first = 0.0, last = 0.0;
+	char query[400];
 	sqlite3_stmt *s;
-	int result = sql_query(archive, &s, query, "s", series);
+	int result;
 
+	snprintf(query, sizeof(query),
+	         "SELECT d.number, t.\"%s\" AS value FROM drops d JOIN series g ON g.id = d.series_id"
+	         " JOIN of_tower t ON t.result_id = (SELECT max(id) FROM results WHERE drop_id = d.id)"
+	         " WHERE g.name = ? AND value IS NOT NULL ORDER BY d.number",
+	         quantity->key);
+	result = sql_query(archive, &s, query, "s", series);
 	if (result != 0)
 		return result;
 	while ((result = sql_step(archive, s)) > 0) {
@@ -59,18 +61,4 @@ static int one(struct archive *archive, const char *series, const char *query, s
 		trend->to = at(&line, last);
 	}
 	return 0;
-}
-
-int archive_trends(struct archive *archive, const char *series, struct archive_trend trend[ARCHIVE_TRENDS])
-{
-	static const char *const queries[ARCHIVE_TRENDS] = {
-	        [ARCHIVE_TREND_DROPOUT] = QUERY("dropout_s"),
-	        [ARCHIVE_TREND_SEPARATION] = QUERY("separation_m"),
-	        [ARCHIVE_TREND_ACCELERATION] = QUERY("acceleration_m_s2"),
-	};
-	int result = 0;
-
-	for (int i = 0; i < ARCHIVE_TRENDS && result == 0; i++)
-		result = one(archive, series, queries[i], &trend[i]);
-	return result;
 }

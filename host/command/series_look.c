@@ -92,24 +92,20 @@ int series_verb_drops(struct archive *archive, struct series_arguments *a)
 /* How the tower has changed over the series; nothing when its drops say nothing. */
 static int print_trends(struct archive *archive, const char *series)
 {
-	static const struct {
-		const char *name, *unit;
-		double scale;
-		int decimals;
-	} words[ARCHIVE_TRENDS] = {
-	        [ARCHIVE_TREND_DROPOUT] = {"magnet drop-out", "ms", 1e3, 2},
-	        [ARCHIVE_TREND_SEPARATION] = {"separation", "mm", 1e3, 1},
-	        [ARCHIVE_TREND_ACCELERATION] = {"frame", "m/s2", 1.0, 3},
-	};
-	struct archive_trend trend[ARCHIVE_TRENDS];
+	const struct quantity *q = NULL;
 
-	if (archive_trends(archive, series, trend) != 0)
-		return archived_failed(archive);
-	for (int i = 0; i < ARCHIVE_TRENDS; i++)
-		if (trend[i].drops > 1)
-			printf("tower    %s %.*f -> %.*f %s over %u drops\n", words[i].name,
-			       words[i].decimals, trend[i].from * words[i].scale, words[i].decimals,
-			       trend[i].to * words[i].scale, words[i].unit, trend[i].drops);
+	while ((q = quantity_next(QUANTITY_TOWER, q)) != NULL) {
+		double scale = quantity_scale(q);
+		struct archive_trend trend;
+
+		if (q->label[0] == '\0')
+			continue;
+		if (archive_trend(archive, series, q, &trend) != 0)
+			return archived_failed(archive);
+		if (trend.drops > 1)
+			printf("tower    %s %.*f -> %.*f %s over %u drops\n", q->label, q->digits,
+			       trend.from * scale, q->digits, trend.to * scale, q->shown, trend.drops);
+	}
 	return COMMAND_DONE;
 }
 
