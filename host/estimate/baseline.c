@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "host/estimate/hum.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/median.h"
 #include "host/estimate/pair.h"
 #include "host/estimate/quiet.h"
@@ -12,28 +13,17 @@
 
 enum { DIFFERENCES_MIN = 16, BEGINNING = 16 };
 
-/* Of the largest sample: what a record without a quiet part may fall by before it rises, and has risen to
- * where its beginning may be its largest. */
-#define MOTION_PART 0.1
-#define RISEN 0.8
-
-/* What the last samples are off zero: standard deviations of their mean, and of the largest sample; and off
- * those before them, of that. */
-#define ELSEWHERE 8.0
-#define ELSEWHERE_PART 0.005
+/* What the last samples before a pulse are off those before them, of what they are off zero: at rest. */
 #define AT_REST 0.25
 
 /* Of the good samples, outliers that are none. */
 #define OUTLIERS_MOST 0.03
 
-#define OUTLIER 6.0
-
 /* Means of this length carry the mains nearly whole, and a slope. */
 #define BLOCK_S 2e-3
 
-/* A sensor on a high-pass and gravity leave less; of the pulse, what its uncertainty should be. */
+/* A sensor on a high-pass and gravity leave less. */
 #define OFFSET_MIN_G 3.0
-#define OFFSET_PART 0.01
 
 static const struct estimate_baseline nothing_found = {
         .noise_g = NAN, .deviation_g = NAN, .hum_hz = NAN, .from_s = NAN, .until_s = NAN};
@@ -58,13 +48,13 @@ static void measure(struct quiet *quiet, struct estimate_baseline *found)
 	double half_s = (double)(quiet->until - quiet->from) / (2 * trace->rate_hz), sigma = 0;
 	double about = quiet_glance(trace, quiet->from, quiet->until, &sigma);
 	/* More than half of the samples equal: the median deviation is blind there. */
-	double reach = sigma > 0 ? OUTLIER * sigma : DBL_MAX;
+	double reach = sigma > 0 ? LIMIT_NOISE * sigma : DBL_MAX;
 	struct quiet_moments inner = quiet_take(quiet, about, reach), plain = inner;
 	struct hum_line line;
 
 	if (inner.count < inner.good) {
 		plain = quiet_take(quiet, about, DBL_MAX);
-		reach = OUTLIER * inner.deviation; /* of many more samples than the glance took */
+		reach = LIMIT_NOISE * inner.deviation; /* of many more samples than the glance took */
 		inner = quiet_take(quiet, inner.mean, reach);
 	}
 	line = hum_find(quiet, half_s, &inner, reach);
@@ -137,8 +127,8 @@ static bool begins_in_motion(const struct trace *trace, double noise_g)
 	for (size_t k = 0; k < at; k++)
 		if (trace_good(trace, k))
 			low = fmin(low, sign * trace->value_g[k]);
-	return fmin(first, low) > RISEN * fabs(peak) ||
-	       first - low > fmax(OUTLIER * noise_g, MOTION_PART * fabs(peak));
+	return fmin(first, low) > LIMIT_MOST * fabs(peak) ||
+	       first - low > fmax(LIMIT_NOISE * noise_g, LIMIT_EDGE * fabs(peak));
 }
 
 /* Mean of the good samples [from, until) without zero as it was found; *n of them. */
@@ -173,8 +163,8 @@ static bool ends_elsewhere(const struct quiet *quiet, const struct estimate_base
 
 	if (last >= quiet->from + QUIET_SAMPLES_MIN)
 		before = mean_off(trace, found, last - QUIET_SAMPLES_MIN, last, &m);
-	return fabs(off - before) < AT_REST * fabs(off) && fabs(off) > ELSEWHERE * noise / sqrt(n) &&
-	       fabs(off) > ELSEWHERE_PART * fabs(largest(trace, &at) - found->offset_g);
+	return fabs(off - before) < AT_REST * fabs(off) && fabs(off) > LIMIT_SURE * noise / sqrt(n) &&
+	       fabs(off) > ESTIMATE_TOLERANCE * fabs(largest(trace, &at) - found->offset_g);
 }
 
 void baseline_find(const struct trace *trace, double *scratch, struct estimate_baseline *baseline)
@@ -249,7 +239,7 @@ void baseline_remove(struct trace *trace, const struct estimate_baseline *baseli
 		most = low > most ? low : most;
 	}
 	subtract(trace, baseline);
-	if (fabs(offset) > fmax(OFFSET_MIN_G, OFFSET_PART * most))
+	if (fabs(offset) > fmax(OFFSET_MIN_G, LIMIT_PART * most))
 		trace->flags |= RECORD_FLAG_OFFSET;
 	if (baseline->doubtful && baseline->samples > 0)
 		trace->flags |= RECORD_FLAG_ZERO_UNSURE;

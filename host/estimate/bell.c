@@ -5,26 +5,19 @@
 
 #include "common/units.h"
 #include "host/estimate/gram.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/lm.h"
 #include "host/estimate/phasor.h"
+#include "host/estimate/shape_private.h"
 
 /* Samples this many bases to either side of the peak take part: beyond the feet zero is fitted. */
 #define REACH_BASES 0.8
 
 #define BULGE_PRIOR 0.05
 
-#define POWER_MIN 0.3
-#define POWER_MAX 8.0
-
 /* Reduced chi-square of a right model stays below 1 + this times sqrt(2 / freedom). Generous: what is left of
  * a wrong shape then is less than the samples' noise, as input, would do. */
 #define REFUSE 7.0
-
-/* The shape is no better than this part of the height: less noise is taken for as much. */
-#define MISFIT 3e-4
-
-/* Nor does this many standard deviations of lopsidedness: one degree of freedom, sharper than chi-square. */
-#define LOPSIDED_MAX 4.5
 
 /* Samples at the feet come and go with the base. */
 #define KINK 0.1
@@ -84,7 +77,7 @@ static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_
 	size_t used = 0;
 	struct gram gram;
 
-	if (!(p[POWER] > POWER_MIN && p[POWER] < POWER_MAX) || !(p[BASE] > 0))
+	if (!(p[POWER] > SHAPE_POWER_MIN && p[POWER] < SHAPE_POWER_MAX) || !(p[BASE] > 0))
 		return 0;
 	walk = start_walk(scene, p);
 	gram_start(&gram, PARAMETERS);
@@ -157,7 +150,7 @@ static double lopsided(const struct scene *scene, const double p[PARAMETERS])
 bool bell_fit(const struct trace *trace, const struct peak *peak, struct bell *bell)
 {
 	static const double centre_row[PARAMETERS] = {[CENTRE] = 1};
-	double noise = fmax(trace->noise_g, MISFIT * fabs(peak->result.value_g));
+	double noise = fmax(trace->noise_g, LIMIT_MISFIT * fabs(peak->result.value_g));
 	struct scene scene = {.trace = trace, .noise_g = noise};
 	struct lm_problem problem = {.size = PARAMETERS, .model = &scene, .normal = normal, .kink = KINK};
 	struct lm_result result;
@@ -178,7 +171,7 @@ bool bell_fit(const struct trace *trace, const struct peak *peak, struct bell *b
 	bell->bulge = p[BULGE];
 	bell->sigma_centre_s = noise * sqrt(cholesky_variance(&result.factor, centre_row));
 	return bell->chi_square <= 1 + REFUSE * sqrt(2 / freedom) &&
-	       fabs(lopsided(&scene, p)) <= LOPSIDED_MAX;
+	       fabs(lopsided(&scene, p)) <= LIMIT_SIGNIFICANT;
 }
 
 double bell_of(const struct bell *bell, double c)

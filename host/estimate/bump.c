@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "host/estimate/limits.h"
+
 enum { SHORTEST = 8, LONGEST = 128 };
 
 static double value_of(const struct trace *trace, size_t k)
@@ -29,7 +31,7 @@ bool bump_find(const struct trace *trace, struct bump *bump)
 		}
 	}
 	/* Without a noise the unit is no number, or the excess none. */
-	if (!(best.sigmas >= BUMP_SIGMAS) || isinf(best.sigmas))
+	if (!(best.sigmas >= LIMIT_SURE) || isinf(best.sigmas))
 		return false;
 	*bump = best;
 	return true;

@@ -12,10 +12,8 @@ struct bump {
 	double sigmas; /* how far it stands out */
 };
 
-/* In the trace's event window; samples that are not good count as zero. False below BUMP_SIGMAS, or without
+/* In the trace's event window; samples that are not good count as zero. False below LIMIT_SURE, or without
  * a noise to compare with. */
-#define BUMP_SIGMAS 8.0
-
 bool bump_find(const struct trace *trace, struct bump *bump);
 
 #endif

@@ -4,9 +4,7 @@
 #include <math.h>
 
 #include "common/assert.h"
-
-/* A pivot this much smaller than its diagonal is rounding. */
-#define PIVOT_MIN 1e-13
+#include "host/estimate/limits.h"
 
 bool cholesky_factor(struct cholesky *factor, unsigned size, double a[CHOLESKY_MAX][CHOLESKY_MAX])
 {
@@ -26,7 +24,7 @@ bool cholesky_factor(struct cholesky *factor, unsigned size, double a[CHOLESKY_M
 			factor->lower[i][j] = sum * factor->inverse[j];
 			pivot -= sum * factor->lower[i][j];
 		}
-		if (!(pivot > PIVOT_MIN * a[i][i]) || !isfinite(pivot))
+		if (!(pivot > LIMIT_ROUNDING * a[i][i]) || !isfinite(pivot))
 			return false;
 		factor->inverse[i] = 1 / pivot;
 	}

@@ -3,15 +3,13 @@
 
 #include <math.h>
 
+#include "host/estimate/limits.h"
+
 enum {
 	EQUAL_EXTREMES = 3,
 	EQUAL_APART = 3,         /* noise may keep samples between them below the limit */
 	COARSENESS_WINDOW = 256, /* samples the step of the numbers is looked for in */
 };
-
-/* Twins are a limit when the parabola through their neighbours passes them by this many standard deviations;
- * a summit that is none stays below it. */
-#define TWINS_SIGMAS 2.5
 
 /* Where samples tremble by so many steps of their numbers, two do not come out equal by chance. */
 #define TREMBLE_STEPS 200.0
@@ -123,7 +121,7 @@ void clip_judge_twins(struct trace *trace, double noise_g)
 	near = (v[-1] + v[2]) / 2;
 	far = (v[-2] + v[3]) / 2;
 	beyond = near + (near - far) / 2 - v[0];
-	if (!(beyond * (v[0] - near) > 0) || !(fabs(beyond) > TWINS_SIGMAS * sqrt(1.75) * noise_g))
+	if (!(beyond * (v[0] - near) > 0) || !(fabs(beyond) > LIMIT_AGREE * sqrt(1.75) * noise_g))
 		return;
 	trace->flags |= RECORD_FLAG_CLIPPED;
 	trace->sample[k] |= SAMPLE_CLIPPED | TRACE_LIMIT;

@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "host/estimate/limits.h"
+
 enum {
 	CREST_PASSES = 6,
 	CREST_STEPS = 24, /* coarse steps across the reach */
@@ -23,12 +25,6 @@ enum { SHRINKS = 12 };
 /* Where the pulse itself gives too few samples, the window in samples that is tried instead: enough for both
  * orders even where the foot of the pulse cuts one side. */
 #define NARROWEST 15.0
-
-/* A residual, or half the orders' difference, this small against the magnitude does no harm. */
-#define RESIDUAL_MIN 3e-4
-
-/* Newton's last move, in steps. */
-#define NEAR_ENOUGH 1e-7
 
 /* A window is around the summit when it is off by less than this part of a sample. */
 #define OFF_CENTRE 0.2
@@ -70,7 +66,7 @@ static bool newton(const struct surface *surface, double step_s, double *time_s,
 		time -= move;
 		if (!(fabs(time - *time_s) <= step_s))
 			return false;
-		if (fabs(move) < NEAR_ENOUGH * step_s)
+		if (fabs(move) < LIMIT_SMALL * step_s)
 			break;
 	}
 	*time_s = time;
@@ -130,10 +126,10 @@ static bool climb(struct surface *surface, const struct trace *const axes[], uns
 	return side == 0;
 }
 
-/* Whether a residual is what noise leaves: chi square within 3.3 of its standard deviations. */
+/* Whether a residual is what noise leaves: chi-square within chance. */
 static bool is_noise(const struct local *local, const struct trace *trace)
 {
-	return local->residual_g <= trace->noise_g * sqrt(1 + 3.3 * sqrt(2.0 / local->freedom));
+	return local->residual_g <= trace->noise_g * sqrt(1 + LIMIT_CHI * sqrt(2.0 / local->freedom));
 }
 
 double crest_noise(const struct local *local, const struct trace *trace)
@@ -145,7 +141,7 @@ static bool follows(const struct surface *surface, const struct trace *const axe
 {
 	for (unsigned i = 0; i < surface->count; i++)
 		if (!is_noise(&surface->axis[i], axes[i]) &&
-		    surface->axis[i].residual_g > RESIDUAL_MIN * value_g)
+		    surface->axis[i].residual_g > LIMIT_MISFIT * value_g)
 			return false;
 	return true;
 }
@@ -210,7 +206,7 @@ static bool fit_pair(struct crest *crest, const struct trace *const axes[], unsi
 	for (unsigned i = 0; i < count; i++)
 		six.axis[i] = fine.axis[i];
 	*crest = six;
-	*good = follows(&fine, axes, six.value_g) && six.model_g <= fmax(noise_g, RESIDUAL_MIN * six.value_g);
+	*good = follows(&fine, axes, six.value_g) && six.model_g <= fmax(noise_g, LIMIT_MISFIT * six.value_g);
 	return true;
 }
 

@@ -8,6 +8,7 @@
 #include "host/estimate/bell.h"
 #include "host/estimate/bridge.h"
 #include "host/estimate/gram.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/lm.h"
 #include "host/estimate/product.h"
 
@@ -19,32 +20,13 @@
 /* Samples per cycle that are averaged away: a block of the decay is an eighth of one or less. */
 #define BLOCKS_PER_CYCLE 8.0
 
-/* S2's samples as input reach this part of the pulse's length before its foot, and this much beyond its
- * peak: a skewed pulse has a long tail. */
-#define FOOT_LENGTHS 0.1
-#define GATE_LENGTHS 1.1
-
-/* Blocks begin this part of the input's length after its end, so that a fitted delay cannot undercut it. */
+/* S2's samples as input reach this part of the pulse's length before its foot, and by as much more than a
+ * length beyond its peak: a skewed pulse has a long tail. Blocks begin this part of the input's length after
+ * its end, so that a fitted delay cannot undercut it. */
 #define MARGIN 0.1
-
-/* The case is hit again when it reads this part of its peak. */
-#define NEXT_CONTACT_LEVEL 0.3
-
-/* Reduced chi-square of a right model stays below 1 + this times sqrt(2 / freedom). Generous, since what is
- * tried after a refusal costs a right model much of its certainty. */
-#define REFUSE 6.0
-
-/* Beyond this it is not for a peak, which has a smooth curve to go back to. */
-#define STRAINED 5.0
-
-/* No plate is an oscillator to better than this part of its peak: less noise is taken for as much. */
-#define MISFIT 3e-4
 
 /* What is tried after a refusal must leave this part of its excess. */
 #define BETTER 0.5
-
-/* It rings when its free decay starts at this part of its peak or more. */
-#define RING_LEVEL 0.1
 
 /* A lag less certain than this part of S2's pulse says nothing. */
 #define UNCERTAIN_MAX 0.1
@@ -173,8 +155,8 @@ static void input_from_samples(const struct trace *trace, const struct peak *pea
                                struct respond_input *input)
 {
 	double length = peak->span.until_s - peak->span.from_s;
-	double from = peak->span.from_s - FOOT_LENGTHS * length;
-	double until = fmax(peak->result.time_s + GATE_LENGTHS * length, peak->span.until_s);
+	double from = peak->span.from_s - MARGIN * length;
+	double until = fmax(peak->result.time_s + (1 + MARGIN) * length, peak->span.until_s);
 	size_t first = trace_index(trace, from), last = trace_index(trace, until), stride;
 
 	stride = (last - first) / RESPOND_STEPS + 1;
@@ -220,7 +202,7 @@ static void collect(const struct driven_axis *axis, double delay_s, double windo
 	const struct trace *s1 = axis->trace[0], *s2 = axis->trace[1];
 	double length = scene->input->count * scene->input->step_s, end = scene->input->from_s + length;
 	double free = end + delay_s + MARGIN * length;
-	double level = NEXT_CONTACT_LEVEL * fabs(axis->peak[1]->result.value_g);
+	double level = LIMIT_AGAIN * fabs(axis->peak[1]->result.value_g);
 	size_t first = trace_index(s1, scene->input->from_s + fmin(delay_s, 0)), middle, last, stride;
 	size_t again =
 	        trace_reaches(s2, trace_index(s2, end), trace_index(s2, fmax(free + window_s, end)), level);
@@ -262,9 +244,9 @@ struct solution {
 	double peak_g, peak_spread_g; /* likewise */
 	double chi_square;            /* reduced */
 	double noise_g;
-	double free_s;          /* S1's decay, from then on */
-	unsigned late;          /* half cycles from where S1 would peak without a delay to its peak */
-	bool refused, strained; /* for a lag, for a peak */
+	double free_s; /* S1's decay, from then on */
+	unsigned late; /* half cycles from where S1 would peak without a delay to its peak */
+	bool refused;
 };
 
 /* What S1 is later by than an oscillator is no more than the contact and a swing. */
@@ -277,7 +259,7 @@ static bool judge(const struct driven_axis *axis, const struct scene *scene, con
                   const struct lm_result *result, struct solution *solution)
 {
 	double row[PARAMETERS] = {0, 0, 1, 0, 0}, freedom = (double)(result->used - PARAMETERS);
-	double noise = fmax(axis->trace[0]->noise_g, MISFIT * fabs(axis->peak[0]->result.value_g));
+	double noise = fmax(axis->trace[0]->noise_g, LIMIT_MISFIT * fabs(axis->peak[0]->result.value_g));
 	double height[PARAMETERS] = {0};
 	struct respond_crest crest;
 	struct respond_point top;
@@ -300,8 +282,7 @@ static bool judge(const struct driven_axis *axis, const struct scene *scene, con
 	solution->free_s = respond_free_since(respond, DRIVE_LEFT * noise / fabs(solution->p[GAIN])) +
 	                   solution->p[DELAY];
 	solution->chi_square = result->squares / freedom / (noise * noise);
-	solution->refused = solution->chi_square > 1 + REFUSE * sqrt(2 / freedom);
-	solution->strained = solution->chi_square > 1 + STRAINED * sqrt(2 / freedom);
+	solution->refused = solution->chi_square > 1 + LIMIT_SIGNIFICANT * sqrt(2 / freedom);
 	return isfinite(solution->spread_s);
 }
 
@@ -379,7 +360,7 @@ static bool possible(const struct driven_axis *axis, enum estimate_status *statu
 	if (!isfinite(ring->frequency_hz) || !(ring->damping_ratio > 0) || !(ring->damping_ratio < 1))
 		return false;
 	*status = ESTIMATE_NO_PEAK;
-	return ring->amplitude_g >= RING_LEVEL * fabs(axis->peak[0]->result.value_g);
+	return ring->amplitude_g >= LIMIT_EDGE * fabs(axis->peak[0]->result.value_g);
 }
 
 static unsigned flaws(const struct driven_axis *axis)
@@ -439,7 +420,6 @@ static void express(const struct driven_axis *axis, const struct solution *solut
 	driven->sigma_peak_g = strain * solution->peak_spread_g * solution->noise_g;
 	driven->peak_s = solution->peak_s;
 	driven->sigma_peak_s = strain * fit;
-	driven->strained = solution->strained;
 }
 
 static void draw(const struct solution *solution, const struct driven *driven, struct driven_curve *curve)

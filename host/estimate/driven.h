@@ -34,7 +34,6 @@ struct driven {
 	/* S1's by the fitted response and its time, with the fit's uncertainty, and S2's noise where its
 	 * samples are the input: no doubt of the model; NAN unless ok and not refused. */
 	double peak_g, sigma_peak_g, peak_s, sigma_peak_s;
-	bool strained; /* the residual is less content than a peak should have it */
 	/* From when on S1's decay is as good as free; NAN likewise, or where S2 is no smooth pulse. */
 	double free_s;
 	bool smooth, sampled; /* inputs tried */
@@ -62,8 +61,8 @@ void driven_at(const struct driven_curve *curve, double time_s, double derivativ
  * and nothing tells, a thousandth does, and the value is flagged as extrapolated. True when it was taken;
  * peak's result then is no longer of its model, span and sample.
  *
- * Not where S2's peak is clipped or below 12 sigma, so that its shape is a guess, nor where the fit is
- * strained or the pulse lasts 0.8 cycles and more, or, of a clipped S1, where its flanks are as certain:
+ * Not where S2's peak is clipped or below 12 sigma, so that its shape is a guess, nor where
+ * the pulse lasts 0.8 cycles and more, or, of a clipped S1, where its flanks are as certain:
  * there the smooth curve's value stays, and its time is less certain by what the two differ. Nor where S1's
  * largest sample is of another contact: nothing is changed. */
 bool peak_driven(const struct driven_axis *axis, const struct driven *driven,

@@ -3,11 +3,10 @@
 
 #include <math.h>
 
+#include "host/estimate/limits.h"
+
 /* Three zeros hold a sample whose number this divides. */
 enum { RUN_MIN = 3 };
-
-/* How far the readings beside the run stand off, in sigmas of noise. */
-#define SIGMAS 10.0
 
 static bool is_zero(const struct trace *trace, size_t k)
 {
@@ -27,7 +26,7 @@ static void run_around(const struct trace *trace, size_t k, size_t *from, size_t
 
 static bool stands_off(const struct trace *trace, size_t k, double noise_g)
 {
-	return trace_good(trace, k) && fabs(trace->value_g[k]) > SIGMAS * noise_g;
+	return trace_good(trace, k) && fabs(trace->value_g[k]) > LIMIT_SURE * noise_g;
 }
 
 /* Marks the runs that begin in samples [from, until). */
@@ -56,7 +55,7 @@ bool dropout_mark(struct trace *trace, double noise_g)
 
 	for (size_t i = 0; noise_g > 0 && i < trace_blocks(trace); i++) {
 		size_t from = i * TRACE_BLOCK, until = from + TRACE_BLOCK;
-		bool loud = trace_most(trace, from) > SIGMAS * noise_g;
+		bool loud = trace_most(trace, from) > LIMIT_SURE * noise_g;
 
 		/* A run begins beside a reading that stands off. */
 		if (loud || was_loud)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "host/estimate/bump.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/rebound.h"
 
 /* The force fades slowly beyond the pulse's 10 % point: the decay is surely free this part of a width later,
@@ -12,18 +13,11 @@
 #define TAIL_WIDTHS 0.3
 #define MARGIN_WIDTHS 0.35
 
-/* A peak is sure of its pulse's end at this many times the noise; otherwise a bump tells, whose edges are the
- * force's less exactly. */
-#define PEAK_SURE 8.0
+/* A bump's edges are the force's less exactly. */
 #define BUMP_TAIL_WIDTHS 0.5
 
-/* A plate rings when its decay starts at this part of its peak or more, and, where the case rings too, at
- * this many times the case's. */
-#define PLATE_LEVEL 0.1
+/* A plate beside a case that rings too starts its decay at this many times the case's. */
 #define PLATE_OVER_CASE 2.0
-
-/* Standard deviations between an axis' damping and the plate's that chance makes. */
-#define PLATE_AGREE 3.0
 
 static bool measured(const struct analysis *analysis, size_t i)
 {
@@ -60,7 +54,7 @@ static double next_contact(const struct trace *trace, double after_s, double lev
 /* Whether a channel's peak is too near the noise to say where its pulse ends. */
 static bool doubtful(const struct desk *desk, const struct analysis *analysis, size_t i)
 {
-	return !(fabs(analysis->channels[i].peak.value_g) > PEAK_SURE * desk->work[i].trace.noise_g);
+	return !(fabs(analysis->channels[i].peak.value_g) > LIMIT_SURE * desk->work[i].trace.noise_g);
 }
 
 /* The decay's window: surely free somewhat after the contact's pulse meets 10 %, and perhaps from then on.
@@ -145,7 +139,7 @@ static bool rings(const struct desk *desk, char axis)
 	if (plate == none || desk->work[plate].ringdown.result.how.status != ESTIMATE_OK)
 		return false;
 	amplitude = desk->work[plate].ringdown.amplitude_g;
-	if (amplitude < PLATE_LEVEL * fabs(desk->work[plate].peak.result.value_g))
+	if (amplitude < LIMIT_EDGE * fabs(desk->work[plate].peak.result.value_g))
 		return false;
 	return box == none || amplitude >= PLATE_OVER_CASE * desk->work[box].ringdown.amplitude_g;
 }
@@ -156,7 +150,7 @@ static void widen_by_plate(const struct desk *desk, char axis, struct analysis *
 	struct estimate_ringdown *ring = &analysis->channels[estimate_find(desk, "S1", axis)].ringdown;
 	double apart = fabs(ring->damping_ratio - analysis->plate.damping_ratio);
 
-	if (ring->how.flags & ESTIMATE_FLAG_AMPLITUDE && apart > PLATE_AGREE * ring->sigma_damping)
+	if (ring->how.flags & ESTIMATE_FLAG_AMPLITUDE && apart > LIMIT_AGREE * ring->sigma_damping)
 		ring->sigma_damping = hypot(ring->sigma_damping, apart);
 }
 

@@ -8,10 +8,6 @@
 
 enum { SECTIONS = 2 };
 
-/* (sqrt(2) - 1)^(-1/8): from the corner of two passes to that of one, both on the bilinear transform's
- * frequency axis, so that the whole has its corner where it was asked for at any rate. */
-#define ONE_PASS_CORNER 1.1164697500474103
-
 /* Reflected length in periods of the corner; the filter has forgotten its start by then. */
 #define REFLECT_PERIODS 5.0
 
@@ -101,7 +97,9 @@ int filter_lowpass(struct trace *trace, double lowpass_hz)
 	}
 	if (trace->count == 0)
 		return 0;
-	one_pass = atan(ONE_PASS_CORNER * tan(UNITS_PI * corner)) / UNITS_PI;
+	/* From the corner of two passes to that of one, both on the bilinear transform's frequency axis, so
+	 * that the whole has its corner where it was asked for at any rate. */
+	one_pass = atan(pow(sqrt(2.0) - 1, -1.0 / 8) * tan(UNITS_PI * corner)) / UNITS_PI;
 	/* Pole pairs at 67.5 and 22.5 degrees from the real axis. */
 	for (unsigned i = 0; i < SECTIONS; i++)
 		section[i] = filter_section(one_pass, 2 * cos(UNITS_PI * (1 + 2 * i) / (4 * SECTIONS)));

@@ -6,9 +6,6 @@
 #include "common/units.h"
 #include "host/estimate/phasor.h"
 
-/* A curve that leaves zero with a slope: a power below. */
-#define KINK_POWER 1.1
-
 /* The bulge moves an edge by little: each round leaves a hundredth of that. */
 enum { EDGE_ROUNDS = 4 };
 
@@ -22,7 +19,7 @@ bool guide_from_shape(const struct shape *shape, struct guide *guide)
 	                             .power = shape->power};
 	guide->area_g_s = shape->area_g_s;
 	guide->sigma_peak_g = shape->sigma_peak_g;
-	guide->sigma_base_s = shape->power < KINK_POWER ? shape->sigma_base_s : 0;
+	guide->sigma_base_s = shape->power <= 1 ? shape->sigma_base_s : 0;
 	return true;
 }
 

@@ -6,6 +6,7 @@
 #include "common/units.h"
 #include "host/estimate/cholesky.h"
 #include "host/estimate/gram.h"
+#include "host/estimate/limits.h"
 
 enum {
 	BLOCK_SAMPLES_MIN = 4,
@@ -14,26 +15,14 @@ enum {
 	SHORT_BLOCKS = 40, /* of a quiet part that is too short for blocks of a length, at most */
 };
 
-/* Once in a million quiet records: F of two, and of one more unknown. */
-#define HUM_F 15.0
-#define DRIFT_F 26.0
-
-/* Smaller lines than this are rounding. */
-#define LEAST_G 1e-3
-
 /* Hum that would be significant makes the means scatter by more than this, in squares. */
 #define HUM_SIGN 1.2
 
-/* Hum of no mains frequency is looked for where they scatter by this many standard deviations more: between
- * what is no longer motion and what the means show, in steps of this part of what the quiet part resolves,
- * and then this often at half the step. One of many frequencies needs more than one of two to be no chance.
- */
-#define TONE_SIGN 4.0
-#define TONE_LEAST_HZ 15.0
+/* Hum of no mains frequency is looked for where the means scatter by more than chance: from so many cycles,
+ * slower is motion, to as near half the means' rate, where they do not tell its phase, in steps of this part
+ * of what the quiet part resolves, and then this often at half the step. */
 #define TONE_CYCLES 3.0
-#define TONE_MOST 0.47
 #define TONE_STEP 0.35
-#define TONE_F 20.0
 
 enum { TONE_HALVINGS = 14 };
 
@@ -42,9 +31,6 @@ enum { TONE_HALVINGS = 14 };
 
 /* The means may scatter by this much more, in squares, than the samples' noise asks. */
 #define COLOUR_MAX 3.0
-
-/* Means of few short blocks may scatter by so many standard deviations of their own scatter. */
-#define SHORT_SIGN 6.0
 
 /* Adds up the normal equations, means taken from that of the first block on. */
 static void add_blocks(struct hum_line *line, const struct quiet *quiet, double half_s, struct gram *gram)
@@ -133,7 +119,7 @@ static void refine_all(struct hum_line *line, const struct quiet *quiet, double 
 		struct hum_line trial = *line;
 
 		refine(&trial, quiet, half_s, h, 0.5 / (2 * half_s));
-		if (line->squares - trial.squares > TONE_F * left(&trial, quiet->count))
+		if (line->squares - trial.squares > LIMIT_F * left(&trial, quiet->count))
 			*line = trial;
 	}
 }
@@ -178,7 +164,7 @@ static struct hum_line one_more(const struct hum_line *line, const struct quiet 
 
 	take_rest(line, quiet, half_s, rest);
 	best.hum_hz[best.hums] = 0;
-	for (double hz = fmax(TONE_LEAST_HZ, TONE_CYCLES / (2 * half_s)); hz < TONE_MOST / block_s;
+	for (double hz = TONE_CYCLES / (2 * half_s); hz < 0.5 / block_s - TONE_CYCLES / (2 * half_s);
 	     hz += step) {
 		double here = power(rest, quiet->count, 2 * UNITS_PI * hz * block_s);
 
@@ -189,7 +175,7 @@ static struct hum_line one_more(const struct hum_line *line, const struct quiet 
 	}
 	best.hums++;
 	if (!(most > 0) || !fit_line(&best, quiet, half_s) ||
-	    !(line->squares - best.squares > TONE_F * left(&best, quiet->count)))
+	    !(line->squares - best.squares > LIMIT_F * left(&best, quiet->count)))
 		return *line;
 	refine(&best, quiet, half_s, best.hums - 1, step / 2);
 	return best;
@@ -288,7 +274,7 @@ static bool unfold(struct hum_line *line, const struct quiet *quiet, double half
 /* Whether the means scatter by more than the samples' noise makes them. */
 static bool coloured(const struct hum_line *line, size_t count, double variance)
 {
-	return left(line, count) > (1 + TONE_SIGN * sqrt(2.0 / (double)(count - line->terms))) * variance;
+	return left(line, count) > (1 + LIMIT_CHI * sqrt(2.0 / (double)(count - line->terms))) * variance;
 }
 
 /* What the two frequencies of mains leave: their own true frequency first, then whatever else hums. Returns
@@ -306,8 +292,9 @@ static double find_tones(struct hum_line *best, const struct quiet *quiet, doubl
 	while (best->hums < ZERO_HUMS_MAX && coloured(best, count, variance)) {
 		struct hum_line trial = one_more(best, quiet, half_s);
 		if (trial.hums == best->hums ||
-		    !(best->squares - trial.squares > 2 * TONE_F * left(&trial, count)) ||
-		    !unfold(&trial, quiet, half_s, moments, reach) || !(last_hum_g(&trial, quiet) > LEAST_G))
+		    !(best->squares - trial.squares > 2 * LIMIT_F * left(&trial, count)) ||
+		    !unfold(&trial, quiet, half_s, moments, reach) ||
+		    !(last_hum_g(&trial, quiet) > LIMIT_LEAST))
 			break;
 		*best = trial;
 		refine_all(best, quiet, half_s);
@@ -335,8 +322,8 @@ static bool short_coloured(const struct quiet *quiet, double about, double reach
 	if (blocks < 2 || count < blocks + 2)
 		return false;
 	within = (moments.deviation * moments.deviation * (count - 1) - between) / (count - blocks);
-	limit = 1 + SHORT_SIGN * sqrt(2 / (blocks - 1) + 2 / (count - blocks));
-	return between / (blocks - 1) > fmax(fmax(COLOUR_MAX, limit) * within, LEAST_G * LEAST_G);
+	limit = 1 + LIMIT_CHI_REFUSED * sqrt(2 / (blocks - 1) + 2 / (count - blocks));
+	return between / (blocks - 1) > fmax(fmax(COLOUR_MAX, limit) * within, LIMIT_LEAST * LIMIT_LEAST);
 }
 
 struct hum_line hum_find(struct quiet *quiet, double half_s, const struct quiet_moments *moments,
@@ -359,16 +346,16 @@ struct hum_line hum_find(struct quiet *quiet, double half_s, const struct quiet_
 		struct hum_line trial = {.has_slope = true, .hums = 1, .hum_hz = {mains_hz[i]}};
 
 		if (fit_line(&trial, quiet, half_s) && trial.squares < best.squares &&
-		    start.squares - trial.squares > 2 * HUM_F * left(&trial, count))
+		    start.squares - trial.squares > 2 * LIMIT_F * left(&trial, count))
 			best = trial;
 	}
 	if (count >= HUM_BLOCKS_MIN && (best.hums > 0 || coloured(&best, count, variance)))
 		variance = find_tones(&best, quiet, half_s, moments, reach);
-	quiet->doubtful = left(&best, count) > fmax(COLOUR_MAX * variance, LEAST_G * LEAST_G);
+	quiet->doubtful = left(&best, count) > fmax(COLOUR_MAX * variance, LIMIT_LEAST * LIMIT_LEAST);
 	if (quiet->doubtful)
 		return none;
-	if (best.term[1] * best.term[1] > DRIFT_F * best.slope_variance * left(&best, count) &&
-	    fabs(best.term[1]) > LEAST_G)
+	if (best.term[1] * best.term[1] > LIMIT_F * best.slope_variance * left(&best, count) &&
+	    fabs(best.term[1]) > LIMIT_LEAST)
 		return best;
 	best.has_slope = false;
 	return best.hums > 0 && fit_line(&best, quiet, half_s) ? best : none;

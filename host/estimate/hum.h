@@ -8,7 +8,7 @@
  * of up to 40 short blocks scatter by far more than what is within them.
  *
  * Hum is 50 or 60 Hz where that explains it. Where the means still scatter by more than chance, mains get
- * their true frequency, and up to three tones of any are added, from 15 Hz and three cycles on to what the
+ * their true frequency, and up to three tones of any are added, from three cycles on to what the
  * means show folded once; the samples tell which of the two it is.
  *
  * Values in g, frequencies in Hz, half_s half the length of the quiet part. No memory but the caller's.

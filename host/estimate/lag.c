@@ -5,6 +5,7 @@
 #include <stddef.h>
 
 #include "host/estimate/bridge.h"
+#include "host/estimate/limits.h"
 
 enum {
 	SHIFTS = 48,     /* to either side */
@@ -15,9 +16,6 @@ enum {
 /* S2's pulse is taken this many widths to either side of its peak, and S1 shifted by up to that much. */
 #define GATE_WIDTHS 1.1
 #define REACH_WIDTHS 1.5
-
-/* Two axes further apart than this many standard deviations disagree. */
-#define AGREE 3.0
 
 /* Of S2's gated pulse with S1 shift_s later; about use samples of the gate, all when 0. */
 static double correlate(const struct lag_sensor *s1, const struct lag_sensor *s2, double shift_s, size_t use)
@@ -124,7 +122,7 @@ static void combine(const struct driven axis[2], struct estimate_lag *lag)
 	apart = weight[0] > 0 && weight[1] > 0
 	                ? fabs(axis[0].lag_s - axis[1].lag_s) / hypot(axis[0].sigma_s, axis[1].sigma_s)
 	                : 0;
-	if (apart > AGREE)
+	if (apart > LIMIT_AGREE)
 		lag->sigma_driven_s *= apart;
 }
 

@@ -4,9 +4,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "host/estimate/limits.h"
+
 #define DAMPING_START 1e-4
 #define DAMPING_DOWN 0.1
-#define DAMPING_UP 10.0
 
 /* Less hardly changes a step: one that was taken back would be again. */
 #define DAMPING_FELT 1e-3
@@ -17,13 +18,6 @@
 
 /* Damped this much and still no better: this is the bottom, as far as rounding can tell. */
 #define DAMPING_MAX 1e6
-
-/* A step that promises less of the sum of squares than this part of what it was at the start cannot be told
- * from rounding, even where the model fits to the last bit. */
-#define GAIN_MIN 1e-14
-
-/* Nor one that is this small a part of the unknowns themselves, however good the start was. */
-#define STEP_MIN 1e-13
 
 struct place {
 	double normal[CHOLESKY_MAX][CHOLESKY_MAX];
@@ -98,7 +92,9 @@ bool lm_fit(const struct lm_problem *problem, double *p, struct lm_result *resul
 
 	if (!stand(problem, p, here))
 		return false;
-	rounding = fmax(GAIN_MIN * here->squares, STEP_MIN * STEP_MIN * squares_of(problem, here, p));
+	/* A step that promises no more of the sum of squares, or is no larger a part of the unknowns. */
+	rounding = fmax(LIMIT_ROUNDING * here->squares,
+	                LIMIT_ROUNDING * LIMIT_ROUNDING * squares_of(problem, here, p));
 	result->iterations = 1;
 	while (result->iterations < LM_ITERATIONS) {
 		double change[CHOLESKY_MAX], trial[CHOLESKY_MAX], promise, gain, variance;
@@ -117,7 +113,7 @@ bool lm_fit(const struct lm_problem *problem, double *p, struct lm_result *resul
 		if (!stand(problem, trial, there) || there->squares > here->squares) {
 			if (promise <= rounding || damping > DAMPING_MAX)
 				return finish(problem, here, 0, result);
-			damping = fmax(damping * DAMPING_UP, felt);
+			damping = fmax(damping / DAMPING_DOWN, felt);
 			before = 0;
 			continue;
 		}

@@ -3,10 +3,8 @@
 
 #include <math.h>
 
+#include "host/estimate/limits.h"
 #include "host/estimate/pair.h"
-
-/* A sample on the end of the window belongs to it, whatever rounding says. */
-#define SLACK 1e-5
 
 /* Sums over the samples: of the powers of x, of those times the value, of the value's square. */
 struct sums {
@@ -48,7 +46,8 @@ bool local_fit(struct local *local, const struct trace *trace, double centre_s, 
 	if (!(half_s > 0))
 		return false;
 	first = trace_index(trace, from);
-	last = trace_index(trace, until + SLACK / trace->rate_hz);
+	/* A sample on the end of the window belongs to it, whatever rounding says. */
+	last = trace_index(trace, until + 2 * LIMIT_SMALL / trace->rate_hz);
 	start = (trace_time(trace, first) - centre_s) / half_s;
 	step = 1 / (trace->rate_hz * half_s);
 	/* The orders in use, so that the compiler knows how often the loops go round. */

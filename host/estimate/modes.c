@@ -9,9 +9,6 @@
 #include "host/estimate/phasor.h"
 #include "host/estimate/spring.h"
 
-/* Damping beyond this part of the angular frequency is no swing. */
-#define DECAY_MAX 3.0
-
 enum { MEAN_ROUNDS = 6 }; /* each leaves a few hundredths of what the time of a law's cycles is off by */
 
 unsigned modes_size(const struct modes *modes)
@@ -24,7 +21,7 @@ bool modes_possible(const struct modes *modes, const double *p)
 	for (unsigned m = 0; m < modes->count; m++) {
 		double decay = p[MODES_DECAY + MODES_EACH * m], omega = p[MODES_OMEGA + MODES_EACH * m];
 
-		if (!(omega > 0) || !(fabs(decay) < DECAY_MAX * omega))
+		if (!(omega > 0) || !(fabs(decay) < MODES_DAMPING_MAX * hypot(decay, omega)))
 			return false;
 	}
 	return true;

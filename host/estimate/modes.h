@@ -28,6 +28,9 @@ enum {
 	MODES_EACH = 4,
 };
 
+/* No decay is damped more, as a ratio. */
+#define MODES_DAMPING_MAX 0.95
+
 enum modes_law {
 	MODES_LAW_NONE,
 	MODES_LAW_SQUARE, /* one unknown more */

@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "host/estimate/limits.h"
 #include "host/estimate/median.h"
 
 enum { NEIGHBOURS = 7, LEAST = 16 };
@@ -44,7 +45,7 @@ unsigned outlier_drop(struct series *series, const struct modes *modes, const bo
 		return 0;
 	for (size_t k = 0; k < count; k++)
 		sorted[k] = fabs(residual[k]);
-	limit = OUTLIER_SIGMAS * MAD_TO_SIGMA * median_find(sorted, count);
+	limit = LIMIT_SIGNIFICANT * MAD_TO_SIGMA * median_find(sorted, count);
 	series->used = 0;
 	for (unsigned k = 0; k < series->count; k++) {
 		series->good[k] = usable[k] && is_near(residual, count, i, limit);

@@ -3,13 +3,11 @@
 #define DT_HOST_ESTIMATE_OUTLIER_H
 /*
  * Single samples that no decay explains. A point is left out when its residual lies further than
- * OUTLIER_SIGMAS from the median of its neighbours' residuals, in the standard deviation that the median of
- * all residuals' magnitudes gives. Neighbours, because the residual of a model that is wrong is smooth: it
+ * LIMIT_SIGNIFICANT from the median of its neighbours' residuals, in the standard deviation that the median
+ * of all residuals' magnitudes gives. Neighbours, because the residual of a model that is wrong is smooth: it
  * must not be taken for spikes, or the fit would leave out what refutes it.
  */
 #include "host/estimate/modes.h"
-
-#define OUTLIER_SIGMAS 5.0
 
 /* Modes without a law or hum. Of the usable points of the series, [series->count], makes the outliers not
  * good and all others good again; returns how many are out. */

@@ -5,39 +5,21 @@
 #include <string.h>
 
 #include "host/estimate/crest.h"
-
-#define NOISE_FACTOR_MIN 5.0
-#define FOOT_LEVEL 0.05
+#include "host/estimate/limits.h"
 
 /* A hole at the summit wider than this part of the width may hide more than the fit can know. */
 #define HOLE_MAX 0.35
 
 /* A pulse whose middles at half and at a tenth of its height lie further apart than this part of its width,
  * and this many times the noise's part of its height, is no symmetric one. */
-#define SKEW_LEVEL 0.1
 #define SKEW_MAX 0.06
 #define SKEW_NOISE 2.0
-
-/* Nor is one that goes this part of its height below zero, and so much noise, within half its width. */
-#define SWING_LEVEL 0.1
-#define SWING_NOISE 6.0
 
 /* A half-sine is two thirds of its base wide at half height. */
 #define BASE_PER_HALF_WIDTH 1.5
 
 /* A family and the polynomials are of one pulse when they agree within this many sigma. */
 #define AGREE_SIGMAS 4.0
-
-/* What an unasked sine-power may be off, as part of the height, on a symmetric pulse of another family before
- * its residual shows. */
-#define UNSEEN 1e-3
-
-/* Another extreme is as high when it lies below by less than this part and this many sigma. */
-#define RIVAL_PART 0.01
-#define RIVAL_SIGMAS 3.0
-
-/* How far from its centre a local model is believed, in half widths of its window. */
-#define LOCAL_REACH 0.95
 
 /* No parabola tells a time better than to this part of a sample. */
 #define SHIFT_MIN 1e-2
@@ -81,9 +63,10 @@ static size_t highest(const struct trace *trace)
 	return good < SAMPLES_MIN ? trace->count : at;
 }
 
+/* Goes below zero by a tenth of its height and more than noise. */
 static bool swings_back(const struct trace *trace, const struct peak *peak, double from_s, double until_s)
 {
-	double level = SWING_LEVEL * fabs(trace->value_g[peak->at]) + SWING_NOISE * trace->noise_g;
+	double level = LIMIT_EDGE * fabs(trace->value_g[peak->at]) + LIMIT_NOISE * trace->noise_g;
 
 	for (size_t k = trace_index(trace, from_s), end = trace_index(trace, until_s); k < end; k++)
 		if (trace_good(trace, k) && peak->sign * trace->value_g[k] < -level)
@@ -96,8 +79,8 @@ static bool is_lopsided(const struct trace *trace, const struct peak *peak)
 {
 	double value = fabs(trace->value_g[peak->at]), from, until;
 
-	if (!trace_edge(trace, peak->at, -1, peak->sign, SKEW_LEVEL * value, &from) ||
-	    !trace_edge(trace, peak->at, 1, peak->sign, SKEW_LEVEL * value, &until) ||
+	if (!trace_edge(trace, peak->at, -1, peak->sign, LIMIT_EDGE * value, &from) ||
+	    !trace_edge(trace, peak->at, 1, peak->sign, LIMIT_EDGE * value, &until) ||
 	    trace_any(trace, from, until, SAMPLE_LOST | SAMPLE_BAD | SAMPLE_SPIKE))
 		return false;
 	return swings_back(trace, peak, until, until + (until - from) / 2) ||
@@ -125,8 +108,8 @@ static bool measure_width(const struct trace *trace, struct peak *peak)
 	peak->width_s = BASE_PER_HALF_WIDTH * (left + right);
 	peak->start = (struct shape_start){trace->value_g[peak->at], time + (right - left) / 2, left + right,
 	                                   INFINITY, -INFINITY};
-	trace_edge(trace, peak->at, -1, peak->sign, FOOT_LEVEL * value, &peak->span.from_s);
-	trace_edge(trace, peak->at, 1, peak->sign, FOOT_LEVEL * value, &peak->span.until_s);
+	trace_edge(trace, peak->at, -1, peak->sign, PEAK_FOOT_LEVEL * value, &peak->span.from_s);
+	trace_edge(trace, peak->at, 1, peak->sign, PEAK_FOOT_LEVEL * value, &peak->span.until_s);
 	peak->lopsided = has_left && has_right && is_lopsided(trace, peak);
 	return true;
 }
@@ -291,7 +274,7 @@ static void sharpen(const struct trace *trace, struct peak *peak)
 	}
 	apart_g = fabs(peak->shape.peak_g - local.value_g);
 	apart_s = fabs(peak->shape.peak_s - local.time_s);
-	sigma_g = hypot(peak->shape.sigma_peak_g, UNSEEN * local.value_g);
+	sigma_g = hypot(peak->shape.sigma_peak_g, LIMIT_UNSEEN * local.value_g);
 	if (shape_judge(&peak->shape) != SHAPE_FITS || isnan(peak->shape.chi_square) ||
 	    apart_g > AGREE_SIGMAS * local.sigma_g || apart_s > AGREE_SIGMAS * local.sigma_time_s ||
 	    sigma_g > local.sigma_g)
@@ -363,7 +346,7 @@ void peak_climb(const struct trace *trace, const struct estimate_options *option
 static bool has_rival(const struct trace *trace, const struct peak *peak)
 {
 	double noise = trace->noise_g > 0 ? trace->noise_g : 0, height = fabs(trace->value_g[peak->at]);
-	double level = (1 - RIVAL_PART) * height - RIVAL_SIGMAS * noise;
+	double level = (1 - LIMIT_PART) * height - LIMIT_AGREE * noise;
 	size_t from = trace_index(trace, peak->span.from_s), until = trace_index(trace, peak->span.until_s);
 
 	if (!(height > PEAK_WEAK_SIGMAS * noise))
@@ -391,7 +374,7 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 		return;
 	peak->sign = trace->value_g[peak->at] < 0 ? -1 : 1;
 	height = fabs(trace->value_g[peak->at]);
-	if (!(height > 0) || height < NOISE_FACTOR_MIN * trace->noise_g) {
+	if (!(height > 0) || height < LIMIT_SIGNIFICANT * trace->noise_g) {
 		peak->result.how.status = ESTIMATE_NO_PEAK;
 		return;
 	}
@@ -415,7 +398,7 @@ bool peak_at(const struct peak *peak, double time_s, double derivative[3], doubl
 {
 	switch (peak->model) {
 	case PEAK_MODEL_LOCAL:
-		if (fabs(time_s - peak->local.centre_s) > LOCAL_REACH * peak->local.half_s)
+		if (fabs(time_s - peak->local.centre_s) > peak->local.half_s)
 			return false;
 		local_at(&peak->local, time_s, derivative);
 		for (unsigned i = 0; variance && i < 2; i++)

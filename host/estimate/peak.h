@@ -42,6 +42,9 @@
 #include "host/estimate/local.h"
 #include "host/estimate/shape.h"
 
+/* A pulse's samples are those above this part of its peak. */
+#define PEAK_FOOT_LEVEL 0.05
+
 enum peak_model {
 	PEAK_MODEL_NONE, /* too few samples for one */
 	PEAK_MODEL_LOCAL,

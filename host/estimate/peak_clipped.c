@@ -3,8 +3,7 @@
 
 #include <math.h>
 
-/* Clipped samples within so many sigma of each other tremble about a limit. */
-#define FLAT_SIGMAS 6.0
+#include "host/estimate/limits.h"
 
 /* What readings beyond the range are trusted: this part of what they add is taken as their uncertainty. */
 #define BEYOND_RANGE 0.1
@@ -138,7 +137,7 @@ bool peak_unclip(const struct trace *trace, const struct estimate_options *optio
 	struct estimate_peak *result = &peak->result;
 	double half = 0.5 / trace->rate_hz;
 	/* Two samples to either side of a summit are alike by chance. */
-	bool flat = clipped.n > 2 && clipped.high - clipped.low <= FLAT_SIGMAS * trace->noise_g;
+	bool flat = clipped.n > 2 && clipped.high - clipped.low <= LIMIT_NOISE * trace->noise_g;
 
 	if (clipped.n == 0)
 		return false;

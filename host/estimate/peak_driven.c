@@ -2,11 +2,8 @@
 #include <math.h>
 
 #include "host/estimate/driven.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/peak_private.h"
-
-/* What an oscillator's peak may be off, as part of it, before the residual shows that the plate is none such:
- * where S1 is clipped nothing else tells. */
-#define UNSEEN 1e-3
 
 /* Cycles of the plate that S2's pulse may last, as wide as a half-sine of its width: a plate that follows the
  * case through a longer one has that pulse's shape, which its own samples tell better than any model of S2's.
@@ -16,14 +13,8 @@
 /* Sigma from which S2's shape is more than a guess. */
 #define SHAPE_SIGMAS 12.0
 
-/* Standard deviations between a smooth curve's peak and the oscillator's that chance makes. */
-#define AGREE 3.0
-
-/* S1's largest sample may lie above the oscillator by this part of the peak and so much noise; higher, it is
- * of another contact. */
-#define ABOVE_PART 0.05
-#define ABOVE_NOISE 6.0
-
+/* S1's largest sample may lie above the oscillator by some of the peak and noise; higher, it is of another
+ * contact. */
 static bool same_contact(const struct driven_axis *axis, const struct driven *driven,
                          const struct driven_curve *curve)
 {
@@ -33,10 +24,10 @@ static bool same_contact(const struct driven_axis *axis, const struct driven *dr
 
 	driven_at(curve, trace_time(trace, at), there, NULL);
 	return fabs(trace->value_g[at]) - fabs(there[0]) <
-	       ABOVE_PART * fabs(driven->peak_g) + ABOVE_NOISE * fmax(trace->noise_g, 0);
+	       PEAK_FOOT_LEVEL * fabs(driven->peak_g) + LIMIT_NOISE * fmax(trace->noise_g, 0);
 }
 
-static bool knows_better(const struct driven_axis *axis, double sigma_g, bool strained)
+static bool knows_better(const struct driven_axis *axis, double sigma_g)
 {
 	const struct estimate_peak *s1 = &axis->peak[0]->result, *s2 = &axis->peak[1]->result;
 
@@ -44,7 +35,7 @@ static bool knows_better(const struct driven_axis *axis, double sigma_g, bool st
 		return false;
 	if (s1->how.status == ESTIMATE_CLIPPED)
 		return !(sigma_g >= s1->sigma_g);
-	return !strained && axis->peak[1]->width_s * axis->ringdown->result.frequency_hz < PULSE_CYCLES;
+	return axis->peak[1]->width_s * axis->ringdown->result.frequency_hz < PULSE_CYCLES;
 }
 
 /* What the oscillator differs from the smooth curve's peak beyond chance, there: noise may have lifted
@@ -55,7 +46,7 @@ static double apart(const struct estimate_peak *s1, const struct driven *driven,
 	double chance = pow(s1->sigma_g, 2) - pow(driven->sigma_peak_g, 2), there[3], beyond;
 
 	driven_at(curve, s1->time_s, there, NULL);
-	beyond = pow(s1->value_g - there[0], 2) - pow(AGREE, 2) * fmax(chance, 0);
+	beyond = pow(s1->value_g - there[0], 2) - pow(LIMIT_AGREE, 2) * fmax(chance, 0);
 	return sqrt(fmax(beyond, 0));
 }
 
@@ -83,8 +74,9 @@ bool peak_driven(const struct driven_axis *axis, const struct driven *driven,
 
 	if (isnan(driven->peak_g) || !same_contact(axis, driven, curve))
 		return false;
-	sigma = hypot(driven->sigma_peak_g, clipped ? UNSEEN * driven->peak_g : apart(s1, driven, curve));
-	taken = knows_better(axis, sigma, driven->strained);
+	sigma = hypot(driven->sigma_peak_g,
+	              clipped ? LIMIT_UNSEEN * driven->peak_g : apart(s1, driven, curve));
+	taken = knows_better(axis, sigma);
 	if (taken)
 		take(driven, sigma, s1);
 	else

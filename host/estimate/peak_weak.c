@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "host/estimate/limits.h"
+
 /* The strongest axis must stand this many times higher than a weak one may. */
 #define STRONG_OVER_WEAK 2.0
 
@@ -46,7 +48,7 @@ static bool fit_amplitude(const struct trace *trace, const struct trace *strong_
 	amplitude->sigma = trace->noise_g / sqrt(square);
 	amplitude->chi_square =
 	        (squares - product * amplitude->value) / ((used - 1) * trace->noise_g * trace->noise_g);
-	return !(amplitude->chi_square > 1 + SHAPE_CHI_MAX * sqrt(2.0 / (used - 1)));
+	return !(amplitude->chi_square > 1 + LIMIT_CHI * sqrt(2.0 / (used - 1)));
 }
 
 bool peak_weak(const struct trace *trace, const struct estimate_options *options,

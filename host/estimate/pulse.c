@@ -5,17 +5,7 @@
 
 #include "common/units.h"
 #include "host/estimate/guide.h"
-
-#define EDGE_LEVEL 0.1
-
-/* Standard deviation of the trapezoid's error at a kink, over its place x between two samples, in units of
- * slope times step squared: that of x (1 - x) / 2 for x uniform in 0..1, 1/sqrt(720). The two kinks of a
- * pulse may fall on the same place, so that their errors add up. */
-#define KINK 0.0372677996249965
-
-/* In a peak of less than this many times the noise a curve may have found one hump of it: its feet then are
- * not the pulse's. */
-#define GUIDE_SIGMAS 8.0
+#include "host/estimate/limits.h"
 
 struct edge {
 	double time_s;
@@ -158,6 +148,10 @@ static void velocity(const struct trace *trace, const struct peak *peak,
                      struct estimate_pulse *pulse)
 {
 	double from, until, length, hole, step = 1 / trace->rate_hz, sigma;
+	/* Standard deviation of the trapezoid's error at a kink, over its place x between two samples, in
+	 * units of slope times step squared: that of x (1 - x) / 2 for x uniform in 0..1. The two kinks of a
+	 * pulse may fall on the same place, so that their errors add up. */
+	const double kink = 1 / sqrt(720.0);
 
 	trace_edge(trace, peak->at, -1, peak->sign, 0, &from);
 	trace_edge(trace, peak->at, 1, peak->sign, 0, &until);
@@ -167,15 +161,9 @@ static void velocity(const struct trace *trace, const struct peak *peak,
 	pulse->velocity_change_m_s = UNITS_G_M_S2 * area(trace, peak, from, until, &hole);
 	sigma = hypot(trace->noise_g * sqrt(step * length), hole);
 	sigma = hypot(sigma, filled(trace, peak, from, until) * peak->result.sigma_g);
-	sigma = hypot(sigma, KINK * step * step * (edge[0].slope_g_s + edge[1].slope_g_s));
+	sigma = hypot(sigma, kink * step * step * (edge[0].slope_g_s + edge[1].slope_g_s));
 	take_velocity_sigma(trace, baseline, sigma, length, pulse);
 }
-
-/* A half-sine that is not refused and asks for no other power by this many sigma needs no second opinion. */
-#define CLEAR_SCORE 2.0
-
-/* Unless its noise may hide one: below this many times the noise every family is asked. */
-#define PLAIN_SIGMAS 100.0
 
 /* The family's fit, the peak's own where it has that already. */
 static bool fit(const struct trace *trace, const struct peak *peak, enum estimate_family family,
@@ -194,7 +182,6 @@ static bool fit(const struct trace *trace, const struct peak *peak, enum estimat
 static bool choose(const struct trace *trace, const struct peak *peak, enum estimate_family family,
                    struct shape *best, struct estimate_how *how)
 {
-	bool plain = fabs(peak->result.value_g) > PLAIN_SIGMAS * trace->noise_g;
 	unsigned tried = 0;
 
 	for (unsigned i = 0; i < SHAPE_LADDER; i++) {
@@ -228,8 +215,6 @@ static bool choose(const struct trace *trace, const struct peak *peak, enum esti
 			continue;
 		*best = shape;
 		how->flags |= verdict == SHAPE_FITS ? 0 : ESTIMATE_FLAG_MODEL;
-		if (plain && fabs(shape.power_z) < CLEAR_SCORE)
-			return true;
 	}
 	return true;
 }
@@ -278,7 +263,7 @@ static void guided_velocity(const struct trace *trace, const struct peak *peak,
 static void guided_width(const struct trace *trace, const struct peak *peak, const struct guide *guide,
                          struct estimate_pulse *pulse)
 {
-	double level = EDGE_LEVEL * fabs(peak->result.value_g);
+	double level = LIMIT_EDGE * fabs(peak->result.value_g);
 	struct guide_edge edge[2];
 
 	if (!guide_edge(guide, trace, -1, level, &edge[0]) || !guide_edge(guide, trace, 1, level, &edge[1]))
@@ -288,7 +273,7 @@ static void guided_width(const struct trace *trace, const struct peak *peak, con
 	pulse->duration_s = pulse->end_s - pulse->start_s;
 	pulse->sigma_duration_s =
 	        hypot(guide_spread(guide, edge),
-	              EDGE_LEVEL * peak->result.sigma_g * (1 / edge[0].slope_g_s + 1 / edge[1].slope_g_s));
+	              LIMIT_EDGE * peak->result.sigma_g * (1 / edge[0].slope_g_s + 1 / edge[1].slope_g_s));
 }
 
 void pulse_measure(const struct trace *trace, const struct peak *peak,
@@ -310,7 +295,7 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	        .sigma_fitted_velocity_m_s = NAN,
 	        .contact = {.method = "", .chi_square = NAN, .status = ESTIMATE_SHORT},
 	};
-	double level = EDGE_LEVEL * fabs(peak->result.value_g), tilt;
+	double level = LIMIT_EDGE * fabs(peak->result.value_g), tilt;
 	struct edge edge[2];
 	struct guide guide;
 	bool guided;
@@ -330,9 +315,10 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	pulse->flags = (peak->result.how.flags & (ESTIMATE_FLAG_GAPS | ESTIMATE_FLAG_SPIKE)) |
 	               (baseline->doubtful ? ESTIMATE_FLAG_ZERO : 0u);
 	pulse->sigma_duration_s =
-	        hypot(hypot(edge[0].sigma_s, edge[1].sigma_s), EDGE_LEVEL * peak->result.sigma_g * tilt);
+	        hypot(hypot(edge[0].sigma_s, edge[1].sigma_s), LIMIT_EDGE * peak->result.sigma_g * tilt);
+	/* In a peak near its noise a curve may have found one hump: its feet then are not the pulse's. */
 	guided = peak->model != PEAK_MODEL_NONE && contact(trace, peak, family, pulse, &guide) &&
-	         fabs(peak->result.value_g) > GUIDE_SIGMAS * trace->noise_g;
+	         fabs(peak->result.value_g) > LIMIT_SURE * trace->noise_g;
 	if (!guided) {
 		velocity(trace, peak, baseline, edge, pulse);
 		return;

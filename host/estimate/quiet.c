@@ -3,26 +3,23 @@
 
 #include <math.h>
 
+#include "host/estimate/limits.h"
 #include "host/estimate/median.h"
 #include "host/estimate/pair.h"
 #include "host/estimate/zero.h"
 
 /* As long as the study's pre-trigger and more; longer reaches into what happened before the fall. */
 #define QUIET_S 0.25
-#define RISE_LEVEL 0.1
 
 enum { GLANCE = 31 }; /* samples that tell roughly where the middle is, and how wide */
 enum { SECOND_DIFFERENCES = 255 };
 
-/* A quarter's mean against the next: standard deviations of a mean, and the last step against the first. */
-#define DECAYS_BY 8.0
+/* Of a decay's quarters the last step against the first. */
 #define DECAYS_ON 1.2
 
-/* Noise spreads each block of samples by more than this in its standard deviations, and no block by so much
- * more than another. */
+/* Noise spreads each block of samples by more than this in its standard deviations, and two blocks alike by
+ * no more than this beside each other. */
 #define QUIET_SPREAD 2.0
-#define QUIET_UNLIKE 8.0
-#define QUIET_ALIKE 3.0
 
 double quiet_glance(const struct trace *trace, size_t from, size_t until, double *sigma_g)
 {
@@ -84,7 +81,7 @@ static double find_peak(const struct trace *trace, size_t *peak)
 	*peak = largest(trace, middle);
 	if (*peak == trace->count)
 		return middle;
-	level = RISE_LEVEL * fabs(trace->value_g[*peak] - middle);
+	level = LIMIT_EDGE * fabs(trace->value_g[*peak] - middle);
 	if (sigma > level && starts_at_rest(trace, level)) {
 		middle = quiet_glance(trace, 0, QUIET_SAMPLES_MIN, NULL);
 		*peak = largest(trace, middle);
@@ -102,7 +99,7 @@ void quiet_find(const struct trace *trace, size_t *from, size_t *until)
 	*until = (double)trace->count > quiet ? (size_t)quiet : trace->count;
 	if (peak == trace->count)
 		return;
-	level = RISE_LEVEL * fabs(trace->value_g[peak] - middle);
+	level = LIMIT_EDGE * fabs(trace->value_g[peak] - middle);
 	while (k > 0 && (!trace_good(trace, k) || fabs(trace->value_g[k] - middle) >= level))
 		k--;
 	rise = peak - k + 2;
@@ -247,10 +244,10 @@ bool quiet_narrow(struct quiet *quiet)
 		least = spread > 0 ? fmin(least, spread) : least;
 		most = fmax(most, spread);
 	}
-	if (!(most > QUIET_UNLIKE * least))
+	if (!(most > LIMIT_SURE * least))
 		return false;
 	for (size_t i = first; i < last; i++) {
-		run = spread_of(quiet->trace, i) <= QUIET_ALIKE * least ? run + 1 : 0;
+		run = spread_of(quiet->trace, i) <= QUIET_SPREAD * least ? run + 1 : 0;
 		if (run > longest) {
 			longest = run;
 			quiet->from = (i + 1 - run) * TRACE_BLOCK;
@@ -290,7 +287,7 @@ static bool decays(const struct trace *trace, size_t from, size_t until)
 			return false;
 		mean[i] /= (double)n;
 	}
-	noise = DECAYS_BY * noise / sqrt((double)length);
+	noise = LIMIT_SURE * noise / sqrt((double)length);
 	sign = mean[0] > mean[1] ? 1 : -1;
 	for (size_t i = 0; i < 3; i++)
 		if (!(sign * (mean[i] - mean[i + 1]) > noise))

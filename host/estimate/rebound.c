@@ -3,26 +3,20 @@
 
 #include <math.h>
 
-/* An impact is well under way at this part of its peak. It begins this part of a width earlier, more or
- * less: contacts rise steeply. */
-#define EDGE_LEVEL 0.1
+#include "host/estimate/limits.h"
+
+/* An impact begins this part of a width before 10 % of its peak, more or less: contacts rise steeply. */
 #define FOOT_PART 0.05
 
-/* They fade slowly: from the 10 % point to this level, or to so many sigma, and on to the foot by this part
+/* They fade slowly: from the 10 % point to this level, or to the noise, and on to the foot by this part
  * of that time, give or take half of it. A force linear in what is left to go asks for a quarter, one of
  * power 1.5 for a half. */
 #define FADE_LEVEL 0.02
-#define FADE_SIGMAS 3.0
 #define FADE_ON 0.4
-
-#define SIGMAS 3.0
-
-#define AGAIN_LEVEL 0.3
-#define AGAIN_NOISE 6.0
 
 double rebound_again_g(const struct trace *trace, double peak_g)
 {
-	return fmax(AGAIN_LEVEL * fabs(peak_g), AGAIN_NOISE * trace->noise_g);
+	return fmax(LIMIT_AGAIN * fabs(peak_g), LIMIT_NOISE * trace->noise_g);
 }
 
 static bool measured(const struct rebound_axes *axes, unsigned i)
@@ -83,7 +77,7 @@ static bool second_impact(const struct rebound_axes *axes, unsigned strong, doub
 			if (trace_good(trace, k) && fabs(trace->value_g[k]) > fabs(trace->value_g[top]))
 				top = k;
 		if (!trace_edge(trace, top, -1, trace->value_g[top] < 0 ? -1 : 1,
-		                EDGE_LEVEL * fabs(trace->value_g[top]), &edge) ||
+		                LIMIT_EDGE * fabs(trace->value_g[top]), &edge) ||
 		    edge >= *impact_s)
 			continue;
 		*impact_s = edge;
@@ -100,7 +94,7 @@ static double contact_end(const struct rebound_axes *axes, unsigned strong, doub
 	const struct trace *trace = axes->trace[strong];
 	double level = FADE_LEVEL * fabs(peak->result.value_g), fade;
 
-	level = fmax(level, FADE_SIGMAS * trace->noise_g);
+	level = fmax(level, LIMIT_AGREE * trace->noise_g);
 	(void)trace_edge(trace, peak->at, 1, peak->sign, level, &fade);
 	fade = fmin(fmax(fade - pulse->end_s, 0), pulse->duration_s);
 	*sigma_s = hypot(pulse->sigma_duration_s / sqrt(2.0), FADE_ON / 2 * fade);
@@ -136,7 +130,7 @@ void rebound_find(const struct rebound_axes *axes, double impact_speed_m_s, doub
 	by_flight(axes, impact_speed_m_s, gravity_m_s2, &found);
 	apart = fabs(found.velocity_ratio - found.flight_ratio);
 	if (found.status == ESTIMATE_OK && apart > REBOUND_APART &&
-	    !(apart <= SIGMAS * hypot(found.sigma_velocity_ratio, found.sigma_flight_ratio)))
+	    !(apart <= LIMIT_AGREE * hypot(found.sigma_velocity_ratio, found.sigma_flight_ratio)))
 		found.status = ESTIMATE_AMBIGUOUS;
 	*rebound = found;
 }

@@ -5,27 +5,17 @@
 
 #include "host/estimate/bridge.h"
 #include "host/estimate/crest.h"
+#include "host/estimate/limits.h"
 
-/* A local maximum is one once the resultant has come down from it by this part of the largest, and by this
- * many sigma: less is noise on a flank. */
-#define FALL_LEVEL 0.1
-#define FALL_NOISE 5.0
+/* The first local maximum is looked for above this part of the largest. */
 #define FIRST_LEVEL 0.5
 
 /* The axes' own models are of the resultant's pulse when its largest sample lies no further from between
- * their peaks than this part of its width. */
+ * their peaks than this part of its width, and two curves or families lie no further apart. */
 #define SAME_PULSE 0.3
-
-/* Two pulses of a family whose summits lie further apart than this part of a width are not both there. */
-#define OVERLAP 0.5
-
-/* A silent axis was so in this part of its samples under the pulse at least: a hole is not silence. */
-#define READ 0.5
 
 /* Instants tried between the peaks of the axes, and Newton's steps from the best. */
 enum { STEPS = 8, NEWTON = 8 };
-
-#define RESOLUTION_S 1e-12
 
 /* Magnitude at a sample of axis i, the other axis interpolated; false where either is missing. Good enough
  * to know where to look. */
@@ -81,11 +71,12 @@ static size_t largest(const struct resultant_axes *axes, unsigned i, double stro
 	return at;
 }
 
-/* The first local maximum above half of the largest one, by its instant of the faster axis. */
+/* The first local maximum above half of the largest one, by its instant of the faster axis. It is one once
+ * the resultant has come down from it: by less, that is noise on a flank. */
 static size_t first_local(const struct resultant_axes *axes, unsigned i, size_t largest_at, double largest_g)
 {
 	double noise = fmax(axes->trace[0]->noise_g, axes->trace[1]->noise_g);
-	double fall = fmax(FALL_LEVEL * largest_g, noise > 0 ? FALL_NOISE * noise : 0), top = 0, value;
+	double fall = fmax(LIMIT_EDGE * largest_g, noise > 0 ? LIMIT_NOISE * noise : 0), top = 0, value;
 	struct local_span span = reaching(axes, FIRST_LEVEL * largest_g / sqrt(2.0));
 	size_t at = largest_at;
 
@@ -117,8 +108,8 @@ static struct local_span span_around(const struct resultant_axes *axes, unsigned
 	while (k > 0 && (k == trace->count || !trace_good(trace, k)))
 		k--;
 	sign = trace->value_g[k] < 0 ? -1 : 1;
-	trace_edge(trace, k, -1, sign, 0.05 * fabs(trace->value_g[k]), &span.from_s);
-	trace_edge(trace, k, 1, sign, 0.05 * fabs(trace->value_g[k]), &span.until_s);
+	trace_edge(trace, k, -1, sign, PEAK_FOOT_LEVEL * fabs(trace->value_g[k]), &span.from_s);
+	trace_edge(trace, k, 1, sign, PEAK_FOOT_LEVEL * fabs(trace->value_g[k]), &span.until_s);
 	return span;
 }
 
@@ -177,7 +168,7 @@ static bool summit(const struct resultant_axes *axes, double *time_s, double hal
 			return false;
 		step = half[1] / half[2];
 		*time_s -= step;
-		if (fabs(step) < RESOLUTION_S)
+		if (fabs(step) < LIMIT_ROUNDING)
 			break;
 	}
 	return *time_s >= fmin(x, y) - slack && *time_s <= fmax(x, y) + slack;
@@ -210,8 +201,8 @@ static bool reach(const struct resultant_axes *axes, double width_s)
 	double apart = fabs(axes->peak[1]->result.time_s - axes->peak[0]->result.time_s);
 
 	for (unsigned i = 0; i < 2; i++)
-		if ((axes->curve[i] != NULL && apart > SAME_PULSE * width_s) ||
-		    (axes->peak[i]->model == PEAK_MODEL_SHAPE && apart > OVERLAP * width_s))
+		if ((axes->curve[i] != NULL || axes->peak[i]->model == PEAK_MODEL_SHAPE) &&
+		    apart > SAME_PULSE * width_s)
 			return false;
 	return true;
 }
@@ -295,7 +286,7 @@ static bool share(const struct resultant_axes *axes, unsigned strong, struct res
 	return true;
 }
 
-/* Whether most of the samples within are there. */
+/* Whether most of the samples within are there: a hole is not silence. */
 static bool was_read(const struct trace *trace, const struct local_span *span)
 {
 	double good = 0;
@@ -303,7 +294,7 @@ static bool was_read(const struct trace *trace, const struct local_span *span)
 	for (size_t k = trace_index(trace, span->from_s);
 	     k < trace->count && trace_time(trace, k) <= span->until_s; k++)
 		good += trace_good(trace, k);
-	return good > READ * (span->until_s - span->from_s) * trace->rate_hz;
+	return 2 * good > (span->until_s - span->from_s) * trace->rate_hz;
 }
 
 /* What the other axis reads counts unless it is silent. False where its samples are missing. */

@@ -7,6 +7,7 @@
 
 #include "common/units.h"
 #include "host/estimate/crossings.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/ringdown_private.h"
 #include "host/estimate/spring.h"
 
@@ -14,9 +15,6 @@
  * nothing. */
 #define GAIN_MIN 64.0
 #define EXPLAINED_MIN 0.5
-
-/* Every sample is this much more certain than blocks, at most. */
-#define FULL_GAIN 1.05
 
 /* Of these the plain decay is not the whole. */
 #define RICHER (ESTIMATE_FLAG_TWO_MODES | ESTIMATE_FLAG_AMPLITUDE | ESTIMATE_FLAG_HUM | ESTIMATE_FLAG_MODEL)
@@ -33,7 +31,7 @@ bool ringdown_decays(const struct modes *modes, unsigned m)
 {
 	double decay = modes->p[MODES_DECAY + MODES_EACH * m], omega = modes->p[MODES_OMEGA + MODES_EACH * m];
 
-	return decay > 0 && decay < RINGDOWN_DAMPING_MAX * hypot(decay, omega);
+	return decay > 0 && decay < MODES_DAMPING_MAX * hypot(decay, omega);
 }
 
 /* Of the mode that the values are of. */
@@ -95,10 +93,6 @@ static double spread(const struct ringdown_job *job, unsigned m, double by_decay
 /* What a law's mean has instead of the vanishing swing's. */
 enum { MEAN_HZ, MEAN_NATURAL, MEAN_DAMPING, MEAN_VALUES };
 
-/* Of a difference for a derivative: this part of the unknown, and a little for one that is none. */
-#define DIFFERENCE 1e-5
-#define DIFFERENCE_LEAST 1e-9
-
 static void mean_values(const struct modes *modes, double value[MEAN_VALUES])
 {
 	const double *p = modes->p;
@@ -116,7 +110,7 @@ static void mean_sigmas(const struct ringdown_job *job, double sigma[MEAN_VALUES
 	for (unsigned i = 0; i < modes_size(&job->modes); i++) {
 		struct modes above = job->modes, below = job->modes;
 		double high[MEAN_VALUES], low[MEAN_VALUES];
-		double step = DIFFERENCE * fabs(job->modes.p[i]) + DIFFERENCE_LEAST;
+		double step = LIMIT_SMALL * fmax(fabs(job->modes.p[i]), LIMIT_LEAST);
 
 		above.p[i] += step;
 		below.p[i] -= step;
@@ -188,27 +182,13 @@ static const char *method_of(const struct ringdown_job *job)
 	return job->series.block > 1 ? "block" : "full";
 }
 
-/* Values that their residual allows may still be less certain than slack times what was asked for. */
-static bool certain(const struct ringdown_job *job, const struct estimate_ringdown *result, double slack)
+/* Values that their residual allows may still be less certain than what was asked for. */
+static bool meets_tolerance(const struct ringdown_job *job, const struct estimate_ringdown *result)
 {
-	double tolerance = slack * (job->span->tolerance > 0 ? job->span->tolerance : ESTIMATE_TOLERANCE);
+	double tolerance = job->span->tolerance > 0 ? job->span->tolerance : ESTIMATE_TOLERANCE;
 
 	return result->sigma_hz <= tolerance * result->frequency_hz &&
 	       result->sigma_damping <= tolerance * result->damping_ratio;
-}
-
-static void meet_tolerance(struct ringdown_job *job, struct ringdown *ringdown)
-{
-	if (certain(job, &ringdown->result, 1))
-		return;
-	if (certain(job, &ringdown->result, FULL_GAIN) && job->series.block > 1 && job->modes.count == 1 &&
-	    job->modes.law == MODES_LAW_NONE) {
-		ringdown_try(job, "full");
-		if (ringdown_full(job))
-			express(job, ringdown);
-	}
-	if (!certain(job, &ringdown->result, 1))
-		job->flags |= ESTIMATE_FLAG_TOLERANCE;
 }
 
 static unsigned shape_flags(const struct ringdown_job *job)
@@ -234,7 +214,7 @@ static double three_cycles(const struct ringdown_job *job)
 	struct crossings crossings;
 
 	crossings_find(&crossings, job->trace, job->first, job->last, job->modes.p[MODES_OFFSET],
-	               fmax(RINGDOWN_SWING_NOISE * noise, RINGDOWN_SWING_LEVEL * job->span->peak_g));
+	               fmax(LIMIT_SIGNIFICANT * noise, RINGDOWN_SWING_LEVEL * job->span->peak_g));
 	if (crossings.count < CROSSINGS_MAX)
 		return NAN;
 	return 3 / (crossings.time_s[CROSSINGS_MAX - 1] - crossings.time_s[0]);
@@ -253,10 +233,10 @@ static void conclude(struct ringdown_job *job, struct ringdown *ringdown)
 	struct estimate_how *how = &ringdown->result.how;
 
 	express(job, ringdown);
-	if (ringdown_passes(job, &job->modes))
-		meet_tolerance(job, ringdown);
-	else
+	if (!ringdown_passes(job, &job->modes))
 		job->flags |= ESTIMATE_FLAG_MODEL;
+	else if (!meets_tolerance(job, &ringdown->result))
+		job->flags |= ESTIMATE_FLAG_TOLERANCE;
 	how->method = method_of(job);
 	/* Another window may have taken it from blocks to samples, or back. */
 	if (!has_tried(job, how->method))

@@ -19,8 +19,7 @@
  * are not separable and not taken. What is still refused keeps the best fit, flagged, its uncertainty widened
  * by the square root of its chi-square; but not two modes or a law that are grossly refused (chi-square over
  * 3): then the mean of the window stays, and the distance to the other's answer is added to its uncertainty.
- * A fit that is not refused but less certain than the tolerance is repeated at the full rate where the few
- * percent that gains may be enough; otherwise, or when they are not, the flag says so.
+ * A fit that is not refused but less certain than the tolerance is flagged.
  *
  * The window opens where the decay is surely free and then reaches back as far as the fit foretells the
  * samples before it, since every cycle lost at the start costs most.

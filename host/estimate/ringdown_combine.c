@@ -3,13 +3,13 @@
 
 #include <math.h>
 
-/* X and Y are not of one thing when they are this part apart, and by so many standard deviations. */
-#define APART_MAX 0.05
-#define AGREE 3.0
+#include "host/estimate/limits.h"
 
-/* What exchange between the axes leaves of a law's damping in doubt, as part of it, and how far apart it may
- * lead them. */
-#define LAW_DAMPING 0.01
+/* X and Y are not of one thing when they are this part apart, and by more than chance. */
+#define APART_MAX 0.05
+
+/* How far apart exchange between the axes may lead a law's damping, as part of it; a hundredth of it is left
+ * in doubt. */
 #define LAW_APART 0.15
 
 /* What the contact's last force leaves in a damping, as part of its uncertainty: both axes have it. */
@@ -27,7 +27,7 @@ static struct value weighted_mean(double a, double sigma_a, double b, double sig
 	/* Data without noise must not divide by zero. */
 	double sa = fmax(sigma_a, 1e-12 * fabs(a)), sb = fmax(sigma_b, 1e-12 * fabs(b));
 	double wa = 1 / (sa * sa), wb = 1 / (sb * sb);
-	struct value mean = {(wa * a + wb * b) / (wa + wb), 0, fabs(a - b) < AGREE * hypot(sa, sb)};
+	struct value mean = {(wa * a + wb * b) / (wa + wb), 0, fabs(a - b) < LIMIT_AGREE * hypot(sa, sb)};
 
 	mean.sigma = hypot(sqrt(1 / (wa + wb)), mean.agree ? 0 : (a - b) / 2);
 	return mean;
@@ -42,7 +42,7 @@ static struct value mean_of_laws(double a, double sigma_a, double b, double sigm
 
 	mean.agree = mean.agree || fabs(a - b) < LAW_APART * mean.value;
 	if (mean.agree)
-		mean.sigma = hypot(1 / hypot(1 / sigma_a, 1 / sigma_b), LAW_DAMPING * mean.value);
+		mean.sigma = hypot(1 / hypot(1 / sigma_a, 1 / sigma_b), LIMIT_PART * mean.value);
 	return mean;
 }
 

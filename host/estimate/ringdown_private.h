@@ -13,14 +13,10 @@
 #include "host/estimate/ringdown.h"
 #include "host/estimate/series.h"
 
-/* What is no swing: this little of the peak; this little of the noise, per sample, as a threshold for zero
- * crossings. What of the swing is small enough not to matter whatever the noise. */
+/* What is no swing: this little of the peak. What of the swing is small enough not to matter whatever the
+ * noise. */
 #define RINGDOWN_SWING_LEVEL 0.02
-#define RINGDOWN_SWING_NOISE 5.0
 #define RINGDOWN_SWING_MODEL 1e-4
-
-/* No decay is damped more, as a ratio. */
-#define RINGDOWN_DAMPING_MAX 0.95
 
 /* So many blocks more to a cycle where the start is known, and for two modes or a law. */
 #define RINGDOWN_FINER 1.3

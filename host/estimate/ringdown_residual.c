@@ -3,8 +3,9 @@
 
 #include <math.h>
 
-/* Standard deviations of chi-square, and how well the noise itself is known. */
-#define CHI_LIMIT 3.3
+#include "host/estimate/limits.h"
+
+/* How well the noise itself is known. */
 #define NOISE_KNOWN 0.05
 
 unsigned ringdown_freedom(const struct ringdown_job *job, const struct modes *modes)
@@ -23,7 +24,7 @@ bool ringdown_passes(const struct ringdown_job *job, const struct modes *modes)
 {
 	double spread = sqrt(2.0 / ringdown_freedom(job, modes) + 2 * NOISE_KNOWN * NOISE_KNOWN);
 
-	return !(ringdown_chi_square(job, modes) > 1 + CHI_LIMIT * spread);
+	return !(ringdown_chi_square(job, modes) > 1 + LIMIT_CHI * spread);
 }
 
 double ringdown_sigma_point(const struct ringdown_job *job, const struct modes *modes)

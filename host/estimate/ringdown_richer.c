@@ -4,18 +4,13 @@
 #include <math.h>
 #include <string.h>
 
+#include "host/estimate/limits.h"
 #include "host/estimate/outlier.h"
-
-#define CHI_GROSS 3.0
 
 #define F_LIMIT 7.0
 
-/* B of a spring to start from. */
-#define SPRING_SOFT 0.3
-#define SPRING_STIFF -0.2
-
-/* Modes are apart when their frequencies are by this many standard deviations. */
-#define SEPARATION 3.0
+/* B of a spring to start from; of one that stiffens as much below zero. */
+#define SPRING_B 0.3
 
 enum { OUTLIER_ROUNDS = 3, THIN_MIN = 48 };
 
@@ -129,14 +124,13 @@ static void try_spring(struct ringdown_job *job, double k)
 	modes.p[MODES_COSINE] *= -1;
 	modes.p[MODES_SINE] *= -1;
 	modes.p[MODES_LAW] = 1 / (swing * swing);
-	modes.p[MODES_LAW + 1] = k < 0 ? SPRING_SOFT : SPRING_STIFF;
+	modes.p[MODES_LAW + 1] = k < 0 ? SPRING_B : -SPRING_B;
 	if (modes_fit(&modes, &job->series))
 		consider(job, &modes);
 }
 
-/* A second mode's frequency over the first's, to start from. */
-#define ASIDE_BELOW 0.85
-#define ASIDE_ABOVE 1.15
+/* A second mode's frequency over the first's, or the first's over it, to start from. */
+#define ASIDE 1.15
 
 /* Two modes from the one and another beside it; false unless both come out as decays. */
 static bool fit_two(struct modes *modes, const struct ringdown_job *job, double aside)
@@ -161,13 +155,13 @@ static bool separable(const struct ringdown_job *job, const struct modes *modes)
 	row[MODES_OMEGA + MODES_EACH] = -1;
 	apart = fabs(p[MODES_OMEGA] - p[MODES_OMEGA + MODES_EACH]);
 	unsure = ringdown_sigma_point(job, modes) * sqrt(cholesky_variance(&modes->fit.factor, row));
-	return apart + 2 * unsure >= own[MODES_DECAY] && apart >= SEPARATION * unsure;
+	return apart + 2 * unsure >= own[MODES_DECAY] && apart >= LIMIT_AGREE * unsure;
 }
 
 /* From either side of the one mode, the second only where the first does not pass. */
 static void try_two(struct ringdown_job *job)
 {
-	static const double aside[] = {ASIDE_BELOW, ASIDE_ABOVE};
+	static const double aside[] = {1 / ASIDE, ASIDE};
 	struct modes modes, best = job->single;
 
 	ringdown_try(job, "two-modes");
@@ -268,6 +262,6 @@ void ringdown_try_richer(struct ringdown_job *job)
 		job->flags &= ~(unsigned)ESTIMATE_FLAG_NOT_SEPARABLE;
 	else if (ringdown_chi_square(&before, &before.modes) < ringdown_chi_square(job, &job->modes))
 		restore(job, &before);
-	else if (ringdown_chi_square(job, &job->modes) > CHI_GROSS)
+	else if (ringdown_chi_square(job, &job->modes) > LIMIT_GROSS)
 		distrust(job);
 }

@@ -5,11 +5,11 @@
 
 #include "common/units.h"
 #include "host/estimate/crossings.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/scan.h"
 
-/* The window: cycles, or time constants if that is longer, but no more cycles than the most, and
+/* The window: SCAN_CYCLES, or time constants if that is longer, but no more cycles than the most, and
  * from a mere start no more than a start is good for. */
-#define CYCLES 5.0
 #define TIME_CONSTANTS 4.4
 #define CYCLES_MOST 80.0
 #define CYCLES_START 7.0
@@ -24,24 +24,18 @@
 /* Window and block are chosen anew when the fit's wish differs from them by more than this. */
 #define WINDOW_CHANGE 0.1
 
-/* A start by zero crossings that explains less than this of the variance is doubted. */
-#define EXPLAINED_SURE 0.8
-
 /* Samples before the window that lie this far from what the fit foretells, in standard deviations of one,
  * were still driven: one alone, two together, if the next earlier one is off too. */
 #define BACK_ALONE 2.2
 #define BACK_PAIR 2.0
 #define BACK_AGAIN 1.5
 
-/* So far off one is not even chance: an outlier, or a contact too short to show twice. */
-#define BACK_FAR 6.0
-
 enum { WINDOWS = 4 };
 
 static size_t window_end(const struct ringdown_job *job, double omega, double decay, double constants,
                          double most_s)
 {
-	double cycle = 2 * UNITS_PI / omega, length = CYCLES * cycle;
+	double cycle = 2 * UNITS_PI / omega, length = SCAN_CYCLES * cycle;
 	size_t end;
 
 	if (decay * length < constants)
@@ -104,7 +98,7 @@ static bool settle_by_scan(struct ringdown_job *job)
 enum estimate_status ringdown_start(struct ringdown_job *job)
 {
 	double noise = isfinite(job->trace->noise_g) ? job->trace->noise_g : 0, omega, decay;
-	double threshold = fmax(RINGDOWN_SWING_NOISE * noise, RINGDOWN_SWING_LEVEL * job->span->peak_g);
+	double threshold = fmax(LIMIT_SIGNIFICANT * noise, RINGDOWN_SWING_LEVEL * job->span->peak_g);
 	struct crossings crossings;
 	bool begun;
 
@@ -116,7 +110,8 @@ enum estimate_status ringdown_start(struct ringdown_job *job)
 		return ESTIMATE_SHORT;
 	if (!begun && !(noise > 0))
 		return ESTIMATE_NO_PEAK;
-	if (begun && settle(job, omega, decay) && ringdown_explained(job) > EXPLAINED_SURE)
+	/* A start that explains less is doubted. */
+	if (begun && settle(job, omega, decay) && ringdown_explained(job) > LIMIT_MOST)
 		return ESTIMATE_OK;
 	return settle_by_scan(job) ? ESTIMATE_OK : begun ? ESTIMATE_NOT_CONVERGED : ESTIMATE_NO_PEAK;
 }
@@ -173,7 +168,8 @@ static size_t free_since(const struct ringdown_job *job, const struct modes *sam
 	for (k = job->first; k > earliest; k--) {
 		double off = off_by(job, samples, k - 1, noise);
 
-		if (fabs(off) > BACK_FAR ||
+		/* Beyond noise: an outlier, or a contact too short to show twice. */
+		if (fabs(off) > LIMIT_NOISE ||
 		    ((fabs(off) > BACK_ALONE || fabs(off + after) > BACK_PAIR) &&
 		     (k - 1 == earliest || fabs(off_by(job, samples, k - 2, noise)) > BACK_AGAIN)))
 			return k;

@@ -6,18 +6,15 @@
 
 #include "common/units.h"
 #include "host/estimate/cholesky.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/pair.h"
 #include "host/estimate/series.h"
 
-/* Each frequency is looked at over this many of its cycles, and is given up when fewer than the least fit. */
-#define CYCLES 5.0
+/* Each frequency is given up when fewer of its cycles fit. */
 #define CYCLES_LEAST 1.5
 
 /* Points per cycle at the top of an octave. */
 #define POINTS 6.0
-
-/* Excess of the variance over the noise's, in its standard deviations. */
-#define EXCESS_MIN 4.0
 
 enum { PER_OCTAVE = 8, LINEAR = 3, OCTAVES = 16, WORTH_SAMPLES = 32, LANES = 8 /* marks in a word */ };
 
@@ -59,7 +56,7 @@ static void scan_octave(struct scan *best, const struct series *series, double t
 
 	for (int i = 0; i < PER_OCTAVE; i++) {
 		double hz = top_hz * exp2(-(double)i / PER_OCTAVE), omega = 2 * UNITS_PI * hz;
-		double points = CYCLES / (hz * series->step_s);
+		double points = SCAN_CYCLES / (hz * series->step_s);
 		unsigned n = points < series->count ? (unsigned)points : series->count;
 
 		if (n * series->step_s * hz < CYCLES_LEAST)
@@ -81,7 +78,7 @@ bool scan_find(struct scan *scan, const struct trace *trace, size_t first, size_
 	for (unsigned octave = 0; octave < OCTAVES; octave++) {
 		unsigned block = 1u << octave;
 		double top_hz = trace->rate_hz / (POINTS * block);
-		double samples = 2 * CYCLES * POINTS * block;
+		double samples = 2 * SCAN_CYCLES * POINTS * block;
 		size_t until = samples < (double)(last - first) ? first + (size_t)samples : last;
 
 		if ((double)(last - first) < CYCLES_LEAST * POINTS * block)
@@ -145,7 +142,7 @@ bool scan_worth(const struct trace *trace, size_t first, size_t last, double noi
 		end = last - first > length ? first + length : last;
 		n += add_up(trace, k, end, &sum, &squares);
 		if (n > 0 && squares - sum * sum / (double)n >
-		                     noise_g * noise_g * ((double)n + EXCESS_MIN * sqrt(2 * (double)n)))
+		                     noise_g * noise_g * ((double)n + LIMIT_CHI * sqrt(2 * (double)n)))
 			return true;
 	}
 	return false;

@@ -9,6 +9,9 @@
  */
 #include "host/estimate/trace.h"
 
+/* A decay is looked at over so many of its cycles. */
+#define SCAN_CYCLES 5.0
+
 struct scan {
 	double omega;   /* rad/s */
 	double decay;   /* 1/s */

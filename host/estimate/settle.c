@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "host/estimate/limits.h"
 #include "host/estimate/quiet.h"
 
 enum {
@@ -12,35 +13,22 @@ enum {
 	BEGINNING = 16 /* whose mean is held against the samples before the pulse */
 };
 
-/* From try to try; more left than this many times the try before: something else began. The last part of the
- * samples may hold its foot. */
+/* From try to try; more left than this many times the try before: something else began. */
 #define GROWTH 1.2
 #define WORSE 2.0
-#define FOOT 0.1
 
-/* What it moves by against what it leaves, and what it leaves against a constant, a slope, the samples' noise
- * and what it moves by. */
-#define MOVES 6.0
-#define OVER_CONSTANT 0.6
-#define OVER_SLOPE_F 30.0
+/* What it leaves against the samples' noise and what it moves by. */
 #define OVER_NOISE 4.0
 #define OVER_SPAN 0.003
 
-/* The root mean square of such sums, in standard deviations. */
-#define SIGN 3.0
-
-/* Time constants after which it is over, and those it must be seen for not to be a guess. */
-#define OVER_AFTER 8.0
+/* Time constants after which hardly any is left; seen for less than half of these it is a guess. */
 #define ENDED 4.0
-#define SEEN 2.0
 
 /* Of the way to the pulse. */
 #define COVERS 0.3
 
 /* Grid of time constants, per factor of e, and golden sections after it. */
 enum { GRID = 3, SECTIONS = 24 };
-
-#define OUTLIER 6.0
 
 struct blocks {
 	double mean[BLOCKS], middle; /* of the trace's samples; middle is subtracted */
@@ -154,7 +142,7 @@ static void fit_robustly(struct blocks *blocks, struct fit *fit)
 	for (size_t i = 0; i < blocks->count; i++) {
 		double e = blocks->mean[i] - fit->constant - fit->amplitude * exp(-fit->rate * (double)i);
 
-		if (blocks->used[i] && fabs(e) > OUTLIER * fit->leaves) {
+		if (blocks->used[i] && fabs(e) > LIMIT_NOISE * fit->leaves) {
 			blocks->used[i] = false;
 			dropped++;
 		}
@@ -163,13 +151,13 @@ static void fit_robustly(struct blocks *blocks, struct fit *fit)
 		fit_exponential(blocks, fit);
 }
 
-static double leaves_by(const struct blocks *blocks, bool slope)
+static double leaves_by_slope(const struct blocks *blocks)
 {
 	double function[BLOCKS] = {0}, factor;
 	struct fit fit;
 
 	for (size_t i = 0; i < blocks->count; i++)
-		function[i] = slope ? (double)i : 0;
+		function[i] = (double)i;
 	fit_two(blocks, function, &fit, &factor);
 	return fit.leaves;
 }
@@ -183,10 +171,9 @@ static double span_of(const struct blocks *blocks, const struct fit *fit)
 static bool is_one(const struct blocks *blocks, const struct fit *fit, double noise_g)
 {
 	double span = span_of(blocks, fit), noise = noise_g > 0 ? noise_g : 0;
-	double than_slope = sqrt(1 + OVER_SLOPE_F / (double)blocks->count);
+	double than_slope = sqrt(1 + LIMIT_F / (double)blocks->count);
 
-	return span > MOVES * fit->leaves && fit->leaves < OVER_CONSTANT * leaves_by(blocks, false) &&
-	       than_slope * fit->leaves < leaves_by(blocks, true) &&
+	return span > LIMIT_NOISE * fit->leaves && than_slope * fit->leaves < leaves_by_slope(blocks) &&
 	       fit->leaves <= fmax(OVER_NOISE * noise, OVER_SPAN * span);
 }
 
@@ -207,7 +194,7 @@ static bool is_inexact(const struct blocks *blocks, const struct fit *fit)
 		squares += used > 0 ? sum * sum / used : 0;
 		n++;
 	}
-	return n > 0 && sqrt(squares / n) > SIGN * fit->leaves;
+	return n > 0 && sqrt(squares / n) > LIMIT_AGREE * fit->leaves;
 }
 
 /* Whether the record begins elsewhere than it is before its pulse. Most do not, and are done with here. */
@@ -260,12 +247,13 @@ static size_t grow(const struct trace *trace)
 			break;
 		if (is_one(&blocks, &fit, quiet_noise(trace, 0, samples)))
 			fits = samples;
-		if (fit.rate * (double)blocks.count > OVER_AFTER && blocks.length > 1)
+		if (fit.rate * (double)blocks.count > 2 * ENDED && blocks.length > 1)
 			break;
 		before = now;
 		samples = (size_t)(GROWTH * (double)samples) + 1;
 	}
-	return fits - (size_t)(FOOT * (double)fits);
+	/* The last of them may hold a foot. */
+	return fits - (size_t)(LIMIT_EDGE * (double)fits);
 }
 
 bool settle_find(const struct trace *trace, struct settle *settle)
@@ -292,7 +280,7 @@ bool settle_find(const struct trace *trace, struct settle *settle)
 	/* a block's mean is its first sample's value times the mean of the decay over it */
 	part = fit.rate / (double)blocks.length;
 	found.amplitude_g = fit.amplitude * (double)blocks.length * expm1(-part) / expm1(-fit.rate);
-	found.extrapolated = found.until_s < SEEN * found.time_constant_s;
+	found.extrapolated = found.until_s < ENDED / 2 * found.time_constant_s;
 	if (found.until_s < ENDED * found.time_constant_s) {
 		size_t at = largest_without(trace, &found, fit.constant + blocks.middle);
 

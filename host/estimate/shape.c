@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "host/estimate/limits.h"
 #include "host/estimate/pair.h"
 #include "host/estimate/phasor.h"
 
@@ -10,8 +11,6 @@
 #define REACH_HALF_WIDTHS 1.2
 
 #define POWER_START 1.4
-#define POWER_MIN 0.3
-#define POWER_MAX 12.0
 
 /* The base may become this many times what it started with, or as little of it. */
 #define BASE_RANGE 4.0
@@ -21,9 +20,6 @@
 
 /* On the kink at a foot the fit may stop this far from its bottom, in squares of sigma. */
 #define KINK_GAIN 1e-2
-
-/* Without noise a limit is sharp. */
-#define SHARP 1e-6
 
 const enum estimate_family shape_ladder[SHAPE_LADDER] = {ESTIMATE_FAMILY_HALF_SINE, ESTIMATE_FAMILY_HAVERSINE,
                                                          ESTIMATE_FAMILY_SINE_POWER};
@@ -74,7 +70,7 @@ static bool possible(const struct shape_problem *m, const double *p)
 	    !(fabs(p[SHAPE_TIME]) < m->base_s) || !isfinite(p[SHAPE_PEAK]))
 		return false;
 	return m->family != ESTIMATE_FAMILY_SINE_POWER ||
-	       (p[SHAPE_POWER] > POWER_MIN && p[SHAPE_POWER] < POWER_MAX);
+	       (p[SHAPE_POWER] > SHAPE_POWER_MIN && p[SHAPE_POWER] < SHAPE_POWER_MAX);
 }
 
 static void add_censored(unsigned size, const double *row, const struct share *share,
@@ -102,7 +98,7 @@ static void censor(const struct shape_problem *m, const double *p, double matrix
 		if (!trace_good(m->trace, k) || !shape_is_censored(m, k))
 			continue;
 		if (k >= under.first && k < under.last)
-			residual -= shape_row(m, p, phi, fmax(cos(phi), SHAPE_COSINE_MIN), sin(phi), row);
+			residual -= shape_row(m, p, phi, fmax(cos(phi), LIMIT_ROUNDING), sin(phi), row);
 		share = censored(sign * residual / m->noise_g, m->noise_g);
 		share.residual_g *= sign;
 		*squares += share.squares;
@@ -169,7 +165,7 @@ static struct sums sum_under(const struct shape_problem *m, const double *p, con
 		PAIR count, value = two_samples(m, k, under->last, &count);
 
 		if (m->family == ESTIMATE_FAMILY_SINE_POWER) {
-			const PAIR cosine = pair_more(c, (PAIR){SHAPE_COSINE_MIN, SHAPE_COSINE_MIN});
+			const PAIR cosine = pair_more(c, (PAIR){LIMIT_ROUNDING, LIMIT_ROUNDING});
 			const PAIR logarithm = {log(cosine[0]), log(cosine[1])},
 			           less = (p[SHAPE_POWER] - 1) * logarithm;
 			const PAIR rest = count * (PAIR){exp(less[0]), exp(less[1])};
@@ -317,7 +313,7 @@ bool shape_fit(struct shape *shape, const struct trace *trace, enum estimate_fam
 	                                .last = trace_index(trace, start->peak_s + reach),
 	                                .near_s = start->peak_s,
 	                                .base_s = base,
-	                                .noise_g = fmax(trace->noise_g, SHARP * fabs(start->peak_g)),
+	                                .noise_g = fmax(trace->noise_g, LIMIT_SMALL * fabs(start->peak_g)),
 	                                .limit_first = trace_index(trace, start->limit_from_s)};
 	struct lm_problem lm = {shape_unknowns(family), &problem, normal, KINK_GAIN};
 	struct shape found = {

@@ -29,10 +29,6 @@ enum shape_verdict {
 	SHAPE_REFUSED,
 };
 
-/* Doubtful beyond: the scores, and chi-square in its standard deviations from 1. */
-#define SHAPE_SCORE_MAX 3.0
-#define SHAPE_CHI_MAX 3.3
-
 struct shape_start {
 	double peak_g; /* signed */
 	double peak_s;

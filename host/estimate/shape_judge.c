@@ -4,17 +4,11 @@
 #include <math.h>
 
 #include "host/estimate/gram.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/phasor.h"
 
-#define CHI_REFUSED 6.0
-#define SCORE_REFUSED 5.0
-
-#define LOPSIDED_PART 0.125
-
-/* Of a misfit that no power explains another power takes less than this part; told where chi-square is this
- * many times as far off as what is refused. */
-#define POWER_PART 0.1
-#define GROSS 3.0
+/* Of a misfit one more unknown explains less than this part, or it is what the misfit is. */
+#define EXPLAINS_PART 0.125
 
 /* How much the residual asks for a direction, in standard deviations: number q of the columns, against the
  * unknowns before. */
@@ -39,7 +33,7 @@ bool shape_question(const struct shape_problem *m, const double *p, struct shape
 	gram_start(&gram, asks_power ? size + 2 : size + 1);
 	for (size_t k = under.first; k < under.last; k++, phi += under.step) {
 		double row[GRAM_COMMON], residual = m->trace->value_g[k];
-		double cosine = at.cosine > SHAPE_COSINE_MIN ? at.cosine : SHAPE_COSINE_MIN, sine = at.sine;
+		double cosine = at.cosine > LIMIT_ROUNDING ? at.cosine : LIMIT_ROUNDING, sine = at.sine;
 
 		phasor_turn(&at);
 		if (!trace_good(m->trace, k) || shape_is_censored(m, k))
@@ -70,9 +64,9 @@ enum shape_verdict shape_judge(const struct shape *shape)
 	double chi = (shape->chi_square - 1) / sqrt(2.0 / shape->freedom);
 	double score = fmax(fabs(shape->skew_z), fabs(shape->power_z));
 
-	if (chi > CHI_REFUSED || score > SCORE_REFUSED)
+	if (chi > LIMIT_CHI_REFUSED || score > LIMIT_SIGNIFICANT)
 		return SHAPE_REFUSED;
-	return chi > SHAPE_CHI_MAX || score > SHAPE_SCORE_MAX ? SHAPE_DOUBTFUL : SHAPE_FITS;
+	return chi > LIMIT_CHI || score > LIMIT_AGREE ? SHAPE_DOUBTFUL : SHAPE_FITS;
 }
 
 bool shape_hopeless(const struct shape *shape)
@@ -82,14 +76,14 @@ bool shape_hopeless(const struct shape *shape)
 	if (shape_lopsided(shape))
 		return true;
 	return shape->family != ESTIMATE_FAMILY_SINE_POWER &&
-	       shape->chi_square - 1 > GROSS * CHI_REFUSED * sqrt(2.0 / shape->freedom) &&
-	       shape->power_z * shape->power_z < POWER_PART * misfit;
+	       shape->chi_square - 1 > LIMIT_GROSS * LIMIT_CHI_REFUSED * sqrt(2.0 / shape->freedom) &&
+	       shape->power_z * shape->power_z < EXPLAINS_PART * misfit;
 }
 
 bool shape_lopsided(const struct shape *shape)
 {
 	double square = shape->skew_z * shape->skew_z;
 
-	return square > SCORE_REFUSED * SCORE_REFUSED &&
-	       square > LOPSIDED_PART * shape->chi_square * shape->freedom;
+	return square > LIMIT_SIGNIFICANT * LIMIT_SIGNIFICANT &&
+	       square > EXPLAINS_PART * shape->chi_square * shape->freedom;
 }

@@ -13,8 +13,9 @@
 
 enum { SHAPE_PEAK, SHAPE_TIME, SHAPE_BASE, SHAPE_POWER, SHAPE_UNKNOWNS };
 
-/* At a foot rounding must not lead below zero. */
-#define SHAPE_COSINE_MIN 1e-12
+/* No contact is flatter, none sharper: keeps a fit in range. */
+#define SHAPE_POWER_MIN 0.3
+#define SHAPE_POWER_MAX 8.0
 
 struct shape_problem {
 	const struct trace *trace;

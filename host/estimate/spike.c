@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "host/estimate/limits.h"
 #include "host/estimate/pair.h"
 
 enum {
@@ -11,14 +12,10 @@ enum {
 	REACH = 10, /* how far for them, where some are missing */
 };
 
-/* A spike of one sample, of two, stands off by so many times its neighbours' bends, and sigmas of noise. */
+/* A spike of one sample stands off by so many times its neighbours' bends, and noise; of two, or where some
+ * of the neighbours are missing, by so many. */
 #define ONE_BENDS 2.0
-#define TWO_BENDS 3.0
-#define HOLE_BENDS 4.0
-#define SIGMAS 6.0
-
-/* Of two near each other one reaches this part of the highest around them. So does one at an end. */
-#define EXTREME 0.7
+#define WIDE_BENDS 4.0
 
 /* |second difference| about sample k */
 static double bend(const double *v)
@@ -40,7 +37,7 @@ static bool stands_alone(const double *v, double noise_g)
 {
 	double off = fabs(v[0] - (v[-1] + v[1]) / 2);
 
-	return off > SIGMAS * noise_g && off > ONE_BENDS * bends_around(v, 1) + SIGMAS * noise_g;
+	return off > LIMIT_NOISE * noise_g && off > ONE_BENDS * bends_around(v, 1) + LIMIT_NOISE * noise_g;
 }
 
 /* Two side by side, to the same side. */
@@ -49,7 +46,8 @@ static bool stand_alone(const double *v, double noise_g)
 	double a = v[0] - (2 * v[-1] + v[2]) / 3, b = v[1] - (v[-1] + 2 * v[2]) / 3;
 	double off = fmin(fabs(a), fabs(b));
 
-	return a * b > 0 && off > SIGMAS * noise_g && off > TWO_BENDS * bends_around(v, 2) + SIGMAS * noise_g;
+	return a * b > 0 && off > LIMIT_NOISE * noise_g &&
+	       off > WIDE_BENDS * bends_around(v, 2) + LIMIT_NOISE * noise_g;
 }
 
 static bool all_good(const struct trace *trace, size_t from, size_t until)
@@ -105,7 +103,7 @@ static bool stands_alone_by_hole(const struct trace *trace, size_t k, size_t ski
 {
 	const int m = SIDE;
 	/* Between two spikes there is no hole wide enough for noise to hide a bend. */
-	const double calm = skip == k ? 0 : SIGMAS * noise_g;
+	const double calm = skip == k ? 0 : LIMIT_NOISE * noise_g;
 	struct around a;
 	double span, near, far;
 
@@ -116,7 +114,7 @@ static bool stands_alone_by_hole(const struct trace *trace, size_t k, size_t ski
 	far = fmax(fmax(curvature(&a, m - 3, m - 2, m - 1), curvature(&a, m - 4, m - 3, m - 2)),
 	           fmax(curvature(&a, m + 1, m + 2, m + 3), curvature(&a, m + 2, m + 3, m + 4)));
 	return curvature(&a, m - 1, m, m + 1) * span >
-	       HOLE_BENDS * fmax(fmax(near, far) - calm, 0) * span + 2 * SIGMAS * noise_g;
+	       WIDE_BENDS * fmax(fmax(near, far) - calm, 0) * span + 2 * LIMIT_NOISE * noise_g;
 }
 
 /* How far v[0] stands off the straight line between its neighbours so many samples before and after. */
@@ -128,7 +126,7 @@ static double off_line(const double *v, int before, int after)
 /* Hardly a good sample of its block lies further from zero. */
 static bool is_extreme(const struct trace *trace, size_t k)
 {
-	return fabs(trace->value_g[k]) >= EXTREME * trace_most(trace, k);
+	return fabs(trace->value_g[k]) >= LIMIT_MOST * trace_most(trace, k);
 }
 
 /* Two so near that each is the other's neighbour: how far behind k the second one is; 0 if there is none.
@@ -136,7 +134,7 @@ static bool is_extreme(const struct trace *trace, size_t k)
  * harm, and may be a vibration. */
 static size_t second_spike(const struct trace *trace, size_t k, double noise_g)
 {
-	const double *v = trace->value_g + k, least = 2 * SIGMAS * noise_g;
+	const double *v = trace->value_g + k, least = 2 * LIMIT_NOISE * noise_g;
 
 	/* Nearly always nothing stands off. */
 	if (!(fabs(off_line(v, 1, 1)) > least) && !(fabs(off_line(v, 1, 2)) > least))
@@ -196,7 +194,7 @@ static bool mark_in(struct trace *trace, size_t i, double noise_g)
 	const size_t until =
 	        from + TRACE_BLOCK + SIDE < trace->count ? from + TRACE_BLOCK : trace->count - SIDE;
 	const bool whole = is_whole(trace, i - 1) && is_whole(trace, i) && is_whole(trace, i + 1);
-	const double *value = trace->value_g, calm_g = SIGMAS * noise_g;
+	const double *value = trace->value_g, calm_g = LIMIT_NOISE * noise_g;
 	bool marked = false;
 
 	for (size_t k = from < SIDE ? SIDE : from; k < until; k++) {
@@ -240,7 +238,7 @@ static bool stands_at_end(const struct trace *trace, size_t k, double noise_g)
 		around = fmax(around, fabs(v[-in] - v[-2 * in] - bridge));
 	for (ptrdiff_t away = 2; away <= SIDE; away++)
 		around = fmax(around, bend(v + away * in));
-	return bend(v) / 2 > HOLE_BENDS * around + 2 * SIGMAS * noise_g;
+	return bend(v) / 2 > WIDE_BENDS * around + 2 * LIMIT_NOISE * noise_g;
 }
 
 /* All but the very first and last: a pulse that is cut off there looks the same. */
@@ -270,7 +268,7 @@ bool spike_mark(struct trace *trace, double noise_g)
 	for (size_t i = 0; i < trace_blocks(trace); i++) {
 		const struct trace_block *block = &trace->block[i];
 
-		if (block->high_g - block->low_g > SIGMAS * noise_g)
+		if (block->high_g - block->low_g > LIMIT_NOISE * noise_g)
 			marked |= mark_in(trace, i, noise_g);
 	}
 	marked |= mark_ends(trace, noise_g);

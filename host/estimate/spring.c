@@ -6,24 +6,17 @@
 
 #include "common/units.h"
 #include "host/estimate/gram.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/modes.h"
 #include "host/estimate/pair.h"
-
-/* A difference for a derivative: this part of the unknown, or of the least it is reckoned as. */
-#define DIFFERENCE 1e-6
-#define LEAST_G 1e-3
-#define LEAST_B 1e-3
 
 /* Q, of a swing as large as the start's: beyond is no spring any more. */
 #define SOFT_MAX 1e4
 #define B_MIN -0.9
 #define B_MAX 10.0
 
-/* Of spring_at's steps and those of the first cycles. These are as good as done this near, in rad, and would
- * take no spring this many times as long as a small swing. */
+/* Of spring_at's steps and those of the first cycles. */
 #define STEPS_PER_CYCLE 64.0
-#define ANGLE_NEAR 1e-12
-#define SLOWEST 10.0
 
 enum { PLACE_Q = MODES_LAW, PLACE_B = MODES_LAW + 1, PAIRS = (SPRING_SIZE + 1) / 2 };
 
@@ -98,12 +91,13 @@ static double turned(const struct state *from, const struct state *to)
 double spring_mean_hz(const double *p, unsigned cycles)
 {
 	const double turns = 2 * UNITS_PI * cycles, longest = 2 * UNITS_PI / STEPS_PER_CYCLE;
-	const unsigned most = (unsigned)(SLOWEST * STEPS_PER_CYCLE) * cycles;
+	/* No spring takes longer. */
+	const unsigned most = (unsigned)(B_MAX * STEPS_PER_CYCLE) * cycles;
 	struct spring s = spring_of(p);
 	double left = turns, time = 0;
 
 	/* What is left is a step too far or too short, each time a smaller one. */
-	for (unsigned i = 0; i < most && fabs(left) > ANGLE_NEAR; i++) {
+	for (unsigned i = 0; i < most && fabs(left) > LIMIT_ROUNDING; i++) {
 		const struct state before = s.at;
 		double step = fmin(longest, left);
 
@@ -126,14 +120,15 @@ static bool possible(const double *p)
 static void start_all(struct spring *s, double *difference, const double *p, const struct series *series)
 {
 	const double swing = hypot(p[MODES_COSINE], p[MODES_SINE]);
-	const double least[SPRING_SIZE] = {1, 0, 0, LEAST_G, LEAST_G, DIFFERENCE / (swing * swing), LEAST_B};
+	const double least[SPRING_SIZE] = {
+	        1, 0, 0, LIMIT_LEAST, LIMIT_LEAST, LIMIT_SMALL / (swing * swing), LIMIT_LEAST};
 	const double sample_s = series->step_s / series->block;
 
 	for (unsigned i = 0; i < SPRING_SIZE; i++) {
 		double q[SPRING_SIZE];
 
 		memcpy(q, p, sizeof(q));
-		difference[i] = DIFFERENCE * fmax(fabs(p[i]), least[i]);
+		difference[i] = LIMIT_SMALL * fmax(fabs(p[i]), least[i]);
 		if (i != MODES_OFFSET)
 			q[i] += difference[i];
 		s[i] = spring_of(q);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "host/estimate/clip.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/pair.h"
 
 /* Beyond any sensor; keeps squares and sums far from overflow. */
@@ -200,7 +201,7 @@ size_t trace_reaches(const struct trace *trace, size_t k, size_t last, double le
 
 size_t trace_index(const struct trace *trace, double time_s)
 {
-	double k = ceil((time_s - trace->start_s) * trace->rate_hz - 1e-6);
+	double k = ceil((time_s - trace->start_s) * trace->rate_hz - LIMIT_SMALL);
 
 	if (!(k > 0))
 		return 0;
