@@ -4,6 +4,8 @@
 #include "common/error.h"
 #include "common/memory.h"
 
+enum { RESET = 1, AHEAD = 2, BEHIND_SHIFT = 12, ID_MASK = 0x0FFF };
+
 static uint8_t *put16(uint8_t *p, uint16_t v)
 {
 	p[0] = (uint8_t)v;
@@ -35,7 +37,7 @@ size_t sensorbus_put_request(uint8_t *out, const struct sensorbus_request *reque
 	p = put16(p, request->outputs);
 	*p++ = request->edges;
 	*p++ = request->frames;
-	*p++ = request->reset;
+	*p++ = (uint8_t)((request->reset ? RESET : 0) | (request->ahead ? AHEAD : 0));
 	*p++ = request->kept;
 	for (int i = 0; i < SENSORBUS_OUTPUTS; i++)
 		p = put32(p, request->edge_us[i]);
@@ -51,7 +53,8 @@ size_t sensorbus_get_request(const uint8_t *in, struct sensorbus_request *reques
 	        .outputs = get16(in + 6),
 	        .edges = in[8],
 	        .frames = in[9],
-	        .reset = in[10],
+	        .reset = in[10] & RESET,
+	        .ahead = (in[10] & AHEAD) != 0,
 	        .kept = in[11],
 	};
 	for (int i = 0; i < SENSORBUS_OUTPUTS; i++)
@@ -71,7 +74,7 @@ size_t sensorbus_put_answer(uint8_t *out, const struct sensorbus_answer *answer)
 	for (int i = 0; i < SENSORBUS_CAPTURES; i++)
 		p = put32(p, answer->capture_us[i]);
 	*p++ = answer->ready;
-	*p++ = answer->stop;
+	*p++ = answer->then;
 	p = put16(p, answer->bus_errors);
 	*p++ = answer->bus_state;
 	*p++ = answer->tx_blocked;
@@ -88,7 +91,7 @@ size_t sensorbus_get_answer(const uint8_t *in, struct sensorbus_answer *answer)
 	        .captures = in[14],
 	        .frames = in[15],
 	        .ready = in[28],
-	        .stop = in[29],
+	        .then = in[29],
 	        .bus_errors = get16(in + 30),
 	        .bus_state = in[32],
 	        .tx_blocked = in[33],
@@ -103,9 +106,9 @@ size_t sensorbus_get_answer(const uint8_t *in, struct sensorbus_answer *answer)
 	return SENSORBUS_ANSWER_BYTES;
 }
 
-size_t sensorbus_put_frame(uint8_t *out, const struct frame *frame)
+size_t sensorbus_put_frame(uint8_t *out, const struct frame *frame, unsigned behind)
 {
-	uint8_t *p = put16(out, (uint16_t)frame->id);
+	uint8_t *p = put16(out, (uint16_t)((frame->id & ID_MASK) | behind << BEHIND_SHIFT));
 
 	*p++ = frame->flags;
 	*p++ = frame->length;
@@ -113,12 +116,13 @@ size_t sensorbus_put_frame(uint8_t *out, const struct frame *frame)
 	return 4u + frame->length;
 }
 
-int sensorbus_frame_head(const uint8_t *in, struct frame *frame)
+int sensorbus_frame_head(const uint8_t *in, struct frame *frame, unsigned *behind)
 {
 	if (in[3] > FRAME_DATA_MAX)
 		return DT_E_LENGTH;
 	frame->time_us = 0;
-	frame->id = get16(in);
+	frame->id = get16(in) & ID_MASK;
+	*behind = get16(in) >> BEHIND_SHIFT;
 	frame->flags = in[2];
 	frame->length = in[3];
 	return in[3];

@@ -86,21 +86,54 @@ static void each_ms(struct bench *bench)
 		watch_end(bench);
 }
 
-static void handle(struct bench *bench, const struct sensorbus_request *request, const struct frame *sent,
+/* At the instants at which they would have come, each with a request of its own. */
+static void take_frames(struct bench *bench, const struct sensorbus_request *request, struct frame *sent,
+                        int64_t asked_grid)
+{
+	int64_t now_grid = bench->now_grid;
+
+	for (unsigned i = 0; i < request->frames; i++) {
+		bench->now_grid = bench_instant_after(asked_grid, 1 + (unsigned)sent[i].time_us, now_grid);
+		sent[i].time_us = 0;
+		bench_from_firmware(bench, &sent[i]);
+	}
+	bench->now_grid = now_grid;
+}
+
+static void handle(struct bench *bench, const struct sensorbus_request *request, struct frame *sent,
                    struct sensorbus_answer *answer, struct frame *received)
 {
-	int64_t before_ms = bench_now_ms(bench);
+	int64_t before_ms = bench_now_ms(bench), asked_grid = bench->asked_grid;
 
 	if (!bench_plant_move(bench, request, answer))
 		return;
-	for (unsigned i = 0; i < request->frames; i++)
-		bench_from_firmware(bench, &sent[i]);
+	bench->asked_grid = bench->now_grid;
+	take_frames(bench, request, sent, asked_grid);
 	if (!bench->running || bench_now_ms(bench) != before_ms)
 		each_ms(bench);
 	bench->running = true;
 	bench->kept = request->kept;
 	bench_to_firmware(bench, answer, received);
 	bench_events_answer(bench, answer);
+}
+
+/* The rest of the tick as long as nothing comes that the firmware could act on; how many answers in all. */
+static unsigned answer_ahead(struct bench *bench, struct sensorbus_request *request,
+                             struct sensorbus_answer *answers)
+{
+	unsigned count = 1;
+
+	if (!request->ahead || answers[0].frames > 0 || ring_fill(&bench->queue) > 0)
+		return count;
+	while (!bench->stop && answers[count - 1].captures == 0 && bench_plant_next(bench, request)) {
+		answers[count] = (struct sensorbus_answer){0};
+		if (!bench_plant_move(bench, request, &answers[count]))
+			break;
+		bench_events_answer(bench, &answers[count]);
+		answers[count - 1].then = SENSORBUS_MORE;
+		count++;
+	}
+	return count;
 }
 
 static void tell_ready(struct bench *bench)
@@ -150,8 +183,9 @@ static void serve(struct bench *bench)
 	char message[TARGET_MESSAGE_MAX];
 
 	for (;;) {
-		struct sensorbus_answer answer = {0};
+		struct sensorbus_answer answers[SENSORBUS_ANSWERS_MAX];
 		struct sensorbus_request request;
+		unsigned count = 1;
 		int result = target_receive(bench->target, &request, sent, message);
 
 		if (result == 0) { /* told to stop; the firmware is told with its next answer */
@@ -160,9 +194,13 @@ static void serve(struct bench *bench)
 		}
 		if (result == 1) {
 			tell_ready(bench);
-			handle(bench, &request, sent, &answer, received);
-			answer.stop = bench->stop || bench->restart;
-			result = target_answer(bench->target, &answer, received, message);
+			answers[0] = (struct sensorbus_answer){0};
+			handle(bench, &request, sent, answers, received);
+			if (!bench->stop && !bench->restart)
+				count = answer_ahead(bench, &request, answers);
+			if (bench->stop || bench->restart)
+				answers[count - 1].then = SENSORBUS_STOP;
+			result = target_answer(bench->target, answers, count, received, message);
 		}
 		if (result < 0)
 			bench_fail(bench, BENCH_LINK, "%s, after %.3f s of virtual time", message,

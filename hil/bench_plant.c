@@ -4,7 +4,33 @@
 enum {
 	LIFT_AFTER_MS = 2000, /* how long the technician takes once the tower is safe ... */
 	LIFT_SOON_MS = 100,   /* ... and in a scenario */
+	GRID_X = BENCH_GRID_PER_MS / WIRE_X_PER_TICK,
+	GRID_YZ = BENCH_GRID_PER_MS / WIRE_YZ_PER_TICK,
 };
+
+/* ---- sample instants ---- */
+
+int64_t bench_instant_after(int64_t grid, unsigned instants, int64_t limit)
+{
+	for (; instants > 0 && grid < limit; instants--)
+		do
+			grid++;
+		while (grid % GRID_X != 0 && grid % GRID_YZ != 0);
+	return grid < limit ? grid : limit;
+}
+
+bool bench_plant_next(const struct bench *bench, struct sensorbus_request *request)
+{
+	int64_t grid = bench_instant_after(bench->now_grid, 1, INT64_MAX) % BENCH_GRID_PER_MS;
+
+	request->group =
+	        (uint8_t)((grid % GRID_X == 0 ? SENSORBUS_X : 0) | (grid % GRID_YZ == 0 ? SENSORBUS_YZ : 0));
+	request->index = (uint8_t)(grid / (grid % GRID_X == 0 ? GRID_X : GRID_YZ));
+	request->edges = request->frames = request->reset = 0;
+	return grid != 0;
+}
+
+/* ---- the plant ---- */
 
 /* False when the request makes no sense. */
 static bool take_time(struct bench *bench, const struct sensorbus_request *request)

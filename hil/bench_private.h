@@ -47,10 +47,11 @@ struct bench {
 	} tape;
 	uint16_t bus_errors; /* error reports of the host's link since the answer before */
 
-	int64_t base_grid; /* virtual time of the firmware's latest reset, 1/70 ms */
-	int64_t now_grid;  /* of the present request */
-	double tower_rate; /* the tower's seconds in one of the firmware's */
-	bool running;      /* a request came */
+	int64_t base_grid;  /* virtual time of the firmware's latest reset, 1/70 ms */
+	int64_t now_grid;   /* of the present answer ... */
+	int64_t asked_grid; /* ... and of the latest request */
+	double tower_rate;  /* the tower's seconds in one of the firmware's */
+	bool running;       /* a request came */
 	uint16_t outputs;
 	uint8_t kept;    /* what the firmware keeps over a reset */
 	uint64_t random; /* for its port_random */
@@ -122,6 +123,13 @@ static inline double bench_tower_s(const struct bench *bench, int64_t grid)
 /* Takes over the request's instant and outputs and samples there; false when the request makes no sense. */
 bool bench_plant_move(struct bench *bench, const struct sensorbus_request *request,
                       struct sensorbus_answer *answer);
+
+/* The request that the next instant of this tick would bring, without edges or frames; false after the last.
+ */
+bool bench_plant_next(const struct bench *bench, struct sensorbus_request *request);
+
+/* So many sample instants after grid, and no later than limit. */
+int64_t bench_instant_after(int64_t grid, unsigned instants, int64_t limit);
 
 /* Each ms: the technician. */
 void bench_plant_attend(struct bench *bench);

@@ -266,8 +266,10 @@ static int bytes_needed(const struct target *target)
 		return DT_E_FORMAT;
 	for (unsigned i = 0; i < request.frames; i++) {
 		struct frame frame;
-		int length =
-		        needed + 4 <= target->fill ? sensorbus_frame_head(target->input + needed, &frame) : 0;
+		unsigned behind;
+		int length = needed + 4 <= target->fill
+		                     ? sensorbus_frame_head(target->input + needed, &frame, &behind)
+		                     : 0;
 
 		if (length < 0)
 			return DT_E_FORMAT;
@@ -283,8 +285,11 @@ static void unpack(struct target *target, struct sensorbus_request *request, str
 	const uint8_t *p = target->input + sensorbus_get_request(target->input, request);
 
 	for (unsigned i = 0; i < request->frames; i++) {
+		unsigned behind;
+
 		frames[i] = (struct frame){0};
-		(void)sensorbus_frame_head(p, &frames[i]);
+		(void)sensorbus_frame_head(p, &frames[i], &behind);
+		frames[i].time_us = behind;
 		memcpy(frames[i].data, p + 4, frames[i].length);
 		p += 4u + frames[i].length;
 	}
@@ -305,7 +310,7 @@ static int say_silent(struct target *target, char message[TARGET_MESSAGE_MAX])
 {
 	kill_now(target);
 	snprintf(message, TARGET_MESSAGE_MAX,
-	         "the firmware asked for no sample for %d s, expected 17 a millisecond; it was killed",
+	         "the firmware asked for no sample for %d s, expected two times a millisecond; it was killed",
 	         SILENCE_MS / 1000);
 	return DT_E_TIMEOUT;
 }
@@ -366,14 +371,16 @@ int target_receive(struct target *target, struct sensorbus_request *request,
 	return 1;
 }
 
-int target_answer(struct target *target, const struct sensorbus_answer *answer, const struct frame *frames,
-                  char message[TARGET_MESSAGE_MAX])
+int target_answer(struct target *target, const struct sensorbus_answer *answers, unsigned count,
+                  const struct frame *frames, char message[TARGET_MESSAGE_MAX])
 {
 	uint8_t output[SENSORBUS_MESSAGE_MAX];
-	size_t length = sensorbus_put_answer(output, answer);
+	size_t length = 0;
 
-	for (unsigned i = 0; i < answer->frames; i++)
-		length += sensorbus_put_frame(output + length, &frames[i]);
+	for (unsigned i = 0; i < count; i++)
+		length += sensorbus_put_answer(output + length, &answers[i]);
+	for (unsigned i = 0; i < answers[count - 1].frames; i++)
+		length += sensorbus_put_frame(output + length, &frames[i], 0);
 	/* Shorter than PIPE_BUF, so it is written whole; this end is a reader too, so it never breaks. */
 	if (write(target->answer_fd, output, length) == (ssize_t)length)
 		return 0;

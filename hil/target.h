@@ -31,13 +31,14 @@ struct target_options {
  * not 0. NULL on error. */
 struct target *target_start(const struct target_options *options, char message[TARGET_MESSAGE_MAX]);
 
-/* Waits for the next request. 1 with it and its frames, 0 when a signal asks to stop, DT_E_TIMEOUT after
- * 5 s without one, DT_E_CLOSED when the firmware is gone, DT_E_FORMAT for bytes that are no request. */
+/* Waits for the next request. 1 with it and its frames, whose time_us is how many answers ahead the firmware
+ * had taken when it sent them; 0 when a signal asks to stop, DT_E_TIMEOUT after 5 s without one, DT_E_CLOSED
+ * when the firmware is gone, DT_E_FORMAT for bytes that are no request. */
 DT_MUST_USE int target_receive(struct target *target, struct sensorbus_request *request,
                                struct frame frames[SENSORBUS_FRAMES_MAX], char message[TARGET_MESSAGE_MAX]);
 
-/* answer->frames of frames go with it. 0 or DT_E_SYSTEM. */
-DT_MUST_USE int target_answer(struct target *target, const struct sensorbus_answer *answer,
+/* count answers, the last of them with its frames. 0 or DT_E_SYSTEM. */
+DT_MUST_USE int target_answer(struct target *target, const struct sensorbus_answer *answers, unsigned count,
                               const struct frame *frames, char message[TARGET_MESSAGE_MAX]);
 
 /* Waits for the firmware to end by itself, after an answer with stop or its own death; one that does not

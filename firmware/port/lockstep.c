@@ -9,6 +9,7 @@
 enum {
 	TICK_US = 1000,
 	RECEIVED = 32, /* what an answer brings at most */
+	ROOM = 8,      /* frames in a request that still leaves room for those of the instants ahead */
 	KEEPER = 2,    /* the capture behind those of the gates */
 };
 
@@ -43,7 +44,8 @@ static struct machine {
 	uint32_t edge_us[SENSORBUS_OUTPUTS]; /* ... and when */
 	uint8_t off_planned;                 /* outputs that port_off_at will switch ... */
 	uint32_t off_us[SENSORBUS_OUTPUTS];  /* ... and when */
-	bool first_request, reset_wanted, bus_classic, hung;
+	bool first_request, reset_wanted, bus_classic, hung, ahead;
+	unsigned behind; /* answers ahead that were taken since the request */
 	enum port_bus bus;
 	bool tx_blocked;
 	uint32_t bus_errors, frames_lost;
@@ -56,6 +58,8 @@ static struct machine {
 	/* As the frames are sent, so they wait: each is written once. */
 	uint8_t request[SENSORBUS_REQUEST_BYTES + SENSORBUS_FRAMES_MAX * SENSORBUS_FRAME_BYTES_MAX];
 	struct ring received;
+	size_t come, taken; /* bytes of input[] */
+	uint8_t input[SENSORBUS_MESSAGE_MAX];
 } machine;
 
 /* app_poll takes fewer frames than an answer may bring: the others wait here for the next. */
@@ -175,7 +179,8 @@ static int take_frame(const struct frame *frame)
 {
 	if (!lockstep_can_open() || machine.sent_count == SENSORBUS_FRAMES_MAX)
 		return DT_E_FULL;
-	machine.request_bytes += sensorbus_put_frame(machine.request + machine.request_bytes, frame);
+	machine.request_bytes +=
+	        sensorbus_put_frame(machine.request + machine.request_bytes, frame, machine.behind);
 	machine.sent_count++;
 	return 0;
 }
@@ -249,6 +254,21 @@ static void set_time(const struct instant *instant)
 	machine.now_us = floor_us + (whole ? 0 : 1);
 }
 
+/* Nothing that main or control could do before the next tick changes an output: it has taken all frames, and
+ * no edge is planned before. What it sends meanwhile must find room. */
+static bool ahead_is_welcome(const struct instant *instant)
+{
+	uint32_t next_tick_us = (machine.tick_ms + 1) * TICK_US;
+
+	if (!machine.ahead || instant->index == 0 || ring_fill(&machine.received) > 0 ||
+	    machine.sent_count > ROOM)
+		return false;
+	for (unsigned i = 0; i < SENSORBUS_OUTPUTS; i++)
+		if ((machine.off_planned & 1u << i) && (int32_t)(machine.off_us[i] - next_tick_us) <= 0)
+			return false;
+	return true;
+}
+
 static int send_request(const struct instant *instant)
 {
 	struct sensorbus_request request = {
@@ -259,6 +279,7 @@ static int send_request(const struct instant *instant)
 	        .edges = machine.edges,
 	        .frames = (uint8_t)machine.sent_count,
 	        .reset = machine.first_request,
+	        .ahead = ahead_is_welcome(instant),
 	        .kept = machine.kept,
 	};
 	int result;
@@ -270,20 +291,38 @@ static int send_request(const struct instant *instant)
 	machine.sent_count = 0;
 	machine.edges = 0;
 	machine.first_request = false;
+	machine.behind = 0;
+	machine.come = machine.taken = 0;
 	return result;
+}
+
+/* The next bytes of what was answered, read as far as they are not here. */
+static int take(void *bytes, size_t count)
+{
+	int result = 0;
+
+	while (result == 0 && machine.come - machine.taken < count)
+		result = lockstep_read(machine.input + machine.come, sizeof(machine.input) - machine.come,
+		                       &machine.come);
+	if (result != 0)
+		return result;
+	memcpy(bytes, machine.input + machine.taken, count);
+	machine.taken += count;
+	return 0;
 }
 
 static int read_frame(void)
 {
 	struct frame frame;
 	uint8_t head[4];
-	int result = lockstep_read(head, sizeof(head));
+	unsigned behind;
+	int result = take(head, sizeof(head));
 
 	if (result != 0)
 		return result;
-	result = sensorbus_frame_head(head, &frame);
+	result = sensorbus_frame_head(head, &frame, &behind);
 	if (result > 0)
-		result = lockstep_read(frame.data, (size_t)result);
+		result = take(frame.data, (size_t)result);
 	if (result == 0 && ring_put(&machine.received, &frame) != 0)
 		machine.frames_lost++;
 	return result;
@@ -319,7 +358,7 @@ static int read_answer(void)
 {
 	uint8_t bytes[SENSORBUS_ANSWER_BYTES];
 	struct sensorbus_answer *answer = &machine.answer;
-	int result = lockstep_read(bytes, sizeof(bytes));
+	int result = take(bytes, sizeof(bytes));
 
 	if (result != 0)
 		return result;
@@ -336,16 +375,19 @@ static int read_answer(void)
 	machine.bus = worse(bus_of(answer->bus_state), link_bus);
 	machine.tx_blocked = answer->tx_blocked != 0;
 	result = read_frames(answer->frames);
-	return result == 0 && answer->stop ? LOCKSTEP_GONE : result;
+	return result == 0 && answer->then == SENSORBUS_STOP ? LOCKSTEP_GONE : result;
 }
 
 int lockstep_exchange(unsigned instant)
 {
-	int result;
+	int result = 0;
 
 	at = instant;
 	set_time(&instants[instant]);
-	result = send_request(&instants[instant]);
+	if (machine.answer.then == SENSORBUS_MORE)
+		machine.behind++;
+	else
+		result = send_request(&instants[instant]);
 	if (instant == LOCKSTEP_INSTANTS - 1)
 		machine.tick_ms++;
 	return result == 0 ? read_answer() : result;
@@ -389,7 +431,7 @@ void lockstep_control(void)
 	app_on_tick();
 }
 
-void lockstep_boot(enum port_reset cause, uint8_t kept, bool bus_classic)
+void lockstep_boot(enum port_reset cause, uint8_t kept, bool bus_classic, bool ahead)
 {
 	memset(&machine, 0, sizeof(machine));
 	machine.outputs = WIRE_IO_MAGNET_HOLD; /* as the drivers hold it in reset */
@@ -397,6 +439,7 @@ void lockstep_boot(enum port_reset cause, uint8_t kept, bool bus_classic)
 	machine.request_bytes = SENSORBUS_REQUEST_BYTES;
 	machine.first_request = true;
 	machine.bus_classic = bus_classic;
+	machine.ahead = ahead;
 	machine.kept = machine.kept_before = kept;
 	app_init(cause);
 }

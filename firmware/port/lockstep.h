@@ -6,9 +6,9 @@
  * have in common. lockstep.c also defines the functions of port.h that deal with outputs, time, the state of
  * the bus, what is kept over a reset, and port_reset.
  *
- * Time is virtual: at each of the 16 sample instants of a millisecond one request and its answer; all that
- * the core then does, it does at that instant, rounded up to the next whole us. An output edge that is
- * planned for a time carries that us, whenever the next request goes.
+ * Time is virtual: at each of the 16 sample instants of a millisecond one answer, and a request where it has
+ * not come ahead; all that the core then does, it does at that instant, rounded up to the next whole us. An
+ * output edge that is planned for a time carries that us, whenever the next request goes.
  *
  * Context: lockstep_exchange and lockstep_deliver are the sample interrupts', lockstep_control the control
  * interrupt's, the rest main's. The functions of port.h exclude interrupts where they must. One instance,
@@ -27,11 +27,12 @@ enum {
 /* When the instant's samples are due, us after the tick, rounded down. */
 unsigned lockstep_instant_us(unsigned instant);
 
-/* After a reset, interrupts off: a new machine, and app_init. kept: what port_kept gives. */
-void lockstep_boot(enum port_reset cause, uint8_t kept, bool bus_classic);
+/* After a reset, interrupts off: a new machine, and app_init. kept: what port_kept gives. ahead: main runs
+ * once between any two instants, and frames come with answers only; answers then may come ahead. */
+void lockstep_boot(enum port_reset cause, uint8_t kept, bool bus_classic, bool ahead);
 
-/* Request and answer; 0, LOCKSTEP_GONE or DT_E_*. Then, if 0, the samples go to the core; true asks for the
- * control interrupt, which brings it what else came. */
+/* The answer for the instant; 0, LOCKSTEP_GONE or DT_E_*. Then, if 0, the samples go to the core; true asks
+ * for the control interrupt, which brings it what else came. */
 DT_MUST_USE int lockstep_exchange(unsigned instant);
 DT_MUST_USE bool lockstep_deliver(void);
 void lockstep_control(void);
@@ -56,9 +57,10 @@ DT_MUST_USE int lockstep_can_receive(struct frame *frame);
 bool lockstep_can_open(void);
 void lockstep_can_link(uint32_t errors, enum port_bus state);
 
-/* From the port, the two pipes: all bytes; 0, LOCKSTEP_GONE or DT_E_*. */
+/* From the port, the two pipes: all bytes are written; at least one is read and added to *count. 0,
+ * LOCKSTEP_GONE or DT_E_*. */
 DT_MUST_USE int lockstep_write(const void *bytes, size_t count);
-DT_MUST_USE int lockstep_read(void *bytes, size_t count);
+DT_MUST_USE int lockstep_read(void *bytes, size_t size, size_t *count);
 
 /* From the port: no interrupt from here on; the argument of lockstep_release, which ends it. May be nested.
  */

@@ -14,13 +14,14 @@
 static void request_bytes(void **state)
 {
 	static const uint8_t bytes[SENSORBUS_REQUEST_BYTES] = {
-	        0x78, 0x56, 0x34, 0x12, 3, 0, 0x0B, 0x00, 2, 1, 1, 6, 0, 0, 0, 0, 0xD2, 0x04, 0, 0};
+	        0x78, 0x56, 0x34, 0x12, 3, 0, 0x0B, 0x00, 2, 1, 3, 6, 0, 0, 0, 0, 0xD2, 0x04, 0, 0};
 	struct sensorbus_request request = {.tick_ms = 0x12345678,
 	                                    .group = SENSORBUS_X | SENSORBUS_YZ,
 	                                    .outputs = 0x000B,
 	                                    .edges = 2,
 	                                    .frames = 1,
 	                                    .reset = 1,
+	                                    .ahead = 1,
 	                                    .kept = 6,
 	                                    .edge_us = {0, 1234}};
 	struct sensorbus_request back;
@@ -54,7 +55,7 @@ static void answer_bytes(void **state)
 	assert_int_equal(back.capture_us[1], 123456);
 	assert_int_equal(back.capture_us[2], 0x01000007);
 	assert_int_equal(back.ready, 3);
-	assert_int_equal(back.stop, 1);
+	assert_int_equal(back.then, SENSORBUS_STOP);
 	assert_int_equal(back.bus_errors, 9);
 	assert_int_equal(back.bus_state, SENSORBUS_BUS_OFF);
 	assert_int_equal(back.tx_blocked, 1);
@@ -67,19 +68,21 @@ static void answer_bytes(void **state)
 
 static void frame_bytes(void **state)
 {
-	static const uint8_t bytes[] = {0x01, 0x02, 0x03, 3, 9, 8, 7};
+	static const uint8_t bytes[] = {0x01, 0xE2, 0x03, 3, 9, 8, 7};
 	static const uint8_t too_long[] = {0x01, 0x02, 0x03, 65};
 	struct frame frame = {.id = 0x201, .flags = FRAME_FD | FRAME_BRS, .length = 3, .data = {9, 8, 7}};
 	struct frame back = {0};
 	uint8_t out[SENSORBUS_FRAME_BYTES_MAX];
+	unsigned behind = 0;
 
 	(void)state;
-	assert_int_equal(sensorbus_put_frame(out, &frame), sizeof(bytes));
+	assert_int_equal(sensorbus_put_frame(out, &frame, 14), sizeof(bytes));
 	assert_memory_equal(out, bytes, sizeof(bytes));
-	assert_int_equal(sensorbus_frame_head(bytes, &back), 3);
+	assert_int_equal(sensorbus_frame_head(bytes, &back, &behind), 3);
 	assert_int_equal(back.id, 0x201);
+	assert_int_equal(behind, 14);
 	assert_int_equal(back.flags, FRAME_FD | FRAME_BRS);
-	assert_int_equal(sensorbus_frame_head(too_long, &back), DT_E_LENGTH);
+	assert_int_equal(sensorbus_frame_head(too_long, &back, &behind), DT_E_LENGTH);
 }
 
 int main(void)

@@ -139,20 +139,16 @@ int lockstep_write(const void *bytes, size_t count)
 	return 0;
 }
 
-int lockstep_read(void *bytes, size_t count)
+int lockstep_read(void *bytes, size_t size, size_t *count)
 {
-	uint8_t *p = bytes;
+	ssize_t done;
 
-	while (count > 0) {
-		ssize_t done = read(port.answer_fd, p, count);
-
-		if (done < 0 && errno == EINTR)
-			continue;
-		if (done <= 0)
-			return done == 0 ? LOCKSTEP_GONE : DT_E_SYSTEM;
-		p += done;
-		count -= (size_t)done;
-	}
+	do
+		done = read(port.answer_fd, bytes, size);
+	while (done < 0 && errno == EINTR);
+	if (done <= 0)
+		return done == 0 ? LOCKSTEP_GONE : DT_E_SYSTEM;
+	*count += (size_t)done;
 	return 0;
 }
 
@@ -214,7 +210,7 @@ static void boot(enum port_reset cause, uint8_t kept, const struct posix_options
 {
 	port.kicked_us = 0;
 	port.bitten = false;
-	lockstep_boot(cause, kept, options->classic);
+	lockstep_boot(cause, kept, options->classic, port.link == NULL);
 }
 
 static int run(const struct posix_options *options)

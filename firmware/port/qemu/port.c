@@ -164,19 +164,12 @@ int lockstep_write(const void *bytes, size_t count)
 	return semihost_write(kept.request, bytes, count) == 0 ? 0 : LOCKSTEP_GONE;
 }
 
-int lockstep_read(void *bytes, size_t count)
+int lockstep_read(void *bytes, size_t size, size_t *count)
 {
-	unsigned char *p = bytes;
+	size_t left = semihost_read(kept.answer, bytes, size);
 
-	while (count > 0) {
-		size_t left = semihost_read(kept.answer, p, count);
-
-		if (left == count)
-			return LOCKSTEP_GONE;
-		p += count - left;
-		count = left;
-	}
-	return 0;
+	*count += size - left;
+	return left < size ? 0 : LOCKSTEP_GONE;
 }
 
 static int open_pipe(const char *suffix, int mode)
@@ -462,7 +455,7 @@ _Noreturn void board_main(void)
 		kept.cause = options.cause;
 		kept.byte = options.kept;
 	}
-	lockstep_boot(kept.cause, kept.byte, options.classic);
+	lockstep_boot(kept.cause, kept.byte, options.classic, !options.preempt);
 	start_clocks();
 	for (;;) {
 		wait_for_sample();
