@@ -5,8 +5,8 @@ PACKAGES_TEST += python3
 
 # ---- mutants ------------------------------------------------------------------------------------------
 
-MUTATED_C = firmware/sequence.c firmware/command.c firmware/stream.c firmware/capture.c common/wire.c \
-	common/segment.c host/record/join.c
+MUTATED_C = $(addprefix firmware/,sequence.c command.c stream.c capture.c measure.c hosts.c) \
+	common/wire.c common/segment.c host/record/join.c
 MUTATED_O = $(MUTATED_C:%.c=$(BUILD)/mutate/%.o)
 # The unit tests that come near them. Not test_port_faults: thousands of drops for each mutant.
 MUTATED_BY = sequence hosts input measure command stream capture wire segment join acquire health parameter

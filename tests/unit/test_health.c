@@ -21,6 +21,7 @@ static int begin(void **state)
 	(void)state;
 	memset(counters, 0, sizeof(counters));
 	parameters_init(&parameters);
+	memset(&health, 0xA5, sizeof(health));
 	health_init(&health, &parameters, counters);
 	return 0;
 }
@@ -64,8 +65,7 @@ static void sensors_are_red_until_seen(void **state)
 	(void)state;
 	for (unsigned t = 0; t < 99; t++)
 		health_samples(&health, &tick);
-	assert_true(checks_of(FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S1);
-	assert_true(checks_of(FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S2);
+	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), WIRE_CHECK_SENSOR_S1 | WIRE_CHECK_SENSOR_S2);
 	health_samples(&health, &tick);
 	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), 0);
 }
@@ -103,6 +103,30 @@ static void absent_samples_make_a_sensor_red(void **state)
 	}
 }
 
+/* Half of them at least, of each channel: 350 of an X, 500 of a Y or Z. */
+static void half_of_the_samples_are_enough(void **state)
+{
+	(void)state;
+	for (unsigned channel = 0; channel < 6; channel++)
+		for (unsigned short_of = 0; short_of < 2; short_of++) {
+			unsigned per_tick = channel % 3 == 0 ? 7 : 10, left = 50 * per_tick - short_of;
+
+			for (unsigned t = 0; t < 100; t++) {
+				struct acquire_tick tick = {0};
+
+				for (unsigned k = 0; k < per_tick; k++)
+					if (left > 0)
+						left--;
+					else
+						*at(&tick, channel, k) = WIRE_SAMPLE_NOT_TAKEN;
+				health_samples(&health, &tick);
+			}
+			assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), short_of == 0 ? 0
+			                                              : channel < 3 ? WIRE_CHECK_SENSOR_S1
+			                                                            : WIRE_CHECK_SENSOR_S2);
+		}
+}
+
 static void each_input_has_its_check(void **state)
 {
 	static const struct {
@@ -121,7 +145,10 @@ static void each_input_has_its_check(void **state)
 	assert_int_equal(after_window(0, 0, 0), 0);
 	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), 0);
 	for (size_t i = 0; i < sizeof(pairs) / sizeof(pairs[0]); i++)
-		assert_int_equal(checks_of((uint16_t)(FAKE_ALL_GOOD ^ pairs[i].input), 0), pairs[i].check);
+		for (unsigned outputs = 0; outputs < 2; outputs++) /* which are no inputs */
+			assert_int_equal(checks_of(((FAKE_ALL_GOOD ^ pairs[i].input) & ~1u) | outputs, 0),
+			                 pairs[i].check);
+	assert_int_equal(checks_of(FAKE_ALL_GOOD | 1, 0), 0);
 }
 
 /* Which sensor by the input, which fault by the level. */
@@ -136,6 +163,8 @@ static void open_and_short_are_told_apart(void **state)
 	        {0, s1 | s2, 0}, /* in their windows again */
 	        {s1, 0, WIRE_CHECK_SHORT_S1},
 	        {s1, s2, WIRE_CHECK_SHORT_S1},
+	        {s1, s2 | 1, WIRE_CHECK_SHORT_S1},
+	        {s2, s1 | 1, WIRE_CHECK_SHORT_S2},
 	        {s1, s1, WIRE_CHECK_OPEN_S1},
 	        {s2, 0, WIRE_CHECK_SHORT_S2},
 	        {s2, s2, WIRE_CHECK_OPEN_S2},
@@ -188,6 +217,8 @@ static void trigger_must_be_quiet_at_rest(void **state)
 	assert_false(trigger_is_red(5, 0, 5000, WIRE_STATE_READY));
 	assert_false(trigger_is_red(3, 0, WIRE_SAMPLE_NOT_TAKEN, WIRE_STATE_READY));
 	assert_false(trigger_is_red(3, 0, 5000, WIRE_STATE_BRAKED)); /* there it is the impact */
+	assert_true(trigger_is_red(4, 9, 961, WIRE_STATE_READY));
+	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), WIRE_CHECK_TRIGGER);
 	parameters.value[WIRE_PARAMETER_trigger_counts] = 160;
 	assert_true(trigger_is_red(4, 0, 161, WIRE_STATE_SAFE));
 }
@@ -214,6 +245,20 @@ static void zero_is_the_offset_of_the_last_window_at_rest(void **state)
 		health_samples(&health, &tick);
 	}
 	assert_int_equal(health.zero[4], -100);
+}
+
+/* One with a drop in it tells nothing; the next does, by one sample if there are no more. */
+static void zero_is_told_again_after_a_drop(void **state)
+{
+	(void)state;
+	for (unsigned t = 0; t < 200; t++) {
+		struct acquire_tick tick = {.status = {t == 50 ? WIRE_STATE_FALLING : WIRE_STATE_READY}};
+
+		for (unsigned k = 0; k < 10; k++)
+			tick.sensor[1].y[k] = t == 150 && k == 5 ? 77 : WIRE_SAMPLE_NOT_TAKEN;
+		health_samples(&health, &tick);
+		assert_int_equal(health.zero[4], t < 199 ? 0 : 77);
+	}
 }
 
 static uint16_t stuck_marks;
@@ -251,18 +296,36 @@ static void stuck_channel_in_motion_is_counted_once(void **state)
 	assert_int_equal(counters[WIRE_COUNTER_samples_stuck], 2);
 }
 
+/* An X is stuck when all of its 7 samples are; a channel whose last two are alike is not. */
+static void all_samples_of_a_tick_are_alike_when_it_is_stuck(void **state)
+{
+	(void)state;
+	for (unsigned t = 0; t < 100; t++) {
+		struct acquire_tick tick = {.status = {WIRE_STATE_FALLING, WIRE_STATE_FALLING}};
+
+		for (unsigned channel = 0; channel < 6; channel++)
+			for (unsigned k = 0; k < (channel % 3 ? 10u : 7u); k++)
+				*at(&tick, channel, k) = channel == 3 ? 123 : (int16_t)(k / 2);
+		health_samples(&health, &tick);
+		assert_int_equal(counters[WIRE_COUNTER_samples_stuck], t >= 20);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test_setup(sensors_are_red_until_seen, begin),
 	        cmocka_unit_test_setup(offset_and_noise_of_each_axis, begin),
 	        cmocka_unit_test_setup(absent_samples_make_a_sensor_red, begin),
+	        cmocka_unit_test_setup(half_of_the_samples_are_enough, begin),
 	        cmocka_unit_test_setup(each_input_has_its_check, begin),
 	        cmocka_unit_test_setup(open_and_short_are_told_apart, begin),
 	        cmocka_unit_test_setup(host_clocks_and_brown_out_level, begin),
 	        cmocka_unit_test_setup(trigger_must_be_quiet_at_rest, begin),
 	        cmocka_unit_test_setup(zero_is_the_offset_of_the_last_window_at_rest, begin),
 	        cmocka_unit_test_setup(stuck_channel_in_motion_is_counted_once, begin),
+	        cmocka_unit_test_setup(zero_is_told_again_after_a_drop, begin),
+	        cmocka_unit_test_setup(all_samples_of_a_tick_are_alike_when_it_is_stuck, begin),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

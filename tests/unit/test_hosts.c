@@ -109,6 +109,24 @@ static void a_fifth_waits(void **state)
 	assert_false(hosts_here(&hosts, 51));
 }
 
+/* The fourth is a host like the others. */
+static void the_last_place_counts(void **state)
+{
+	uint32_t session = 0;
+
+	(void)state;
+	for (uint32_t i = 1; i <= 3; i++)
+		hosts_heard(&hosts, 0, i, true);
+	hosts_heard(&hosts, 0, 0x51E7A0D3, true);
+	assert_int_equal(hosts_find(&hosts, 0xA0D3, 0x311A4681, 0xCAFEF00D, 0xA7DEE12E, &session), 0);
+	assert_int_equal(session, 0x51E7A0D3);
+	hosts_heard(&hosts, 0, 0x51E7A0D3, false);
+	assert_true(hosts_hash_differs(&hosts, 0xA0D3));
+	hosts_tick(&hosts, 501);
+	assert_int_equal(counters[WIRE_COUNTER_host_heartbeats_lost], 4);
+	assert_false(hosts_hash_differs(&hosts, 0xA0D3));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -116,6 +134,7 @@ int main(void)
 	        cmocka_unit_test_setup(another_wire_is_no_host, begin),
 	        cmocka_unit_test_setup(an_answer_belongs_to_a_session_a_nonce_and_a_set, begin),
 	        cmocka_unit_test_setup(a_fifth_waits, begin),
+	        cmocka_unit_test_setup(the_last_place_counts, begin),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -150,7 +150,8 @@ static void the_edge_calibrates_itself(void **state)
 	        {9300, 9225, WIRE_MARK_CALIBRATED},      /* a quarter of 100 */
 	        {9000, 9169, WIRE_MARK_CALIBRATED},      /* of -225, towards 0 */
 	        {9669, 9294, WIRE_MARK_CALIBRATED},      /* 500 is not yet a change */
-	        {8793, 8793, WIRE_MARK_CALIBRATED | WIRE_MARK_DROPOUT_CHANGED}, /* 501 is */
+	        {8794, 9169, WIRE_MARK_CALIBRATED},      /* nor is -500 */
+	        {8668, 8668, WIRE_MARK_CALIBRATED | WIRE_MARK_DROPOUT_CHANGED}, /* -501 is */
 	        {8000, 8000, WIRE_MARK_CALIBRATED | WIRE_MARK_DROPOUT_CHANGED},
 	        {8000, 8000, 0}, /* the parameter's */
 	};
@@ -173,6 +174,8 @@ static void it_stays_within_its_limits(void **state)
 {
 	(void)state;
 	parameters.value[WIRE_PARAMETER_dropout_limit_us] = 3000;
+	drop(9.81, 0.01, 0.0092, 8000, 0);
+	assert_int_equal(measure_dropout_us(&measure), 9200);
 	drop(9.81, 0.01, 0.030, 8000, 0);
 	assert_int_equal(measure_dropout_us(&measure), 11000);
 	drop(9.81, 0.01, 0.001, 8000, 0);
@@ -183,6 +186,26 @@ static void it_stays_within_its_limits(void **state)
 	assert_int_equal(measure_dropout_us(&measure), 0);
 	parameters.value[WIRE_PARAMETER_dropout_limit_us] = 0;
 	assert_int_equal(measure_dropout_us(&measure), 8000);
+}
+
+static void a_limit_is_still_within(void **state)
+{
+	uint32_t late_um = parameters.value[WIRE_PARAMETER_separation_late_um], travel_um;
+
+	(void)state;
+	assert_int_equal(measure_us(65534), 65534);
+	assert_int_equal(measure_us(65535), MEASURE_NONE);
+	assert_int_equal(measure_us(65536), MEASURE_NONE);
+	drop(9.81, 0.01, 0.008, 8000, 0);
+	travel_um = measured.separation_um;
+	parameters.value[WIRE_PARAMETER_dampers_um] = travel_um;
+	parameters.value[WIRE_PARAMETER_separation_um] = travel_um - late_um;
+	assert_false(measure_drop(&measure, &plan, &times, &measured) & WIRE_MARK_SEPARATED_LATE);
+	assert_int_equal(measured.separation_um, travel_um);
+	parameters.value[WIRE_PARAMETER_dampers_um] = travel_um - 1;
+	parameters.value[WIRE_PARAMETER_separation_um] = travel_um - late_um - 1;
+	assert_true(measure_drop(&measure, &plan, &times, &measured) & WIRE_MARK_SEPARATED_LATE);
+	assert_int_equal(measured.separation_um, UINT32_MAX);
 }
 
 /* From 8 ms planned: any magnet of 2 to 20 ms that scatters by 0.1 ms separates within 0.9 mm of 780 after
@@ -218,6 +241,7 @@ int main(void)
 	        cmocka_unit_test_setup(late_separation_is_marked, begin),
 	        cmocka_unit_test_setup(the_edge_calibrates_itself, begin),
 	        cmocka_unit_test_setup(it_stays_within_its_limits, begin),
+	        cmocka_unit_test_setup(a_limit_is_still_within, begin),
 	        cmocka_unit_test_setup(any_magnet_is_learned, begin),
 	};
 
