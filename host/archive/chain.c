@@ -229,8 +229,7 @@ static int place_of_index(struct archive *archive, struct chain_place *place)
 	return result < 0 ? result : 0;
 }
 
-/* The writer before us may have ended between entering a sidecar and putting it in its place. */
-static int finish_last(struct archive *archive, const struct chain_entry *entry)
+int chain_finish(struct archive *archive, const struct chain_entry *entry)
 {
 	char path[ARCHIVE_PATH_MAX], part[ARCHIVE_PATH_MAX + 8], hash[DIGEST_CHARS];
 	int64_t bytes;
@@ -257,7 +256,7 @@ int chain_next(struct archive *archive, struct chain_place *place)
 		return 0;
 	place->number = last.number + 1;
 	snprintf(place->head, sizeof(place->head), "%s", last.head);
-	return finish_last(archive, &last);
+	return chain_finish(archive, &last);
 }
 
 int chain_note(struct archive *archive, int64_t number, const char *head)

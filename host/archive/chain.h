@@ -45,13 +45,17 @@ const struct chain_entry *chain_find(const struct chain *chain, const char *path
 /* The entry that has this hash, the last of them; NULL. */
 const struct chain_entry *chain_find_hash(const struct chain *chain, const char *hash);
 
+/* Puts the sidecar of the chain's last entry in its place, if a writer ended between entering it and that. To
+ * be called by who holds the lock. */
+DT_MUST_USE int chain_finish(struct archive *archive, const struct chain_entry *last);
+
 /* Where the next entry goes. */
 struct chain_place {
 	int64_t number, at;
 	char head[DIGEST_CHARS]; /* before it */
 };
 
-/* Finds it, and puts a sidecar in its place that a writer before us had staged, entered and not published. */
+/* Finds it, after chain_finish of the entry before it. */
 DT_MUST_USE int chain_next(struct archive *archive, struct chain_place *place);
 
 /* Enters path; the index notes the new head. */

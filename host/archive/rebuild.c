@@ -237,8 +237,10 @@ static int fill_index(struct rebuild *rebuild)
 {
 	struct archive *archive = &rebuild->archive;
 	const struct chain *chain = &rebuild->proof.chain;
-	int result = take_all(rebuild);
+	int result = chain->count > 0 ? chain_finish(archive, &chain->entry[chain->count - 1]) : 0;
 
+	if (result == 0)
+		result = take_all(rebuild);
 	if (result == 0)
 		result = proof_of_all(&rebuild->proof, NULL, 0);
 	if (result == 0)

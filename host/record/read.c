@@ -90,8 +90,8 @@ static int refuse_empty(struct log_file *log, const struct log_contents *content
 {
 	if (strcmp(log_format(log), "lcm") == 0)
 		return source_refuse(message, DT_E_EMPTY, log->file, 0,
-		                     "no message of a drop tower in %llu events, %llu refused, expected %s "
-		                     "or %s",
+		                     "no message of a drop tower in %llu events, %llu refused as damaged or "
+		                     "of another version, expected %s or %s as this version writes them",
 		                     (unsigned long long)contents->frames,
 		                     (unsigned long long)contents->refused, LCM_CODEC_DROP, LCM_CODEC_BLOCK);
 	if (contents->frames == 0 && contents->refused)

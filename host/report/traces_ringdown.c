@@ -6,10 +6,8 @@
 
 #include <math.h>
 
-#include <gsl/gsl_errno.h>
-#include <gsl/gsl_multifit.h>
-
 #include "common/units.h"
+#include "host/estimate/cholesky.h"
 #include "host/report/script.h"
 
 enum { RINGDOWN_CYCLES = 5, RINGDOWN_DOTS = 70 };
@@ -41,40 +39,24 @@ static double decay_value(const struct decay *d, double time_s)
 static bool fit_decay(struct decay *d, const struct channel *c, double offset, struct script_window window)
 {
 	size_t first = script_from(c, window.from_s), last = script_from(c, window.to_s), rows = 0;
-	double chi2;
-	gsl_matrix *design, *covariance;
-	gsl_vector *value;
-	gsl_multifit_linear_workspace *work;
-	bool fitted = false;
+	double normal[CHOLESKY_MAX][CHOLESKY_MAX] = {{0.0}}, moment[3] = {0.0}, terms[3];
+	struct cholesky factor;
 
-	for (size_t k = first; k < last; k++)
-		rows += script_good(c, k);
-	if (rows < 8)
-		return false;
-	design = gsl_matrix_alloc(rows, 3);
-	covariance = gsl_matrix_alloc(3, 3);
-	value = gsl_vector_alloc(rows);
-	work = gsl_multifit_linear_alloc(rows, 3);
-	if (design && covariance && value && work) {
-		gsl_vector_view result = gsl_vector_view_array(d->c, 3);
-		size_t row = 0;
-
-		for (size_t k = first; k < last; k++) {
-			if (!script_good(c, k))
-				continue;
-			decay_terms(d, script_time(c, k), gsl_matrix_ptr(design, row, 0));
-			gsl_vector_set(value, row++, c->value_g[k] - offset);
+	for (size_t k = first; k < last; k++) {
+		if (!script_good(c, k))
+			continue;
+		decay_terms(d, script_time(c, k), terms);
+		for (int i = 0; i < 3; i++) {
+			moment[i] += terms[i] * (c->value_g[k] - offset);
+			for (int j = 0; j <= i; j++)
+				normal[i][j] += terms[i] * terms[j];
 		}
-		fitted = gsl_multifit_linear(design, value, &result.vector, covariance, &chi2, work) ==
-		                 GSL_SUCCESS &&
-		         isfinite(d->c[0] + d->c[1] + d->c[2]);
+		rows++;
 	}
-	gsl_matrix_free(design);
-	gsl_matrix_free(covariance);
-	gsl_vector_free(value);
-	if (work)
-		gsl_multifit_linear_free(work);
-	return fitted;
+	if (rows < 8 || !cholesky_factor(&factor, 3, normal))
+		return false;
+	cholesky_solve(&factor, moment, d->c);
+	return isfinite(d->c[0] + d->c[1] + d->c[2]);
 }
 
 /* The plate is free from the end of the contact on, which is a little after S2's pulse meets 10 %. */
@@ -102,7 +84,6 @@ bool traces_ringdown(FILE *out, const struct report *report, const struct report
 	double offset, fit[SCRIPT_CURVE_POINTS];
 	size_t points;
 
-	gsl_set_error_handler_off();
 	if (!c || !decay_of_plate(report, &decay))
 		return false;
 	offset = report_offset(report_axis(report, name));

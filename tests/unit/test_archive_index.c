@@ -295,6 +295,31 @@ static void test_a_series_staged_but_not_in_its_place(void **state)
 	archive_close(archive);
 }
 
+/* The same of a drop, when the index is made again before anybody else writes. */
+static void test_a_drop_staged_but_not_in_its_place_is_rebuilt(void **state)
+{
+	struct archive *archive = trial_with_series("one");
+	char path[256], part[264], hash[72];
+	int wrong = 0;
+
+	(void)state;
+	trial_record(archive, "one", "abc");
+	trial_record(archive, "one", "def");
+	snprintf(path, sizeof(path), "%s/%s", trial_folder, trial_look(archive, "one", 2, NULL).raw);
+	snprintf(hash, sizeof(hash), "%s", trial_look(archive, "one", 2, NULL).hash);
+	archive_close(archive);
+	strcpy(strrchr(path, '.'), ".ini");
+	snprintf(part, sizeof(part), "%s.part", path);
+	assert_int_equal(rename(path, part), 0);
+	assert_int_equal(archive_rebuild(trial_folder, false, trial_count, &wrong, trial_message), 0);
+	assert_int_equal(wrong, 0);
+	assert_int_equal(access(part, F_OK), -1);
+	archive = trial_open(ARCHIVE_READ);
+	assert_string_equal(trial_look(archive, "one", 2, NULL).state, "recorded");
+	assert_string_equal(trial_look(archive, "one", 2, NULL).hash, hash);
+	archive_close(archive);
+}
+
 /* ---- heights ---- */
 
 static void write_scene(const char *path, const char *section, const char *key)
@@ -359,6 +384,7 @@ int main(void)
 	        IN_A_TRIAL(test_raw_files_are_verified),
 	        IN_A_TRIAL(test_a_file_that_cannot_be_read),
 	        IN_A_TRIAL(test_a_series_staged_but_not_in_its_place),
+	        IN_A_TRIAL(test_a_drop_staged_but_not_in_its_place_is_rebuilt),
 	        IN_A_TRIAL(test_a_series_from_another_height),
 	};
 
