@@ -76,6 +76,7 @@ static void sample(const struct fisher *fisher, const struct synthetic_signal *s
 	const struct synthetic *s = fisher->synthetic;
 	const struct synthetic_axis *axis = &s->signal[fisher->axis].axis;
 	double decays = s->onset_s + axis->onset_s + axis->contact_s + axis->delay_s;
+	double until = fisher->part == DECAY && s->scene.decay_s > 0 ? decays + s->scene.decay_s : INFINITY;
 
 	for (int sensor = 0; sensor < 2; sensor++) {
 		enum synthetic_channel c =
@@ -87,7 +88,7 @@ static void sample(const struct fisher *fisher, const struct synthetic_signal *s
 			double t = (double)k / axis->rate_hz;
 
 			*out = 0;
-			if (counts && t >= from && synthetic_keeps(s, c, k))
+			if (counts && t >= from && t < until && synthetic_keeps(s, c, k))
 				*out = sensor ? synthetic_box(signal, t - s->onset_s)
 				              : synthetic_plate(signal, t - s->onset_s);
 		}

@@ -58,6 +58,7 @@ struct synthetic_scene {
 	double contact_s, interval_s, damped_hz, damping;
 	double skew_s;        /* Y's onset after X's */
 	double pre_s, post_s; /* the record, before and after the earliest onset */
+	double decay_s;       /* of the free decay that a bound counts; 0: all of it */
 	double noise_g, step_g;
 	double offset_g, drift_g_s; /* of the whole record */
 	double shift_g;             /* zero shift that the impact leaves behind */

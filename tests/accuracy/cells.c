@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define GROSS 0.15
+#define DECAY_S 45e-3 /* that the limits were set with */
 
 enum { SCENES_MAX = 200 };
 
@@ -359,6 +360,7 @@ static struct synthetic_scene drop_of(const struct row *row, enum geometry geome
 	scene.damping = usual.damping;
 	scene.pre_s = usual.pre_s;
 	scene.post_s = usual.post_s;
+	scene.decay_s = DECAY_S;
 	scene.noise_g = noise_g;
 	scene.step_g = usual.step_g;
 	scene.hum_hz = usual.hum_hz;
