@@ -107,7 +107,10 @@ class Receiver(threading.Thread):
                 continue
             if len(packet) > 8 and struct.unpack(">I", packet[:4])[0] == MAGIC_SHORT:
                 channel, _, data = packet[8:].partition(b"\0")
-                self.messages.append((channel.decode(errors="replace"), data))
+                self.take(channel.decode(errors="replace"), data)
+
+    def take(self, channel, data):
+        self.messages.append((channel, data))
 
     def stop(self):
         self.ended = True
