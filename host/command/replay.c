@@ -27,7 +27,8 @@ struct pace {
 };
 
 enum {
-	LISTEN_MS = 1000, /* a tower says ten times a second that it is there, and so does a bridge */
+	LISTEN_MS = 3000, /* a tower says ten times a second that it is there, and so does a bridge; a busy
+	                     one later */
 	ROOM_MS = 2000,   /* a link that takes nothing for so long is stuck */
 };
 

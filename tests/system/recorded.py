@@ -189,7 +189,8 @@ def path_without_pictures(folder):
 def real_drop(watch, url, folder):
     """One of this very tower: `ctl` arms and releases, `run` sets parameters and fetches it. What was heard of them."""
     watch.heard.clear()
-    run("droptower", "ctl", "--link", url, "--unattended", "arm", timeout=600)
+    armed = run("droptower", "ctl", "--link", url, "--unattended", "arm", timeout=600, expect=None)
+    equal(armed.returncode in (0, 4), True, f"ctl arm, which a busy machine stops following: {armed.err}")
     run("droptower", "run", "--link", url, "--unattended", "--scene", SCENE, "--out", folder, timeout=600,
         expect=5, env=path_without_pictures(folder))  # 5: nothing was released now
     tape = from_host(watch.heard)
