@@ -59,7 +59,7 @@ static int wait_ready(int fd)
 /* As a program is started from a shell: what we do with signals is not its business. */
 static void default_signals(void)
 {
-	const int ours[] = {SIGINT, SIGTERM, SIGPIPE};
+	const int ours[] = {SIGINT, SIGTERM, SIGHUP, SIGPIPE};
 	sigset_t none;
 
 	for (size_t i = 0; i < sizeof(ours) / sizeof(ours[0]); i++)
