@@ -77,6 +77,26 @@ static void nmt_does_one_thing(void **state)
 	assert_int_equal(firmware_counter(WIRE_COUNTER_frames_unknown), 0);
 }
 
+/* What is handled well asks for nothing else. */
+static void only_its_request_sends_a_capture_end(void **state)
+{
+	static const struct frame strange[] = {{.id = 0x555, .length = 3},
+	                                       {.id = 0x201, .length = 8, .flags = FRAME_EXTENDED}};
+	static const uint8_t commands[] = {1, 2, 128, 129, 130};
+
+	(void)state;
+	firmware_to_ready();
+	firmware_forget_frames();
+	for (size_t i = 0; i < sizeof(commands); i++)
+		nmt(commands[i]);
+	for (size_t i = 0; i < sizeof(strange) / sizeof(strange[0]); i++)
+		fake_receive(&strange[i]);
+	app_poll();
+	assert_int_equal(fake_count(WIRE_ID_CAPTURE_END), 0);
+	assert_int_equal(firmware_sdo(0x40, 0x2007, 0, 0).specifier, 0x43);
+	assert_int_equal(fake_count(WIRE_ID_CAPTURE_END), 0);
+}
+
 static void parameters_in_safe(void **state)
 {
 	(void)state;
@@ -131,6 +151,7 @@ int main(void)
 	        cmocka_unit_test(abort_leaves_the_window_alone),
 	        cmocka_unit_test(a_reset_in_motion_is_refused_and_counted),
 	        cmocka_unit_test(nmt_does_one_thing),
+	        cmocka_unit_test(only_its_request_sends_a_capture_end),
 	        cmocka_unit_test(parameters_in_safe),
 	        cmocka_unit_test(every_frame_is_counted),
 	};
