@@ -5,7 +5,7 @@ PACKAGES_TEST += python3
 
 # ---- mutants ------------------------------------------------------------------------------------------
 
-MUTATED_C = $(addprefix firmware/,sequence.c command.c stream.c capture.c measure.c hosts.c) \
+MUTATED_C = $(addprefix firmware/,sequence.c command.c stream.c capture.c measure.c hosts.c input.c health.c) \
 	common/wire.c common/segment.c host/record/join.c
 MUTATED_O = $(MUTATED_C:%.c=$(BUILD)/mutate/%.o)
 # The unit tests that come near them. Not test_port_faults: thousands of drops for each mutant.
@@ -50,6 +50,7 @@ CHANGED = $(BUILD) tests/fault/judged $(MUTATED_C)
 
 .PHONY: mutate mutate-changed
 mutate: setup-test ## make every small mistake in the heart of the firmware, see a unit test fail, renew tests/fault/judged
+	@rm -f $(filter-out $(foreach s,$(MUTATED_C:.c=),$(BUILD)/mutate/$(subst /,-,$s).json),$(wildcard $(BUILD)/mutate/*.json))
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(MUTATED_UNITS)
 	@$(MUTATE); judged=$$?; tests/fault/changed --renew $(CHANGED) && exit $$judged
 

@@ -145,6 +145,18 @@ static void every_frame_is_counted(void **state)
 	assert_int_equal(firmware_counter(WIRE_COUNTER_frames_malformed), 1);
 }
 
+/* It is counted; what it would have asked for is not known. */
+static void a_parameter_frame_of_another_length_has_no_answer(void **state)
+{
+	(void)state;
+	firmware_to_ready();
+	firmware_forget_frames();
+	fake_receive(&(struct frame){.id = WIRE_ID_SDO_REQUEST, .length = 7, .data = {0x40, 0x02, 0x20}});
+	app_poll();
+	assert_int_equal(fake_count(WIRE_ID_SDO_REPLY), 0);
+	assert_int_equal(firmware_counter(WIRE_COUNTER_frames_malformed), 1);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -154,6 +166,7 @@ int main(void)
 	        cmocka_unit_test(only_its_request_sends_a_capture_end),
 	        cmocka_unit_test(parameters_in_safe),
 	        cmocka_unit_test(every_frame_is_counted),
+	        cmocka_unit_test(a_parameter_frame_of_another_length_has_no_answer),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -311,6 +311,15 @@ static void all_samples_of_a_tick_are_alike_when_it_is_stuck(void **state)
 	}
 }
 
+static void a_look_has_the_inputs_that_are_known(void **state)
+{
+	struct input input = {.agreed = FAKE_ALL_GOOD & ~WIRE_IO_OUTPUTS, .known = 0x7FE3};
+	struct acquire acquire = {.clocks_good = true};
+
+	(void)state;
+	assert_int_equal(health_look(&health, &input, &acquire, true).known, 0x7FE3);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -326,6 +335,7 @@ int main(void)
 	        cmocka_unit_test_setup(stuck_channel_in_motion_is_counted_once, begin),
 	        cmocka_unit_test_setup(zero_is_told_again_after_a_drop, begin),
 	        cmocka_unit_test_setup(all_samples_of_a_tick_are_alike_when_it_is_stuck, begin),
+	        cmocka_unit_test_setup(a_look_has_the_inputs_that_are_known, begin),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

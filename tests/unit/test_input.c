@@ -8,7 +8,9 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
+#include "common/wire.h"
 #include "firmware/input.h"
+#include "tests/unit/fake_port.h"
 
 static void readings(const uint16_t *pins, const uint16_t *agreed, unsigned count)
 {
@@ -54,11 +56,25 @@ static void what_flickers_from_the_start_is_not_known(void **state)
 	assert_int_equal(input.agreed, 0x8001);
 }
 
+/* Outputs as they are driven, inputs as agreed on; not a pin that has only just changed. */
+static void the_word_is_outputs_and_agreed_inputs(void **state)
+{
+	struct input input = {.agreed = WIRE_IO_DOOR_CLOSED};
+
+	(void)state;
+	fake.inputs = WIRE_IO_ESTOP_CLEAR;
+	fake.outputs = WIRE_IO_OUTPUTS;
+	assert_int_equal(input_io(&input), WIRE_IO_OUTPUTS | WIRE_IO_DOOR_CLOSED);
+	fake.outputs = WIRE_IO_LATCH_OPEN;
+	assert_int_equal(input_io(&input), WIRE_IO_LATCH_OPEN | WIRE_IO_DOOR_CLOSED);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(three_that_agree),
 	        cmocka_unit_test(what_flickers_from_the_start_is_not_known),
+	        cmocka_unit_test(the_word_is_outputs_and_agreed_inputs),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
