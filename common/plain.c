@@ -34,7 +34,7 @@ static bool shows(uint32_t code)
 	         (code >= 0x2066 && code <= 0x2069) || code == 0xFEFF);
 }
 
-static bool check(const char *text, size_t length, bool plain)
+static bool plain_check(const char *text, size_t length, bool plain)
 {
 	const unsigned char *bytes = (const unsigned char *)text;
 	uint32_t code = 0;
@@ -49,10 +49,10 @@ static bool check(const char *text, size_t length, bool plain)
 
 bool plain_is_utf8(const char *text, size_t length)
 {
-	return check(text, length, false);
+	return plain_check(text, length, false);
 }
 
 bool plain_is_line(const char *text, size_t length)
 {
-	return check(text, length, true);
+	return plain_check(text, length, true);
 }

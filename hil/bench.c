@@ -14,7 +14,7 @@ enum {
 	COUNTERS_MS = 100 * WIRE_COUNTERS + 200, /* in which every counter is told */
 };
 
-static void say(const char *format, va_list arguments)
+static void hil_bench_say(const char *format, va_list arguments)
 {
 	fputs("droptower-bench: ", stderr);
 	vfprintf(stderr, format, arguments);
@@ -26,7 +26,7 @@ void bench_say(const char *format, ...)
 	va_list arguments;
 
 	va_start(arguments, format);
-	say(format, arguments);
+	hil_bench_say(format, arguments);
 	va_end(arguments);
 }
 
@@ -37,7 +37,7 @@ void bench_tell(const struct bench_options *options, const char *format, ...)
 	if (options->quiet)
 		return;
 	va_start(arguments, format);
-	say(format, arguments);
+	hil_bench_say(format, arguments);
 	va_end(arguments);
 }
 
@@ -47,7 +47,7 @@ void bench_fail(struct bench *bench, int status, const char *format, ...)
 
 	if (bench->status == BENCH_DONE) {
 		va_start(arguments, format);
-		say(format, arguments);
+		hil_bench_say(format, arguments);
 		va_end(arguments);
 		bench->status = status;
 	}
@@ -62,7 +62,7 @@ static bool all_done(const struct bench *bench)
 }
 
 /* What is left when the last drop has been accepted goes on while the counters are told. */
-static void watch_end(struct bench *bench)
+static void bench_watch_end(struct bench *bench)
 {
 	bool last = bench->script.phase == SCRIPT_RETURN &&
 	            bench->script.drops_done + 1 == bench->options->script.drops;
@@ -83,7 +83,7 @@ static void each_ms(struct bench *bench)
 	bench_events(bench);
 	bench_host(bench);
 	if (bench->watch != NULL)
-		watch_end(bench);
+		bench_watch_end(bench);
 }
 
 /* At the instants at which they would have come, each with a request of its own. */
@@ -177,7 +177,7 @@ static void restart_target(struct bench *bench)
 		start_target(bench, bench->restart_cause);
 }
 
-static void serve(struct bench *bench)
+static void bench_serve(struct bench *bench)
 {
 	struct frame sent[SENSORBUS_FRAMES_MAX], received[SENSORBUS_FRAMES_MAX];
 	char message[TARGET_MESSAGE_MAX];
@@ -231,7 +231,7 @@ static void close_file(struct bench *bench, FILE *file, const char *path)
 		bench_fail(bench, BENCH_LINK, "%s: could not be written", path);
 }
 
-static void open_link(struct bench *bench)
+static void bench_open_link(struct bench *bench)
 {
 	char message[TARGET_MESSAGE_MAX];
 
@@ -242,7 +242,7 @@ static void open_link(struct bench *bench)
 		bench_fail(bench, BENCH_LINK, "%s", message);
 }
 
-static void start(struct bench *bench)
+static void bench_start(struct bench *bench)
 {
 	const struct bench_options *options = bench->options;
 
@@ -264,7 +264,7 @@ static void set_up_random(struct bench *bench)
 }
 
 /* Each step only if those before it went well. */
-static void set_up(struct bench *bench)
+static void bench_set_up(struct bench *bench)
 {
 	const struct bench_options *options = bench->options;
 	struct busfault_options back = options->bus;
@@ -299,11 +299,11 @@ static void set_up(struct bench *bench)
 		bench->truth = open_file(bench, options->truth);
 	codes_init(&bench->codes, bench->truth);
 	if (!bench->stop)
-		open_link(bench);
+		bench_open_link(bench);
 	if (!bench->stop)
 		bench_control_open(bench);
 	if (!bench->stop)
-		start(bench);
+		bench_start(bench);
 }
 
 static void tear_down(struct bench *bench)
@@ -360,7 +360,7 @@ static double bus_error(const struct busfault *fault)
 	       (double)(c->given + c->lost + c->burst_lost + c->cut + c->silenced + busfault_held(fault));
 }
 
-static void take_results(const struct bench *bench, double wall_s)
+static void bench_take_results(const struct bench *bench, double wall_s)
 {
 	struct bench_watch *watch = bench->watch;
 	double *results = watch->results;
@@ -397,13 +397,13 @@ int bench_run(const struct bench_options *options)
 		return BENCH_LINK;
 	}
 	bench->options = options;
-	set_up(bench);
+	bench_set_up(bench);
 	if (!bench->stop) {
-		serve(bench);
+		bench_serve(bench);
 		if (bench->running)
 			say_summary(bench, clock_s() - begin_s);
 		if (bench->watch != NULL)
-			take_results(bench, clock_s() - begin_s);
+			bench_take_results(bench, clock_s() - begin_s);
 	}
 	tear_down(bench);
 	status = bench->status;

@@ -8,7 +8,7 @@ enum {
 	LINK_FRAMES = 64,  /* taken from the link in one ms */
 };
 
-static void log_frame(struct bench *bench, const struct frame *frame)
+static void bench_bus_log_frame(struct bench *bench, const struct frame *frame)
 {
 	char line[CANDUMP_LINE_MAX];
 	struct frame stamped = *frame;
@@ -23,7 +23,7 @@ static void give_to_host(struct bench *bench, const struct frame *frame)
 {
 	int result;
 
-	log_frame(bench, frame);
+	bench_bus_log_frame(bench, frame);
 	if (bench->watch != NULL)
 		observe_at_host(&bench->watch->observe, frame);
 	if (bench->link == NULL) {
@@ -90,7 +90,7 @@ void bench_from_host(struct bench *bench, const struct frame *frame)
 		bench->not_carried++;
 		return;
 	}
-	log_frame(bench, frame);
+	bench_bus_log_frame(bench, frame);
 	bench_keep(bench, frame);
 	count = busfault_pass(&bench->to_tower, frame, out);
 	for (unsigned i = 0; i < count; i++)
@@ -98,7 +98,7 @@ void bench_from_host(struct bench *bench, const struct frame *frame)
 			bench->queue_lost++;
 }
 
-static void poll_link(struct bench *bench)
+static void bench_bus_poll_link(struct bench *bench)
 {
 	struct frame frame;
 
@@ -135,7 +135,7 @@ static void poll_script(struct bench *bench)
 void bench_host(struct bench *bench)
 {
 	if (bench->link != NULL)
-		poll_link(bench);
+		bench_bus_poll_link(bench);
 	else
 		poll_script(bench);
 }

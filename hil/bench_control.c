@@ -21,7 +21,7 @@ struct sender {
 };
 
 /* Who has no address of its own, or does not fetch its answers, gets none. */
-static void answer(const struct bench *bench, const struct sender *to, const char *text)
+static void bench_control_answer(const struct bench *bench, const struct sender *to, const char *text)
 {
 	if (to->size > sizeof(sa_family_t))
 		(void)sendto(bench->control, text, strlen(text), MSG_DONTWAIT,
@@ -38,7 +38,7 @@ static void refuse_line(const struct bench *bench, const struct sender *to, cons
 		used += snprintf(text + used, sizeof(text) - (size_t)used, " %s",
 		                 tower_fault_name((enum tower_fault)i));
 	snprintf(text + used, sizeof(text) - (size_t)used, "\n");
-	answer(bench, to, text);
+	bench_control_answer(bench, to, text);
 }
 
 static void tell_faults(const struct bench *bench, const struct sender *to)
@@ -51,10 +51,10 @@ static void tell_faults(const struct bench *bench, const struct sender *to)
 		                 tower_fault_name((enum tower_fault)i),
 		                 tower_has_fault(bench->tower, (enum tower_fault)i));
 	snprintf(text + used, sizeof(text) - (size_t)used, "\n");
-	answer(bench, to, text);
+	bench_control_answer(bench, to, text);
 }
 
-static void take_line(struct bench *bench, const struct sender *from, const char *line)
+static void bench_control_take_line(struct bench *bench, const struct sender *from, const char *line)
 {
 	char text[LINE_MAX_BYTES + 1];
 	char *words[SCENARIO_WORDS_MAX];
@@ -85,7 +85,7 @@ void bench_control(struct bench *bench)
 			return;
 		line[got] = '\0';
 		line[strcspn(line, "\r\n")] = '\0';
-		take_line(bench, &from, line);
+		bench_control_take_line(bench, &from, line);
 	}
 }
 

@@ -64,7 +64,7 @@ void bench_event(struct bench *bench, const struct event *event)
 
 /* Events at a state come in their order: each counts from an entry that does not lie before the one that the
  * event before it counted from. */
-static bool is_due(const struct bench *bench, const struct event *event, bool chain_free)
+static bool bench_events_is_due(const struct bench *bench, const struct event *event, bool chain_free)
 {
 	int64_t entered_ms;
 
@@ -84,7 +84,7 @@ static void make_events(struct bench *bench)
 
 		if (bench->event_done[i])
 			continue;
-		if (is_due(bench, event, chain_free)) {
+		if (bench_events_is_due(bench, event, chain_free)) {
 			bench->event_done[i] = true;
 			bench->events_done++;
 			if (event->state != EVENT_AT_TIME)

@@ -33,7 +33,7 @@ bool bench_plant_next(const struct bench *bench, struct sensorbus_request *reque
 /* ---- the plant ---- */
 
 /* False when the request makes no sense. */
-static bool take_time(struct bench *bench, const struct sensorbus_request *request)
+static bool bench_plant_take_time(struct bench *bench, const struct sensorbus_request *request)
 {
 	unsigned per_tick = request->group & SENSORBUS_X ? WIRE_X_PER_TICK : WIRE_YZ_PER_TICK;
 	int64_t grid;
@@ -119,8 +119,8 @@ static uint32_t capture_us(const struct bench *bench, uint32_t time_us)
 	return (uint32_t)(int64_t)firmware_us - (uint32_t)bench_grid_us(bench->base_grid);
 }
 
-static void sample(struct bench *bench, const struct sensorbus_request *request,
-                   struct sensorbus_answer *answer)
+static void bench_plant_sample(struct bench *bench, const struct sensorbus_request *request,
+                               struct sensorbus_answer *answer)
 {
 	double time_s = bench_tower_s(bench, bench->now_grid);
 
@@ -184,10 +184,10 @@ bool bench_plant_move(struct bench *bench, const struct sensorbus_request *reque
 {
 	int64_t before_grid = bench->now_grid;
 
-	if (!take_time(bench, request))
+	if (!bench_plant_take_time(bench, request))
 		return false;
 	apply_outputs(bench, request, before_grid);
-	sample(bench, request, answer);
+	bench_plant_sample(bench, request, answer);
 	watch_impact(bench);
 	return true;
 }

@@ -34,7 +34,7 @@ static bool burst_takes(struct busfault *fault, uint32_t id)
 }
 
 /* False when every slot is taken: the frame then passes in its turn. */
-static bool hold(struct busfault *fault, const struct frame *frame, unsigned copies, unsigned behind)
+static bool busfault_hold(struct busfault *fault, const struct frame *frame, unsigned copies, unsigned behind)
 {
 	for (unsigned i = 0; i < BUSFAULT_BEHIND_MAX; i++) {
 		if (fault->held[i].copies == 0) {
@@ -54,7 +54,7 @@ static unsigned give(struct busfault *fault, const struct frame *frame, unsigned
 }
 
 /* Those whose last frame to wait for has just passed. */
-static unsigned give_held(struct busfault *fault, struct frame *out)
+static unsigned busfault_give_held(struct busfault *fault, struct frame *out)
 {
 	unsigned count = 0;
 
@@ -97,12 +97,12 @@ unsigned busfault_pass(struct busfault *fault, const struct frame *frame, struct
 		return 0;
 	}
 	counters->duplicated += copies - 1;
-	if (late && hold(fault, frame, copies, behind)) {
+	if (late && busfault_hold(fault, frame, copies, behind)) {
 		counters->reordered++;
 		return 0;
 	}
 	count = give(fault, frame, copies, out);
-	return count + give_held(fault, out + count);
+	return count + busfault_give_held(fault, out + count);
 }
 
 unsigned busfault_held(const struct busfault *fault)

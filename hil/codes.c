@@ -3,7 +3,7 @@
 
 enum { VALUES = WIRE_X_PER_TICK + 2 * WIRE_YZ_PER_TICK };
 
-static void begin(struct codes *codes, uint32_t tick_ms)
+static void codes_begin(struct codes *codes, uint32_t tick_ms)
 {
 	codes->tick_ms = tick_ms;
 	codes->begun = true;
@@ -36,7 +36,7 @@ void codes_put(struct codes *codes, const struct sensorbus_request *request, con
 		return;
 	if (!codes->begun || codes->tick_ms != request->tick_ms || request->reset) {
 		codes_flush(codes);
-		begin(codes, request->tick_ms);
+		codes_begin(codes, request->tick_ms);
 	}
 	for (unsigned sensor = 0; sensor < WIRE_SENSORS; sensor++) {
 		int16_t *values = codes->values[sensor];

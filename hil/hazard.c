@@ -21,7 +21,7 @@
 #define COILS (WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE)
 #define GATES 3u
 
-static void note(struct hazard *hazard, const char *what, double tower_s)
+static void hazard_note(struct hazard *hazard, const char *what, double tower_s)
 {
 	if (hazard->count++ > 0)
 		return;
@@ -54,11 +54,11 @@ void hazard_acknowledged(struct hazard *hazard)
 static void latch_energised(struct hazard *hazard, bool asked, double tower_s)
 {
 	if (!asked)
-		note(hazard, "latch opened unasked", tower_s);
+		hazard_note(hazard, "latch opened unasked", tower_s);
 	if ((hazard->inputs & (SUPPLIES | CHAIN)) != (SUPPLIES | CHAIN))
-		note(hazard, "latch opened with a guard open", tower_s);
+		hazard_note(hazard, "latch opened with a guard open", tower_s);
 	if (!(tower_s - hazard->warning_s >= WARNING_MIN_S)) /* NAN fails too */
-		note(hazard, "latch opened before the warning was over", tower_s);
+		hazard_note(hazard, "latch opened before the warning was over", tower_s);
 	hazard->latch_s = tower_s;
 	hazard->captures = 0;
 	hazard->relief_told = false;
@@ -67,9 +67,9 @@ static void latch_energised(struct hazard *hazard, bool asked, double tower_s)
 void hazard_edge(struct hazard *hazard, uint16_t mask, bool on, bool asked, double tower_s)
 {
 	if (mask == WIRE_IO_MAGNET_HOLD && !on && isnan(hazard->latch_open_s))
-		note(hazard, "magnet off with the frame at height", tower_s);
+		hazard_note(hazard, "magnet off with the frame at height", tower_s);
 	if (mask == WIRE_IO_DAMPERS_RELIEVE && on && !asked)
-		note(hazard, "dampers relieved unasked", tower_s);
+		hazard_note(hazard, "dampers relieved unasked", tower_s);
 	if (mask == WIRE_IO_LATCH_OPEN && on)
 		latch_energised(hazard, asked, tower_s);
 	if (mask == WIRE_IO_WARNING)
@@ -80,7 +80,7 @@ void hazard_edge(struct hazard *hazard, uint16_t mask, bool on, bool asked, doub
 /* ---- the tower ---- */
 
 /* Since when a condition holds; NAN while it does not. */
-static void follow(double *since_s, bool holds, double tower_s)
+static void hazard_follow(double *since_s, bool holds, double tower_s)
 {
 	if (!holds)
 		*since_s = NAN;
@@ -88,22 +88,22 @@ static void follow(double *since_s, bool holds, double tower_s)
 		*since_s = tower_s;
 }
 
-static void watch_guards(struct hazard *hazard, uint16_t inputs, double tower_s)
+static void hazard_watch_guards(struct hazard *hazard, uint16_t inputs, double tower_s)
 {
 	const bool at_rest = hazard->state == WIRE_STATE_SAFE || hazard->state == WIRE_STATE_READY;
 	const bool closed = (inputs & (CHAIN | HELD)) == (CHAIN | HELD) && !(inputs & WIRE_IO_FRAME_DOWN);
 
-	follow(&hazard->guard_s, !closed, tower_s);
+	hazard_follow(&hazard->guard_s, !closed, tower_s);
 	if (at_rest && tower_s - hazard->guard_s >= GUARD_LOST_S && isnan(hazard->loss_s)) {
 		hazard->loss_s = tower_s;
 		hazard->ready_told = false;
 	}
-	follow(&hazard->chain_s, (inputs & CHAIN) != CHAIN, tower_s);
+	hazard_follow(&hazard->chain_s, (inputs & CHAIN) != CHAIN, tower_s);
 	if (isnan(hazard->chain_s) || !(hazard->outputs & COILS))
 		hazard->chain_told = false;
 	else if (tower_s - hazard->chain_s > CHAIN_LATE_S && !hazard->chain_told) {
 		hazard->chain_told = true;
-		note(hazard, "latch or relief energised with door or emergency stop open", tower_s);
+		hazard_note(hazard, "latch or relief energised with door or emergency stop open", tower_s);
 	}
 }
 
@@ -113,12 +113,12 @@ static void watch_relief(struct hazard *hazard, const struct tower_truth *truth,
 
 	if (on && !hazard->unbraked_told && tower_s >= truth->frame_down_s + BRAKE_LATE_S) {
 		hazard->unbraked_told = true;
-		note(hazard, "dampers relieved after the frame met them", tower_s);
+		hazard_note(hazard, "dampers relieved after the frame met them", tower_s);
 	}
 	if (on && !hazard->relief_told && hazard->captures != GATES &&
 	    tower_s >= hazard->latch_s + hazard->free_fall_s + BRAKE_LATE_S) {
 		hazard->relief_told = true;
-		note(hazard, "dampers relieved beyond the free fall to them", tower_s);
+		hazard_note(hazard, "dampers relieved beyond the free fall to them", tower_s);
 	}
 }
 
@@ -130,12 +130,12 @@ void hazard_sample(struct hazard *hazard, uint16_t inputs, unsigned captures, co
 	if (isnan(truth->latch_open_s)) /* a new drop */
 		hazard->unbraked_told = false;
 	hazard->latch_open_s = truth->latch_open_s;
-	watch_guards(hazard, inputs, tower_s);
+	hazard_watch_guards(hazard, inputs, tower_s);
 	watch_relief(hazard, truth, tower_s);
 	if (hazard->state == WIRE_STATE_READY && !hazard->ready_told &&
 	    tower_s - hazard->loss_s > READY_LATE_S) {
 		hazard->ready_told = true;
-		note(hazard, "READY with a guard lost and not acknowledged", tower_s);
+		hazard_note(hazard, "READY with a guard lost and not acknowledged", tower_s);
 	}
 }
 
@@ -148,14 +148,14 @@ void hazard_block(struct hazard *hazard, uint8_t state, uint16_t io)
 
 	hazard->unwarned = needed && !(io & WIRE_IO_WARNING) ? hazard->unwarned + 1 : 0;
 	if (hazard->unwarned == UNWARNED_BLOCKS)
-		note(hazard, "no warning while armed or falling", NAN);
+		hazard_note(hazard, "no warning while armed or falling", NAN);
 }
 
 void hazard_state(struct hazard *hazard, uint8_t state, const struct tower_truth *truth, double tower_s)
 {
 	if (hazard->state != UINT8_MAX && wire_state_moving(hazard->state) && !wire_state_moving(state) &&
 	    truth->frame_away)
-		note(hazard, "motion ended with the frame in the rails", tower_s);
+		hazard_note(hazard, "motion ended with the frame in the rails", tower_s);
 	hazard->state = state;
 }
 

@@ -161,7 +161,7 @@ static bool says_run(const struct line *line)
 }
 
 /* What does not go together. */
-static int check(const struct line *line)
+static int main_check(const struct line *line)
 {
 	const struct option_table *table = &known_options;
 
@@ -185,7 +185,7 @@ static int check(const struct line *line)
 	return OPTIONS_READ;
 }
 
-static int run_scene(struct line *line)
+static int main_run_scene(struct line *line)
 {
 	struct scene *scene = &line->bench.scene;
 	char message[SCENE_MESSAGE_MAX];
@@ -203,7 +203,7 @@ static int run_scene(struct line *line)
 
 /* ---- a scenario ---- */
 
-static void set_options(struct bench_options *bench, const struct scenario *scenario)
+static void main_set_options(struct bench_options *bench, const struct scenario *scenario)
 {
 	bench->seed = (uint64_t)scenario->run_seed;
 	bench->ideal = scenario->run_ideal != 0;
@@ -227,7 +227,7 @@ static void set_options(struct bench_options *bench, const struct scenario *scen
 }
 
 /* The file's name without folders and ".ini". */
-static void name_of(const char *file, char *name, size_t size)
+static void main_name_of(const char *file, char *name, size_t size)
 {
 	const char *slash = strrchr(file, '/');
 	size_t length;
@@ -240,7 +240,8 @@ static void name_of(const char *file, char *name, size_t size)
 
 /* First line, for whoever makes a table: verdict, name, end state, virtual and wall seconds, hash of the
  * firmware's frames, what failed. Then an expectation a line. */
-static int judge(const struct scenario *scenario, const struct line *line, const struct bench_watch *watch)
+static int main_judge(const struct scenario *scenario, const struct line *line,
+                      const struct bench_watch *watch)
 {
 	char name[64], failed[300], title[600];
 	struct text report;
@@ -256,7 +257,7 @@ static int judge(const struct scenario *scenario, const struct line *line, const
 		bench_say("%s", error_text(result));
 		return BENCH_LINK;
 	}
-	name_of(line->scenario_file, name, sizeof(name));
+	main_name_of(line->scenario_file, name, sizeof(name));
 	printf("%s %s %s %.3f %.2f %016" PRIx64 " %s\n%s", failures ? "FAIL" : "PASS", name,
 	       wire_state_name(watch->observe.state), watch->virtual_s, watch->wall_s, watch->observe.hash,
 	       failures ? failed : "-", report.bytes);
@@ -286,14 +287,14 @@ static int run_scenario(struct line *line)
 		bench_say("%s", message);
 		return BENCH_INPUT;
 	}
-	set_options(&line->bench, &scenario);
+	main_set_options(&line->bench, &scenario);
 	watch.end_s = scenario.run_end_s;
 	if (line->timeline_file != NULL)
 		watch.timeline = timeline_create();
 	line->bench.watch = &watch;
 	status = bench_run(&line->bench);
 	if (status == BENCH_DONE)
-		status = judge(&scenario, line, &watch);
+		status = main_judge(&scenario, line, &watch);
 	timeline_destroy(watch.timeline);
 	return status;
 }
@@ -309,11 +310,11 @@ int main(int argc, char **argv)
 	told.tail = tail();
 	code = option_read(&told, &line, argc, argv);
 	if (code == OPTIONS_READ)
-		code = check(&line);
+		code = main_check(&line);
 	if (code != OPTIONS_READ)
 		return code;
 	if (line.ready_fd != NO_FD)
 		line.bench.ready_fd = (int)line.ready_fd;
 	line.bench.realtime = line.pace != NULL ? strcmp(line.pace, "1") == 0 : line.bench.link != NULL;
-	return line.scenario_file != NULL ? run_scenario(&line) : run_scene(&line);
+	return line.scenario_file != NULL ? run_scenario(&line) : main_run_scene(&line);
 }

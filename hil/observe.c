@@ -96,7 +96,7 @@ void observe_reset(struct observe *observe)
 	hazard_reset(&observe->hazard);
 }
 
-static int block_sensor(const struct frame *frame)
+static int observe_block_sensor(const struct frame *frame)
 {
 	if (frame->id == WIRE_ID_BLOCK_S1)
 		return 0;
@@ -105,7 +105,7 @@ static int block_sensor(const struct frame *frame)
 
 void observe_at_host(struct observe *observe, const struct frame *frame)
 {
-	int sensor = block_sensor(frame);
+	int sensor = observe_block_sensor(frame);
 	struct wire_block block;
 	struct observe_blocks *blocks;
 
@@ -126,7 +126,7 @@ void observe_at_host(struct observe *observe, const struct frame *frame)
 
 /* ---- what the firmware says ---- */
 
-static void note_state(struct observe *observe, uint8_t state, double tower_s)
+static void observe_note_state(struct observe *observe, uint8_t state, double tower_s)
 {
 	hazard_state(&observe->hazard, state, &observe->truth, tower_s);
 	if (state == observe->state)
@@ -144,7 +144,7 @@ static void see_block(struct observe *observe, unsigned sensor, const struct fra
 	if (block.tick_ms < OBSERVE_TICKS)
 		observe->blocks[sensor].sent[block.tick_ms] = 1;
 	observe->block_s = observe->now_s;
-	note_state(observe, block.status & WIRE_STATUS_STATE, tower_s);
+	observe_note_state(observe, block.status & WIRE_STATUS_STATE, tower_s);
 	if (sensor == 0)
 		hazard_block(&observe->hazard, block.status & WIRE_STATUS_STATE, block.io);
 }
@@ -160,7 +160,7 @@ static void see_status(struct observe *observe, const struct frame *frame, doubl
 	if (observe->was_ready)
 		observe->checks |= status.checks;
 	if (observe->block_s < 0 || observe->now_s - observe->block_s > STATUS_ALONE_S)
-		note_state(observe, status.state, tower_s);
+		observe_note_state(observe, status.state, tower_s);
 }
 
 static void see_emcy(struct observe *observe, const struct frame *frame)
@@ -315,7 +315,7 @@ static void add_hash(struct observe *observe, const void *bytes, size_t count)
 
 static void see_message(struct observe *observe, const struct frame *frame, double tick_s, double tower_s)
 {
-	int sensor = block_sensor(frame);
+	int sensor = observe_block_sensor(frame);
 
 	if (sensor >= 0)
 		see_block(observe, (unsigned)sensor, frame, tower_s);

@@ -37,7 +37,7 @@ static double hysteresis(double restitution)
 	return low;
 }
 
-static double wedge(double angle_rad)
+static double product_wedge(double angle_rad)
 {
 	return sin(UNITS_RAD(50.0)) / fmax(fabs(sin(2 * angle_rad)), sin(2 * WEDGE_ANGLE_MIN_RAD));
 }
@@ -57,8 +57,8 @@ static struct corner corner_at(const struct product *p, const double s[], int i,
 }
 
 /* Adds the mat's force on one corner; returns how fast its tangential deflection grows. */
-static double contact_force(const struct product *p, int i, const struct corner *c, double grip_m,
-                            struct load *load)
+static double product_contact_force(const struct product *p, int i, const struct corner *c, double grip_m,
+                                    struct load *load)
 {
 	const double root = sqrt(c->depth_m), k = p->stiffness_n_m15[i];
 	const double normal =
@@ -80,7 +80,7 @@ static double contact_force(const struct product *p, int i, const struct corner 
 }
 
 /* The mounts' force on the box; the plate feels its opposite. */
-static struct load mount_force(const struct product *p, const double s[])
+static struct load product_mount_force(const struct product *p, const double s[])
 {
 	const double x = s[PRODUCT_PLATE_X] - s[PRODUCT_X], y = s[PRODUCT_PLATE_Y] - s[PRODUCT_Y];
 	/* how the offset changes as seen from the turning box */
@@ -91,7 +91,7 @@ static struct load mount_force(const struct product *p, const double s[])
 	return (struct load){k * x + p->mount_damping_n_s_m * vx, k * y + p->mount_damping_n_s_m * vy, 0};
 }
 
-static void rates(const struct product *p, const double s[], double rate[])
+static void product_rates(const struct product *p, const double s[], double rate[])
 {
 	const double sn = sin(s[PRODUCT_ANGLE]), cs = cos(s[PRODUCT_ANGLE]);
 	struct load load = {0, 0, 0}, mount = {0, 0, 0};
@@ -100,10 +100,10 @@ static void rates(const struct product *p, const double s[], double rate[])
 		const struct corner c = corner_at(p, s, i, sn, cs);
 
 		rate[PRODUCT_GRIP + i] =
-		        c.depth_m > 0 ? contact_force(p, i, &c, s[PRODUCT_GRIP + i], &load) : 0;
+		        c.depth_m > 0 ? product_contact_force(p, i, &c, s[PRODUCT_GRIP + i], &load) : 0;
 	}
 	if (p->plate_mass_kg > 0)
-		mount = mount_force(p, s);
+		mount = product_mount_force(p, s);
 	rate[PRODUCT_X] = s[PRODUCT_VX];
 	rate[PRODUCT_Y] = s[PRODUCT_VY];
 	rate[PRODUCT_ANGLE] = s[PRODUCT_SPIN];
@@ -129,7 +129,7 @@ static void corners_renew(struct product *p)
 		if (c.depth_m > 0)
 			continue;
 		p->state[PRODUCT_GRIP + i] = 0;
-		p->stiffness_n_m15[i] = p->stiffness25_n_m15 * wedge(p->state[PRODUCT_ANGLE]);
+		p->stiffness_n_m15[i] = p->stiffness25_n_m15 * product_wedge(p->state[PRODUCT_ANGLE]);
 		p->approach_m_s[i] = fmax(c.closing_m_s, PRODUCT_APPROACH_MIN_M_S);
 	}
 }
@@ -180,7 +180,7 @@ void product_strike(struct product *p, double speed_m_s)
 	p->state[PRODUCT_Y] = p->state[PRODUCT_PLATE_Y] = -lowest.arm_y_m;
 	p->state[PRODUCT_VY] = p->state[PRODUCT_PLATE_VY] = -speed_m_s;
 	corners_renew(p);
-	rates(p, p->state, p->rate);
+	product_rates(p, p->state, p->rate);
 }
 
 void product_step(struct product *p, double step_s)
@@ -195,14 +195,14 @@ void product_step(struct product *p, double step_s)
 
 		for (int i = 0; i < PRODUCT_STATES; i++)
 			at[i] = p->state[i] + reach[stage] * step_s * slope[i];
-		rates(p, at, slope);
+		product_rates(p, at, slope);
 		for (int i = 0; i < PRODUCT_STATES; i++)
 			sum[i] += weight * slope[i];
 	}
 	for (int i = 0; i < PRODUCT_STATES; i++)
 		p->state[i] += step_s / 6 * sum[i];
 	corners_renew(p);
-	rates(p, p->state, p->rate);
+	product_rates(p, p->state, p->rate);
 }
 
 void product_read(const struct product *p, struct product_reading *reading)

@@ -96,8 +96,8 @@ static int fail_number(struct scenario_reading *reading, const char *what, const
 	                     "%.60s = '%.60s', expected a number from %g to %g", what, text, min, max);
 }
 
-static int read_text(struct scenario_reading *reading, const char *name, const char *value, char *to,
-                     size_t size)
+static int scenario_read_text(struct scenario_reading *reading, const char *name, const char *value, char *to,
+                              size_t size)
 {
 	if (to[0] != '\0')
 		return settings_fail(&reading->settings, DT_E_FORMAT, "%s is given twice", name);
@@ -107,8 +107,8 @@ static int read_text(struct scenario_reading *reading, const char *name, const c
 	return 1;
 }
 
-static int read_number(struct scenario_reading *reading, const char *section, const char *name,
-                       const char *value)
+static int scenario_read_number(struct scenario_reading *reading, const char *section, const char *name,
+                                const char *value)
 {
 	for (unsigned i = 0; i < NUMBERS; i++) {
 		const struct number *number = &numbers[i];
@@ -163,15 +163,17 @@ static int read_parameter(struct scenario_reading *reading, const char *name, co
 
 /* ---- the file ---- */
 
-static int read_entry(struct settings *settings, const char *section, const char *name, const char *value)
+static int scenario_read_entry(struct settings *settings, const char *section, const char *name,
+                               const char *value)
 {
 	struct scenario_reading *reading = (struct scenario_reading *)settings;
 	struct scenario *scenario = &reading->scenario;
 
 	if (section[0] == '\0' && strcmp(name, "title") == 0)
-		return read_text(reading, name, value, scenario->title, sizeof(scenario->title));
+		return scenario_read_text(reading, name, value, scenario->title, sizeof(scenario->title));
 	if (strcmp(section, "run") == 0 && strcmp(name, "scene") == 0)
-		return read_text(reading, name, value, scenario->scene_file, sizeof(scenario->scene_file));
+		return scenario_read_text(reading, name, value, scenario->scene_file,
+		                          sizeof(scenario->scene_file));
 	if (strcmp(section, "scene") == 0)
 		return read_override(reading, name, value);
 	if (strcmp(section, "parameters") == 0)
@@ -182,17 +184,17 @@ static int read_entry(struct settings *settings, const char *section, const char
 		return scenario_read_expectation(reading, name, value);
 	if (strcmp(section, "counters") == 0)
 		return scenario_read_counter(reading, name, value);
-	return read_number(reading, section, name, value);
+	return scenario_read_number(reading, section, name, value);
 }
 
-static void begin(struct scenario *scenario)
+static void scenario_begin(struct scenario *scenario)
 {
 	for (unsigned i = 0; i < NUMBERS; i++)
 		*number_in(scenario, &numbers[i]) = numbers[i].initial;
 	scenario_expect_nominal(scenario);
 }
 
-static int complete(const struct scenario_reading *reading)
+static int scenario_complete(const struct scenario_reading *reading)
 {
 	const struct scenario *scenario = &reading->scenario;
 	const char *missing = NULL;
@@ -216,13 +218,13 @@ static int complete(const struct scenario_reading *reading)
 int scenario_read(struct scenario *scenario, const char *file, char message[SCENARIO_MESSAGE_MAX])
 {
 	struct scenario_reading reading = {
-	        .settings = {.file = file, .message = message, .entry = read_entry}};
+	        .settings = {.file = file, .message = message, .entry = scenario_read_entry}};
 	int result;
 
-	begin(&reading.scenario);
+	scenario_begin(&reading.scenario);
 	result = settings_read(&reading.settings);
 	if (result == 0)
-		result = complete(&reading);
+		result = scenario_complete(&reading);
 	if (result == 0)
 		*scenario = reading.scenario;
 	return result;

@@ -18,7 +18,7 @@ static const struct {
 };
 enum { ERRORS = sizeof(errors) / sizeof(errors[0]) };
 
-static const char *error_of(unsigned i)
+static const char *scenario_expect_error_of(unsigned i)
 {
 	return errors[i].name;
 }
@@ -97,7 +97,8 @@ static const struct list_kind {
         {"checks", offsetof(struct scenario, checks), WIRE_CHECKS, 0, WIRE_CHECKS, wire_check_name},
         {"marks", offsetof(struct scenario, marks), 16, 0, 16, mark_of},
         {"replies", offsetof(struct scenario, replies), WIRE_STATES, 0, SCENARIO_LIST_MAX, wire_state_name},
-        {"refused", offsetof(struct scenario, refused), ERRORS, 0, SCENARIO_LIST_MAX, error_of},
+        {"refused", offsetof(struct scenario, refused), ERRORS, 0, SCENARIO_LIST_MAX,
+         scenario_expect_error_of},
         {"aborts", offsetof(struct scenario, aborts), 0, 0, SCENARIO_LIST_MAX, NULL},
 };
 enum { LISTS = sizeof(lists) / sizeof(lists[0]) };
@@ -114,12 +115,13 @@ static bool parse_item(const struct list_kind *kind, const char *word, int32_t *
 		return true;
 	}
 	index = scenario_find(word, kind->names, kind->name_of);
-	*item = kind->name_of == error_of && index >= 0 ? errors[index].code : index;
+	*item = kind->name_of == scenario_expect_error_of && index >= 0 ? errors[index].code : index;
 	return index >= 0;
 }
 
 /* One that is given again goes on. */
-static int read_list(struct scenario_reading *reading, const struct list_kind *kind, const char *value)
+static int scenario_expect_read_list(struct scenario_reading *reading, const struct list_kind *kind,
+                                     const char *value)
 {
 	struct scenario_list *list = (void *)((char *)&reading->scenario + kind->offset);
 	char text[512];
@@ -154,7 +156,7 @@ int scenario_read_expectation(struct scenario_reading *reading, const char *name
 		return read_range(reading, name, value, &reading->scenario.result[result]);
 	for (unsigned i = 0; i < LISTS; i++)
 		if (strcmp(name, lists[i].key) == 0)
-			return read_list(reading, &lists[i], value);
+			return scenario_expect_read_list(reading, &lists[i], value);
 	return settings_fail(&reading->settings, DT_E_FORMAT, "unknown key '%.60s' in [expect]", name);
 }
 

@@ -23,7 +23,7 @@ enum {
 };
 _Static_assert(WIRE_PARAMETERS < 32, "has_value has a bit for each");
 
-static void enter(struct script *script, enum script_phase phase, uint32_t send_ms)
+static void script_enter(struct script *script, enum script_phase phase, uint32_t send_ms)
 {
 	script->phase = phase;
 	script->send_ms = send_ms;
@@ -49,7 +49,7 @@ void script_init(struct script *script, const struct script_options *options)
 	script->phase = first_phase(script);
 }
 
-static bool due(uint32_t time_ms, uint32_t now_ms)
+static bool script_due(uint32_t time_ms, uint32_t now_ms)
 {
 	return (int32_t)(now_ms - time_ms) >= 0;
 }
@@ -62,7 +62,8 @@ static bool in_capture(const struct script *script, uint32_t tick_ms)
 	       script->capture.last_tick_ms - script->capture.first_tick_ms;
 }
 
-static void feed_block(struct script *script, unsigned sensor, const struct frame *frame, uint32_t now_ms)
+static void script_feed_block(struct script *script, unsigned sensor, const struct frame *frame,
+                              uint32_t now_ms)
 {
 	struct wire_block block;
 	uint32_t *slot;
@@ -96,7 +97,7 @@ static void feed_capture(struct script *script, const struct frame *frame, uint3
 	script->resend_at = 0;
 }
 
-static void feed_measured(struct script *script, const struct frame *frame, uint32_t now_ms)
+static void script_feed_measured(struct script *script, const struct frame *frame, uint32_t now_ms)
 {
 	struct wire_measured measured;
 
@@ -118,7 +119,7 @@ static unsigned find_parameter(uint16_t index)
 }
 
 /* The set a capture was made with; its CRC-32 in the capture end is compared by who observes. */
-static void feed_parameter(struct script *script, const struct frame *frame, uint32_t now_ms)
+static void script_feed_parameter(struct script *script, const struct frame *frame, uint32_t now_ms)
 {
 	struct wire_parameter parameter;
 	unsigned i;
@@ -147,7 +148,7 @@ static void feed_challenge(struct script *script, const struct frame *frame, uin
 }
 
 /* A tower that starts anew has forgotten what was written. */
-static void feed_heartbeat(struct script *script, const struct frame *frame)
+static void script_feed_heartbeat(struct script *script, const struct frame *frame)
 {
 	struct wire_heartbeat heartbeat;
 
@@ -181,7 +182,7 @@ static void feed_sdo(struct script *script, const struct frame *frame, uint32_t 
 	if (sdo.specifier == SDO_WRITTEN && i < WIRE_PARAMETERS)
 		script->value[i] = script->options.parameters[script->parameters_done].value;
 	script->parameters_done++;
-	enter(script, first_phase(script), now_ms);
+	script_enter(script, first_phase(script), now_ms);
 }
 
 void script_feed(struct script *script, const struct frame *part, uint32_t now_ms)
@@ -197,11 +198,11 @@ void script_feed(struct script *script, const struct frame *part, uint32_t now_m
 	switch (frame->id) {
 	case WIRE_ID_BLOCK_S1:
 	case WIRE_ID_RESENT_S1:
-		feed_block(script, 0, frame, now_ms);
+		script_feed_block(script, 0, frame, now_ms);
 		break;
 	case WIRE_ID_BLOCK_S2:
 	case WIRE_ID_RESENT_S2:
-		feed_block(script, 1, frame, now_ms);
+		script_feed_block(script, 1, frame, now_ms);
 		break;
 	case WIRE_ID_CAPTURE_END:
 		feed_capture(script, frame, now_ms);
@@ -211,16 +212,16 @@ void script_feed(struct script *script, const struct frame *part, uint32_t now_m
 			return; /* of another wire: the hash in the heartbeat tells */
 		break;
 	case WIRE_ID_MEASURED:
-		feed_measured(script, frame, now_ms);
+		script_feed_measured(script, frame, now_ms);
 		break;
 	case WIRE_ID_PARAMETER:
-		feed_parameter(script, frame, now_ms);
+		script_feed_parameter(script, frame, now_ms);
 		break;
 	case WIRE_ID_CHALLENGE:
 		feed_challenge(script, frame, now_ms);
 		break;
 	case WIRE_ID_HEARTBEAT_TOWER:
-		feed_heartbeat(script, frame);
+		script_feed_heartbeat(script, frame);
 		break;
 	case WIRE_ID_REPLY:
 		feed_reply(script, frame);
@@ -235,7 +236,7 @@ void script_feed(struct script *script, const struct frame *part, uint32_t now_m
 
 /* ---- what the operator does ---- */
 
-static void fail(struct script *script, const char *what)
+static void script_fail(struct script *script, const char *what)
 {
 	char checks[160] = "";
 
@@ -290,7 +291,7 @@ static uint32_t capture_ticks(const struct script *script)
 	return script->capture.last_tick_ms - script->capture.first_tick_ms + 1;
 }
 
-static bool missing(const struct script *script, uint32_t block)
+static bool script_missing(const struct script *script, uint32_t block)
 {
 	uint32_t ticks = capture_ticks(script);
 	uint32_t tick_ms = script->capture.first_tick_ms + block % ticks;
@@ -303,7 +304,7 @@ static unsigned count_missing(const struct script *script)
 	unsigned count = 0;
 
 	for (uint32_t block = 0; block < WIRE_SENSORS * capture_ticks(script); block++)
-		count += missing(script, block);
+		count += script_missing(script, block);
 	return count;
 }
 
@@ -316,7 +317,8 @@ static unsigned request_missing(struct script *script, uint32_t now_ms, struct f
 	while (block < WIRE_SENSORS * ticks && count < RESEND_RUNS) {
 		uint32_t sensor = block / ticks, first = block;
 
-		while (block < (sensor + 1) * ticks && block - first < RESEND_TICKS && missing(script, block))
+		while (block < (sensor + 1) * ticks && block - first < RESEND_TICKS &&
+		       script_missing(script, block))
 			block++;
 		if (block == first) {
 			block++;
@@ -339,7 +341,7 @@ static unsigned do_set(struct script *script, uint32_t now_ms, struct frame *out
 	const struct scenario_parameter *parameter = &script->options.parameters[script->parameters_done];
 	unsigned state = script->status.state;
 
-	if ((state != WIRE_STATE_SAFE && state != WIRE_STATE_READY) || !due(script->send_ms, now_ms))
+	if ((state != WIRE_STATE_SAFE && state != WIRE_STATE_READY) || !script_due(script->send_ms, now_ms))
 		return 0;
 	wire_pack_sdo(out, WIRE_ID_SDO_REQUEST,
 	              &(struct wire_sdo){SDO_WRITE, parameter->index, 0, parameter->value});
@@ -353,10 +355,10 @@ static unsigned do_arm(struct script *script, uint32_t now_ms, struct frame *out
 	bool armed = script->status.state == WIRE_STATE_ARMED;
 
 	if (armed && script->has_armed) {
-		enter(script, SCRIPT_RELEASE, now_ms + script->options.release_ms);
+		script_enter(script, SCRIPT_RELEASE, now_ms + script->options.release_ms);
 		return 0;
 	}
-	if ((!armed && script->status.state != WIRE_STATE_READY) || !due(script->send_ms, now_ms))
+	if ((!armed && script->status.state != WIRE_STATE_READY) || !script_due(script->send_ms, now_ms))
 		return 0;
 	script->has_armed = false;
 	return command(script, WIRE_OP_ARM, now_ms, out);
@@ -368,14 +370,14 @@ static unsigned do_release(struct script *script, uint32_t now_ms, struct frame 
 
 	if (state == WIRE_STATE_SAFE || state == WIRE_STATE_READY) { /* disarmed */
 		script->has_armed = false;
-		enter(script, SCRIPT_ARM, now_ms);
+		script_enter(script, SCRIPT_ARM, now_ms);
 		return 0;
 	}
 	if (state != WIRE_STATE_ARMED) {
-		enter(script, SCRIPT_FETCH, now_ms);
+		script_enter(script, SCRIPT_FETCH, now_ms);
 		return 0;
 	}
-	return due(script->send_ms, now_ms) ? command(script, WIRE_OP_RELEASE, now_ms, out) : 0;
+	return script_due(script->send_ms, now_ms) ? command(script, WIRE_OP_RELEASE, now_ms, out) : 0;
 }
 
 /* What was measured and the parameters come behind the capture end, and again with it. */
@@ -397,9 +399,9 @@ static unsigned do_fetch(struct script *script, uint32_t now_ms, struct frame *o
 	bool patient;
 	unsigned lacking;
 
-	if (!due(script->send_ms, now_ms))
+	if (!script_due(script->send_ms, now_ms))
 		return 0;
-	if (script->classic && !due(script->segment_ms + SETTLE_MS, now_ms))
+	if (script->classic && !script_due(script->segment_ms + SETTLE_MS, now_ms))
 		return 0; /* the upload goes on */
 	if (!script->captured) {
 		script->send_ms = now_ms + REPEAT_MS;
@@ -408,11 +410,11 @@ static unsigned do_fetch(struct script *script, uint32_t now_ms, struct frame *o
 		return request_end(script, now_ms, out); /* it was lost */
 	}
 	if (capture_ticks(script) > SCRIPT_TICKS) {
-		fail(script, "capture longer than the script remembers");
+		script_fail(script, "capture longer than the script remembers");
 		return 0;
 	}
 	lacking = count_missing(script);
-	patient = !due(script->progress_ms + GIVE_UP_MS, now_ms);
+	patient = !script_due(script->progress_ms + GIVE_UP_MS, now_ms);
 	if (lacking > 0 && patient)
 		return request_missing(script, now_ms, out);
 	if (tail_missing(script) && patient)
@@ -423,7 +425,7 @@ static unsigned do_fetch(struct script *script, uint32_t now_ms, struct frame *o
 		script->incomplete++;
 	}
 	script->accept_op = lacking > 0 ? WIRE_OP_DISCARD : WIRE_OP_ACCEPT;
-	enter(script, SCRIPT_ACCEPT, now_ms);
+	script_enter(script, SCRIPT_ACCEPT, now_ms);
 	return 0;
 }
 
@@ -433,10 +435,10 @@ static unsigned do_accept(struct script *script, uint32_t now_ms, struct frame *
 
 	if (state == WIRE_STATE_UPLOADED || state == WIRE_STATE_SAFE || state == WIRE_STATE_READY ||
 	    state == WIRE_STATE_FAULT_HELD) {
-		enter(script, SCRIPT_RETURN, now_ms);
+		script_enter(script, SCRIPT_RETURN, now_ms);
 		return 0;
 	}
-	if (state != WIRE_STATE_CAPTURED || !due(script->send_ms, now_ms))
+	if (state != WIRE_STATE_CAPTURED || !script_due(script->send_ms, now_ms))
 		return 0;
 	return command(script, script->accept_op, now_ms, out);
 }
@@ -446,13 +448,13 @@ static unsigned do_return(struct script *script, uint32_t now_ms, struct frame *
 	unsigned state = script->status.state;
 
 	if (state == WIRE_STATE_FAULT_HELD) /* the fault was in motion, the drop is uploaded */
-		return due(script->send_ms, now_ms) ? command(script, WIRE_OP_CLEAR, now_ms, out) : 0;
+		return script_due(script->send_ms, now_ms) ? command(script, WIRE_OP_CLEAR, now_ms, out) : 0;
 	if (state != WIRE_STATE_SAFE && state != WIRE_STATE_READY)
 		return 0;
 	script->drops_done++;
 	script->captured = false;
 	script->drop_ms = now_ms;
-	enter(script, first_phase(script), now_ms);
+	script_enter(script, first_phase(script), now_ms);
 	return 0;
 }
 
@@ -489,23 +491,23 @@ static bool drop_is_off(const struct script *script)
 	return state == WIRE_STATE_FAULT_HELD && script->phase < SCRIPT_ACCEPT;
 }
 
-static void stopped(struct script *script, uint32_t now_ms)
+static void script_stopped(struct script *script, uint32_t now_ms)
 {
 	if (!script->options.patient)
-		fail(script, "stopped");
+		script_fail(script, "stopped");
 	else if (script->phase != SCRIPT_SET && script->phase != SCRIPT_ARM)
-		enter(script, SCRIPT_ARM, now_ms);
+		script_enter(script, SCRIPT_ARM, now_ms);
 }
 
 /* The technician has looked: guards that were open are closed again. */
-static unsigned acknowledge(struct script *script, uint32_t now_ms, struct frame *out)
+static unsigned script_acknowledge(struct script *script, uint32_t now_ms, struct frame *out)
 {
 	struct wire_command message = {.op = WIRE_OP_CLEAR, .sequence = script->sequence};
 	uint32_t checks = script->status.checks;
 	bool waiting = script->status.state == WIRE_STATE_SAFE && checks & WIRE_CHECK_ACKNOWLEDGE &&
 	               !(checks & GUARDS);
 
-	if (!waiting || script->options.passive || !due(script->clear_ms, now_ms))
+	if (!waiting || script->options.passive || !script_due(script->clear_ms, now_ms))
 		return 0;
 	script->clear_ms = now_ms + REPEAT_MS;
 	script->sequence++;
@@ -524,17 +526,17 @@ unsigned script_poll(struct script *script, uint32_t now_ms, struct frame out[SC
 {
 	unsigned count = 0;
 
-	if (due(script->heartbeat_ms, now_ms)) {
+	if (script_due(script->heartbeat_ms, now_ms)) {
 		script->heartbeat_ms = now_ms + HEARTBEAT_MS;
 		script_heartbeat(&out[count++], SCRIPT_SESSION, wire_hash() ^ script->options.wrong_hash);
 	}
 	if (script->phase == SCRIPT_ARM || script->phase == SCRIPT_DONE)
-		count += acknowledge(script, now_ms, out + count);
+		count += script_acknowledge(script, now_ms, out + count);
 	if (script->phase == SCRIPT_DONE || script->phase == SCRIPT_FAILED)
 		return count;
 	if (drop_is_off(script))
-		stopped(script, now_ms);
-	else if (!script->options.patient && due(script->drop_ms + SCRIPT_LIMIT_MS, now_ms))
-		fail(script, "not done in time");
+		script_stopped(script, now_ms);
+	else if (!script->options.patient && script_due(script->drop_ms + SCRIPT_LIMIT_MS, now_ms))
+		script_fail(script, "not done in time");
 	return count + do_phase(script, now_ms, out + count);
 }

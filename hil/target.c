@@ -171,7 +171,8 @@ static void share_processor(void)
 }
 
 /* An option and its number, in text; nothing for 0. Returns the words. */
-static size_t add_number(const char **argv, const char *option, unsigned number, char *text, size_t size)
+static size_t target_add_number(const char **argv, const char *option, unsigned number, char *text,
+                                size_t size)
 {
 	if (number == 0)
 		return 0;
@@ -210,8 +211,9 @@ static int run_command(struct target *target, const struct target_options *optio
 	argv[count++] = target->prefix;
 	if (options->realtime)
 		argv[count++] = "--realtime";
-	count += add_number(argv + count, "--reset-cause", options->cause, cause_text, sizeof(cause_text));
-	count += add_number(argv + count, "--kept", options->kept, kept_text, sizeof(kept_text));
+	count += target_add_number(argv + count, "--reset-cause", options->cause, cause_text,
+	                           sizeof(cause_text));
+	count += target_add_number(argv + count, "--kept", options->kept, kept_text, sizeof(kept_text));
 	argv[count] = NULL;
 	/* a Ctrl-C reaches the bench alone, which then ends the firmware in order */
 	error = process_start(&(struct process){.words = argv, .fd = {PROCESS_NOTHING}, .alone = true},

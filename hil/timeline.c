@@ -114,7 +114,7 @@ void timeline_sample(struct timeline *timeline, double time_s, uint16_t io, uint
 /* ---- drawing ---- */
 
 /* gnuplot's text in single quotes; its enhanced mode is off. */
-static void put_text(FILE *out, const char *text)
+static void timeline_put_text(FILE *out, const char *text)
 {
 	fputc('\'', out);
 	for (; *text != '\0'; text++) {
@@ -168,7 +168,7 @@ static void put_trace(const struct timeline *timeline, const char *name, size_t 
 }
 
 /* The point at which the latch was opened first; count: never. */
-static size_t find_drop(const struct timeline *timeline)
+static size_t timeline_find_drop(const struct timeline *timeline)
 {
 	size_t i = 0;
 
@@ -226,20 +226,20 @@ static void put_column(const struct observe *observe, const char *trace, double 
 static void put_picture(const struct timeline *timeline, const struct observe *observe, const char *title,
                         const char *file, FILE *out)
 {
-	size_t count = timeline->count, drop = find_drop(timeline), first, last;
+	size_t count = timeline->count, drop = timeline_find_drop(timeline), first, last;
 	bool dropped = drop < count;
 	double end_s = timeline->points[count - 1].time_s;
 
 	fputs("set terminal svg size 1500,850 font 'sans-serif,11' noenhanced background '#ffffff'\nset "
 	      "output ",
 	      out);
-	put_text(out, file);
+	timeline_put_text(out, file);
 	fputc('\n', out);
 	put_levels(timeline, out);
 	put_trace(timeline, "wide", 0, count, 1 + count / WIDE_POINTS, out);
 	fputs("unset key\nset grid x lc rgb '#d0d0d0'\nset tics nomirror font ',9'\nset multiplot title ",
 	      out);
-	put_text(out, title);
+	timeline_put_text(out, title);
 	fputc('\n', out);
 	put_column(observe, "wide", 0.095, dropped ? 0.52 : 0.985, 0, end_s, out);
 	if (dropped) {

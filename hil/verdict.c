@@ -16,8 +16,8 @@ struct verdict {
 	size_t size;
 };
 
-static void say(struct verdict *verdict, bool good, const char *name, const char *measured,
-                const char *expected)
+static void verdict_say(struct verdict *verdict, bool good, const char *name, const char *measured,
+                        const char *expected)
 {
 	size_t used = strlen(verdict->failed);
 
@@ -43,12 +43,12 @@ static void judge_range(struct verdict *verdict, const char *name, double value,
 		snprintf(expected, sizeof(expected), "%.9g", range->min);
 	else
 		snprintf(expected, sizeof(expected), "%.9g..%.9g", range->min, range->max);
-	say(verdict, value >= range->min && value <= range->max, name, measured, expected);
+	verdict_say(verdict, value >= range->min && value <= range->max, name, measured, expected);
 }
 
 /* ---- lists ---- */
 
-static const char *error_of(unsigned number)
+static const char *verdict_error_of(unsigned number)
 {
 	return scenario_error_name((int)(int32_t)number);
 }
@@ -77,7 +77,7 @@ static void judge_notes(struct verdict *verdict, const char *name, const struct 
 	}
 	for (unsigned i = 0; i < list->count; i++)
 		add_item(expected, (uint32_t)list->item[i], name_of);
-	say(verdict, good, name, measured[0] ? measured : "-", expected[0] ? expected : "-");
+	verdict_say(verdict, good, name, measured[0] ? measured : "-", expected[0] ? expected : "-");
 }
 
 static void judge_one(struct verdict *verdict, const char *name, uint32_t number,
@@ -105,14 +105,15 @@ static void judge_bits(struct verdict *verdict, const char *name, unsigned bits,
 		if (wanted >> bit & 1)
 			add_item(expected, bit, name_of);
 	}
-	say(verdict, wanted == bits, name, measured[0] ? measured : "-", expected[0] ? expected : "-");
+	verdict_say(verdict, wanted == bits, name, measured[0] ? measured : "-",
+	            expected[0] ? expected : "-");
 }
 
 static void judge_marks(struct verdict *verdict, const struct observe *observe,
                         const struct scenario_list *list)
 {
 	if (list->given && observe->captures == 0)
-		say(verdict, false, "marks", "no capture", "a capture end");
+		verdict_say(verdict, false, "marks", "no capture", "a capture end");
 	else
 		judge_bits(verdict, "marks", observe->capture.marks, list, wire_mark_name);
 }
@@ -139,7 +140,7 @@ unsigned verdict_print(const struct scenario *scenario, const struct observe *ob
 	judge_bits(&verdict, "checks", observe->checks, &scenario->checks, wire_check_name);
 	judge_marks(&verdict, observe, &scenario->marks);
 	judge_notes(&verdict, "replies", &observe->replies, &scenario->replies, wire_state_name);
-	judge_notes(&verdict, "refused", &observe->refused, &scenario->refused, error_of);
+	judge_notes(&verdict, "refused", &observe->refused, &scenario->refused, verdict_error_of);
 	judge_notes(&verdict, "aborts", &observe->aborts, &scenario->aborts, NULL);
 	for (unsigned i = 0; i < SCENARIO_RESULTS; i++)
 		judge_range(&verdict, scenario_result_name(i), results[i], &scenario->result[i]);

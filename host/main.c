@@ -42,7 +42,7 @@ static void help(FILE *out)
 	      out);
 }
 
-static int run(int argc, char **argv)
+static int main_run(int argc, char **argv)
 {
 	if (argc < 2) {
 		help(stderr);
@@ -69,7 +69,7 @@ int main(int argc, char **argv)
 	int code;
 
 	gsl_set_error_handler_off();
-	code = run(argc, argv);
+	code = main_run(argc, argv);
 	/* a command that failed has said why */
 	if ((fflush(stdout) != 0 || ferror(stdout)) && code == COMMAND_DONE) {
 		command_error("standard output: not all of it could be written");

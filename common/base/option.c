@@ -30,7 +30,7 @@ static int text_column(const struct option_table *table)
 	return column;
 }
 
-static void tell_row(const struct option_row *row, int column)
+static void option_tell_row(const struct option_row *row, int column)
 {
 	const char *text = row->help;
 	int at = printf("  --%s%s%s", row->name, row->value != NULL ? " " : "",
@@ -56,7 +56,7 @@ void option_help(const struct option_table *table)
 
 	fputs(table->head, stdout);
 	for (int i = 0; i < table->count; i++)
-		tell_row(&table->rows[i], column);
+		option_tell_row(&table->rows[i], column);
 	if (table->tail != NULL)
 		fputs(table->tail, stdout);
 }
@@ -116,8 +116,8 @@ int option_choose(const struct option_table *table, const char *name, const char
 
 /* ---- read ---- */
 
-static int take_number(const struct option_table *table, const struct option_row *row, const char *text,
-                       void *field)
+static int option_take_number(const struct option_table *table, const struct option_row *row,
+                              const char *text, void *field)
 {
 	double value;
 
@@ -128,8 +128,8 @@ static int take_number(const struct option_table *table, const struct option_row
 	return OPTIONS_READ;
 }
 
-static int take_whole(const struct option_table *table, const struct option_row *row, const char *text,
-                      void *field)
+static int option_take_whole(const struct option_table *table, const struct option_row *row, const char *text,
+                             void *field)
 {
 	uint64_t max = row->max < (double)UINT64_MAX ? (uint64_t)row->max : UINT64_MAX, value;
 
@@ -155,7 +155,8 @@ static int take_word(const struct option_table *table, const struct option_row *
 	return OPTIONS_READ;
 }
 
-static int take(const struct option_table *table, const struct option_row *row, const char *text, void *into)
+static int base_option_take(const struct option_table *table, const struct option_row *row, const char *text,
+                            void *into)
 {
 	void *field = (char *)into + row->at;
 
@@ -168,10 +169,10 @@ static int take(const struct option_table *table, const struct option_row *row, 
 		return OPTIONS_READ;
 	case OPTION_IS_NUMBER:
 	case OPTION_IS_PERCENT:
-		return take_number(table, row, text, field);
+		return option_take_number(table, row, text, field);
 	case OPTION_IS_UNSIGNED:
 	case OPTION_IS_UINT64:
-		return take_whole(table, row, text, field);
+		return option_take_whole(table, row, text, field);
 	case OPTION_IS_WORDS:
 		return take_word(table, row, text, field);
 	default:
@@ -195,8 +196,9 @@ int option_read(const struct option_table *table, void *into, int argc, char **a
 			option_help(table);
 			return OPTIONS_TOLD;
 		}
-		code = option < ROW_OPTION ? refuse_word(table, argv[optind - 1])
-		                           : take(table, &table->rows[option - ROW_OPTION], optarg, into);
+		code = option < ROW_OPTION
+		               ? refuse_word(table, argv[optind - 1])
+		               : base_option_take(table, &table->rows[option - ROW_OPTION], optarg, into);
 	}
 	if (code == OPTIONS_READ && !table->words && optind != argc)
 		code = option_wrong(table, "'%s' is too much", argv[optind]);

@@ -9,7 +9,7 @@
 
 enum { ROOM_BYTES = 4096 };
 
-static ssize_t put(void *context, const char *bytes, size_t size)
+static ssize_t text_put(void *context, const char *bytes, size_t size)
 {
 	struct text *text = context;
 	size_t room = text->room;
@@ -32,7 +32,7 @@ int text_open(struct text *text)
 {
 	*text = (struct text){.room = ROOM_BYTES, .bytes = calloc(1, ROOM_BYTES)};
 	if (text->bytes != NULL)
-		text->out = fopencookie(text, "w", (cookie_io_functions_t){.write = put});
+		text->out = fopencookie(text, "w", (cookie_io_functions_t){.write = text_put});
 	if (text->out != NULL)
 		return 0;
 	free(text->bytes);

@@ -16,7 +16,7 @@ struct coder {
 	unsigned run, last;
 };
 
-static void put(struct coder *coder, unsigned bit)
+static void canbits_put(struct coder *coder, unsigned bit)
 {
 	coder->run = bit == coder->last ? coder->run + 1 : 1;
 	coder->last = bit;
@@ -31,28 +31,28 @@ static void put(struct coder *coder, unsigned bit)
 static void put_word(struct coder *coder, uint32_t word, unsigned count)
 {
 	while (count-- > 0)
-		put(coder, word >> count & 1);
+		canbits_put(coder, word >> count & 1);
 }
 
 /* Data that fill the run under way and then change with every stuff bit. */
 static void put_worst(struct coder *coder, unsigned count)
 {
 	while (count-- > 0)
-		put(coder, coder->last);
+		canbits_put(coder, coder->last);
 }
 
-static struct coder start(uint32_t id)
+static struct coder canbits_start(uint32_t id)
 {
 	struct coder coder = {.last = 1}; /* idle: stuffing begins with the frame */
 
-	put(&coder, 0);
+	canbits_put(&coder, 0);
 	put_word(&coder, id, ID_BITS);
 	return coder;
 }
 
 struct canbits canbits_classic(uint32_t id, unsigned length)
 {
-	struct coder coder = start(id);
+	struct coder coder = canbits_start(id);
 
 	put_word(&coder, 0, 3); /* RTR, IDE, r0 */
 	put_word(&coder, length, DLC_BITS);
@@ -73,13 +73,13 @@ static unsigned fd_code(unsigned length)
 
 struct canbits canbits_fd(uint32_t id, unsigned length)
 {
-	struct coder coder = start(id);
+	struct coder coder = canbits_start(id);
 	unsigned field = FD_COUNT_BITS + (length > 16 ? 21 : 17);
 	unsigned nominal;
 
 	put_word(&coder, 0x5, 5); /* RRS 0, IDE 0, FDF 1, res 0, BRS 1 */
 	nominal = coder.bits;
-	put(&coder, 0); /* ESI */
+	canbits_put(&coder, 0); /* ESI */
 	put_word(&coder, fd_code(length), DLC_BITS);
 	put_worst(&coder, 8 * length - 1);
 	coder.bits++; /* after the last data bit a fixed stuff bit comes anyway */

@@ -121,7 +121,7 @@ static int log_send(struct link *link, const struct frame *frame)
 }
 
 /* Makes room and reads more: 1, 0 at the deadline, DT_E_CLOSED at the end. */
-static int fill(struct log *log, int64_t deadline_us)
+static int log_fill(struct log *log, int64_t deadline_us)
 {
 	ssize_t n;
 	int ready;
@@ -158,7 +158,7 @@ static bool is_remark(const char *line, size_t length)
 }
 
 /* Takes one line of length bytes from the buffer: whether it is a frame. */
-static bool take_line(struct log *log, size_t length, struct frame *frame)
+static bool log_take_line(struct log *log, size_t length, struct frame *frame)
 {
 	const char *line = log->buffer + log->start;
 	bool whole = !log->skipping;
@@ -190,13 +190,13 @@ static int log_receive(struct link *link, struct frame *frame, int64_t deadline_
 		int result;
 
 		if (newline != NULL || (log->ended && (left > 0 || log->skipping))) {
-			if (take_line(log, newline != NULL ? (size_t)(newline - line) + 1u : left, frame))
+			if (log_take_line(log, newline != NULL ? (size_t)(newline - line) + 1u : left, frame))
 				return 1;
 			continue;
 		}
 		if (log->ended)
 			return DT_E_CLOSED;
-		result = fill(log, deadline_us);
+		result = log_fill(log, deadline_us);
 		if (result == DT_E_CLOSED)
 			log->ended = true;
 		else if (result <= 0)

@@ -96,7 +96,7 @@ static int flush(struct slcan *slcan, int64_t deadline_us)
 	return 1;
 }
 
-static int put(struct slcan *slcan, const char *text, size_t length, int64_t deadline_us)
+static int slcan_put(struct slcan *slcan, const char *text, size_t length, int64_t deadline_us)
 {
 	memcpy(slcan->output, text, length);
 	slcan->output_at = 0;
@@ -111,7 +111,7 @@ static int slcan_close(struct link *link)
 	bool kept = true;
 
 	if (slcan->descriptor >= 0) {
-		kept = flush(slcan, deadline_us) == 1 && put(slcan, "C\r", 2, deadline_us) == 1;
+		kept = flush(slcan, deadline_us) == 1 && slcan_put(slcan, "C\r", 2, deadline_us) == 1;
 		(void)close(slcan->descriptor);
 	}
 	if (slcan->poller >= 0)
@@ -139,7 +139,7 @@ static struct slcan *slcan_new(void)
 	return NULL;
 }
 
-static const char *start(struct slcan *slcan, const char *device, speed_t speed)
+static const char *slcan_start(struct slcan *slcan, const char *device, speed_t speed)
 {
 	static const char commands[] = "C\rS8\rY5\rO\r";
 	struct epoll_event input = {.events = EPOLLIN};
@@ -153,7 +153,7 @@ static const char *start(struct slcan *slcan, const char *device, speed_t speed)
 		return "not a serial line";
 	}
 	slcan->descriptor = descriptor;
-	if (put(slcan, commands, sizeof(commands) - 1, link_now_us() + LINK_PATIENCE_US) != 1)
+	if (slcan_put(slcan, commands, sizeof(commands) - 1, link_now_us() + LINK_PATIENCE_US) != 1)
 		return "the adapter takes no commands";
 	return NULL;
 }
@@ -170,7 +170,7 @@ static struct link *slcan_open(const char *rest, enum link_mode mode, struct lin
 		if (!parse_rest(device, &speed))
 			reason = "not a known line speed";
 		else
-			reason = start(slcan, device, speed);
+			reason = slcan_start(slcan, device, speed);
 	}
 	free(device);
 	if (reason == NULL)
@@ -198,11 +198,11 @@ static int slcan_send(struct link *link, const struct frame *frame)
 		return result == 0 ? DT_E_FULL : DT_E_LINK;
 	}
 	link->counters.send_retried += waiting;
-	return put(slcan, line, length, link_now_us()) < 0 ? DT_E_LINK : 0;
+	return slcan_put(slcan, line, length, link_now_us()) < 0 ? DT_E_LINK : 0;
 }
 
 /* Looks for a frame in what was read. */
-static bool take_frame(struct slcan *slcan, struct frame *frame)
+static bool slcan_take_frame(struct slcan *slcan, struct frame *frame)
 {
 	eventfd_t ignored;
 
@@ -252,7 +252,7 @@ static int slcan_receive(struct link *link, struct frame *frame, int64_t deadlin
 
 	/* A line that never stops talking nonsense must not keep us past the deadline. */
 	do {
-		if (take_frame(slcan, frame))
+		if (slcan_take_frame(slcan, frame))
 			return 1;
 		if (result <= 0)
 			return result;

@@ -27,7 +27,7 @@ static const struct {
 
 #define LETTERS (sizeof(letters) / sizeof(letters[0]))
 
-static unsigned code_of_length(uint8_t length)
+static unsigned slcan_text_code_of_length(uint8_t length)
 {
 	unsigned code = 0;
 
@@ -49,7 +49,7 @@ size_t slcan_encode(char line[SLCAN_LINE_MAX], const struct frame *frame)
 		return 0;
 	while (id_digits-- > 0)
 		*p++ = hex_digits[frame->id >> (4 * id_digits) & 15u];
-	*p++ = hex_digits[code_of_length(frame->length)];
+	*p++ = hex_digits[slcan_text_code_of_length(frame->length)];
 	for (unsigned i = 0; i < frame->length && (flags & FRAME_REMOTE) == 0; i++) {
 		*p++ = hex_digits[frame->data[i] >> 4];
 		*p++ = hex_digits[frame->data[i] & 15u];
@@ -78,7 +78,7 @@ static bool all_hex(const char *text, unsigned length)
 }
 
 /* text holds hex digits only */
-static uint32_t number_of(const char *text, unsigned digits)
+static uint32_t slcan_text_number_of(const char *text, unsigned digits)
 {
 	uint32_t value = 0;
 
@@ -102,20 +102,20 @@ static bool parse_line(const char *line, unsigned length, struct frame *frame)
 	head = 1 + id_digits + 1;
 	if (length < head || !all_hex(line + 1, length - 1))
 		return false;
-	parsed.id = number_of(line + 1, id_digits);
-	parsed.length = length_of_code[number_of(line + 1 + id_digits, 1)];
+	parsed.id = slcan_text_number_of(line + 1, id_digits);
+	parsed.length = length_of_code[slcan_text_number_of(line + 1 + id_digits, 1)];
 	data_digits = (parsed.flags & FRAME_REMOTE) != 0 ? 0 : 2u * parsed.length;
 	if (!link_frame_valid(&parsed) ||
 	    (length != head + data_digits && length != head + data_digits + STAMP_DIGITS))
 		return false;
 	for (unsigned i = 0; i < data_digits / 2; i++)
-		parsed.data[i] = (uint8_t)number_of(line + head + (size_t)2 * i, 2);
+		parsed.data[i] = (uint8_t)slcan_text_number_of(line + head + (size_t)2 * i, 2);
 	*frame = parsed;
 	return true;
 }
 
 /* What adapters say of our own lines: nothing, or z or Z when a frame was taken. */
-static bool is_answer(const char *line, unsigned length)
+static bool slcan_text_is_answer(const char *line, unsigned length)
 {
 	return length == 0 || (length == 1 && (line[0] == 'z' || line[0] == 'Z'));
 }
@@ -136,7 +136,7 @@ int slcan_decode(struct slcan_decoder *decoder, char byte, struct frame *frame)
 	}
 	decoder->length = 0;
 	decoder->overflow = false;
-	if (!overflow && is_answer(decoder->line, length))
+	if (!overflow && slcan_text_is_answer(decoder->line, length))
 		return 0;
 	return byte == '\r' && !overflow && parse_line(decoder->line, length, frame) ? 1 : DT_E_FORMAT;
 }

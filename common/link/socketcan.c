@@ -57,7 +57,7 @@ int socketcan_pack(struct canfd_frame *kernel, const struct frame *frame)
 	return (flags & FRAME_FD) != 0 ? (int)CANFD_MTU : (int)CAN_MTU;
 }
 
-static uint8_t flags_of(const struct canfd_frame *kernel, bool is_fd)
+static uint8_t socketcan_flags_of(const struct canfd_frame *kernel, bool is_fd)
 {
 	unsigned flags = 0;
 
@@ -82,7 +82,7 @@ int socketcan_unpack(struct frame *frame, const struct canfd_frame *kernel, size
 
 	if (size != CAN_MTU && size != CANFD_MTU)
 		return DT_E_FORMAT;
-	parsed.flags = flags_of(kernel, size == CANFD_MTU);
+	parsed.flags = socketcan_flags_of(kernel, size == CANFD_MTU);
 	parsed.id = kernel->can_id & CAN_EFF_MASK;
 	if (!link_frame_valid(&parsed))
 		return DT_E_FORMAT;
@@ -179,7 +179,7 @@ static bool set_option(int socket, int level, int name, int value)
 	return setsockopt(socket, level, name, &value, sizeof(value)) == 0;
 }
 
-static bool set_options(int socket, enum link_mode mode)
+static bool socketcan_set_options(int socket, enum link_mode mode)
 {
 	/* Without the right to exceed rmem_max the kernel gives what it allows; losses are counted. */
 	if (!set_option(socket, SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BUFFER_BYTES))
@@ -192,7 +192,7 @@ static bool set_options(int socket, enum link_mode mode)
 	       set_option(socket, SOL_SOCKET, SO_RXQ_OVFL, 1);
 }
 
-static int can_close(struct link *link)
+static int socketcan_can_close(struct link *link)
 {
 	struct socketcan *can = (struct socketcan *)link;
 
@@ -212,7 +212,7 @@ static bool open_socket(struct socketcan *can, struct link_message *message)
 		link_complain(message, "%s", strerror(errno));
 	else if (!is_can(can->socket, can->name))
 		complain_of_interface(can, message);
-	else if (!set_options(can->socket, can->link.mode) || !attach(can))
+	else if (!socketcan_set_options(can->socket, can->link.mode) || !attach(can))
 		link_complain(message, "%s, expected an interface that takes CAN FD sockets",
 		              strerror(errno));
 	else
@@ -220,7 +220,7 @@ static bool open_socket(struct socketcan *can, struct link_message *message)
 	return false;
 }
 
-static struct link *can_open(const char *name, enum link_mode mode, struct link_message *message)
+static struct link *socketcan_can_open(const char *name, enum link_mode mode, struct link_message *message)
 {
 	struct socketcan *can;
 
@@ -237,7 +237,7 @@ static struct link *can_open(const char *name, enum link_mode mode, struct link_
 	can->link.mode = mode;
 	if (open_socket(can, message))
 		return &can->link;
-	(void)can_close(&can->link);
+	(void)socketcan_can_close(&can->link);
 	return NULL;
 }
 
@@ -262,7 +262,7 @@ static int why_not_sent(struct socketcan *can, int error, int64_t deadline_us)
 	return 0;
 }
 
-static int can_send(struct link *link, const struct frame *frame)
+static int socketcan_can_send(struct link *link, const struct frame *frame)
 {
 	struct socketcan *can = (struct socketcan *)link;
 	int64_t deadline_us = link_now_us() + LINK_PATIENCE_US;
@@ -307,7 +307,7 @@ static void read_control(struct socketcan *can, struct msghdr *message, struct f
 }
 
 /* 1 a frame, 0 nothing there or nothing of use, or an error. */
-static int read_frame(struct socketcan *can, struct frame *frame)
+static int socketcan_read_frame(struct socketcan *can, struct frame *frame)
 {
 	_Alignas(struct cmsghdr) char
 	        control[CMSG_SPACE(sizeof(struct timeval)) + CMSG_SPACE(sizeof(uint32_t))];
@@ -340,7 +340,7 @@ static int64_t until_us(const struct socketcan *can, int64_t deadline_us)
 	return soon_us < deadline_us ? soon_us : deadline_us;
 }
 
-static int can_receive(struct link *link, struct frame *frame, int64_t deadline_us)
+static int socketcan_can_receive(struct link *link, struct frame *frame, int64_t deadline_us)
 {
 	struct socketcan *can = (struct socketcan *)link;
 
@@ -348,7 +348,7 @@ static int can_receive(struct link *link, struct frame *frame, int64_t deadline_
 		int result;
 
 		look_again(can);
-		result = read_frame(can, frame);
+		result = socketcan_read_frame(can, frame);
 		if (result != 0)
 			return result;
 		if (link_now_us() >= deadline_us)
@@ -364,4 +364,10 @@ static int can_descriptor(const struct link *link)
 	return ((const struct socketcan *)link)->socket;
 }
 
-const struct link_ops link_can = {"can", can_open, can_send, can_receive, can_descriptor, can_close, NULL};
+const struct link_ops link_can = {"can",
+                                  socketcan_can_open,
+                                  socketcan_can_send,
+                                  socketcan_can_receive,
+                                  can_descriptor,
+                                  socketcan_can_close,
+                                  NULL};

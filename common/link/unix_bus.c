@@ -45,13 +45,13 @@ bool unix_queue_allocate(struct queue *queue)
 
 /* ---- packet ----------------------------------------------------------------------------------------- */
 
-static void put_u32(uint8_t *p, uint32_t value)
+static void unix_bus_put_u32(uint8_t *p, uint32_t value)
 {
 	for (unsigned i = 0; i < 4; i++)
 		p[i] = (uint8_t)(value >> (8u * i));
 }
 
-static uint32_t get_u32(const uint8_t *p)
+static uint32_t unix_bus_get_u32(const uint8_t *p)
 {
 	return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
@@ -59,11 +59,11 @@ static uint32_t get_u32(const uint8_t *p)
 static void packet_encode(uint8_t packet[PACKET_BYTES], const struct frame *frame, uint32_t dropped)
 {
 	memset(packet, 0, PACKET_BYTES);
-	put_u32(packet, frame->id);
+	unix_bus_put_u32(packet, frame->id);
 	packet[4] = frame->flags;
 	packet[5] = frame->length;
 	packet[6] = PACKET_VERSION;
-	put_u32(packet + 8, dropped);
+	unix_bus_put_u32(packet + 8, dropped);
 	memcpy(packet + 12, frame->data, frame->length);
 }
 
@@ -73,14 +73,14 @@ static bool packet_decode(const uint8_t *packet, size_t length, struct frame *fr
 
 	if (length != PACKET_BYTES || packet[6] != PACKET_VERSION || packet[7] != 0)
 		return false;
-	decoded.id = get_u32(packet);
+	decoded.id = unix_bus_get_u32(packet);
 	decoded.flags = packet[4];
 	decoded.length = packet[5];
 	if (!link_frame_valid(&decoded))
 		return false;
 	memcpy(decoded.data, packet + 12, decoded.length);
 	*frame = decoded;
-	*dropped = get_u32(packet + 8);
+	*dropped = unix_bus_get_u32(packet + 8);
 	return true;
 }
 

@@ -33,7 +33,7 @@ static const struct key keys[] = {
 };
 enum { KEYS = sizeof(keys) / sizeof(keys[0]) };
 
-static double *value_of(struct scene *scene, const struct key *key)
+static double *scene_value_of(struct scene *scene, const struct key *key)
 {
 	return (double *)(void *)((char *)scene + key->offset);
 }
@@ -50,7 +50,7 @@ struct reading {
 	int name_line;
 };
 
-static int read_text(struct reading *reading, const char *name, const char *value)
+static int scene_read_text(struct reading *reading, const char *name, const char *value)
 {
 	struct settings *settings = &reading->settings;
 	char *to = strcmp(name, "name") == 0 ? reading->scene.name : reading->scene.title;
@@ -72,7 +72,7 @@ static int read_text(struct reading *reading, const char *name, const char *valu
 	return 1;
 }
 
-static int read_number(struct reading *reading, size_t index, const char *text)
+static int scene_read_number(struct reading *reading, size_t index, const char *text)
 {
 	struct settings *settings = &reading->settings;
 	const struct key *key = &keys[index];
@@ -83,26 +83,27 @@ static int read_number(struct reading *reading, size_t index, const char *text)
 	if (!number_read(text, -INFINITY, INFINITY, &any) && strcasecmp(text, "nan") != 0)
 		return settings_fail(settings, DT_E_FORMAT, "%.60s = '%.60s' is not a number", key->name,
 		                     text);
-	if (!number_read(text, key->min, key->max, value_of(&reading->scene, key)))
+	if (!number_read(text, key->min, key->max, scene_value_of(&reading->scene, key)))
 		return settings_fail(settings, DT_E_RANGE, "%.60s is %.60s, expected %g to %g", key->name,
 		                     text, key->min, key->max);
 	reading->line_of[index] = settings->line;
 	return 1;
 }
 
-static int read_entry(struct settings *settings, const char *section, const char *name, const char *value)
+static int scene_read_entry(struct settings *settings, const char *section, const char *name,
+                            const char *value)
 {
 	struct reading *reading = (struct reading *)settings;
 	int known_section = 0;
 
 	if (section[0] == '\0')
-		return read_text(reading, name, value);
+		return scene_read_text(reading, name, value);
 	for (size_t i = 0; i < KEYS; i++) {
 		if (strcmp(section, keys[i].section) != 0)
 			continue;
 		known_section = 1;
 		if (strcmp(name, keys[i].name) == 0)
-			return read_number(reading, i, value);
+			return scene_read_number(reading, i, value);
 	}
 	if (!known_section)
 		return settings_fail(settings, DT_E_FORMAT, "unknown section [%.60s]", section);
@@ -121,7 +122,7 @@ static void place_tower(struct scene *scene)
 		scene->tower_gate_upper_m = scene->tower_separation_m * UPPER_GATE_SHARE;
 }
 
-static int complete(struct reading *reading)
+static int scene_complete(struct reading *reading)
 {
 	const struct settings *settings = &reading->settings;
 
@@ -131,7 +132,7 @@ static int complete(struct reading *reading)
 		if (isnan(keys[i].initial))
 			return settings_refuse(settings, DT_E_FORMAT, "[%s] %s is missing", keys[i].section,
 			                       keys[i].name);
-		*value_of(&reading->scene, &keys[i]) = keys[i].initial;
+		*scene_value_of(&reading->scene, &keys[i]) = keys[i].initial;
 	}
 	if (reading->name_line == 0)
 		return settings_refuse(settings, DT_E_FORMAT, "name is missing");
@@ -143,7 +144,7 @@ static int complete(struct reading *reading)
 
 int scene_read(struct scene *scene, const char *file, char message[SCENE_MESSAGE_MAX])
 {
-	struct reading reading = {.settings = {.file = file, .message = message, .entry = read_entry}};
+	struct reading reading = {.settings = {.file = file, .message = message, .entry = scene_read_entry}};
 	int result = settings_read(&reading.settings);
 
 	if (result == DT_E_SYSTEM) {
@@ -152,7 +153,7 @@ int scene_read(struct scene *scene, const char *file, char message[SCENE_MESSAGE
 		snprintf(message + said, SCENE_MESSAGE_MAX - said, ", expected a scene file");
 	}
 	if (result == 0)
-		result = complete(&reading);
+		result = scene_complete(&reading);
 	if (result == 0)
 		*scene = reading.scene;
 	return result;

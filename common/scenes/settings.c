@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void say(const struct settings *settings, int used, const char *format, va_list arguments)
+static void settings_say(const struct settings *settings, int used, const char *format, va_list arguments)
 {
 	vsnprintf(settings->message + used, (size_t)(SETTINGS_MESSAGE_MAX - used), format, arguments);
 }
@@ -19,7 +19,7 @@ int settings_fail(struct settings *settings, int code, const char *format, ...)
 	va_list arguments;
 
 	va_start(arguments, format);
-	say(settings, used, format, arguments);
+	settings_say(settings, used, format, arguments);
 	va_end(arguments);
 	settings->result = code;
 	return 0;
@@ -31,7 +31,7 @@ int settings_refuse(const struct settings *settings, int code, const char *forma
 	va_list arguments;
 
 	va_start(arguments, format);
-	say(settings, used, format, arguments);
+	settings_say(settings, used, format, arguments);
 	va_end(arguments);
 	return code;
 }
@@ -51,7 +51,7 @@ static char *read_line(char *text, int size, void *user)
 	return text;
 }
 
-static int read_entry(void *user, const char *section, const char *name, const char *value)
+static int settings_read_entry(void *user, const char *section, const char *name, const char *value)
 {
 	struct settings *settings = user;
 
@@ -67,7 +67,7 @@ int settings_read(struct settings *settings)
 	settings->in = fopen(settings->file, "re");
 	if (settings->in == NULL)
 		return settings_refuse(settings, DT_E_SYSTEM, "%s", strerror(errno));
-	line = ini_parse_stream(read_line, settings, read_entry, settings);
+	line = ini_parse_stream(read_line, settings, settings_read_entry, settings);
 	fclose(settings->in);
 	if (settings->result != 0)
 		return settings->result;

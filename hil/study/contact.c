@@ -16,7 +16,8 @@ static double crossing(const double value[], size_t count, size_t peak, int step
 }
 
 /* The sensor's high-pass undone and zero taken off, both by the 20 ms before the pulse. */
-static size_t restore(const struct channel *channel, double tau_s, double at_s, double value[], size_t room)
+static size_t contact_restore(const struct channel *channel, double tau_s, double at_s, double value[],
+                              size_t room)
 {
 	size_t first = (size_t)fmax(0.0, (at_s - 0.022) * channel->rate_hz),
 	       quiet = (size_t)(0.020 * channel->rate_hz);
@@ -43,7 +44,7 @@ double contact_time(const struct record *record, double tau_s, double at_s)
 	enum { ROOM = 500 };
 	const struct channel *channel = record_channel(record, "S1X");
 	double value[ROOM];
-	size_t count = channel != NULL ? restore(channel, tau_s, at_s, value, ROOM) : 0, peak = 0;
+	size_t count = channel != NULL ? contact_restore(channel, tau_s, at_s, value, ROOM) : 0, peak = 0;
 	double level;
 
 	for (size_t k = 1; k < count; k++)

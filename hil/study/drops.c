@@ -16,7 +16,8 @@ struct reading {
 };
 
 /* The study's series that a drop belongs to; NULL when it is of no interest. */
-static struct study_series *place(struct reading *reading, const struct archive_drop *drop, size_t *geometry)
+static struct study_series *drops_place(struct reading *reading, const struct archive_drop *drop,
+                                        size_t *geometry)
 {
 	for (size_t g = 0; g < STUDY_GEOMETRIES; g++)
 		for (size_t a = 0; a < STUDY_ANGLES; a++)
@@ -29,7 +30,7 @@ static struct study_series *place(struct reading *reading, const struct archive_
 }
 
 /* What stands in no column of a table of drops. */
-static int take_result(struct reading *reading, struct study_series *series, const char *name)
+static int drops_take_result(struct reading *reading, struct study_series *series, const char *name)
 {
 	struct record record;
 	struct analysis analysis = {.channels = NULL};
@@ -65,11 +66,11 @@ static int take_log(struct reading *reading, struct study_series *series, double
 	return 0;
 }
 
-static int take(void *context, const struct archive_drop *drop)
+static int drops_take(void *context, const struct archive_drop *drop)
 {
 	struct reading *reading = context;
 	size_t g = 0;
-	struct study_series *series = place(reading, drop, &g);
+	struct study_series *series = drops_place(reading, drop, &g);
 	char name[ARCHIVE_NAME_MAX + 16];
 	int status;
 
@@ -82,7 +83,7 @@ static int take(void *context, const struct archive_drop *drop)
 	}
 	snprintf(name, sizeof(name), "%s/%u", drop->series.name, drop->number);
 	snprintf(series->log, sizeof(series->log), "%.4000s/%s", reading->folder, drop->raw);
-	status = take_result(reading, series, name);
+	status = drops_take_result(reading, series, name);
 	series->contact_s[series->cell.drops] = NAN;
 	if (status == 0 && g == 0)
 		status = take_log(reading, series, reading->study->scene[g].sensor_iepe_time_constant_s);
@@ -118,7 +119,7 @@ int study_read(struct study *study, const char *folder, char message[STUDY_MESSA
 	if (reading.archive == NULL)
 		return DT_E_SYSTEM;
 	message[0] = '\0';
-	status = archive_each_drop(reading.archive, &filter, take, &reading);
+	status = archive_each_drop(reading.archive, &filter, drops_take, &reading);
 	if (status != 0 && message[0] == '\0')
 		snprintf(message, STUDY_MESSAGE_MAX, "%s", archive_message(reading.archive));
 	archive_close(reading.archive);

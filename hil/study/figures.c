@@ -166,7 +166,7 @@ static int draw_history(struct drawing *d, size_t g, enum study_quantity q, cons
 
 /* ---- the documents ---- */
 
-static void begin(FILE *script, int rows)
+static void figures_begin(FILE *script, int rows)
 {
 	fprintf(script,
 	        "set terminal svg size %d,%d dynamic noenhanced background rgb 'white' font 'sans-serif,14'\n"
@@ -215,7 +215,7 @@ int study_draw(const struct study *study, enum study_figure figure, char **svg,
 	if (status != 0)
 		return status;
 	drawing.script = script.out;
-	begin(drawing.script, rows[figure]);
+	figures_begin(drawing.script, rows[figure]);
 	status = text_close(&script, draw_panels(&drawing, figure));
 	if (status == 0)
 		status = picture_draw(script.bytes, script.size, svg, message, STUDY_MESSAGE_MAX);

@@ -45,7 +45,7 @@ struct verdict {
 	size_t rows, within_r, within_xy;
 };
 
-static bool row_of(const struct study *study, size_t row, size_t *g, size_t *a, size_t *s)
+static bool judge_row_of(const struct study *study, size_t row, size_t *g, size_t *a, size_t *s)
 {
 	*g = row / (STUDY_ANGLES * STUDY_SENSORS);
 	*a = row / STUDY_SENSORS % STUDY_ANGLES;
@@ -58,13 +58,13 @@ static bool outside(const struct study_series *series, size_t s, enum study_quan
 	return !(fabs(study_difference(series, s, q)) <= (q == STUDY_R ? STUDY_LIMIT_R : STUDY_LIMIT_XY));
 }
 
-static struct verdict count(const struct study *study)
+static struct verdict judge_count(const struct study *study)
 {
 	struct verdict v = {0};
 	size_t g, a, s;
 
 	for (size_t row = 0; row < ROWS; row++) {
-		if (!row_of(study, row, &g, &a, &s))
+		if (!judge_row_of(study, row, &g, &a, &s))
 			continue;
 		v.rows++;
 		v.within_r += !outside(&study->series[g][a], s, STUDY_R);
@@ -129,11 +129,11 @@ static void tell_unexplained(const struct study *study, struct sheet *sheet)
 	                 "direction.");
 	sheet_table(sheet, columns, sizeof(columns) / sizeof(columns[0]));
 	for (size_t row = 0; row < ROWS; row++)
-		if (row_of(study, row, &g, &a, &s))
+		if (judge_row_of(study, row, &g, &a, &s))
 			tell_outside(&study->series[g][a], sheet, g, a, s);
 	sheet_table_end(sheet);
 	for (size_t row = 0; row < ROWS; row++)
-		if (row_of(study, row, &g, &a, &s) &&
+		if (judge_row_of(study, row, &g, &a, &s) &&
 		    (outside(&study->series[g][a], s, STUDY_X) || outside(&study->series[g][a], s, STUDY_Y) ||
 		     outside(&study->series[g][a], s, STUDY_R)))
 			tell_physics(sheet, g, a, s);
@@ -146,7 +146,7 @@ static double deviation(const struct study *study, bool planar, bool plate, size
 	size_t n = 0, g, a, s;
 
 	for (size_t row = 0; row < ROWS; row++) {
-		bool there = row_of(study, row, &g, &a, &s);
+		bool there = judge_row_of(study, row, &g, &a, &s);
 		const struct study_series *series = &study->series[g][a];
 		const struct model_prediction *p = planar ? &series->planar : &series->coupled;
 		double value = q == STUDY_R ? p->resultant[s].value_g : p->peak[2 * s + q].value_g;
@@ -230,12 +230,12 @@ void study_introduce(const struct study *study, struct sheet *sheet)
 	          "plate that rubber cubes of 3 and 5 mm carry. %u drops on the simulated tower, each "
 	          "through firmware, CAN frames and analyzer.",
 	          study->scene[0].drop_height_m, drops);
-	tell_counts(count(study), sheet);
+	tell_counts(judge_count(study), sheet);
 }
 
 bool study_tell(const struct study *study, struct sheet *sheet)
 {
-	struct verdict v = count(study);
+	struct verdict v = judge_count(study);
 	bool agrees = v.within_r >= ENOUGH_R && v.within_xy >= ENOUGH_XY;
 
 	study_tables(study, sheet);

@@ -24,7 +24,7 @@ static FILE *create(const char *folder, const char *name, const char *ending)
 	return out;
 }
 
-static int finish(FILE *out, const char *folder, const char *name)
+static int main_finish(FILE *out, const char *folder, const char *name)
 {
 	bool failed = ferror(out) != 0;
 
@@ -49,7 +49,7 @@ static int write_figure(const struct study *study, enum study_figure figure, con
 	status = DT_E_SYSTEM;
 	if (out != NULL) {
 		fputs(svg, out);
-		status = finish(out, folder, study_figure_name[figure]);
+		status = main_finish(out, folder, study_figure_name[figure]);
 	}
 	if (figure != STUDY_FIGURE_ALL)
 		sheet_picture(sheet, study_figure_title[figure], study_figure_text[figure], svg);
@@ -57,18 +57,18 @@ static int write_figure(const struct study *study, enum study_figure figure, con
 	return status;
 }
 
-static int write_csv(const struct study *study, const char *folder)
+static int main_write_csv(const struct study *study, const char *folder)
 {
 	FILE *out = create(folder, "study", ".csv");
 
 	if (out == NULL)
 		return DT_E_SYSTEM;
 	study_write_csv(study, out);
-	return finish(out, folder, "study.csv");
+	return main_finish(out, folder, "study.csv");
 }
 
 /* Text to stdout, page and pictures into the folder. */
-static int tell(const struct study *study, const char *folder)
+static int main_tell(const struct study *study, const char *folder)
 {
 	struct sheet sheet = {.text = stdout, .page = create(folder, "study", ".html")};
 	int status = sheet.page != NULL ? 0 : DT_E_SYSTEM;
@@ -82,7 +82,8 @@ static int tell(const struct study *study, const char *folder)
 		status = write_figure(study, (enum study_figure)f, folder, &sheet);
 	agrees = study_tell(study, &sheet);
 	sheet_end(&sheet);
-	if (finish(sheet.page, folder, "study.html") != 0 || status != 0 || write_csv(study, folder) != 0)
+	if (main_finish(sheet.page, folder, "study.html") != 0 || status != 0 ||
+	    main_write_csv(study, folder) != 0)
 		return UNUSABLE;
 	printf("\npage      %s/study.html\npictures  %s/figure-10.svg and so on\ntable     %s/study.csv\n",
 	       folder, folder, folder);
@@ -107,5 +108,5 @@ int main(int argc, char **argv)
 		fprintf(stderr, "droptower-study: %s\n", message);
 		return UNUSABLE;
 	}
-	return tell(&study, argv[2]);
+	return main_tell(&study, argv[2]);
 }

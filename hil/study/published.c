@@ -10,7 +10,7 @@ static const char file[] = "hil/study/published.csv";
 const char *const study_geometry[STUDY_GEOMETRIES] = {"1", "2A", "2B"};
 const double study_angle_deg[STUDY_ANGLES] = {15, 20, 25, 30, 35};
 
-static struct study_series *find(struct study *study, const char *geometry, double angle_deg)
+static struct study_series *published_find(struct study *study, const char *geometry, double angle_deg)
 {
 	for (size_t g = 0; g < STUDY_GEOMETRIES; g++)
 		for (size_t a = 0; a < STUDY_ANGLES; a++)
@@ -20,7 +20,7 @@ static struct study_series *find(struct study *study, const char *geometry, doub
 }
 
 /* "1,15,S1,..." are means and deviations, "2A/1,15,S1,..." ratios. */
-static int take(struct study *study, const char *line)
+static int published_take(struct study *study, const char *line)
 {
 	char geometry[8], sensor[4], of[8] = "";
 	double angle, value[STUDY_QUANTITIES], sd[STUDY_QUANTITIES] = {NAN, NAN, NAN, NAN};
@@ -33,7 +33,7 @@ static int take(struct study *study, const char *line)
 	if (n == 1)
 		n = sscanf(line, "%7[^,/]/%7[^,],%lf,%3[^,],%lf,%lf,%lf", geometry, of, &angle, sensor,
 		           &value[STUDY_X], &value[STUDY_Y], &value[STUDY_R]);
-	series = n == 10 || n == 7 ? find(study, geometry, angle) : NULL;
+	series = n == 10 || n == 7 ? published_find(study, geometry, angle) : NULL;
 	if (series == NULL || (strcmp(sensor, "S1") != 0 && strcmp(sensor, "S2") != 0))
 		return DT_E_FORMAT;
 	s = (size_t)(sensor[1] - '1');
@@ -63,7 +63,7 @@ static int read_published(struct study *study, char *message)
 		number++;
 		if (line[0] == '#' || strncmp(line, "geometry,", 9) == 0)
 			continue;
-		status = take(study, line);
+		status = published_take(study, line);
 		rows++;
 	}
 	fclose(in);

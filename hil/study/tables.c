@@ -27,7 +27,7 @@ static const struct {
 enum { FEATURE_ROWS = sizeof(features) / sizeof(features[0]) };
 
 /* "12.3", or a dash. */
-static const char *shown(char text[16], int decimals, double value)
+static const char *tables_shown(char text[16], int decimals, double value)
 {
 	if (isfinite(value)) /* no minus in front of a zero */
 		snprintf(text, 16, "%.*f", decimals, fabs(value) < 0.5 * pow(10, -decimals) ? 0.0 : value);
@@ -36,7 +36,7 @@ static const char *shown(char text[16], int decimals, double value)
 	return text;
 }
 
-static void tell_row(const struct study_series *series, struct sheet *sheet, size_t a, size_t s)
+static void tables_tell_row(const struct study_series *series, struct sheet *sheet, size_t a, size_t s)
 {
 	char cells[512] = "", t[16];
 	size_t at = 0;
@@ -51,12 +51,12 @@ static void tell_row(const struct study_series *series, struct sheet *sheet, siz
 		                       fabs(difference) > limit ? "*" : " ");
 	}
 	at += (size_t)snprintf(cells + at, sizeof(cells) - at, "|%.1f|%s", series->published[s][STUDY_Z].mean,
-	                       shown(t, 1, study_peak(series, s, STUDY_Z).mean));
+	                       tables_shown(t, 1, study_peak(series, s, STUDY_Z).mean));
 	for (size_t q = 0; q < STUDY_QUANTITIES; q++)
 		if (q != STUDY_R)
-			at += (size_t)snprintf(cells + at, sizeof(cells) - at, "|%.1f|%s",
-			                       series->published[s][q].sd,
-			                       shown(t, 1, study_peak(series, s, (enum study_quantity)q).sd));
+			at += (size_t)snprintf(
+			        cells + at, sizeof(cells) - at, "|%.1f|%s", series->published[s][q].sd,
+			        tables_shown(t, 1, study_peak(series, s, (enum study_quantity)q).sd));
 	sheet_row(sheet, "%.0f|S%zu%s", study_angle_deg[a], s + 1, cells);
 }
 
@@ -78,7 +78,7 @@ static void tell_geometry(const struct study *study, struct sheet *sheet, size_t
 	sheet_table(sheet, columns, sizeof(columns) / sizeof(columns[0]));
 	for (size_t a = 0; a < STUDY_ANGLES; a++)
 		for (size_t s = 0; s < STUDY_SENSORS && study->series[g][a].cell.drops > 0; s++)
-			tell_row(&study->series[g][a], sheet, a, s);
+			tables_tell_row(&study->series[g][a], sheet, a, s);
 	sheet_table_end(sheet);
 }
 
@@ -116,11 +116,11 @@ static void tell_ratios(const struct study *study, struct sheet *sheet)
 
 		for (size_t g = 1; g < STUDY_GEOMETRIES; g++)
 			for (size_t q = 0; q <= STUDY_R; q++)
-				at += (size_t)snprintf(
-				        cells + at, sizeof(cells) - at, "|%.2f|%s",
-				        study->series[g][a].published_ratio[q],
-				        shown(t, 2,
-				              ratio_here(study, a, g, 0, 0, 0, (enum study_quantity)q)));
+				at += (size_t)snprintf(cells + at, sizeof(cells) - at, "|%.2f|%s",
+				                       study->series[g][a].published_ratio[q],
+				                       tables_shown(t, 2,
+				                                    ratio_here(study, a, g, 0, 0, 0,
+				                                               (enum study_quantity)q)));
 		if (study->series[0][a].cell.drops + study->series[1][a].cell.drops +
 		            study->series[2][a].cell.drops >
 		    0)
@@ -157,9 +157,10 @@ static void tell_sensors(const struct study *study, struct sheet *sheet)
 		for (size_t k = 0; k < 5; k++) {
 			size_t g = k < 3 ? k : 0, s = k < 3 ? 0 : 1, of = k < 3 ? k : k - 2;
 
-			at += (size_t)snprintf(cells + at, sizeof(cells) - at, "|%.2f|%s",
-			                       ratio_published(study, a, g, s, of, 1),
-			                       shown(t, 2, ratio_here(study, a, g, s, of, 1, STUDY_R)));
+			at += (size_t)snprintf(
+			        cells + at, sizeof(cells) - at, "|%.2f|%s",
+			        ratio_published(study, a, g, s, of, 1),
+			        tables_shown(t, 2, ratio_here(study, a, g, s, of, 1, STUDY_R)));
 		}
 		if (study->series[0][a].cell.drops + study->series[1][a].cell.drops +
 		            study->series[2][a].cell.drops >
@@ -181,7 +182,7 @@ size_t study_reference(const struct study *study, size_t g)
 	return STUDY_ANGLES / 2;
 }
 
-static double predicted(const struct model_prediction *p, enum study_feature feature)
+static double tables_predicted(const struct model_prediction *p, enum study_feature feature)
 {
 	const double value[STUDY_FEATURES] = {
 	        [STUDY_LAG] = p->lag_s,
@@ -214,11 +215,11 @@ static void tell_features(const struct study *study, struct sheet *sheet)
 		char t[5][16];
 
 		sheet_row(sheet, "%s|%s|%.0f|%s|%s|%s|%s|%s", features[i].what, study_geometry[g],
-		          study_angle_deg[a], shown(t[0], features[i].decimals, features[i].published),
-		          shown(t[1], features[i].decimals, here.mean * scale),
-		          shown(t[2], features[i].decimals, here.sd * scale),
-		          shown(t[3], features[i].decimals,
-		                predicted(&series->planar, features[i].feature) * scale),
+		          study_angle_deg[a], tables_shown(t[0], features[i].decimals, features[i].published),
+		          tables_shown(t[1], features[i].decimals, here.mean * scale),
+		          tables_shown(t[2], features[i].decimals, here.sd * scale),
+		          tables_shown(t[3], features[i].decimals,
+		                       tables_predicted(&series->planar, features[i].feature) * scale),
 		          isfinite(off) ? (snprintf(t[4], 16, "%+.1f %%", off), t[4]) : "-");
 	}
 	sheet_table_end(sheet);
@@ -251,7 +252,7 @@ static void tell_directions(const struct study *study, struct sheet *sheet)
 			                       atan2(series->published[1][STUDY_Y].mean,
 			                             series->published[1][STUDY_X].mean) /
 			                               M_PI * 180,
-			                       shown(t, 1, here / M_PI * 180),
+			                       tables_shown(t, 1, here / M_PI * 180),
 			                       series->planar.direction_deg[1]);
 		}
 		if (drops > 0)
@@ -293,8 +294,8 @@ static void tell_scatter(const struct study *study, struct sheet *sheet)
 		char t[2][16];
 
 		sheet_row(sheet, "%s, %c|%s|%s", i < 2 ? "sensors on the box" : "sensor on the plate",
-		          "XY"[i % 2], shown(t[0], 2, scatter(study, i >= 2, q, true)),
-		          shown(t[1], 2, scatter(study, i >= 2, q, false)));
+		          "XY"[i % 2], tables_shown(t[0], 2, scatter(study, i >= 2, q, true)),
+		          tables_shown(t[1], 2, scatter(study, i >= 2, q, false)));
 	}
 	sheet_table_end(sheet);
 }

@@ -116,7 +116,7 @@ int archive_lock(struct archive *archive, bool exclusive)
 	                                : "its index is being rebuilt, expected nobody at it");
 }
 
-static bool is_there(const struct archive *archive, const char *name)
+static bool archive_is_there(const struct archive *archive, const char *name)
 {
 	char path[ARCHIVE_PATH_MAX];
 
@@ -162,13 +162,13 @@ static int open_for_reading(struct archive *archive, const char *name)
 	snprintf(log, sizeof(log), "%.40s-wal", name);
 	sqlite3_close(archive->index);
 	archive->index = NULL;
-	if (!is_there(archive, log))
+	if (!archive_is_there(archive, log))
 		return connect_index(archive, name, SQLITE_OPEN_READONLY, "immutable=1");
 	result = connect_index(archive, name, SQLITE_OPEN_READWRITE, "");
 	return result != 0 ? result : sql_script(archive, "PRAGMA locking_mode = EXCLUSIVE");
 }
 
-static int64_t now_ms(void)
+static int64_t archive_now_ms(void)
 {
 	struct timespec now;
 
@@ -180,12 +180,12 @@ static int64_t now_ms(void)
 static int write_ahead(struct archive *archive)
 {
 	const struct timespec step = {.tv_nsec = 10000000};
-	int64_t start_ms = now_ms();
+	int64_t start_ms = archive_now_ms();
 	int result;
 
 	for (;;) {
 		result = sql_script(archive, "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
-		if (result != DT_E_TIMEOUT || now_ms() - start_ms > WAIT_MS)
+		if (result != DT_E_TIMEOUT || archive_now_ms() - start_ms > WAIT_MS)
 			return result;
 		nanosleep(&step, NULL);
 	}
@@ -215,8 +215,8 @@ static int open_in(struct archive *archive, enum archive_mode mode)
 	snprintf(inside, sizeof(inside), "%s/", archive->folder);
 	if (mode == ARCHIVE_CREATE && durable_folders(inside) != 0)
 		return archive_refuse(archive, DT_E_SYSTEM, "%.400s: %s", archive->folder, strerror(errno));
-	raw = is_there(archive, "raw"); /* asked first: who makes an archive makes its index first */
-	if (!is_there(archive, "index.sqlite")) {
+	raw = archive_is_there(archive, "raw"); /* asked first: who makes an archive makes its index first */
+	if (!archive_is_there(archive, "index.sqlite")) {
 		if (raw)
 			return archive_refuse(archive, DT_E_CORRUPT,
 			                      "%.250s: raw files, but no index; 'droptower series --archive "

@@ -13,12 +13,12 @@ enum { LINE_MAX_BYTES = 512, TAIL_BYTES = 4096 };
 /* Before the first entry. */
 static const char genesis[] = "droptower chain 1";
 
-static void path_of(const struct archive *archive, char path[ARCHIVE_PATH_MAX], const char *name)
+static void chain_path_of(const struct archive *archive, char path[ARCHIVE_PATH_MAX], const char *name)
 {
 	snprintf(path, ARCHIVE_PATH_MAX, "%s/%.200s", archive->folder, name);
 }
 
-static int refuse_file(struct archive *archive, const char *path)
+static int chain_refuse_file(struct archive *archive, const char *path)
 {
 	return archive_refuse(archive, DT_E_SYSTEM, "%.500s: %s", path, strerror(errno));
 }
@@ -77,7 +77,7 @@ static int by_path(const void *a, const void *b, void *entries)
 	return order != 0 ? order : x < y ? -1 : x > y;
 }
 
-static int sort(struct chain *chain)
+static int chain_sort(struct chain *chain)
 {
 	chain->by_path = calloc(chain->count + 1, sizeof(*chain->by_path));
 	if (chain->by_path == NULL)
@@ -123,16 +123,16 @@ int chain_load(struct archive *archive, struct chain *chain)
 	size_t lines = 1;
 
 	*chain = (struct chain){0};
-	path_of(archive, path, CHAIN_FILE);
+	chain_path_of(archive, path, CHAIN_FILE);
 	chain->text = durable_read(path, &chain->size);
 	if (chain->text == NULL)
-		return errno == ENOENT || errno == ENOTDIR ? 0 : refuse_file(archive, path);
+		return errno == ENOENT || errno == ENOTDIR ? 0 : chain_refuse_file(archive, path);
 	for (const char *c = chain->text; c < chain->text + chain->size; c++)
 		lines += *c == '\n';
 	chain->entry = calloc(lines, sizeof(*chain->entry));
 	if (chain->entry != NULL)
 		read_lines(chain);
-	if (chain->entry != NULL && sort(chain) == 0)
+	if (chain->entry != NULL && chain_sort(chain) == 0)
 		return 0;
 	chain_free(chain);
 	return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
@@ -234,11 +234,11 @@ int chain_finish(struct archive *archive, const struct chain_entry *entry)
 	char path[ARCHIVE_PATH_MAX], part[ARCHIVE_PATH_MAX + 8], hash[DIGEST_CHARS];
 	int64_t bytes;
 
-	path_of(archive, path, entry->path);
+	chain_path_of(archive, path, entry->path);
 	snprintf(part, sizeof(part), "%s.part", path);
 	if (digest_file(part, hash, &bytes, -1) != 0 || strcmp(hash, entry->hash) != 0)
 		return 0;
-	return durable_publish(path) == 0 ? 0 : refuse_file(archive, path);
+	return durable_publish(path) == 0 ? 0 : chain_refuse_file(archive, path);
 }
 
 int chain_next(struct archive *archive, struct chain_place *place)
@@ -247,11 +247,11 @@ int chain_next(struct archive *archive, struct chain_place *place)
 	struct chain_entry last;
 	int result = place_of_index(archive, place);
 
-	path_of(archive, path, CHAIN_FILE);
+	chain_path_of(archive, path, CHAIN_FILE);
 	if (result != 0)
 		return result;
 	if (read_tail(path, tail, &place->at) != 0)
-		return errno == ENOENT ? 0 : refuse_file(archive, path);
+		return errno == ENOENT ? 0 : chain_refuse_file(archive, path);
 	if (!last_entry(tail, &place->at, &last))
 		return 0;
 	place->number = last.number + 1;
@@ -276,9 +276,9 @@ int chain_enter(struct archive *archive, const struct chain_place *place, const 
 	                (long long)bytes, hash);
 	head_of(place->head, line, (size_t)said, head);
 	snprintf(line + said, sizeof(line) - (size_t)said, " %s\n", head);
-	path_of(archive, file, CHAIN_FILE);
+	chain_path_of(archive, file, CHAIN_FILE);
 	if (durable_folders(file) != 0 || durable_append(file, place->at, line, strlen(line)) != 0)
-		return refuse_file(archive, file);
+		return chain_refuse_file(archive, file);
 	return chain_note(archive, place->number, head);
 }
 

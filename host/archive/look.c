@@ -63,7 +63,7 @@ struct query {
 	int count;
 };
 
-static void add(struct query *q, const char *text, const char *value)
+static void look_add(struct query *q, const char *text, const char *value)
 {
 	size_t at = strlen(q->text);
 
@@ -72,19 +72,19 @@ static void add(struct query *q, const char *text, const char *value)
 		q->value[q->count++] = value;
 }
 
-static void add_number(struct query *q, char to[32], const char *text, double value)
+static void look_add_number(struct query *q, char to[32], const char *text, double value)
 {
 	snprintf(to, 32, "%.17g", value);
-	add(q, text, to);
+	look_add(q, text, to);
 }
 
 /* Whatever begins with `to` is not later than it: '~' is behind every character of a time. */
 static void add_dates(struct query *q, const struct archive_filter *filter)
 {
 	if (filter->from != NULL)
-		add(q, " AND d.time >= ?", filter->from);
+		look_add(q, " AND d.time >= ?", filter->from);
 	if (filter->to != NULL)
-		add(q, " AND d.time < ? || '~'", filter->to);
+		look_add(q, " AND d.time < ? || '~'", filter->to);
 }
 
 /* For LIKE: word anywhere, its own wildcards as they are. */
@@ -119,37 +119,37 @@ static int add_words(struct archive *archive, struct query *q, const char *text)
 			                      "text: expected at most %d words of at most %d characters",
 			                      WORDS_MAX, WORD_MAX);
 		put_pattern(q->pattern[i], text, length);
-		add(q, " AND " WORDS_OF_DROP " LIKE ? ESCAPE '\\'", q->pattern[i]);
+		look_add(q, " AND " WORDS_OF_DROP " LIKE ? ESCAPE '\\'", q->pattern[i]);
 	}
 	return 0;
 }
 
 static void add_conditions(struct query *q, const struct archive_filter *filter)
 {
-	add(q, " WHERE 1", NULL);
+	look_add(q, " WHERE 1", NULL);
 	if (filter->series != NULL)
-		add(q, " AND s.name = ?", filter->series);
+		look_add(q, " AND s.name = ?", filter->series);
 	if (filter->campaign != NULL)
-		add(q, " AND c.name = ?", filter->campaign);
+		look_add(q, " AND c.name = ?", filter->campaign);
 	if (filter->scene_name != NULL)
-		add(q, " AND s.scene_name = ?", filter->scene_name);
+		look_add(q, " AND s.scene_name = ?", filter->scene_name);
 	if (!isnan(filter->angle_deg))
-		add_number(q, q->number[0], " AND ABS(s.angle_deg - CAST(? AS REAL)) < 1e-9",
-		           filter->angle_deg);
+		look_add_number(q, q->number[0], " AND ABS(s.angle_deg - CAST(? AS REAL)) < 1e-9",
+		                filter->angle_deg);
 	if (filter->number != 0)
-		add_number(q, q->number[1], " AND d.number = CAST(? AS INTEGER)", filter->number);
+		look_add_number(q, q->number[1], " AND d.number = CAST(? AS INTEGER)", filter->number);
 }
 
 static void add_order(struct query *q, const struct archive_filter *filter, const char *newest,
                       const char *names)
 {
-	add(q, " ORDER BY ", NULL);
-	add(q, filter->limit != 0 ? newest : names, NULL);
+	look_add(q, " ORDER BY ", NULL);
+	look_add(q, filter->limit != 0 ? newest : names, NULL);
 	if (filter->limit != 0)
-		add_number(q, q->number[2], " LIMIT CAST(? AS INTEGER)", filter->limit);
+		look_add_number(q, q->number[2], " LIMIT CAST(? AS INTEGER)", filter->limit);
 }
 
-static int start(struct archive *archive, const struct query *q, sqlite3_stmt **s)
+static int look_start(struct archive *archive, const struct query *q, sqlite3_stmt **s)
 {
 	int result = sql_query(archive, s, q->text, "");
 
@@ -187,27 +187,29 @@ int archive_each_series(struct archive *archive, const struct archive_filter *fi
 	sqlite3_stmt *s;
 	int result = 0;
 
-	add(&q,
-	    "SELECT " SERIES_COLUMNS ", s.scene, SUM(d.state <> 'recording'),"
-	    " SUM(d.decision = 'accepted' AND d.proof = ''), SUM(d.decision = 'rejected' AND d.proof = ''),"
-	    " SUM(d.state = 'recording'), SUM(d.proof <> ''), MAX(d.time)"
-	    " FROM series s JOIN campaigns c ON c.id = s.campaign_id LEFT JOIN drops d ON d.series_id = s.id",
-	    NULL);
+	look_add(&q,
+	         "SELECT " SERIES_COLUMNS ", s.scene, SUM(d.state <> 'recording'),"
+	         " SUM(d.decision = 'accepted' AND d.proof = ''), SUM(d.decision = 'rejected' AND d.proof = "
+	         "''),"
+	         " SUM(d.state = 'recording'), SUM(d.proof <> ''), MAX(d.time)"
+	         " FROM series s JOIN campaigns c ON c.id = s.campaign_id LEFT JOIN drops d ON d.series_id = "
+	         "s.id",
+	         NULL);
 	add_conditions(&q, filter);
 	if (filter->from != NULL || filter->to != NULL || filter->text != NULL) {
-		add(&q,
-		    " AND s.id IN (SELECT s.id FROM series s JOIN campaigns c ON c.id = s.campaign_id"
-		    " LEFT JOIN drops d ON d.series_id = s.id WHERE 1",
-		    NULL);
+		look_add(&q,
+		         " AND s.id IN (SELECT s.id FROM series s JOIN campaigns c ON c.id = s.campaign_id"
+		         " LEFT JOIN drops d ON d.series_id = s.id WHERE 1",
+		         NULL);
 		add_dates(&q, filter);
 		result = add_words(archive, &q, filter->text);
-		add(&q, ")", NULL);
+		look_add(&q, ")", NULL);
 	}
-	add(&q, " GROUP BY s.id", NULL);
+	look_add(&q, " GROUP BY s.id", NULL);
 	add_order(&q, filter, "COALESCE(MAX(d.time), s.created) DESC, s.name",
 	          "c.name, s.scene_name, s.height_m, s.angle_deg, s.name");
 	if (result == 0)
-		result = start(archive, &q, &s);
+		result = look_start(archive, &q, &s);
 	if (result != 0)
 		return result;
 	while ((result = sql_step(archive, s)) > 0) {
@@ -311,19 +313,19 @@ static int ask_for_drops(struct archive *archive, struct query *q, const char *c
 {
 	int result;
 
-	add(q, columns, NULL);
-	add(q,
-	    " FROM drops d JOIN series s ON s.id = d.series_id"
-	    " JOIN campaigns c ON c.id = s.campaign_id LEFT JOIN results r ON r.id = ",
-	    NULL);
+	look_add(q, columns, NULL);
+	look_add(q,
+	         " FROM drops d JOIN series s ON s.id = d.series_id"
+	         " JOIN campaigns c ON c.id = s.campaign_id LEFT JOIN results r ON r.id = ",
+	         NULL);
 	if (filter->version != NULL)
-		add(q,
-		    "(SELECT id FROM results WHERE drop_id = d.id AND version_id ="
-		    " (SELECT id FROM versions WHERE name = ?))",
-		    filter->version);
+		look_add(q,
+		         "(SELECT id FROM results WHERE drop_id = d.id AND version_id ="
+		         " (SELECT id FROM versions WHERE name = ?))",
+		         filter->version);
 	else
-		add(q, "(SELECT MAX(id) FROM results WHERE drop_id = d.id)", NULL);
-	add(q, " LEFT JOIN versions v ON v.id = r.version_id", NULL);
+		look_add(q, "(SELECT MAX(id) FROM results WHERE drop_id = d.id)", NULL);
+	look_add(q, " LEFT JOIN versions v ON v.id = r.version_id", NULL);
 	add_conditions(q, filter);
 	add_dates(q, filter);
 	result = add_words(archive, q, filter->text);
@@ -341,7 +343,7 @@ static int each_drop(struct archive *archive, const char *columns, const struct 
 	int result = ask_for_drops(archive, &q, columns, filter);
 
 	if (result == 0)
-		result = start(archive, &q, &s);
+		result = look_start(archive, &q, &s);
 	if (result != 0)
 		return result;
 	while ((result = sql_step(archive, s)) > 0) {

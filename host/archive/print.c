@@ -74,7 +74,7 @@ const struct table_column print_series_columns[PRINT_SERIES_COLUMNS] = {
 };
 #undef COLUMN
 
-static int put_series(void *context, const struct archive_series *series)
+static int print_put_series(void *context, const struct archive_series *series)
 {
 	struct print *p = context;
 	struct series_row row = {.series = *series};
@@ -94,7 +94,7 @@ int print_series(struct archive *archive, const struct archive_filter *filter, e
 
 	fputs(format == TABLE_JSON ? "{\"series\":" : "", out);
 	table_begin(&p.table, print_series_columns, PRINT_SERIES_COLUMNS - 1);
-	result = archive_each_series(archive, &asked, put_series, &p);
+	result = archive_each_series(archive, &asked, print_put_series, &p);
 	table_end(&p.table);
 	if (format == TABLE_JSON)
 		fprintf(out, ",\"more\":%s}\n", p.table.more ? "true" : "false");

@@ -64,7 +64,7 @@ static size_t all_columns(struct table_column column[COLUMNS_MAX])
 
 /* ---- rows ---- */
 
-static int put_event(void *context, const struct archive_event *event)
+static int print_drops_put_event(void *context, const struct archive_event *event)
 {
 	cJSON *item = cJSON_CreateObject();
 	struct builder b = {.failed = item == NULL};
@@ -102,7 +102,7 @@ static void fill_values(struct print *p, struct drop_row *row)
 	}
 }
 
-static int put_drop(void *context, const struct archive_drop *drop)
+static int print_drops_put_drop(void *context, const struct archive_drop *drop)
 {
 	struct print *p = context;
 	struct drop_row row = {.drop = *drop, .state = drop->decision};
@@ -120,7 +120,7 @@ static int put_drop(void *context, const struct archive_drop *drop)
 		row.not_ok = cJSON_CreateArray();
 	if (p->table.format == TABLE_JSON && p->with_events) {
 		row.events = cJSON_CreateArray();
-		result = archive_each_event(p->archive, row.name, put_event, row.events);
+		result = archive_each_event(p->archive, row.name, print_drops_put_event, row.events);
 	}
 	fill_remarks(&row);
 	fill_values(p, &row);
@@ -135,7 +135,7 @@ static int put_drop(void *context, const struct archive_drop *drop)
 
 /* ---- around them: JSON ---- */
 
-static int put_series(void *context, const struct archive_series *series)
+static int print_drops_put_series(void *context, const struct archive_series *series)
 {
 	struct print *p = context;
 
@@ -161,7 +161,7 @@ static int begin_json(struct print *p, const struct archive_filter *filter)
 	fputc('{', p->table.out);
 	if (filter->series != NULL) {
 		fputs("\"series\":", p->table.out);
-		result = archive_each_series(p->archive, filter, put_series, p);
+		result = archive_each_series(p->archive, filter, print_drops_put_series, p);
 		fputs(p->has_series ? "," : "{},", p->table.out);
 	}
 	fputs("\"drops\":", p->table.out);
@@ -256,7 +256,7 @@ int print_drops(struct archive *archive, const struct archive_filter *filter, bo
 		result = archive_each_series(archive, &asked, head_text, out);
 	if (result >= 0) {
 		table_begin(&p.table, column, all_columns(column));
-		result = archive_each_drop(archive, &asked, put_drop, &p);
+		result = archive_each_drop(archive, &asked, print_drops_put_drop, &p);
 		table_end(&p.table);
 	}
 	if (result == 0 && format == TABLE_JSON)

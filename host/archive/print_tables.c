@@ -13,7 +13,7 @@ static const enum archive_value sensor_values[2][AXES] = {
         {ARCHIVE_S2_X, ARCHIVE_S2_Y, ARCHIVE_S2_R, ARCHIVE_S2_Z},
 };
 
-static const struct archive_mean *mean_of(const struct archive_cell *cell, int sensor, int axis)
+static const struct archive_mean *print_tables_mean_of(const struct archive_cell *cell, int sensor, int axis)
 {
 	return &cell->value[sensor_values[sensor][axis]];
 }
@@ -76,9 +76,11 @@ static void put_sensor(struct table *table, const struct archive_cell *cell, int
 	                         .reference = reference != NULL ? reference->scene_name : ""};
 
 	for (int axis = X; axis < AXES; axis++) {
-		row.mean[axis] = *mean_of(cell, sensor, axis);
-		row.ratio[axis] = ratio(mean_of(cell, 0, axis), mean_of(cell, 1, axis));
-		row.over[axis] = reference != NULL ? ratio(&row.mean[axis], mean_of(reference, sensor, axis))
+		row.mean[axis] = *print_tables_mean_of(cell, sensor, axis);
+		row.ratio[axis] =
+		        ratio(print_tables_mean_of(cell, 0, axis), print_tables_mean_of(cell, 1, axis));
+		row.over[axis] = reference != NULL ? ratio(&row.mean[axis],
+		                                           print_tables_mean_of(reference, sensor, axis))
 		                                   : (double)NAN;
 	}
 	row.r_of_means_g = hypot(row.mean[X].mean, row.mean[Y].mean);
@@ -109,7 +111,7 @@ static const struct table_column plate_columns[] = {
 #undef MEAN
 #undef COLUMN
 
-static int tables_json(struct table *out, const struct archive_table *table, const char *reference)
+static int print_tables_json(struct table *out, const struct archive_table *table, const char *reference)
 {
 	int result;
 
@@ -195,9 +197,11 @@ static void ratios_text(const struct archive_table *table, const char *name, FIL
 
 		fprintf(out, "%-16s %7g %5g ", cell->scene_name, cell->height_m, cell->angle_deg);
 		for (int axis = X; axis <= R; axis++)
-			ratio_text(out, ratio(mean_of(cell, 0, axis), mean_of(cell, 1, axis)));
+			ratio_text(out, ratio(print_tables_mean_of(cell, 0, axis),
+			                      print_tables_mean_of(cell, 1, axis)));
 		for (int k = 0; k < 6 && reference != NULL; k++)
-			ratio_text(out, ratio(mean_of(cell, k / 3, k % 3), mean_of(reference, k / 3, k % 3)));
+			ratio_text(out, ratio(print_tables_mean_of(cell, k / 3, k % 3),
+			                      print_tables_mean_of(reference, k / 3, k % 3)));
 		fprintf(out, "  %s\n", reference != NULL ? reference->scene_name : "");
 	}
 }
@@ -212,7 +216,7 @@ int print_tables(struct archive *archive, const struct archive_filter *filter, b
 	if (result != 0)
 		return result;
 	if (format == TABLE_JSON) {
-		result = tables_json(&to, &table, reference);
+		result = print_tables_json(&to, &table, reference);
 	} else if (format == TABLE_CSV) {
 		result = put_sensors(&to, &table, reference);
 	} else {

@@ -297,7 +297,7 @@ static int hold_result(struct proof *proof, const char *text)
 }
 
 /* Takes text. */
-static int hold_text(struct proof *proof, char *text)
+static int proof_hold_text(struct proof *proof, char *text)
 {
 	struct sidecar sidecar = {.file = proof->file};
 	const char *at, *line;
@@ -315,7 +315,7 @@ static int hold_text(struct proof *proof, char *text)
 	return result;
 }
 
-static int read_row(struct proof *proof, int64_t drop)
+static int proof_read_row(struct proof *proof, int64_t drop)
 {
 	sqlite3_stmt *s;
 	int result =
@@ -363,7 +363,7 @@ static int remember(struct proof *proof)
 	return 0;
 }
 
-static int mark(struct proof *proof)
+static int proof_mark(struct proof *proof)
 {
 	char before[ARCHIVE_MESSAGE_MAX];
 
@@ -388,7 +388,7 @@ int proof_of_drop(struct proof *proof, int64_t drop)
 {
 	const struct chain_entry *entry;
 	char *text;
-	int result = read_row(proof, drop);
+	int result = proof_read_row(proof, drop);
 
 	if (result != 0)
 		return result;
@@ -398,10 +398,10 @@ int proof_of_drop(struct proof *proof, int64_t drop)
 	proof->sealed = entry != NULL;
 	text = entry != NULL ? sealed_text(proof, entry) : unsealed_text(proof);
 	if (text != NULL)
-		result = hold_text(proof, text);
+		result = proof_hold_text(proof, text);
 	if (result == 0) {
 		proof_of_file(proof, PROOF_LOG, proof->raw, proof->bytes, proof->hash, proof->copy);
-		result = mark(proof);
+		result = proof_mark(proof);
 	}
 	return result;
 }
@@ -436,7 +436,7 @@ int proof_log(struct archive *archive, int64_t drop, const char *fault)
 
 /* ---- a log, opened ---- */
 
-static int open_log(struct archive *archive, const struct archive_place *place, struct archive_log *log)
+static int proof_open_log(struct archive *archive, const struct archive_place *place, struct archive_log *log)
 {
 	struct proof proof;
 	int result = proof_open(archive, &proof);
@@ -471,7 +471,7 @@ int archive_open_log(struct archive *archive, const char *drop, struct archive_l
 	strcpy(opened.raw, place.raw);
 	opened.number = place.number;
 	snprintf(opened.file, sizeof(opened.file), "/proc/self/fd/%d", opened.copy);
-	result = open_log(archive, &place, &opened);
+	result = proof_open_log(archive, &place, &opened);
 	if (result == 0)
 		*log = opened;
 	else

@@ -16,7 +16,7 @@ static bool is_kept(const struct quantity *q)
 }
 
 /* Ends the statement in text and prepares it. */
-static int query(struct archive *archive, sqlite3_stmt **s, struct text *text)
+static int quantities_query(struct archive *archive, sqlite3_stmt **s, struct text *text)
 {
 	int result = text_close(text, 0);
 
@@ -27,7 +27,7 @@ static int query(struct archive *archive, sqlite3_stmt **s, struct text *text)
 	return result;
 }
 
-static int begin(struct archive *archive, struct text *text)
+static int quantities_begin(struct archive *archive, struct text *text)
 {
 	return text_open(text) == 0 ? 0 : archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
 }
@@ -96,7 +96,7 @@ static int need_table(struct archive *archive, const struct quantity_home *home)
 {
 	const struct quantity *q = NULL;
 	struct text text;
-	int result = begin(archive, &text);
+	int result = quantities_begin(archive, &text);
 
 	if (result != 0)
 		return result;
@@ -140,7 +140,7 @@ static int insert_object(struct archive *archive, int64_t row, const struct quan
 	const struct quantity *q = NULL;
 	struct text text;
 	sqlite3_stmt *s;
-	int at = 3, result = begin(archive, &text);
+	int at = 3, result = quantities_begin(archive, &text);
 
 	if (result != 0)
 		return result;
@@ -149,7 +149,7 @@ static int insert_object(struct archive *archive, int64_t row, const struct quan
 	fputs(") VALUES (?, ?", text.out);
 	each(text.out, home, put_mark);
 	fputs(")", text.out);
-	result = query(archive, &s, &text);
+	result = quantities_query(archive, &s, &text);
 	if (result != 0)
 		return result;
 	sqlite3_bind_int64(s, 1, row);
@@ -192,7 +192,7 @@ static int fill_place(struct archive *archive, const struct quantity_home *home,
 	bool listed = home->array[0] != '\0';
 	struct text text;
 	sqlite3_stmt *s;
-	int result = begin(archive, &text);
+	int result = quantities_begin(archive, &text);
 
 	if (result != 0)
 		return result;
@@ -214,7 +214,7 @@ static int fill_place(struct archive *archive, const struct quantity_home *home,
 	        "'$%s%s')"
 	        " END = 'object'",
 	        listed ? "c.value" : "t.json", home->path[0] ? "." : "", home->path);
-	result = query(archive, &s, &text);
+	result = quantities_query(archive, &s, &text);
 	if (result != 0)
 		return result;
 	sqlite3_bind_int64(s, 1, row);
@@ -256,7 +256,7 @@ static void *object_of(struct result *said, enum quantity_place place, const cha
 	return object;
 }
 
-static void read_row(sqlite3_stmt *s, const struct quantity_home *home, void *object)
+static void quantities_read_row(sqlite3_stmt *s, const struct quantity_home *home, void *object)
 {
 	const struct quantity *q = NULL;
 	int at = 1;
@@ -282,14 +282,14 @@ static int read_place(struct archive *archive, int64_t row, enum quantity_place 
 	const struct quantity_home *home = &quantity_homes[place];
 	struct text text;
 	sqlite3_stmt *s;
-	int result = begin(archive, &text);
+	int result = quantities_begin(archive, &text);
 
 	if (result != 0)
 		return result;
 	fputs("SELECT subject", text.out);
 	each(text.out, home, put_key);
 	fprintf(text.out, " FROM %s WHERE result_id = ?", home->table);
-	result = query(archive, &s, &text);
+	result = quantities_query(archive, &s, &text);
 	if (result != 0)
 		return result;
 	sqlite3_bind_int64(s, 1, row);
@@ -297,7 +297,7 @@ static int read_place(struct archive *archive, int64_t row, enum quantity_place 
 		void *object = object_of(said, place, sql_text(s, 0));
 
 		if (object)
-			read_row(s, home, object);
+			quantities_read_row(s, home, object);
 	}
 	sqlite3_finalize(s);
 	return result;
@@ -323,7 +323,7 @@ static int read_channels(struct archive *archive, int64_t row, struct record *re
 	return result;
 }
 
-static void clear(struct analysis *a)
+static void quantities_clear(struct analysis *a)
 {
 	for (size_t i = 0; i < a->channel_count; i++) {
 		quantity_clear(QUANTITY_BASELINE, &a->channels[i].baseline);
@@ -381,7 +381,7 @@ int quantities_read(struct archive *archive, int64_t row, struct result *said)
 	                       .channel_count = said->record->channel_count};
 	if (a->channels == NULL)
 		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
-	clear(a);
+	quantities_clear(a);
 	for (int p = 0; p < QUANTITY_PLACES && result == 0; p++)
 		if (!from_log ||
 		    (p != QUANTITY_AT_RECORD && p != QUANTITY_AT_DROP && p != QUANTITY_AT_SAMPLES))

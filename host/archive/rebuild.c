@@ -32,7 +32,7 @@ static int note_entry(struct rebuild *rebuild, const char *file, int64_t drop)
 }
 
 /* One sidecar; what is wrong with it is told and left out. */
-static int take(struct rebuild *rebuild, const char *file)
+static int rebuild_take(struct rebuild *rebuild, const char *file)
 {
 	struct archive *archive = &rebuild->archive;
 	char text[ARCHIVE_MESSAGE_MAX + 256];
@@ -87,7 +87,7 @@ static void look_for_sidecar(struct rebuild *rebuild, const FTSENT *entry)
 }
 
 /* A linked folder or file is taken as what it leads to, but not what is linked in there again. */
-static bool follow(struct rebuild *rebuild, FTS *walk, FTSENT *entry)
+static bool rebuild_follow(struct rebuild *rebuild, FTS *walk, FTSENT *entry)
 {
 	char text[ARCHIVE_MESSAGE_MAX];
 
@@ -110,13 +110,13 @@ static int take_entry(struct rebuild *rebuild, FTS *walk, FTSENT *entry)
 	switch (entry->fts_info) {
 	case FTS_SL:
 	case FTS_SLNONE:
-		return follow(rebuild, walk, entry) ? 0 : DT_E_SYSTEM;
+		return rebuild_follow(rebuild, walk, entry) ? 0 : DT_E_SYSTEM;
 	case FTS_D:
 		entry->fts_number |= entry->fts_parent->fts_number;
 		return 0;
 	case FTS_F:
 		if (ends_in(entry->fts_name, ".ini"))
-			return take(rebuild, entry->fts_path + front);
+			return rebuild_take(rebuild, entry->fts_path + front);
 		look_for_sidecar(rebuild, entry);
 		return 0;
 	case FTS_DNR:
@@ -186,7 +186,7 @@ static int64_t drops_of_index(const char *folder)
 	return count;
 }
 
-static int hold_count(struct rebuild *rebuild)
+static int rebuild_hold_count(struct rebuild *rebuild)
 {
 	struct archive *archive = &rebuild->archive;
 	int64_t now = 0;
@@ -200,21 +200,21 @@ static int hold_count(struct rebuild *rebuild)
 	                      archive->folder, (long long)now, (long long)rebuild->before);
 }
 
-static void path_of(const struct archive *archive, char path[ARCHIVE_PATH_MAX], const char *name,
-                    const char *ending)
+static void rebuild_path_of(const struct archive *archive, char path[ARCHIVE_PATH_MAX], const char *name,
+                            const char *ending)
 {
 	snprintf(path, ARCHIVE_PATH_MAX, "%s/%.60s%.60s", archive->folder, name, ending);
 }
 
 /* Moves FROM's file, its log and what goes with it to TO. Only the file itself must be there. */
-static int move(struct archive *archive, const char *from, const char *to)
+static int rebuild_move(struct archive *archive, const char *from, const char *to)
 {
 	static const char *const endings[] = {"-wal", "-shm", ""};
 	char old[ARCHIVE_PATH_MAX], new[ARCHIVE_PATH_MAX];
 
 	for (size_t i = 0; i < sizeof(endings) / sizeof(endings[0]); i++) {
-		path_of(archive, old, from, endings[i]);
-		path_of(archive, new, to, endings[i]);
+		rebuild_path_of(archive, old, from, endings[i]);
+		rebuild_path_of(archive, new, to, endings[i]);
 		if (durable_replace(old, new) != 0 && errno != ENOENT)
 			return archive_refuse(archive, DT_E_SYSTEM, "%.400s: %s", new, strerror(errno));
 	}
@@ -227,7 +227,7 @@ static void remove_rebuilt(const struct archive *archive)
 	char path[ARCHIVE_PATH_MAX];
 
 	for (size_t i = 0; i < sizeof(endings) / sizeof(endings[0]); i++) {
-		path_of(archive, path, REBUILT, endings[i]);
+		rebuild_path_of(archive, path, REBUILT, endings[i]);
 		unlink(path);
 	}
 }
@@ -251,10 +251,10 @@ static int fill_index(struct rebuild *rebuild)
 	if (result == 0 && chain->count > 0)
 		result = chain_note(archive, chain->entry[chain->count - 1].number,
 		                    chain->entry[chain->count - 1].head);
-	return result != 0 ? result : hold_count(rebuild);
+	return result != 0 ? result : rebuild_hold_count(rebuild);
 }
 
-static int fill(struct rebuild *rebuild)
+static int rebuild_fill(struct rebuild *rebuild)
 {
 	struct archive *archive = &rebuild->archive;
 	int result = proof_open(archive, &rebuild->proof);
@@ -287,7 +287,7 @@ static int rebuild_in(struct rebuild *rebuild)
 	char raw[ARCHIVE_PATH_MAX], aside[64];
 	int result = 0;
 
-	path_of(archive, raw, "raw", "");
+	rebuild_path_of(archive, raw, "raw", "");
 	if (access(raw, F_OK) != 0)
 		return archive_refuse(archive, DT_E_EMPTY,
 		                      "%.400s: no archive there, expected a folder raw in it",
@@ -296,12 +296,12 @@ static int rebuild_in(struct rebuild *rebuild)
 	if (result != 0)
 		return result;
 	remove_rebuilt(archive);
-	result = fill(rebuild);
+	result = rebuild_fill(rebuild);
 	snprintf(aside, sizeof(aside), "index.sqlite.before-%lld", (long long)time(NULL));
 	if (result == 0)
-		result = move(archive, "index.sqlite", aside);
+		result = rebuild_move(archive, "index.sqlite", aside);
 	if (result == 0)
-		result = move(archive, REBUILT, "index.sqlite");
+		result = rebuild_move(archive, REBUILT, "index.sqlite");
 	if (result != 0)
 		remove_rebuilt(archive);
 	return result;

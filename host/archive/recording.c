@@ -18,7 +18,7 @@
 
 enum { SCENE_MAX_BYTES = 65536, NUMBER_MAX = 1000000 };
 
-static int refuse_file(struct archive *archive, const char *file)
+static int recording_refuse_file(struct archive *archive, const char *file)
 {
 	return archive_refuse(archive, DT_E_SYSTEM, "%.500s: %s", file, strerror(errno));
 }
@@ -31,7 +31,7 @@ static int read_scene_text(struct archive *archive, const char *file, char **tex
 
 	*text = durable_read(file, &size);
 	if (*text == NULL)
-		return refuse_file(archive, file);
+		return recording_refuse_file(archive, file);
 	if (size <= SCENE_MAX_BYTES && strlen(*text) == size && strstr(*text, SIDECAR_SECTION) == NULL)
 		return 0;
 	free(*text);
@@ -86,8 +86,8 @@ int series_insert(struct archive *archive, const char *name, const char *campaig
 }
 
 /* With its sidecar; the name must be new. */
-static int make_series(struct archive *archive, const char *name, const char *campaign, const char *text,
-                       const struct scene *scene, unsigned planned)
+static int recording_make_series(struct archive *archive, const char *name, const char *campaign,
+                                 const char *text, const struct scene *scene, unsigned planned)
 {
 	char now[ARCHIVE_TIME_CHARS];
 	int64_t known, row = 0;
@@ -126,7 +126,8 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 	if (result == 0)
 		result = archive_start(archive);
 	if (result == 0)
-		result = archive_end(archive, make_series(archive, name, campaign, text, &scene, planned));
+		result = archive_end(archive,
+		                     recording_make_series(archive, name, campaign, text, &scene, planned));
 	free(text);
 	return result;
 }
@@ -158,19 +159,19 @@ bool archive_is_log(const char *name)
 }
 
 /* The next number whose log is not there; its log is made, and locked. */
-static int take_number(struct archive *archive, const char *year, const char *ending,
-                       struct archive_recording *r)
+static int recording_take_number(struct archive *archive, const char *year, const char *ending,
+                                 struct archive_recording *r)
 {
 	for (; r->number < NUMBER_MAX; r->number++) {
 		snprintf(r->raw, sizeof(r->raw), "raw/%.4s/%s/%04u%.8s", year, r->series, r->number, ending);
 		snprintf(r->log, sizeof(r->log), "%s/%s", archive->folder, r->raw);
 		if (durable_folders(r->log) != 0)
-			return refuse_file(archive, r->log);
+			return recording_refuse_file(archive, r->log);
 		r->lock = open(r->log, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
 		if (r->lock >= 0 && flock(r->lock, LOCK_EX | LOCK_NB) == 0)
 			return 0;
 		if (r->lock >= 0 || errno != EEXIST)
-			return refuse_file(archive, r->log);
+			return recording_refuse_file(archive, r->log);
 	}
 	return archive_refuse(archive, DT_E_FULL, "series '%s' has %d drops already", r->series, NUMBER_MAX);
 }
@@ -194,7 +195,7 @@ static int insert_drop(struct archive *archive, const char *operator_name, const
 		return result;
 	archive_time(now, time(NULL));
 	r->number = (unsigned)last + 1;
-	result = take_number(archive, now, ending, r);
+	result = recording_take_number(archive, now, ending, r);
 	if (result == 0)
 		result = sql_run(
 		        archive,
@@ -300,7 +301,7 @@ int archive_resume(struct archive *archive, const char *drop, struct archive_rec
 	if (!place.recorded) {
 		r.lock = open(r.log, O_RDWR | O_CLOEXEC);
 		if (r.lock < 0)
-			return refuse_file(archive, r.log);
+			return recording_refuse_file(archive, r.log);
 		if (flock(r.lock, LOCK_EX | LOCK_NB) == 0) {
 			*recording = r;
 			return 0;
@@ -311,8 +312,8 @@ int archive_resume(struct archive *archive, const char *drop, struct archive_rec
 	                      place.recorded ? "recorded" : "being recorded");
 }
 
-static int acknowledge(struct archive *archive, const struct archive_recording *r, const char *when,
-                       const char *note, const char *hash, int64_t bytes)
+static int recording_acknowledge(struct archive *archive, const struct archive_recording *r, const char *when,
+                                 const char *note, const char *hash, int64_t bytes)
 {
 	int result = sql_run(archive,
 	                     "UPDATE drops SET state = 'recorded', bytes = ?, sha256 = ?, note = ?,"
@@ -332,12 +333,13 @@ int archive_finish(struct archive *archive, struct archive_recording *recording,
 	archive_time(when, time_s);
 	if (result == 0 &&
 	    (durable_sync(recording->log) != 0 || digest_file(recording->log, hash, &bytes, -1) != 0))
-		result = refuse_file(archive, recording->log);
+		result = recording_refuse_file(archive, recording->log);
 	if (result == 0)
 		result = archive_start(archive);
 	if (result == 0)
-		result = archive_end(archive, acknowledge(archive, recording, time_s != 0 ? when : NULL, note,
-		                                          hash, bytes));
+		result = archive_end(archive,
+		                     recording_acknowledge(archive, recording, time_s != 0 ? when : NULL,
+		                                           note, hash, bytes));
 	archive_abandon(recording);
 	return result;
 }

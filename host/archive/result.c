@@ -29,7 +29,7 @@ struct numbers {
 };
 
 /* A value of a lag or a plate that is not there is not ok. */
-static void take(struct numbers *n, int which, struct result *said)
+static void result_take(struct numbers *n, int which, struct result *said)
 {
 	const struct quantity_column *c = &quantity_columns[which];
 	const struct quantity *q = quantity_find(quantity_homes[c->place].object, c->key);
@@ -61,7 +61,7 @@ static int update_columns(struct archive *archive, int64_t row, struct result *s
 	int result;
 
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
-		take(&n, i, said);
+		result_take(&n, i, said);
 	result = sql_query(archive, &s, text, "i", n.not_ok);
 	if (result != 0)
 		return result;

@@ -121,7 +121,7 @@ static int is_shaped(struct archive *archive, int64_t version, int64_t *shaped)
 }
 
 /* The columns of the results, which grow with quantity.def; results of before are taken from their texts. */
-static int shape(struct archive *archive, int64_t version)
+static int schema_shape(struct archive *archive, int64_t version)
 {
 	int result = quantities_shape(archive);
 
@@ -151,6 +151,6 @@ int schema_upgrade(struct archive *archive)
 	if (result == 0 && version < STEPS)
 		result = take_steps(archive, version);
 	if (result == 0)
-		result = shape(archive, version);
+		result = schema_shape(archive, version);
 	return archive_end(archive, result);
 }

@@ -14,7 +14,7 @@
 #define SERIES_TABLES " FROM series s JOIN campaigns c ON c.id = s.campaign_id "
 enum { SERIES_COLUMN_COUNT = 7 };
 
-static void put_series(FILE *out, sqlite3_stmt *s)
+static void sidecar_put_series(FILE *out, sqlite3_stmt *s)
 {
 	fprintf(out, "%s" SIDECAR_MARK "format = 1\nseries = %s\ncampaign = %s\n", sql_text(s, 0),
 	        sql_text(s, 1), sql_text(s, 2));
@@ -23,7 +23,7 @@ static void put_series(FILE *out, sqlite3_stmt *s)
 	        sql_text(s, 6));
 }
 
-static void put_drop(FILE *out, sqlite3_stmt *s)
+static void sidecar_put_drop(FILE *out, sqlite3_stmt *s)
 {
 	static const char *const keys[] = {"drop",   "state", "time",  "operator", "note",     "decision",
 	                                   "reason", "raw",   "bytes", "sha256",   "simulated"};
@@ -33,7 +33,8 @@ static void put_drop(FILE *out, sqlite3_stmt *s)
 }
 
 /* One line "key = a<tab>b..." for each row. */
-static int put_rows(struct archive *archive, FILE *out, const char *key, const char *text, int64_t drop)
+static int sidecar_put_rows(struct archive *archive, FILE *out, const char *key, const char *text,
+                            int64_t drop)
 {
 	sqlite3_stmt *s;
 	int result = sql_query(archive, &s, text, "i", drop);
@@ -77,14 +78,15 @@ static int put_history(struct archive *archive, FILE *out, int64_t drop)
 {
 	int result = put_results(archive, out, drop);
 
-	return result != 0 ? result
-	                   : put_rows(archive, out, "event = ",
-	                              "SELECT time, what, operator, text FROM events WHERE drop_id = ?"
-	                              " ORDER BY id",
-	                              drop);
+	return result != 0
+	               ? result
+	               : sidecar_put_rows(archive, out, "event = ",
+	                                  "SELECT time, what, operator, text FROM events WHERE drop_id = ?"
+	                                  " ORDER BY id",
+	                                  drop);
 }
 
-static int refuse_file(struct archive *archive, const char *path)
+static int sidecar_refuse_file(struct archive *archive, const char *path)
 {
 	return archive_refuse(archive, DT_E_SYSTEM, "%.500s: %s", path, strerror(errno));
 }
@@ -99,11 +101,11 @@ int sidecar_put(struct archive *archive, const char *file, const char *text, siz
 
 	snprintf(path, sizeof(path), "%s/%.200s", archive->folder, file);
 	if (durable_folders(path) != 0 || durable_stage(path, text, size) != 0)
-		return refuse_file(archive, path);
+		return sidecar_refuse_file(archive, path);
 	digest_of(text, size, hash);
 	result = chain_enter(archive, place, file, (int64_t)size, hash);
 	if (result == 0 && durable_publish(path) != 0)
-		result = refuse_file(archive, path);
+		result = sidecar_refuse_file(archive, path);
 	return result;
 }
 
@@ -116,7 +118,7 @@ void sidecar_name(const char *raw, char file[ARCHIVE_NAME_MAX + 64])
 }
 
 /* The row is there; writes what to says, "raw/..." with any ending. */
-static int write_out(struct archive *archive, sqlite3_stmt *s, const char *to, int64_t drop)
+static int sidecar_write_out(struct archive *archive, sqlite3_stmt *s, const char *to, int64_t drop)
 {
 	char file[ARCHIVE_NAME_MAX + 64];
 	struct chain_place place;
@@ -127,9 +129,9 @@ static int write_out(struct archive *archive, sqlite3_stmt *s, const char *to, i
 		return result;
 	if (text_open(&text) != 0)
 		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
-	put_series(text.out, s);
+	sidecar_put_series(text.out, s);
 	if (drop != 0) {
-		put_drop(text.out, s);
+		sidecar_put_drop(text.out, s);
 		result = put_history(archive, text.out, drop);
 	}
 	fprintf(text.out, "entry = %lld\nprevious = %s\n", (long long)place.number, place.head);
@@ -160,7 +162,7 @@ int sidecar_write_drop(struct archive *archive, int64_t drop)
 	result = sql_step(archive, s);
 	if (result > 0) {
 		snprintf(to, sizeof(to), "%s", sql_text(s, SERIES_COLUMN_COUNT + 7));
-		result = write_out(archive, s, to, drop);
+		result = sidecar_write_out(archive, s, to, drop);
 	}
 	sqlite3_finalize(s);
 	return result;
@@ -178,7 +180,7 @@ int sidecar_write_series(struct archive *archive, int64_t series)
 	result = sql_step(archive, s);
 	if (result > 0) {
 		snprintf(to, sizeof(to), "raw/%.4s/%s/series.ini", sql_text(s, 6), sql_text(s, 1));
-		result = write_out(archive, s, to, 0);
+		result = sidecar_write_out(archive, s, to, 0);
 	}
 	sqlite3_finalize(s);
 	return result;

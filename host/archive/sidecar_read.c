@@ -33,7 +33,7 @@ const char *sidecar_value(const struct sidecar *sidecar, const char *key)
 	return sidecar_next(sidecar, key, &at);
 }
 
-static double number(const struct sidecar *sidecar, const char *key)
+static double sidecar_read_number(const struct sidecar *sidecar, const char *key)
 {
 	double read = NAN;
 
@@ -58,14 +58,14 @@ int sidecar_split(struct archive *archive, struct sidecar *sidecar, char *text)
 	for (char *c = sidecar->line; c < sidecar->end; c++)
 		if (*c == '\n')
 			*c = '\0';
-	if (number(sidecar, "format") == 1)
+	if (sidecar_read_number(sidecar, "format") == 1)
 		return 0;
 	return archive_refuse(archive, DT_E_FORMAT, "%.400s: format = %.20s, expected 1", sidecar->file,
 	                      sidecar_value(sidecar, "format"));
 }
 
 /* The series' row, made when this is the first that tells of it. */
-static int take_series(struct archive *archive, const struct sidecar *sidecar, int64_t *series)
+static int sidecar_read_take_series(struct archive *archive, const struct sidecar *sidecar, int64_t *series)
 {
 	const char *name = sidecar_value(sidecar, "series"), *campaign = sidecar_value(sidecar, "campaign");
 	struct scene scene;
@@ -76,7 +76,8 @@ static int take_series(struct archive *archive, const struct sidecar *sidecar, i
 	result = sql_number(archive, series, "SELECT id FROM series WHERE name = ?", "s", name);
 	if (result != DT_E_EMPTY)
 		return result;
-	result = scene_of_text(archive, name, sidecar->scene, number(sidecar, "angle_deg"), &scene);
+	result = scene_of_text(archive, name, sidecar->scene, sidecar_read_number(sidecar, "angle_deg"),
+	                       &scene);
 	if (result == 0)
 		result = series_insert(archive, name, campaign, sidecar->scene, &scene,
 		                       strtol(sidecar_value(sidecar, "planned"), NULL, 10),
@@ -150,7 +151,8 @@ static bool is_of_the_machine(int error)
 }
 
 /* 1 when it is not there, or not what was recorded: to be verified, and made again. */
-static int take_result(struct archive *archive, const struct sidecar *sidecar, int64_t drop, const char *text)
+static int sidecar_read_take_result(struct archive *archive, const struct sidecar *sidecar, int64_t drop,
+                                    const char *text)
 {
 	char path[ARCHIVE_PATH_MAX], *json;
 	struct sidecar_result r;
@@ -179,14 +181,14 @@ static int take_result(struct archive *archive, const struct sidecar *sidecar, i
 }
 
 /* 1 when one of them could not be used. */
-static int take_results(struct archive *archive, const struct sidecar *sidecar, int64_t drop)
+static int sidecar_read_take_results(struct archive *archive, const struct sidecar *sidecar, int64_t drop)
 {
 	const char *at = sidecar->line, *text;
 	bool lost = false;
 	int result = 0;
 
 	while (result == 0 && *(text = sidecar_next(sidecar, "result", &at)) != '\0') {
-		result = take_result(archive, sidecar, drop, text);
+		result = sidecar_read_take_result(archive, sidecar, drop, text);
 		if (result == DT_E_SYSTEM || result == DT_E_FORMAT || result == DT_E_ARGUMENT) {
 			lost = true;
 			result = 0;
@@ -220,12 +222,12 @@ bool sidecar_is_of_drop(const char *path)
 }
 
 /* Its columns are checked by the table itself. */
-static int take_drop(struct archive *archive, const struct sidecar *sidecar, int64_t *drop)
+static int sidecar_read_take_drop(struct archive *archive, const struct sidecar *sidecar, int64_t *drop)
 {
 	const char *raw = sidecar_value(sidecar, "raw"), *name = sidecar_value(sidecar, "series");
 	long number = strtol(sidecar_value(sidecar, "drop"), NULL, 10);
 	int64_t series;
-	int result = take_series(archive, sidecar, &series);
+	int result = sidecar_read_take_series(archive, sidecar, &series);
 
 	if (result != 0)
 		return result;
@@ -248,7 +250,7 @@ static int take_drop(struct archive *archive, const struct sidecar *sidecar, int
 	return result != 0 ? result : take_events(archive, sidecar, *drop);
 }
 
-static int take(struct archive *archive, const struct sidecar *sidecar, int64_t *drop)
+static int sidecar_read_take(struct archive *archive, const struct sidecar *sidecar, int64_t *drop)
 {
 	int64_t row;
 	int result;
@@ -257,14 +259,15 @@ static int take(struct archive *archive, const struct sidecar *sidecar, int64_t 
 		return sql_run(archive,
 		               "INSERT OR REPLACE INTO calibrations (sensor, gain, date, note)"
 		               " VALUES (?, ?, ?, ?)",
-		               "sdss", sidecar_value(sidecar, "calibration"), number(sidecar, "gain"),
-		               sidecar_value(sidecar, "date"), sidecar_value(sidecar, "note"));
+		               "sdss", sidecar_value(sidecar, "calibration"),
+		               sidecar_read_number(sidecar, "gain"), sidecar_value(sidecar, "date"),
+		               sidecar_value(sidecar, "note"));
 	if (sidecar_value(sidecar, "drop")[0] == '\0' && sidecar_is_of_drop(sidecar->file))
 		return archive_refuse(archive, DT_E_FORMAT, "no line 'drop = ', expected its number");
 	if (sidecar_value(sidecar, "drop")[0] == '\0')
-		return take_series(archive, sidecar, &row);
-	result = take_drop(archive, sidecar, drop);
-	return result != 0 ? result : take_results(archive, sidecar, *drop);
+		return sidecar_read_take_series(archive, sidecar, &row);
+	result = sidecar_read_take_drop(archive, sidecar, drop);
+	return result != 0 ? result : sidecar_read_take_results(archive, sidecar, *drop);
 }
 
 int sidecar_read(struct archive *archive, const char *file, int64_t *drop)
@@ -281,7 +284,7 @@ int sidecar_read(struct archive *archive, const char *file, int64_t *drop)
 		                      strerror(errno));
 	result = sidecar_split(archive, &sidecar, text);
 	if (result == 0)
-		result = take(archive, &sidecar, drop);
+		result = sidecar_read_take(archive, &sidecar, drop);
 	free(text);
 	return result;
 }

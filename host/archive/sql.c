@@ -52,8 +52,8 @@ static int bind_one(sqlite3_stmt *statement, int column, char type, va_list *val
 	}
 }
 
-static int query(struct archive *archive, sqlite3_stmt **statement, const char *text, const char *types,
-                 va_list *values)
+static int archive_sql_query(struct archive *archive, sqlite3_stmt **statement, const char *text,
+                             const char *types, va_list *values)
 {
 	int result = sqlite3_prepare_v2(archive->index, text, -1, statement, NULL);
 
@@ -72,7 +72,7 @@ int sql_query(struct archive *archive, sqlite3_stmt **statement, const char *tex
 	int result;
 
 	va_start(values, types);
-	result = query(archive, statement, text, types, &values);
+	result = archive_sql_query(archive, statement, text, types, &values);
 	va_end(values);
 	return result;
 }
@@ -93,7 +93,7 @@ int sql_run(struct archive *archive, const char *text, const char *types, ...)
 	int result;
 
 	va_start(values, types);
-	result = query(archive, &statement, text, types, &values);
+	result = archive_sql_query(archive, &statement, text, types, &values);
 	va_end(values);
 	if (result != 0)
 		return result;
@@ -116,7 +116,7 @@ int sql_number(struct archive *archive, int64_t *number, const char *text, const
 	int result;
 
 	va_start(values, types);
-	result = query(archive, &statement, text, types, &values);
+	result = archive_sql_query(archive, &statement, text, types, &values);
 	va_end(values);
 	if (result != 0)
 		return result;

@@ -74,19 +74,20 @@ struct growing {
 	bool undecided;
 };
 
-static bool equal(double a, double b)
+static bool table_equal(double a, double b)
 {
 	return fabs(a - b) < 1e-9;
 }
 
 static bool belongs(const struct archive_cell *cell, const struct archive_series *series)
 {
-	return equal(cell->angle_deg, series->angle_deg) && equal(cell->height_m, series->height_m) &&
+	return table_equal(cell->angle_deg, series->angle_deg) &&
+	       table_equal(cell->height_m, series->height_m) &&
 	       strcmp(cell->scene_name, series->scene_name) == 0 &&
 	       strcmp(cell->campaign, series->campaign) == 0;
 }
 
-static int add_drop(void *context, const struct archive_drop *drop)
+static int table_add_drop(void *context, const struct archive_drop *drop)
 {
 	struct growing *g = context;
 	struct archive_table *t = &g->table;
@@ -114,7 +115,7 @@ int archive_table(struct archive *archive, const struct archive_filter *filter, 
                   struct archive_table *table)
 {
 	struct growing g = {.undecided = undecided};
-	int result = archive_each_numbers(archive, filter, add_drop, &g);
+	int result = archive_each_numbers(archive, filter, table_add_drop, &g);
 
 	if (result == 0)
 		*table = g.table;
@@ -130,7 +131,7 @@ void archive_table_free(struct archive_table *table)
 
 static bool same_place(const struct archive_cell *a, const struct archive_cell *b)
 {
-	return equal(a->angle_deg, b->angle_deg) && equal(a->height_m, b->height_m) &&
+	return table_equal(a->angle_deg, b->angle_deg) && table_equal(a->height_m, b->height_m) &&
 	       strcmp(a->campaign, b->campaign) == 0;
 }
 

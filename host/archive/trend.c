@@ -12,7 +12,7 @@ struct line {
 	double n, x, y, xx, xy;
 };
 
-static void add(struct line *line, double x, double y)
+static void trend_add(struct line *line, double x, double y)
 {
 	line->n++;
 	line->x += x;
@@ -21,7 +21,7 @@ static void add(struct line *line, double x, double y)
 	line->xy += x * y;
 }
 
-static double at(const struct line *line, double x)
+static double trend_at(const struct line *line, double x)
 {
 	double spread = line->n * line->xx - line->x * line->x;
 	double slope = spread > 0.0 ? (line->n * line->xy - line->x * line->y) / spread : 0.0;
@@ -50,15 +50,15 @@ int archive_trend(struct archive *archive, const char *series, const struct quan
 		last = sqlite3_column_double(s, 0);
 		if (line.n < 1.0)
 			first = last;
-		add(&line, last, sqlite3_column_double(s, 1));
+		trend_add(&line, last, sqlite3_column_double(s, 1));
 	}
 	sqlite3_finalize(s);
 	if (result != 0)
 		return result;
 	*trend = (struct archive_trend){.drops = (unsigned)line.n, .from = NAN, .to = NAN};
 	if (trend->drops > 0) {
-		trend->from = at(&line, first);
-		trend->to = at(&line, last);
+		trend->from = trend_at(&line, first);
+		trend->to = trend_at(&line, last);
 	}
 	return 0;
 }

@@ -24,7 +24,7 @@ static int shut(int fd, int result)
 	return result;
 }
 
-static char *folder_of(const char *path)
+static char *durable_folder_of(const char *path)
 {
 	const char *slash = strrchr(path, '/');
 
@@ -44,7 +44,7 @@ static int sync_one(const char *path, int flags)
 
 int durable_sync_folder(const char *path)
 {
-	char *folder = folder_of(path);
+	char *folder = durable_folder_of(path);
 	int result = folder != NULL ? sync_one(folder, O_RDONLY | O_DIRECTORY) : DT_E_MEMORY;
 
 	free(folder);
@@ -76,7 +76,7 @@ int durable_folders(const char *path)
 	return result;
 }
 
-static int write_all(int fd, const char *bytes, size_t size)
+static int durable_write_all(int fd, const char *bytes, size_t size)
 {
 	errno = process_write(fd, bytes, size);
 	return errno == 0 && fsync(fd) == 0 ? 0 : DT_E_SYSTEM;
@@ -102,7 +102,7 @@ int durable_stage(const char *path, const void *bytes, size_t size)
 		return DT_E_SYSTEM;
 	}
 	fd = open(part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
-	result = fd < 0 ? DT_E_SYSTEM : shut(fd, write_all(fd, bytes, size));
+	result = fd < 0 ? DT_E_SYSTEM : shut(fd, durable_write_all(fd, bytes, size));
 	if (result != 0 && fd >= 0) {
 		int before = errno;
 
@@ -140,7 +140,7 @@ int durable_append(const char *path, int64_t at, const void *bytes, size_t size)
 
 	if (fd < 0)
 		return DT_E_SYSTEM;
-	result = ftruncate(fd, at) == 0 && lseek(fd, at, SEEK_SET) == at ? write_all(fd, bytes, size)
+	result = ftruncate(fd, at) == 0 && lseek(fd, at, SEEK_SET) == at ? durable_write_all(fd, bytes, size)
 	                                                                 : DT_E_SYSTEM;
 	if (result != 0 && ftruncate(fd, at) != 0)
 		result = DT_E_SYSTEM; /* half a line stays: the next one takes its place */

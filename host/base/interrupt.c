@@ -6,7 +6,7 @@
 
 static volatile sig_atomic_t came;
 
-static void on_signal(int number)
+static void interrupt_on_signal(int number)
 {
 	came = number;
 }
@@ -16,7 +16,7 @@ void interrupt_catch(void)
 	struct sigaction action, before;
 
 	memset(&action, 0, sizeof(action));
-	action.sa_handler = on_signal;
+	action.sa_handler = interrupt_on_signal;
 	sigemptyset(&action.sa_mask);
 	sigaction(SIGINT, &action, NULL);
 	sigaction(SIGTERM, &action, NULL);

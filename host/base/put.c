@@ -18,7 +18,7 @@ void put_item(struct builder *b, cJSON *object, const char *key, cJSON *item)
 }
 
 /* cJSON's own numbers may lose the last digit. */
-static cJSON *number(double value)
+static cJSON *base_put_number(double value)
 {
 	char text[NUMBER_CHARS];
 
@@ -30,7 +30,7 @@ static cJSON *number(double value)
 
 void put_number(struct builder *b, cJSON *object, const char *key, double value)
 {
-	put_item(b, object, key, number(value));
+	put_item(b, object, key, base_put_number(value));
 }
 
 void put_numbers(struct builder *b, cJSON *object, const char *key, const double *value, size_t count)
@@ -38,7 +38,7 @@ void put_numbers(struct builder *b, cJSON *object, const char *key, const double
 	cJSON *array = put_array(b, object, key);
 
 	for (size_t i = 0; i < count; i++) {
-		cJSON *item = number(value[i]);
+		cJSON *item = base_put_number(value[i]);
 
 		if (!item || !cJSON_AddItemToArray(array, item)) {
 			cJSON_Delete(item);

@@ -8,7 +8,7 @@
 #include "common/base/number.h"
 #include "host/base/html.h"
 
-static const void *at(const struct table_column *c, const void *object)
+static const void *table_at(const struct table_column *c, const void *object)
 {
 	return (const char *)object + c->offset;
 }
@@ -26,27 +26,27 @@ static bool is_yes(const struct table_column *c)
 /* NULL when not known. */
 static const char *words_of(const struct table_column *c, const void *object)
 {
-	const char *chars = at(c, object);
+	const char *chars = table_at(c, object);
 
 	return c->kind == TABLE_CHARS ? chars : *(const char *const *)(const void *)chars;
 }
 
-static struct table_value value_of(const struct table_column *c, const void *object)
+static struct table_value table_value_of(const struct table_column *c, const void *object)
 {
 	struct table_value v = {(double)NAN, (double)NAN, false};
 
 	switch (c->kind) {
 	case TABLE_NUMBER:
-		v.value = *(const double *)at(c, object);
+		v.value = *(const double *)table_at(c, object);
 		break;
 	case TABLE_VALUE:
-		v = *(const struct table_value *)at(c, object);
+		v = *(const struct table_value *)table_at(c, object);
 		break;
 	case TABLE_WHOLE:
-		v.value = *(const unsigned *)at(c, object);
+		v.value = *(const unsigned *)table_at(c, object);
 		break;
 	case TABLE_LARGE:
-		v.value = (double)*(const int64_t *)at(c, object);
+		v.value = (double)*(const int64_t *)table_at(c, object);
 		break;
 	default:
 		break;
@@ -59,17 +59,17 @@ static struct table_value value_of(const struct table_column *c, const void *obj
 static void put_one(struct builder *b, cJSON *to, const struct table_column *c, const void *object)
 {
 	const char *words = is_words(c) ? words_of(c, object) : NULL;
-	struct table_value v = value_of(c, object);
+	struct table_value v = table_value_of(c, object);
 
 	if (c->kind == TABLE_ITEM) {
-		if (*(cJSON *const *)at(c, object) != NULL)
-			put_item(b, to, c->key, *(cJSON *const *)at(c, object));
+		if (*(cJSON *const *)table_at(c, object) != NULL)
+			put_item(b, to, c->key, *(cJSON *const *)table_at(c, object));
 		return;
 	}
 	if (words != NULL)
 		put_text(b, to, c->key, words);
-	else if (is_yes(c) && (c->kind == TABLE_YES || *(const bool *)at(c, object)))
-		put_bool(b, to, c->key, *(const bool *)at(c, object));
+	else if (is_yes(c) && (c->kind == TABLE_YES || *(const bool *)table_at(c, object)))
+		put_bool(b, to, c->key, *(const bool *)table_at(c, object));
 	else
 		put_number(b, to, c->key, v.value);
 	if (c->sigma != NULL)
@@ -84,7 +84,7 @@ static size_t group_size(const struct table_column *c, const struct table_column
 
 	*known = false;
 	for (; in < end && in->group != NULL && strcmp(in->group, c->group) == 0; in++)
-		*known |= in->kind != TABLE_NUMBER || isfinite(value_of(in, object).value);
+		*known |= in->kind != TABLE_NUMBER || isfinite(table_value_of(in, object).value);
 	return (size_t)(in - c);
 }
 
@@ -131,7 +131,7 @@ static bool has(const struct table *t, const struct table_column *c, bool sigma)
 	return !sigma && c->title != NULL;
 }
 
-static double scale_of(const struct table *t, const struct table_column *c)
+static double table_scale_of(const struct table *t, const struct table_column *c)
 {
 	return t->format == TABLE_CSV || t->of == TABLE_COUNTS || !(fabs(c->scale) > 0.0) ? 1.0 : c->scale;
 }
@@ -175,23 +175,24 @@ static void put_value(const struct table *t, const struct table_column *c, doubl
 }
 
 /* A cell's text; object NULL: of the head. */
-static void put_cell(const struct table *t, const struct table_column *c, const void *object, bool sigma)
+static void table_put_cell(const struct table *t, const struct table_column *c, const void *object,
+                           bool sigma)
 {
-	struct table_value v = value_of(c, object);
-	double scale = scale_of(t, c);
+	struct table_value v = table_value_of(c, object);
+	double scale = table_scale_of(t, c);
 	const char *mark = c->kind == TABLE_VALUE && t->format == TABLE_TEXT ? " " : "";
 
 	if (is_words(c))
 		put_words(t, c, words_of(c, object) != NULL ? words_of(c, object) : "");
 	else if (is_yes(c))
-		put_words(t, c, *(const bool *)at(c, object) ? "yes" : "");
+		put_words(t, c, *(const bool *)table_at(c, object) ? "yes" : "");
 	else
 		put_value(t, c, (sigma ? v.sigma : v.value) * scale, v.sigma * scale);
 	if (t->format != TABLE_CSV)
 		fputs(v.marked && isfinite(v.value) ? "*" : mark, t->out);
 }
 
-static void put_head(const struct table *t, const struct table_column *c, bool sigma)
+static void table_put_head(const struct table *t, const struct table_column *c, bool sigma)
 {
 	bool unit = c->unit != NULL && c->unit[0] != '\0';
 	char title[96];
@@ -231,9 +232,9 @@ static void put_line(const struct table *t, const void *object)
 			fputs(t->format == TABLE_TEXT && c->gap != NULL ? c->gap : gap, t->out);
 		gap = t->format == TABLE_CSV ? "," : " ";
 		if (object != NULL)
-			put_cell(t, c, object, sigma);
+			table_put_cell(t, c, object, sigma);
 		else
-			put_head(t, c, sigma);
+			table_put_head(t, c, sigma);
 		if (t->format == TABLE_HTML)
 			fprintf(t->out, "</%s>", tag);
 	}

@@ -12,7 +12,7 @@
 #include "common/base/text.h"
 #include "host/base/durable.h"
 
-static int refuse(char *message, size_t size, const char *file, int result)
+static int whole_refuse(char *message, size_t size, const char *file, int result)
 {
 	enum { NAME_MAX_CHARS = 256 }; /* the explanation must fit behind it */
 	const char *why = result == DT_E_SYSTEM && errno != 0 ? strerror(errno) : error_text(result);
@@ -24,7 +24,7 @@ static int refuse(char *message, size_t size, const char *file, int result)
 	return result;
 }
 
-static void forget(struct whole *whole)
+static void whole_forget(struct whole *whole)
 {
 	free(whole->place);
 	free(whole->beside);
@@ -51,17 +51,17 @@ int whole_open(struct whole *whole, const char *file, char *message, size_t size
 
 	if (!find_place(&opened)) {
 		free(opened.place); /* beside is undefined after asprintf has failed */
-		return refuse(message, size, file, DT_E_MEMORY);
+		return whole_refuse(message, size, file, DT_E_MEMORY);
 	}
 	fd = open(opened.beside != NULL ? opened.beside : opened.place,
 	          O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | (opened.beside != NULL ? O_NOFOLLOW : 0), 0666);
 	opened.out = fd < 0 ? NULL : fdopen(fd, "w");
 	if (opened.out == NULL) {
-		int result = refuse(message, size, file, DT_E_SYSTEM);
+		int result = whole_refuse(message, size, file, DT_E_SYSTEM);
 
 		if (fd >= 0)
 			close(fd);
-		forget(&opened);
+		whole_forget(&opened);
 		return result;
 	}
 	errno = 0;
@@ -90,8 +90,8 @@ int whole_close(struct whole *whole, int result, char *message, size_t size)
 		unlink(whole->beside);
 	errno = before;
 	if (result != 0)
-		refuse(message, size, whole->file, result);
-	forget(whole);
+		whole_refuse(message, size, whole->file, result);
+	whole_forget(whole);
 	return result;
 }
 

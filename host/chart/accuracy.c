@@ -30,7 +30,7 @@ struct panel {
 	double cheapest, dearest; /* us */
 };
 
-static int write_csv(const struct chart_options *options, const struct panel *p, char *message)
+static int accuracy_write_csv(const struct chart_options *options, const struct panel *p, char *message)
 {
 	struct text text;
 	int status = file_begin(&text, message);
@@ -96,7 +96,7 @@ static void draw_bounds(FILE *out, const struct panel *p, size_t i)
 	}
 }
 
-static void draw_panel(FILE *out, const struct panel *p, size_t i)
+static void accuracy_draw_panel(FILE *out, const struct panel *p, size_t i)
 {
 	size_t kind = 0, drawn = 0;
 	double left = 0.055 + 0.198 * (double)i;
@@ -149,7 +149,7 @@ static bool has_pair(const struct panel *p)
 }
 
 /* Drawn with the last panel. */
-static void draw_legend(FILE *out, const struct panel *p)
+static void accuracy_draw_legend(FILE *out, const struct panel *p)
 {
 	size_t kind = 0;
 	double y = 0.80;
@@ -201,7 +201,7 @@ static void draw_legend(FILE *out, const struct panel *p)
 	fputs("plot 2 notitle\n", out);
 }
 
-static int draw(const struct chart_options *options, struct panel *p, char *message)
+static int accuracy_draw(const struct chart_options *options, struct panel *p, char *message)
 {
 	const struct quantity_text *text = quantity_text(p->quantity);
 	struct text script;
@@ -221,8 +221,8 @@ static int draw(const struct chart_options *options, struct panel *p, char *mess
 	fprintf(out, "set xlabel 'us per call'\nset ylabel 'error, %s'\n", text->unit);
 	fputs("set xtics (0.01,0.1,1,10,100,1000,10000)\n", out);
 	for (size_t i = 0; i < NOISES; i++)
-		draw_panel(out, p, i);
-	draw_legend(out, p);
+		accuracy_draw_panel(out, p, i);
+	accuracy_draw_legend(out, p);
 	fputs("unset multiplot\n", out);
 	status = file_draw(&script, options->folder, "accuracy", text->name, message);
 	file_drop(&script);
@@ -232,7 +232,7 @@ static int draw(const struct chart_options *options, struct panel *p, char *mess
 /* ---- the table
  * ---------------------------------------------------------------------------------------------- */
 
-static void print_table(FILE *out, const struct panel *p)
+static void accuracy_print_table(FILE *out, const struct panel *p)
 {
 	const struct quantity_text *text = quantity_text(p->quantity);
 
@@ -279,10 +279,10 @@ int chart_accuracy(const struct chart_options *options, FILE *out, char *message
 		panel.quantity = (enum quantity)q;
 		if (options->no_plate && quantity_text(panel.quantity)->of_plate)
 			continue;
-		print_table(out, &panel);
-		status = write_csv(options, &panel, message);
+		accuracy_print_table(out, &panel);
+		status = accuracy_write_csv(options, &panel, message);
 		if (!status)
-			status = draw(options, &panel, message);
+			status = accuracy_draw(options, &panel, message);
 	}
 	compare_free(compare.cells, NOISES);
 	return status;

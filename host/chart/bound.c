@@ -50,7 +50,7 @@ static bool is_response(const struct fisher *fisher, unsigned i)
 	return fisher->part != PULSE && (i == CONTACT || i == HZ || i == DAMPING || i >= SECOND_HZ);
 }
 
-static int move(const struct fisher *fisher, unsigned i, double by, struct moved *moved)
+static int bound_move(const struct fisher *fisher, unsigned i, double by, struct moved *moved)
 {
 	const struct synthetic_signal *from = &fisher->synthetic->signal[fisher->axis];
 	struct synthetic_axis axis = from->axis;
@@ -71,7 +71,7 @@ static void let_go(struct moved *moved)
 }
 
 /* Samples of S1, then of S2, as far as they count; others are 0. */
-static void sample(const struct fisher *fisher, const struct synthetic_signal *signal, double *out)
+static void bound_sample(const struct fisher *fisher, const struct synthetic_signal *signal, double *out)
 {
 	const struct synthetic *s = fisher->synthetic;
 	const struct synthetic_axis *axis = &s->signal[fisher->axis].axis;
@@ -112,7 +112,7 @@ static int invert(double m[PARAMETERS][PARAMETERS], unsigned size)
 	return 0;
 }
 
-static int fill(struct fisher *fisher, double *jacobian, double *low, size_t n)
+static int bound_fill(struct fisher *fisher, double *jacobian, double *low, size_t n)
 {
 	const struct synthetic_scene *scene = &fisher->synthetic->scene;
 	double weight = (1 - scene->missing) / (gsl_pow_2(scene->noise_g) + gsl_pow_2(scene->step_g) / 12);
@@ -124,9 +124,9 @@ static int fill(struct fisher *fisher, double *jacobian, double *low, size_t n)
 		for (int side = -1; side <= 1; side += 2) {
 			struct moved moved;
 
-			if (move(fisher, fisher->from + i, side, &moved))
+			if (bound_move(fisher, fisher->from + i, side, &moved))
 				return DT_E_MEMORY;
-			sample(fisher, &moved.signal, side < 0 ? low : row);
+			bound_sample(fisher, &moved.signal, side < 0 ? low : row);
 			let_go(&moved);
 		}
 		for (size_t k = 0; k < n; k++)
@@ -156,7 +156,7 @@ static int fisher_open(struct fisher *fisher, struct synthetic *synthetic, int a
 	                          .from = part == DECAY ? GAIN : PEAK,
 	                          .until = part == PULSE ? GAIN : last};
 	if (jacobian && low)
-		status = fill(fisher, jacobian, low, n);
+		status = bound_fill(fisher, jacobian, low, n);
 	free(jacobian);
 	free(low);
 	return status;
@@ -189,7 +189,7 @@ static int add_variances(const struct fisher *fisher,
 			struct moved moved;
 
 			/* wide steps: a summit is found to the root of rounding */
-			if (move(fisher, i, side ? 4 : -4, &moved))
+			if (bound_move(fisher, i, side ? 4 : -4, &moved))
 				return DT_E_MEMORY;
 			pair[fisher->axis] = moved.signal;
 			f(pair, fisher->axis, value[side]);
@@ -280,7 +280,7 @@ static int add_decays(struct synthetic *synthetic, struct bound *sum)
 	return 0;
 }
 
-static void plate_of(const struct synthetic_signal signal[2], int axis, double *out)
+static void bound_plate_of(const struct synthetic_signal signal[2], int axis, double *out)
 {
 	out[0] = synthetic_lag(&signal[axis]);
 	out[1] = synthetic_plate_summit(&signal[axis]);
@@ -298,7 +298,7 @@ static int add_lags(struct synthetic *synthetic, struct bound *sum)
 		int status = fisher_open(&fisher, synthetic, axis, WHOLE);
 
 		if (!status)
-			status = add_variances(&fisher, plate_of, 3, all);
+			status = add_variances(&fisher, bound_plate_of, 3, all);
 		if (status)
 			return status;
 		weight += 1 / (sum->lag_s[axis] - before);

@@ -49,7 +49,7 @@ void campaign_free(void *memory, size_t bytes)
 	munmap(memory, bytes);
 }
 
-static int run_scene(const struct campaign *campaign, size_t i)
+static int campaign_run_scene(const struct campaign *campaign, size_t i)
 {
 	struct synthetic synthetic;
 	int status = synthetic_open(&synthetic, campaign->scene(campaign->context, i));
@@ -88,7 +88,7 @@ int campaign_run(const struct campaign *campaign)
 			int status = 0;
 
 			for (size_t i = started; i < campaign->count && !status; i += jobs)
-				status = run_scene(campaign, i);
+				status = campaign_run_scene(campaign, i);
 			_exit(-status);
 		}
 		if (child < 0) {

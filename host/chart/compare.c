@@ -33,7 +33,7 @@ struct call {
 	const struct trial *trial;
 };
 
-static void work(const void *context)
+static void compare_work(const void *context)
 {
 	const struct call *call = context;
 	volatile double sink;
@@ -73,7 +73,7 @@ static int find_bounds(void *context, size_t i, struct synthetic *synthetic)
 	return status;
 }
 
-static int look(void *context, size_t i, const struct synthetic *synthetic, unsigned drop)
+static int compare_look(void *context, size_t i, const struct synthetic *synthetic, unsigned drop)
 {
 	const struct compare *compare = context;
 	struct compare_cell *cell = &compare->cells[i];
@@ -89,8 +89,8 @@ static int look(void *context, size_t i, const struct synthetic *synthetic, unsi
 		          (double)NAN, method_gross(&method[m], &trial));
 		cell->tally[m].doubted += method[m].how && doubts(method[m].how(&trial));
 		if (compare->timed && drop < COMPARE_TIMED)
-			cell->drop_us[m][drop] =
-			        timing_us(work, &(struct call){&method[m], &trial}, BATCH_US, BATCHES);
+			cell->drop_us[m][drop] = timing_us(compare_work, &(struct call){&method[m], &trial},
+			                                   BATCH_US, BATCHES);
 	}
 	trial_close(&trial);
 	return 0;
@@ -103,7 +103,7 @@ int compare_run(struct compare *compare)
 	                                  .context = compare,
 	                                  .scene = scene_of,
 	                                  .begin = find_bounds,
-	                                  .drop = look};
+	                                  .drop = compare_look};
 	size_t timed = compare->drops < COMPARE_TIMED ? compare->drops : (size_t)COMPARE_TIMED;
 	int status = campaign_run(&campaign);
 

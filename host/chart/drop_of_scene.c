@@ -10,7 +10,7 @@
 #define CYCLES 6
 #define AFTER_S 50e-3
 
-static int refuse(const struct scene *scene, char *message, const char *why)
+static int drop_of_scene_refuse(const struct scene *scene, char *message, const char *why)
 {
 	snprintf(message, CHART_MESSAGE_MAX, "%s: %s", scene->name, why);
 	return DT_E_ARGUMENT;
@@ -29,7 +29,7 @@ static void clean_name(const struct scene *scene, char name[sizeof(scene->name)]
 	name[i] = '\0';
 }
 
-static bool predicted(const struct model_prediction *p)
+static bool drop_of_scene_predicted(const struct model_prediction *p)
 {
 	double sum = p->contact_time_s;
 
@@ -38,7 +38,8 @@ static bool predicted(const struct model_prediction *p)
 	return isfinite(p->has_plate ? sum + p->lag_s + p->plate_frequency_hz + p->plate_damping_ratio : sum);
 }
 
-static void take(const struct scene *scene, const struct model_prediction *p, struct synthetic_scene *drop)
+static void drop_of_scene_take(const struct scene *scene, const struct model_prediction *p,
+                               struct synthetic_scene *drop)
 {
 	for (int i = 0; i < 2; i++) {
 		drop->peak_g[i] = fabs(p->peak[MODEL_S2X + i].value_g);
@@ -70,12 +71,14 @@ int chart_drop(const struct scene *scene, struct chart_options *options, char *m
 		status = model_solve(scene, MODEL_AUTO, NULL, &p, message);
 		if (status)
 			return status;
-		if (!predicted(&p) || (p.has_plate && !(p.plate_damping_ratio < 1)))
-			return refuse(scene, message, "its peaks, lag or ring-down cannot be predicted");
+		if (!drop_of_scene_predicted(&p) || (p.has_plate && !(p.plate_damping_ratio < 1)))
+			return drop_of_scene_refuse(scene, message,
+			                            "its peaks, lag or ring-down cannot be predicted");
 		if (!(scene->sensor_noise_g > 0))
-			return refuse(scene, message, "noise_g is 0: there is no bound without noise");
+			return drop_of_scene_refuse(scene, message,
+			                            "noise_g is 0: there is no bound without noise");
 		options->no_plate = !p.has_plate;
-		take(scene, &p, drop);
+		drop_of_scene_take(scene, &p, drop);
 		clean_name(scene, name);
 	}
 	if (!options->no_plate)

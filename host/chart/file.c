@@ -27,7 +27,7 @@ void file_drop(struct text *text)
 }
 
 /* What was written so far is in bytes, size. */
-static int finish(struct text *text, char *message)
+static int file_finish(struct text *text, char *message)
 {
 	int result = text_close(text, 0);
 
@@ -50,7 +50,7 @@ static int put_named(const char *bytes, size_t length, const char *folder, const
 int file_write(struct text *text, const char *folder, const char *kind, const char *name,
                const char *extension, char *message)
 {
-	int status = finish(text, message);
+	int status = file_finish(text, message);
 
 	return status ? status : put_named(text->bytes, text->size, folder, kind, name, extension, message);
 }
@@ -58,7 +58,7 @@ int file_write(struct text *text, const char *folder, const char *kind, const ch
 int file_draw(struct text *script, const char *folder, const char *kind, const char *name, char *message)
 {
 	char *svg = NULL;
-	int status = finish(script, message);
+	int status = file_finish(script, message);
 
 	if (!status)
 		status = picture_draw(script->bytes, script->size, &svg, message, CHART_MESSAGE_MAX);

@@ -30,7 +30,7 @@ const struct quantity_text *quantity_text(enum quantity quantity)
 /* ---- a trial ------------------------------------------------------------------------------------------- */
 
 /* Pre-trigger mean off, holes bridged; what is missing at an end repeats the last that is there. */
-static void bridge(const struct channel *channel, size_t quiet, double *y)
+static void method_bridge(const struct channel *channel, size_t quiet, double *y)
 {
 	double sum = 0, last = NAN;
 	size_t n = 0, from = 0;
@@ -56,14 +56,14 @@ static void bridge(const struct channel *channel, size_t quiet, double *y)
 		y[i] = isnan(last) ? 0 : last;
 }
 
-static double contact_end(const struct synthetic *synthetic)
+static double method_contact_end(const struct synthetic *synthetic)
 {
 	const struct synthetic_axis *axis = &synthetic->signal[0].axis;
 
 	return synthetic->onset_s + axis->onset_s + axis->contact_s + fmax(0, axis->delay_s);
 }
 
-static int make_series(struct trial *trial)
+static int method_make_series(struct trial *trial)
 {
 	const struct synthetic *synthetic = trial->synthetic;
 	size_t total = 0, from;
@@ -77,12 +77,12 @@ static int make_series(struct trial *trial)
 	for (int i = 0; i < SYNTHETIC_CHANNELS; i++) {
 		const struct channel *channel = &synthetic->record.channels[i];
 
-		bridge(channel, (size_t)((synthetic->scene.pre_s - 5e-3) * channel->rate_hz), next);
+		method_bridge(channel, (size_t)((synthetic->scene.pre_s - 5e-3) * channel->rate_hz), next);
 		trial->series[i] = (struct reference_series){next, channel->count, channel->rate_hz};
 		next += channel->count;
 	}
 	trial->decay = trial->series[SYNTHETIC_S1X];
-	from = (size_t)ceil(contact_end(synthetic) * trial->decay.rate_hz);
+	from = (size_t)ceil(method_contact_end(synthetic) * trial->decay.rate_hz);
 	from = from < trial->decay.count ? from : trial->decay.count;
 	trial->decay.y += from;
 	trial->decay.count -= from;
@@ -98,11 +98,11 @@ int trial_open(struct trial *trial, const struct synthetic *synthetic)
 	int status;
 
 	*trial = (struct trial){.synthetic = synthetic, .truth = synthetic_truth(synthetic)};
-	status = make_series(trial);
+	status = method_make_series(trial);
 	for (int i = 0; i < TELLINGS && !status; i++)
 		status = estimate_record(&synthetic->record, &options[i], &trial->analysis[i]);
 	if (!status) {
-		trial->product = product_open(&synthetic->record, contact_end(synthetic));
+		trial->product = product_open(&synthetic->record, method_contact_end(synthetic));
 		status = trial->product ? 0 : DT_E_MEMORY;
 	}
 	if (status)
@@ -142,16 +142,16 @@ static struct reference_pulse gsl_pulse(const struct trial *t)
 	return pulse;
 }
 
-VALUE(largest, reference_maximum(&t->series[SYNTHETIC_S2X]).value)
+VALUE(method_largest, reference_maximum(&t->series[SYNTHETIC_S2X]).value)
 VALUE(largest_time, reference_maximum(&t->series[SYNTHETIC_S2X]).time_s)
-VALUE(parabola, reference_parabola(&t->series[SYNTHETIC_S2X]).value)
+VALUE(method_parabola, reference_parabola(&t->series[SYNTHETIC_S2X]).value)
 VALUE(parabola_time, reference_parabola(&t->series[SYNTHETIC_S2X]).time_s)
 VALUE(gsl_peak, gsl_pulse(t).value)
 VALUE(gsl_peak_time, gsl_pulse(t).time_s)
 VALUE(gsl_contact, gsl_pulse(t).base_s)
 VALUE(two_maxima, hypot(reference_maximum(&t->series[SYNTHETIC_S2X]).value,
                         reference_maximum(&t->series[SYNTHETIC_S2Y]).value))
-VALUE(drawn, reference_resultant(&t->series[SYNTHETIC_S2X], &t->series[SYNTHETIC_S2Y]))
+VALUE(method_drawn, reference_resultant(&t->series[SYNTHETIC_S2X], &t->series[SYNTHETIC_S2Y]))
 VALUE(plate_largest, reference_maximum(&t->series[SYNTHETIC_S1X]).value)
 VALUE(plate_parabola, reference_parabola(&t->series[SYNTHETIC_S1X]).value)
 VALUE(maxima_apart, reference_maximum(&t->series[SYNTHETIC_S1X]).time_s -
@@ -162,7 +162,7 @@ VALUE(correlation, reference_correlation(&t->series[SYNTHETIC_S2X], &t->series[S
 VALUE(crossings, reference_crossings(&t->decay).hz)
 VALUE(spectrum_hz, reference_spectrum(&t->decay).hz)
 VALUE(spectrum_damping, reference_spectrum(&t->decay).damping)
-VALUE(decrement, reference_decrement(&t->decay).damping)
+VALUE(method_decrement, reference_decrement(&t->decay).damping)
 VALUE(pencil_hz, reference_pencil(&t->decay).hz)
 VALUE(pencil_damping, reference_pencil(&t->decay).damping)
 VALUE(gsl_hz, reference_fit_decay(&t->decay).hz)
@@ -290,8 +290,8 @@ static void our_plate_work(const struct trial *t)
 	}
 
 static const struct method methods[] = {
-        OTHERS("largest sample", QUANTITY_PEAK, peak_g[0], largest),
-        OTHERS("parabola", QUANTITY_PEAK, peak_g[0], parabola),
+        OTHERS("largest sample", QUANTITY_PEAK, peak_g[0], method_largest),
+        OTHERS("parabola", QUANTITY_PEAK, peak_g[0], method_parabola),
         {"GSL fit, half-sine", QUANTITY_PEAK, false, true, BOUND(peak_g[0]), gsl_peak, NULL, NULL},
         OURS("default", QUANTITY_PEAK, peak_g[0], our_peak, our_peak),
         OURS("sine-power", QUANTITY_PEAK, peak_g[0], our_power_peak, our_power_peak),
@@ -305,7 +305,7 @@ static const struct method methods[] = {
         OURS_TOLD("half-sine", QUANTITY_PEAK_TIME, peak_s[0], our_told_time, our_told_time),
 
         OTHERS("hypot of the maxima", QUANTITY_RESULTANT, resultant_g, two_maxima),
-        OTHERS("X drawn to Y's instants", QUANTITY_RESULTANT, resultant_g, drawn),
+        OTHERS("X drawn to Y's instants", QUANTITY_RESULTANT, resultant_g, method_drawn),
         OURS("default", QUANTITY_RESULTANT, resultant_g, our_resultant, our_resultant),
         OURS_TOLD("half-sine", QUANTITY_RESULTANT, resultant_g, our_told_resultant, our_told_resultant),
 
@@ -331,7 +331,7 @@ static const struct method methods[] = {
         OURS("X", QUANTITY_FREQUENCY, damped_hz[0], our_hz, our_decay),
         OURS("X and Y", QUANTITY_FREQUENCY, pair_hz, our_plate_hz, our_plate),
 
-        OTHERS("log decrement", QUANTITY_DAMPING, damping[0], decrement),
+        OTHERS("log decrement", QUANTITY_DAMPING, damping[0], method_decrement),
         OTHERS("half-power width", QUANTITY_DAMPING, damping[0], spectrum_damping),
         OTHERS("matrix pencil", QUANTITY_DAMPING, damping[0], pencil_damping),
         OTHERS("GSL fit", QUANTITY_DAMPING, damping[0], gsl_damping),

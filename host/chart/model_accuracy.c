@@ -42,7 +42,7 @@ struct mean {
 	double sum, count;
 };
 
-static void add(struct mean *mean, double value, double truth)
+static void model_accuracy_add(struct mean *mean, double value, double truth)
 {
 	mean->sum += 100 * fabs(fabs(value) / truth - 1);
 	mean->count++;
@@ -51,9 +51,9 @@ static void add(struct mean *mean, double value, double truth)
 static void add_answer(struct mean mean[LADDER_QUANTITIES], enum study_product product,
                        const struct answer *a, const struct answer *truth)
 {
-	add(&mean[product == STUDY_BOX ? LADDER_BOX : LADDER_PLATE], a->s1_r, truth->s1_r);
-	add(&mean[LADDER_S2], a->s2_x, truth->s2_x);
-	add(&mean[LADDER_S2], a->s2_y, truth->s2_y);
+	model_accuracy_add(&mean[product == STUDY_BOX ? LADDER_BOX : LADDER_PLATE], a->s1_r, truth->s1_r);
+	model_accuracy_add(&mean[LADDER_S2], a->s2_x, truth->s2_x);
+	model_accuracy_add(&mean[LADDER_S2], a->s2_y, truth->s2_y);
 }
 
 static struct answer answer_of(const struct model_prediction *p)
@@ -172,8 +172,8 @@ int ladder_find(int timed, struct ladder *ladder)
 /* x of the line that stands for what costs nothing. */
 static const double across[] = {0.05, 500};
 
-static void fill_panel(struct plot_panel *panel, const struct ladder *ladder,
-                       double (*value)[LADDER_QUANTITIES], int q, double constant[2])
+static void model_accuracy_fill_panel(struct plot_panel *panel, const struct ladder *ladder,
+                                      double (*value)[LADDER_QUANTITIES], int q, double constant[2])
 {
 	static const char *const title[] = {
 	        [LADDER_PLATE] = "Plate (S1), resultant, 2A and 2B: 10 drops",
@@ -217,7 +217,7 @@ static int draw_tables(const struct chart_options *options, struct ladder *ladde
 
 	for (int q = 0; q < LADDER_QUANTITIES; q++) {
 		constant[q][0] = constant[q][1] = ladder->constant[q];
-		fill_panel(&panel[q], ladder, ladder->tables, q, constant[q]);
+		model_accuracy_fill_panel(&panel[q], ladder, ladder->tables, q, constant[q]);
 	}
 	return plot_write(&plot, options->folder, "model", message);
 }
@@ -237,14 +237,14 @@ static int draw_finest(const struct chart_options *options, struct ladder *ladde
 	};
 
 	for (int q = 0; q < LADDER_QUANTITIES; q++) {
-		fill_panel(&panel[q], ladder, ladder->finest, q, NULL);
+		model_accuracy_fill_panel(&panel[q], ladder, ladder->finest, q, NULL);
 		/* the finest itself, at its default tolerance, is off by less than the axis shows */
 		panel[q].series[LADDER_RUNGS - 1].name = NULL;
 	}
 	return plot_write(&plot, options->folder, "model", message);
 }
 
-static void print_table(FILE *out, const struct ladder *ladder)
+static void model_accuracy_print_table(FILE *out, const struct ladder *ladder)
 {
 	fprintf(out, "%-33s %27s   %27s\n%-33s %9s%9s%9s   %9s%9s%9s  us a drop\n", "Mean deviation, %",
 	        "from the study's tables", "from the finest rung", "", "plate", "S2", "box", "plate", "S2",
@@ -274,7 +274,7 @@ int chart_model(const struct chart_options *options, FILE *out, char *message)
 		         error_text(status));
 		return status;
 	}
-	print_table(out, &ladder);
+	model_accuracy_print_table(out, &ladder);
 	status = draw_tables(options, &ladder, message);
 	if (!status)
 		status = draw_finest(options, &ladder, message);

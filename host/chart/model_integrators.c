@@ -116,7 +116,7 @@ static int our_peaks(const struct problem *p, double tolerance, double peak[2])
 	return status;
 }
 
-static void work(const void *context)
+static void model_integrators_work(const void *context)
 {
 	const struct run *run = context;
 	int status = run->way == OURS         ? ours(run->problem, run->setting, run->readings)
@@ -128,7 +128,7 @@ static void work(const void *context)
 }
 
 /* The largest deviation, as a share of the peak. */
-static double error_of(const struct run *run)
+static double model_integrators_error_of(const struct run *run)
 {
 	const struct problem *p = run->problem;
 	double worst = 0;
@@ -205,7 +205,7 @@ struct curve {
 	double cost_us[POINTS], error[POINTS];
 };
 
-static void measure(const struct problem *problem, enum way way, struct curve *curve)
+static void model_integrators_measure(const struct problem *problem, enum way way, struct curve *curve)
 {
 	double setting = ways[way].coarsest;
 
@@ -214,9 +214,9 @@ static void measure(const struct problem *problem, enum way way, struct curve *c
 		double peak[2] = {0};
 		const struct run run = {problem, way, setting, &readings, peak};
 
-		work(&run);
-		curve->error[i] = error_of(&run);
-		curve->cost_us[i] = timing_us(work, &run, TIMING_BATCH_US, TIMING_BATCHES);
+		model_integrators_work(&run);
+		curve->error[i] = model_integrators_error_of(&run);
+		curve->cost_us[i] = timing_us(model_integrators_work, &run, TIMING_BATCH_US, TIMING_BATCHES);
 	}
 }
 
@@ -233,7 +233,7 @@ static double cost_at(const struct curve *c, size_t points, double error)
 	return NAN;
 }
 
-static void fill_panel(struct plot_panel *panel, struct curve curves[METHODS], bool planar)
+static void model_integrators_fill_panel(struct plot_panel *panel, struct curve curves[METHODS], bool planar)
 {
 	*panel = (struct plot_panel){
 	        .title = planar ? "planar: 10 equations, frictionless" : "coupled: 4 equations",
@@ -279,8 +279,8 @@ int chart_integrators(const struct chart_options *options, FILE *out, char *mess
 			return status;
 		}
 		for (int way = 0; way < METHODS; way++)
-			measure(&problem, (enum way)way, &curves[kind][way]);
-		fill_panel(&panel[kind], curves[kind], kind == 1);
+			model_integrators_measure(&problem, (enum way)way, &curves[kind][way]);
+		model_integrators_fill_panel(&panel[kind], curves[kind], kind == 1);
 	}
 	fputs("\nus a drop at an error of 1e-5        coupled   planar\n", out);
 	for (int way = 0; way < METHODS; way++)

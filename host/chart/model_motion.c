@@ -29,7 +29,7 @@ void motion_start(const struct motion *m, double y[])
 		y[RISE] = y[PLATE_RISE] = -m->speed_m_s;
 }
 
-static double contact(const struct motion *m, double depth, double sinking)
+static double model_motion_contact(const struct motion *m, double depth, double sinking)
 {
 	if (!(depth > 0))
 		return 0;
@@ -37,15 +37,15 @@ static double contact(const struct motion *m, double depth, double sinking)
 }
 
 /* Of a corner against the centre of gravity. */
-static double corner_up(const struct motion *m, double turn, double x, double y)
+static double model_motion_corner_up(const struct motion *m, double turn, double x, double y)
 {
 	return x * cos(m->angle_rad + turn) + y * sin(m->angle_rad + turn);
 }
 
 double motion_depth(const struct motion *m, const double y[], double corner_x_m, double corner_y_m)
 {
-	return corner_up(m, 0, -m->lever_x_m, -m->lever_y_m) - y[UP] -
-	       corner_up(m, y[ANGLE], corner_x_m, corner_y_m);
+	return model_motion_corner_up(m, 0, -m->lever_x_m, -m->lever_y_m) - y[UP] -
+	       model_motion_corner_up(m, y[ANGLE], corner_x_m, corner_y_m);
 }
 
 static struct forces forces_of(const struct motion *m, const double y[])
@@ -57,14 +57,14 @@ static struct forces forces_of(const struct motion *m, const double y[])
 		double k = m->mount_n_m, c = m->mount_damping_n_s_m;
 
 		f.lever_across = m->lever_y_m * cos(g) - m->lever_x_m * sin(g);
-		f.normal = contact(m, motion_depth(m, y, -m->lever_x_m, -m->lever_y_m),
-		                   y[PLACES + ANGLE] * f.lever_across - y[PLACES + UP]);
+		f.normal = model_motion_contact(m, motion_depth(m, y, -m->lever_x_m, -m->lever_y_m),
+		                                y[PLACES + ANGLE] * f.lever_across - y[PLACES + UP]);
 		f.mount_across = k * (y[PLATE_ACROSS] - y[ACROSS]) +
 		                 c * (y[PLACES + PLATE_ACROSS] - y[PLACES + ACROSS]);
 		f.mount_up = k * (y[PLATE_UP] - y[UP]) + c * (y[PLACES + PLATE_UP] - y[PLACES + UP]);
 		return f;
 	}
-	f.normal = contact(m, -y[HEIGHT], -y[RISE]);
+	f.normal = model_motion_contact(m, -y[HEIGHT], -y[RISE]);
 	f.mount_up = m->mount_n_m * (y[PLATE_HEIGHT] - y[HEIGHT]) +
 	             m->mount_damping_n_s_m * (y[PLATE_RISE] - y[RISE]);
 	return f;

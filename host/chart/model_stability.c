@@ -19,8 +19,9 @@ struct canvas {
 	const struct chart_options *options;
 };
 
-static void fill(struct canvas *canvas, size_t panel, size_t columns, size_t rows,
-                 double (*value)(const struct canvas *canvas, double x, double y, size_t index))
+static void model_stability_fill(struct canvas *canvas, size_t panel, size_t columns, size_t rows,
+                                 double (*value)(const struct canvas *canvas, double x, double y,
+                                                 size_t index))
 {
 	struct plot_panel *p = &canvas->panel[panel];
 
@@ -48,7 +49,7 @@ static void trace_curve(struct canvas *canvas, size_t panel, size_t curve,
 	        .name = name, .x = x, .y = y, .count = CURVE, .judged = true, .colour = colour};
 }
 
-static int finish(struct canvas *canvas, FILE *out, char *message)
+static int model_stability_finish(struct canvas *canvas, FILE *out, char *message)
 {
 	canvas->plot.panel = canvas->panel;
 	canvas->plot.panels = PANELS;
@@ -57,7 +58,7 @@ static int finish(struct canvas *canvas, FILE *out, char *message)
 }
 
 /* No error at all has no place on a logarithmic axis. */
-static double shown(double error, double least)
+static double model_stability_shown(double error, double least)
 {
 	return isnan(error) ? error : fmax(error, least);
 }
@@ -73,7 +74,7 @@ static double steady_error(const struct canvas *canvas, double pulse, double zet
 
 static double plain_transient(double apart, double zeta)
 {
-	return shown(maps_plain_transient(apart, zeta), 1e-16);
+	return model_stability_shown(maps_plain_transient(apart, zeta), 1e-16);
 }
 
 static int resonance(struct canvas *canvas, FILE *out, char *message)
@@ -104,7 +105,7 @@ static int resonance(struct canvas *canvas, FILE *out, char *message)
 	                  {"2A", 0.3648, 0.1, true, true},
 	                  {"2B", 0.471, 0.1, true, false}},
 	};
-	fill(canvas, 0, COLUMNS, ROWS, steady_error);
+	model_stability_fill(canvas, 0, COLUMNS, ROWS, steady_error);
 	canvas->panel[1] = (struct plot_panel){
 	        .title = "the usual transient near resonance",
 	        .x = {"distance from resonance, 1 - r", "one_minus_r", 1e-16, 0.1, true, "1e%T"},
@@ -115,7 +116,7 @@ static int resonance(struct canvas *canvas, FILE *out, char *message)
 	};
 	for (size_t i = 0; i < CURVES; i++)
 		trace_curve(canvas, 1, i, plain_transient, damping[i], names[i], (int)i + 1);
-	return finish(canvas, out, message);
+	return model_stability_finish(canvas, out, message);
 }
 
 /* ---- steps ------------------------------------------------------------------------------------------------
@@ -145,7 +146,7 @@ static double gains_from(double e, double other)
 	return NAN;
 }
 
-static int step(struct canvas *canvas, FILE *out, char *message)
+static int model_stability_step(struct canvas *canvas, FILE *out, char *message)
 {
 	canvas->plot = (struct plot){
 	        .name = "step",
@@ -169,7 +170,7 @@ static int step(struct canvas *canvas, FILE *out, char *message)
 	                  {"mat, a step per sample", 3, 1e6 / 7000, true, false},
 	                  {"steel, the same step", 0.537, 1e6 / 7000, true, false}},
 	};
-	fill(canvas, 0, COLUMNS, ROWS, step_error);
+	model_stability_fill(canvas, 0, COLUMNS, ROWS, step_error);
 	canvas->panel[1] = (struct plot_panel){
 	        .title = "restitution",
 	        .x = {"restitution", "restitution", 0.03, 1, false, NULL},
@@ -178,9 +179,9 @@ static int step(struct canvas *canvas, FILE *out, char *message)
 	        .label = {{"RK4 fails", 0.42, 0.42, false, false}},
 	        .key = "bottom right",
 	};
-	fill(canvas, 1, COLUMNS, ROWS, share_error);
+	model_stability_fill(canvas, 1, COLUMNS, ROWS, share_error);
 	trace_curve(canvas, 1, 0, gains_from, 0, "above it leaves faster than it came (RK4)", 0);
-	return finish(canvas, out, message);
+	return model_stability_finish(canvas, out, message);
 }
 
 /* ---- restitution ------------------------------------------------------------------------------------------
@@ -188,12 +189,12 @@ static int step(struct canvas *canvas, FILE *out, char *message)
 
 static double small_error(double e, double way)
 {
-	return shown(maps_damping_of_small((enum maps_way)way, e), 1e-17);
+	return model_stability_shown(maps_damping_of_small((enum maps_way)way, e), 1e-17);
 }
 
 static double near_one_error(double u, double way)
 {
-	return shown(maps_damping_near_one((enum maps_way)way, u), 1e-17);
+	return model_stability_shown(maps_damping_near_one((enum maps_way)way, u), 1e-17);
 }
 
 static void damping_panel(struct canvas *canvas, size_t panel, double (*error)(double x, double way))
@@ -237,7 +238,7 @@ static int restitution(struct canvas *canvas, FILE *out, char *message)
 	        .label = {{"plain equation fails: its digits cancel", 1e-9, 1e-10, false, false}},
 	};
 	damping_panel(canvas, 1, near_one_error);
-	return finish(canvas, out, message);
+	return model_stability_finish(canvas, out, message);
 }
 
 /* ---- angle ------------------------------------------------------------------------------------------------
@@ -329,7 +330,7 @@ static int angle(struct canvas *canvas, FILE *out, char *message)
 	trace_curve(canvas, 1, 0, lever_mm, 25, "balance angle 25 deg, as observed", 1);
 	canvas->panel[1].series[0].judged = false;
 	trace_curve(canvas, 1, 1, lever_mm, own, "the box's own corner, 19.3 deg", 2);
-	return finish(canvas, out, message);
+	return model_stability_finish(canvas, out, message);
 }
 
 /* ---- dent -------------------------------------------------------------------------------------------------
@@ -379,7 +380,7 @@ static int dent(struct canvas *canvas, FILE *out, char *message)
 	                  {"would give 3 ms", 14.86, 0.894, true, false},
 	                  {"sound", 400, 0.4, false, false}},
 	};
-	fill(canvas, 0, COLUMNS, ROWS, dent_share);
+	model_stability_fill(canvas, 0, COLUMNS, ROWS, dent_share);
 	canvas->panel[1] = (struct plot_panel){
 	        .title = "predicted contact time, 0.894 m",
 	        .x = {"Young's modulus of the mat, MPa", "modulus_mpa", 0.3, 3000, true, NULL},
@@ -396,7 +397,7 @@ static int dent(struct canvas *canvas, FILE *out, char *message)
 	canvas->panel[1].label[0] = (struct plot_label){"Hertz fails", 3, 9.5, false, false};
 	canvas->panel[1].label[1] =
 	        (struct plot_label){"the mat's modulus", 1.69, hertz_ms(1.69, 0.894), true, false};
-	return finish(canvas, out, message);
+	return model_stability_finish(canvas, out, message);
 }
 
 /* ---- decrement --------------------------------------------------------------------------------------------
@@ -412,7 +413,7 @@ static double ringdown_error(const struct canvas *canvas, double zeta, double no
 	return maps_decay_error(true, zeta, noise_g, canvas->options->drops, canvas->options->seed + index);
 }
 
-static int decrement(struct canvas *canvas, FILE *out, char *message)
+static int model_stability_decrement(struct canvas *canvas, FILE *out, char *message)
 {
 	static double (*const error[])(const struct canvas *, double, double, size_t) = {decrement_error,
 	                                                                                 ringdown_error};
@@ -439,15 +440,15 @@ static int decrement(struct canvas *canvas, FILE *out, char *message)
 		        .label = {{i ? "the fit fails" : "log decrement fails", 0.25, 40, false, false},
 		                  {"the study's plate", 0.1, 1, true, false}},
 		};
-		fill(canvas, i, DECAY_COLUMNS, DECAY_ROWS, error[i]);
+		model_stability_fill(canvas, i, DECAY_COLUMNS, DECAY_ROWS, error[i]);
 	}
-	return finish(canvas, out, message);
+	return model_stability_finish(canvas, out, message);
 }
 
 int chart_model_stability(const struct chart_options *options, FILE *out, char *message)
 {
-	static int (*const pictures[])(struct canvas *, FILE *, char *) = {resonance, step, restitution,
-	                                                                   angle,     dent, decrement};
+	static int (*const pictures[])(struct canvas *, FILE *, char *) = {
+	        resonance, model_stability_step, restitution, angle, dent, model_stability_decrement};
 	struct canvas *canvas = calloc(1, sizeof(*canvas));
 	int status = 0;
 

@@ -36,14 +36,14 @@ double plot_centre(const struct plot_axis *axis, size_t i, size_t count)
 	return plot_edge(axis, 2 * i + 1, 2 * count);
 }
 
-static double cell(const struct plot_panel *panel, size_t row, size_t column)
+static double plot_cell(const struct plot_panel *panel, size_t row, size_t column)
 {
 	return panel->cell[row * panel->columns + column];
 }
 
 bool plot_fails(const struct plot_panel *panel, size_t row, size_t column)
 {
-	return !(cell(panel, row, column) <= panel->fails);
+	return !(plot_cell(panel, row, column) <= panel->fails);
 }
 
 /* ---- the table ------------------------------------------------------------------------------------------
@@ -55,7 +55,7 @@ static void table_of_map(FILE *out, const struct plot_panel *p)
 		for (size_t c = 0; c < p->columns; c++)
 			fprintf(out, "\"%s\",map,%s,%.6g,%s,%.6g,%.6g,%d\n", p->title, p->x.name,
 			        plot_centre(&p->x, c, p->columns), p->y.name, plot_centre(&p->y, r, p->rows),
-			        cell(p, r, c), plot_fails(p, r, c));
+			        plot_cell(p, r, c), plot_fails(p, r, c));
 }
 
 static bool in_region(const struct plot_panel *p, double x, double y)
@@ -99,7 +99,7 @@ static int write_table(const struct plot *plot, const char *folder, const char *
 /* ---- the cells: neighbours in a row that look alike are one rectangle ------------------------------------
  */
 
-static int shade_of(const struct plot *plot, double value)
+static int plot_shade_of(const struct plot *plot, double value)
 {
 	int i = 0;
 
@@ -111,21 +111,21 @@ static int shade_of(const struct plot *plot, double value)
 /* What a layer holds: a shade, PLOT_SHADES for no value, or those that fail. */
 enum { LAYER_FAILS = PLOT_SHADES + 1, LAYERS };
 
-static bool in_layer(const struct plot *plot, const struct plot_panel *p, size_t row, size_t column,
-                     int layer)
+static bool plot_in_layer(const struct plot *plot, const struct plot_panel *p, size_t row, size_t column,
+                          int layer)
 {
 	return layer == LAYER_FAILS ? plot_fails(p, row, column)
-	                            : shade_of(plot, cell(p, row, column)) == layer;
+	                            : plot_shade_of(plot, plot_cell(p, row, column)) == layer;
 }
 
 /* One point out of sight, so that no layer is empty. */
-static void write_layer(FILE *out, const struct plot *plot, const struct plot_panel *p, size_t number,
-                        int layer)
+static void plot_write_layer(FILE *out, const struct plot *plot, const struct plot_panel *p, size_t number,
+                             int layer)
 {
 	fprintf(out, "$cells%zu_%d << EOD\nNaN NaN NaN NaN\n", number, layer);
 	for (size_t r = 0; r < p->rows; r++)
 		for (size_t c = 0, next; c < p->columns; c = next) {
-			for (next = c; next < p->columns && in_layer(plot, p, r, next, layer); next++)
+			for (next = c; next < p->columns && plot_in_layer(plot, p, r, next, layer); next++)
 				;
 			if (next > c)
 				fprintf(out, "%.5g %.5g %.5g %.5g\n", plot_edge(&p->x, c, p->columns),
@@ -179,7 +179,7 @@ static void write_data(FILE *out, const struct plot *plot, const struct plot_pan
 {
 	if (p->cell) {
 		for (int layer = 0; layer < LAYERS; layer++)
-			write_layer(out, plot, p, number, layer);
+			plot_write_layer(out, plot, p, number, layer);
 		write_boundary(out, p, number);
 	}
 	fprintf(out, "$regions%zu << EOD\nNaN NaN NaN NaN\n", number);
@@ -260,7 +260,7 @@ static void plot_panel(FILE *out, const struct plot_panel *p, size_t number)
 	fputs("\n", out);
 }
 
-static void draw_panel(FILE *out, const struct plot *plot, size_t number, double height)
+static void plot_draw_panel(FILE *out, const struct plot *plot, size_t number, double height)
 {
 	const struct plot_panel *p = &plot->panel[number];
 	double each = (WIDTH - LEFT - RIGHT - GAP * ((double)plot->panels - 1)) / (double)plot->panels;
@@ -287,7 +287,7 @@ static void draw_panel(FILE *out, const struct plot *plot, size_t number, double
 /* ---- the picture ------------------------------------------------------------------------------------------
  */
 
-static void draw_legend(FILE *out, const struct plot *plot, double height)
+static void plot_draw_legend(FILE *out, const struct plot *plot, double height)
 {
 	double y = 22 / height, x = 0.01;
 
@@ -314,7 +314,7 @@ static void draw_legend(FILE *out, const struct plot *plot, double height)
 	        x, y - 8 / height, x + 0.02, y + 8 / height, x + 0.024, y);
 }
 
-static void draw_heads(FILE *out, const struct plot *plot, double height)
+static void plot_draw_heads(FILE *out, const struct plot *plot, double height)
 {
 	fprintf(out,
 	        "set label \"%s\" at screen 0.01,%.4f font ',18'\nset label \"%s\" at screen 0.01,%.4f font "
@@ -322,7 +322,7 @@ static void draw_heads(FILE *out, const struct plot *plot, double height)
 	        "set label \"%s\" at screen 0.01,%.4f font ',13' tc rgb '#08519c'\n",
 	        plot->title, 1 - 22 / height, plot->note[0], 1 - 47 / height, plot->note[1], 1 - 68 / height);
 	if (plot->value)
-		draw_legend(out, plot, height);
+		plot_draw_legend(out, plot, height);
 }
 
 int plot_write(const struct plot *plot, const char *folder, const char *kind, char *message)
@@ -344,12 +344,12 @@ int plot_write(const struct plot *plot, const char *folder, const char *kind, ch
 	      "screen 0\n"
 	      "unset border\nunset tics\nunset key\nset xrange [0:1]\nset yrange [0:1]\n",
 	      script.out);
-	draw_heads(script.out, plot, height);
+	plot_draw_heads(script.out, plot, height);
 	fputs("plot NaN notitle\nunset object\nset border\nset tics front\nset grid back lc rgb '#dddddd' lw "
 	      "1\n",
 	      script.out);
 	for (size_t i = 0; i < plot->panels; i++)
-		draw_panel(script.out, plot, i, height);
+		plot_draw_panel(script.out, plot, i, height);
 	fputs("unset multiplot\n", script.out);
 	status = file_draw(&script, folder, kind, plot->name, message);
 	file_drop(&script);

@@ -36,7 +36,7 @@ static void decay(struct product *product, int axis, struct ringdown *ringdown)
 	ringdown_find(&product->trace[axis], &span, ringdown);
 }
 
-static void prepare(struct product *product)
+static void product_prepare(struct product *product)
 {
 	const struct estimate_options options = {0};
 
@@ -77,7 +77,7 @@ struct product *product_open(const struct record *record, double contact_end_s)
 	}
 	if (product && scratch) {
 		product->contact_end_s = contact_end_s;
-		prepare(product);
+		product_prepare(product);
 	} else {
 		free(product);
 		product = NULL;

@@ -91,7 +91,7 @@ static void resample(struct family *family, const double *time, const double *fo
 		family->area += (family->force[i] + family->force[i + 1]) / (2.0 * STEPS);
 }
 
-static void make(struct family *family, double restitution)
+static void pulse_family_make(struct family *family, double restitution)
 {
 	static double time[ANGLES + 1], force[ANGLES + 1];
 	double c = loss_of(restitution);
@@ -112,8 +112,8 @@ static const struct family *family_of(enum synthetic_family which)
 	static struct family hertz, hunt_crossley;
 
 	if (!hertz.ready) {
-		make(&hertz, 1);
-		make(&hunt_crossley, 0.5);
+		pulse_family_make(&hertz, 1);
+		pulse_family_make(&hunt_crossley, 0.5);
 	}
 	return which == SYNTHETIC_HERTZ ? &hertz : &hunt_crossley;
 }

@@ -68,7 +68,7 @@ struct reference_decay reference_decrement(const struct reference_series *s)
 
 enum { FFT = 1 << 14 };
 
-static double magnitude(const double *half_complex, size_t k)
+static double reference_decay_magnitude(const double *half_complex, size_t k)
 {
 	return k == 0 || k == FFT / 2 ? fabs(half_complex[k]) : hypot(half_complex[k], half_complex[FFT - k]);
 }
@@ -76,12 +76,13 @@ static double magnitude(const double *half_complex, size_t k)
 /* Bin, with a part, where the magnitude falls to level from k on. */
 static double falls(const double *f, size_t k, int step, double level)
 {
-	while (k > 0 && k < FFT / 2 && magnitude(f, k) > level)
+	while (k > 0 && k < FFT / 2 && reference_decay_magnitude(f, k) > level)
 		k = step > 0 ? k + 1 : k - 1;
 	if (k == 0 || k == FFT / 2)
 		return NAN;
-	return (double)k -
-	       step * (level - magnitude(f, k)) / (magnitude(f, step > 0 ? k - 1 : k + 1) - magnitude(f, k));
+	return (double)k - step * (level - reference_decay_magnitude(f, k)) /
+	                           (reference_decay_magnitude(f, step > 0 ? k - 1 : k + 1) -
+	                            reference_decay_magnitude(f, k));
 }
 
 struct reference_decay reference_spectrum(const struct reference_series *s)
@@ -96,9 +97,10 @@ struct reference_decay reference_spectrum(const struct reference_series *s)
 		f[k] = s->y[k];
 	gsl_fft_real_radix2_transform(f, 1, FFT);
 	for (size_t k = at; (double)k * bin < 600 && k < FFT / 2 - 1; k++)
-		if (magnitude(f, k) > magnitude(f, at))
+		if (reference_decay_magnitude(f, k) > reference_decay_magnitude(f, at))
 			at = k;
-	a = magnitude(f, at - 1), b = magnitude(f, at), c = magnitude(f, at + 1);
+	a = reference_decay_magnitude(f, at - 1), b = reference_decay_magnitude(f, at),
+	c = reference_decay_magnitude(f, at + 1);
 	shift = a - 2 * b + c < 0 ? (a - c) / (2 * (a - 2 * b + c)) : 0;
 	found.hz = ((double)at + shift) * bin;
 	width = falls(f, at, 1, b * M_SQRT1_2) - falls(f, at, -1, b * M_SQRT1_2);
@@ -112,7 +114,8 @@ struct reference_decay reference_spectrum(const struct reference_series *s)
 enum { BLOCKS_MAX = 64 };
 
 /* Means of blocks: they keep a damped exponential's pole. */
-static size_t block_means(const struct reference_series *s, double mean[BLOCKS_MAX], size_t *block)
+static size_t reference_decay_block_means(const struct reference_series *s, double mean[BLOCKS_MAX],
+                                          size_t *block)
 {
 	size_t n;
 
@@ -156,7 +159,7 @@ struct reference_decay reference_pencil(const struct reference_series *s)
 {
 	struct reference_decay found = {NAN, NAN};
 	double mean[BLOCKS_MAX], decay, angle;
-	size_t block, n = block_means(s, mean, &block), width = n / 3 + 1;
+	size_t block, n = reference_decay_block_means(s, mean, &block), width = n / 3 + 1;
 	gsl_matrix *y, *v;
 	gsl_vector *singular, *work;
 

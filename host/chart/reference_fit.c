@@ -15,7 +15,7 @@ struct fit {
 };
 
 /* p in and out. */
-static bool solve(gsl_multifit_nlinear_fdf *problem, double *p)
+static bool reference_fit_solve(gsl_multifit_nlinear_fdf *problem, double *p)
 {
 	gsl_multifit_nlinear_parameters how = gsl_multifit_nlinear_default_parameters();
 	gsl_multifit_nlinear_workspace *work;
@@ -64,7 +64,7 @@ bool reference_fit_pulse(const struct reference_series *s, struct reference_puls
 	fit.from = (size_t)(at - base / 2);
 	problem.n = (size_t)base;
 	p[0] = raw.value, p[1] = at - (double)fit.from, p[2] = base / 1.5;
-	if (!solve(&problem, p))
+	if (!reference_fit_solve(&problem, p))
 		return false;
 	*pulse = (struct reference_pulse){p[0], (p[1] + (double)fit.from) / s->rate_hz, p[2] / s->rate_hz};
 	return true;
@@ -113,7 +113,7 @@ struct reference_decay reference_fit_decay(const struct reference_series *s)
 	        .f = decay_residual, .df = decay_jacobian, .n = s->count, .p = 5, .params = &fit};
 	double w = 2 * M_PI * start.hz / s->rate_hz, p[5] = {s->y[0], 0, 0.1 * w, w, 0};
 
-	if (!isfinite(start.hz) || !solve(&problem, p))
+	if (!isfinite(start.hz) || !reference_fit_solve(&problem, p))
 		return (struct reference_decay){NAN, NAN};
 	return (struct reference_decay){fabs(p[3]) * s->rate_hz / (2 * M_PI), p[2] / hypot(p[2], p[3])};
 }

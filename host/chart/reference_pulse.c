@@ -8,7 +8,7 @@
 
 #define LAG_MAX_S 6e-3
 
-static size_t largest(const struct reference_series *s)
+static size_t reference_pulse_largest(const struct reference_series *s)
 {
 	size_t at = 0;
 
@@ -33,14 +33,14 @@ static struct reference_peak top(const double *y, size_t at, size_t count, doubl
 
 struct reference_peak reference_maximum(const struct reference_series *s)
 {
-	size_t at = largest(s);
+	size_t at = reference_pulse_largest(s);
 
 	return (struct reference_peak){s->y[at], (double)at / s->rate_hz};
 }
 
 struct reference_peak reference_parabola(const struct reference_series *s)
 {
-	return top(s->y, largest(s), s->count, s->rate_hz);
+	return top(s->y, reference_pulse_largest(s), s->count, s->rate_hz);
 }
 
 double reference_resultant(const struct reference_series *x, const struct reference_series *y)
@@ -60,7 +60,7 @@ double reference_resultant(const struct reference_series *x, const struct refere
 }
 
 /* Where the line between two samples meets the level, going out from the largest. */
-static double edge(const struct reference_series *s, size_t at, int step, double level)
+static double reference_pulse_edge(const struct reference_series *s, size_t at, int step, double level)
 {
 	size_t k = at;
 
@@ -75,10 +75,10 @@ static double edge(const struct reference_series *s, size_t at, int step, double
 
 static double ten_percent(const struct reference_series *s)
 {
-	size_t at = largest(s);
+	size_t at = reference_pulse_largest(s);
 	double level = 0.1 * s->y[at];
 
-	return edge(s, at, 1, level) - edge(s, at, -1, level);
+	return reference_pulse_edge(s, at, 1, level) - reference_pulse_edge(s, at, -1, level);
 }
 
 double reference_width(const struct reference_series *s)
@@ -88,7 +88,7 @@ double reference_width(const struct reference_series *s)
 
 static double sum_around(const struct reference_series *s, double reach_s)
 {
-	double sum = 0, at = (double)largest(s), reach = reach_s * s->rate_hz;
+	double sum = 0, at = (double)reference_pulse_largest(s), reach = reach_s * s->rate_hz;
 
 	for (size_t k = 0; k < s->count; k++)
 		if (fabs((double)k - at) <= reach)
@@ -98,7 +98,8 @@ static double sum_around(const struct reference_series *s, double reach_s)
 
 double reference_area_width(const struct reference_series *s)
 {
-	return M_PI_2 * sum_around(s, 0.75 * ten_percent(s)) / UNITS_G_M_S2 / s->y[largest(s)];
+	return M_PI_2 * sum_around(s, 0.75 * ten_percent(s)) / UNITS_G_M_S2 /
+	       s->y[reference_pulse_largest(s)];
 }
 
 double reference_velocity(const struct reference_series *s, double contact_s)

@@ -28,7 +28,7 @@ static void noise(struct synthetic_scene *scene, double value)
 	scene->noise_g *= value; /* over the sensor's own */
 }
 
-static void damping(struct synthetic_scene *scene, double value)
+static void stability_damping(struct synthetic_scene *scene, double value)
 {
 	scene->damping = value / 100;
 }
@@ -54,7 +54,7 @@ static void clipping(struct synthetic_scene *scene, double value)
 	scene->clip_g = scene->peak_g[0] * (1 - value / 100);
 }
 
-static void missing(struct synthetic_scene *scene, double value)
+static void stability_missing(struct synthetic_scene *scene, double value)
 {
 	scene->missing = value / 100;
 }
@@ -102,10 +102,10 @@ static const struct sweep sweeps[] = {
         {"Y after X", "ms", skew, {0.1, 0.2, 0.5, 1}, 4},
         {"rate", "kHz", rate, {28, 14, 7, 3.5, 2}, 5},
         {"clipped", "% of peak", clipping, {1, 3, 10, 20, 30, 50}, 6},
-        {"missing", "%", missing, {1, 5, 10, 20, 40}, 5},
+        {"missing", "%", stability_missing, {1, 5, 10, 20, 40}, 5},
         {"run lost", "samples", lost, {1, 2, 4, 8, 20}, 5},
         {"jitter", "us", jitter, {1, 2, 5, 10, 20, 50}, 6},
-        {"damping", "%", damping, {1, 3, 10, 20, 30, 50}, 6},
+        {"damping", "%", stability_damping, {1, 3, 10, 20, 30, 50}, 6},
         {"record", "cycles", length, {5, 3, 2, 1.5, 1, 0.5}, 6},
         {"offset left", "g", offset, {0.3, 1, 3, 10, 30}, 5},
         {"50 Hz hum", "g", hum, {0.3, 1, 3, 5, 10}, 5},
@@ -139,7 +139,7 @@ static bool fails(const struct map *map, const struct tally *t)
 	       compare_gross(map->compare, t) > GROSS_MOST * map->compare->drops;
 }
 
-static int write_csv(const struct chart_options *options, const struct map *map, char *message)
+static int stability_write_csv(const struct chart_options *options, const struct map *map, char *message)
 {
 	struct text text;
 	int status = file_begin(&text, message);
@@ -190,7 +190,7 @@ enum { SHADES = sizeof(shades) / sizeof(shades[0]) };
 #define CROSS "#d55e00"
 
 /* Index of the cell's shade; SHADES: no value at all. */
-static int shade_of(const struct tally *t)
+static int stability_shade_of(const struct tally *t)
 {
 	double ratio = tally_ratio(t);
 	int i = 0;
@@ -213,13 +213,13 @@ static double column(size_t s)
 /* What a data block holds of each cell. */
 enum layer { LAYER_FAILS = SHADES + 1, LAYER_SAYS_SO, LAYERS };
 
-static bool in_layer(const struct map *map, const struct tally *t, int layer)
+static bool stability_in_layer(const struct map *map, const struct tally *t, int layer)
 {
 	if (layer == LAYER_FAILS)
 		return fails(map, t);
 	if (layer == LAYER_SAYS_SO)
 		return fails(map, t) && 2 * t->doubted >= map->compare->drops;
-	return shade_of(t) == layer;
+	return stability_shade_of(t) == layer;
 }
 
 static void write_cells(FILE *out, const struct map *map, size_t m, double row, int layer)
@@ -228,12 +228,12 @@ static void write_cells(FILE *out, const struct map *map, size_t m, double row, 
 
 	for (size_t s = 0; s < SWEEPS; s++)
 		for (size_t i = 0; i < sweeps[s].count; i++, cell++)
-			if (in_layer(map, &cell->tally[m], layer))
+			if (stability_in_layer(map, &cell->tally[m], layer))
 				fprintf(out, "%.1f %.1f\n", column(s) + (double)i, row);
 }
 
 /* Ours above the others', in the table's order. */
-static double row_of(const struct map *map, size_t m)
+static double stability_row_of(const struct map *map, size_t m)
 {
 	double row = 0;
 
@@ -246,7 +246,7 @@ static double row_of(const struct map *map, size_t m)
 	return row + (map->method[m].ours ? 0.2 : 0);
 }
 
-static void draw_heads(FILE *out, double rows)
+static void stability_draw_heads(FILE *out, double rows)
 {
 	for (size_t s = 0; s < SWEEPS; s++) {
 		fprintf(out, "set label \"%s\" at %.2f,%g font ',12' left rotate by 35\n", sweeps[s].name,
@@ -264,7 +264,7 @@ static void draw_heads(FILE *out, double rows)
 }
 
 /* Below the map, in units of its own: shades, the cross, the dot. */
-static void draw_legend(FILE *out, const struct map *map, double height)
+static void stability_draw_legend(FILE *out, const struct map *map, double height)
 {
 	double y = 30 / height;
 
@@ -311,7 +311,7 @@ static void draw_names(FILE *out, const struct map *map)
 		if (map->method[m].quantity == map->quantity)
 			fprintf(out, "set label \"%s%s%s\" at -0.6,%g right\n",
 			        map->method[m].ours ? "droptower: " : "", map->method[m].name,
-			        map->method[m].told ? " *" : "", row_of(map, m) + 0.5);
+			        map->method[m].told ? " *" : "", stability_row_of(map, m) + 0.5);
 }
 
 /* A data block for each layer, with one point out of sight so that none is empty. */
@@ -321,7 +321,7 @@ static void draw_cells(FILE *out, const struct map *map)
 		fprintf(out, "$layer%d << EOD\n-9 -9\n", layer);
 		for (size_t m = 0; m < map->methods; m++)
 			if (map->method[m].quantity == map->quantity)
-				write_cells(out, map, m, row_of(map, m), layer);
+				write_cells(out, map, m, stability_row_of(map, m), layer);
 		fputs("EOD\n", out);
 	}
 	fputs("plot ", out);
@@ -340,7 +340,7 @@ static void draw_cells(FILE *out, const struct map *map)
 	        LAYER_FAILS, LAYER_FAILS, LAYER_SAYS_SO);
 }
 
-static int draw(const struct chart_options *options, const struct map *map, char *message)
+static int stability_draw(const struct chart_options *options, const struct map *map, char *message)
 {
 	const struct quantity_text *text = quantity_text(map->quantity);
 	double columns = column(SWEEPS), rows = 0, width, height;
@@ -352,7 +352,7 @@ static int draw(const struct chart_options *options, const struct map *map, char
 		return status;
 	for (size_t m = 0; m < map->methods; m++)
 		if (map->method[m].quantity == map->quantity)
-			rows = fmax(rows, row_of(map, m) + 1);
+			rows = fmax(rows, stability_row_of(map, m) + 1);
 	width = LEFT + RIGHT + columns * COLUMN;
 	height = TOP + BOTTOM + rows * ROW;
 	fprintf(out,
@@ -372,8 +372,8 @@ static int draw(const struct chart_options *options, const struct map *map, char
 	        "a half-sine.\" at screen 0.01,%.4f font ',12'\n",
 	        options->about, options->drop.noise_g, map->compare->drops, 1 - 50 / height);
 	draw_names(out, map);
-	draw_heads(out, rows);
-	draw_legend(out, map, height);
+	stability_draw_heads(out, rows);
+	stability_draw_legend(out, map, height);
 	draw_cells(out, map);
 	status = file_draw(&script, options->folder, "stability", text->name, message);
 	file_drop(&script);
@@ -381,7 +381,7 @@ static int draw(const struct chart_options *options, const struct map *map, char
 }
 
 /* Of each method, what it does not survive: the first value of each sweep from which on it fails. */
-static void print_table(FILE *out, const struct map *map)
+static void stability_print_table(FILE *out, const struct map *map)
 {
 	fprintf(out, "\n%s\n", quantity_text(map->quantity)->title);
 	for (size_t m = 0; m < map->methods; m++) {
@@ -451,10 +451,10 @@ int chart_stability(const struct chart_options *options, FILE *out, char *messag
 		map.quantity = (enum quantity)q;
 		if (options->no_plate && quantity_text(map.quantity)->of_plate)
 			continue;
-		print_table(out, &map);
-		status = write_csv(options, &map, message);
+		stability_print_table(out, &map);
+		status = stability_write_csv(options, &map, message);
 		if (!status)
-			status = draw(options, &map, message);
+			status = stability_draw(options, &map, message);
 	}
 	compare_free(compare.cells, CELLS_MAX);
 	return status;

@@ -67,7 +67,7 @@ static void glide(const struct step *step, double state[2])
 
 /* Driven by -(b0 + slope t): the particular motion p(t) = -(b0 + slope t) / w^2 + 2 zeta slope / w^3, what is
  * left of the state glides freely. */
-static void drive(const struct step *step, double state[2], double b0, double b1, double step_s)
+static void synthetic_drive(const struct step *step, double state[2], double b0, double b1, double step_s)
 {
 	double w = step->natural, slope = (b1 - b0) / step_s, rest = 2 * step->damping * slope / gsl_pow_3(w);
 	double free[2] = {state[0] + b0 / (w * w) - rest, state[1] + slope / (w * w)};
@@ -82,8 +82,8 @@ static double felt(const struct step *step, const double state[2])
 	return -(2 * step->damping * step->natural * state[1] + step->natural * step->natural * state[0]);
 }
 
-static double *respond(const struct synthetic_signal *signal, double damped_hz, double damping,
-                       double state[2])
+static double *synthetic_respond(const struct synthetic_signal *signal, double damped_hz, double damping,
+                                 double state[2])
 {
 	double *out = malloc((SYNTHETIC_STEPS + 1) * sizeof(*out));
 	double h = signal->axis.contact_s / SYNTHETIC_STEPS, before = 0;
@@ -94,7 +94,7 @@ static double *respond(const struct synthetic_signal *signal, double damped_hz, 
 		double pulse = synthetic_pulse(signal->family, (double)i / SYNTHETIC_STEPS);
 
 		if (i > 0)
-			drive(&step, state, before, pulse, h);
+			synthetic_drive(&step, state, before, pulse, h);
 		out[i] = felt(&step, state);
 		before = pulse;
 	}
@@ -120,9 +120,10 @@ int synthetic_signal_open(struct synthetic_signal *signal, enum synthetic_family
                           const struct synthetic_axis *axis)
 {
 	*signal = (struct synthetic_signal){.family = family, .axis = *axis};
-	signal->response = respond(signal, axis->damped_hz, axis->damping, signal->state);
+	signal->response = synthetic_respond(signal, axis->damped_hz, axis->damping, signal->state);
 	if (fabs(axis->second_gain) > 0)
-		signal->second = respond(signal, axis->second_hz, axis->second_damping, signal->second_state);
+		signal->second = synthetic_respond(signal, axis->second_hz, axis->second_damping,
+		                                   signal->second_state);
 	if (signal->response && (signal->second || !(fabs(axis->second_gain) > 0)))
 		return 0;
 	synthetic_signal_close(signal);
@@ -179,7 +180,7 @@ static double summit_of(double (*f)(const void *context, double t), const void *
 }
 
 /* Upwards whatever its sign. */
-static double plate_of(const void *context, double t)
+static double synthetic_plate_of(const void *context, double t)
 {
 	const struct synthetic_signal *signal = context;
 
@@ -218,7 +219,7 @@ double synthetic_plate_summit(const struct synthetic_signal *signal)
 	const struct synthetic_axis *axis = &signal->axis;
 	double from = axis->onset_s + axis->delay_s;
 
-	return highest_of(plate_of, signal, from, from + axis->contact_s + 1 / axis->damped_hz,
+	return highest_of(synthetic_plate_of, signal, from, from + axis->contact_s + 1 / axis->damped_hz,
 	                  0.02 / axis->damped_hz);
 }
 
@@ -249,7 +250,7 @@ double synthetic_plate_resultant(const struct synthetic_signal signal[2], double
 }
 
 /* Of base 1, at a tenth of the height. */
-static double width_of(enum synthetic_family family)
+static double synthetic_width_of(enum synthetic_family family)
 {
 	double edge[2];
 
@@ -281,7 +282,7 @@ static void find_truth(struct synthetic *synthetic)
 	                                 .natural_hz = scene->damped_hz / sqrt(1 - gsl_pow_2(scene->damping)),
 	                                 .damping = scene->damping,
 	                                 .contact_s = scene->contact_s,
-	                                 .width_s = width_of(scene->family) * scene->contact_s,
+	                                 .width_s = synthetic_width_of(scene->family) * scene->contact_s,
 	                                 .velocity_m_s = synthetic_pulse_area(scene->family) *
 	                                                 scene->contact_s * scene->peak_g[0] * UNITS_G_M_S2};
 	for (int i = 0; i < 2; i++) {
@@ -339,7 +340,7 @@ static int make_axis(struct synthetic *synthetic, int i)
 	return synthetic_signal_open(&synthetic->signal[i], scene->family, &axis);
 }
 
-static double rate_of(const struct synthetic *synthetic, enum synthetic_channel channel)
+static double synthetic_rate_of(const struct synthetic *synthetic, enum synthetic_channel channel)
 {
 	return synthetic->scene.rate_hz[channel != SYNTHETIC_S1X && channel != SYNTHETIC_S2X];
 }
@@ -362,7 +363,7 @@ int synthetic_open(struct synthetic *synthetic, const struct synthetic_scene *sc
 	strcpy(synthetic->record.format, "csv");
 	failed = !synthetic->random || make_axis(synthetic, 0) || make_axis(synthetic, 1);
 	for (unsigned i = 0; i < SYNTHETIC_CHANNELS && !failed; i++) {
-		double rate = rate_of(synthetic, (enum synthetic_channel)i);
+		double rate = synthetic_rate_of(synthetic, (enum synthetic_channel)i);
 
 		failed = !record_add_channel(&synthetic->record, names[i], rate,
 		                             (size_t)((scene->pre_s + scene->post_s) * rate));
@@ -402,13 +403,14 @@ static bool near_peak(const struct synthetic *synthetic, enum synthetic_channel 
 	if (count == 0 || (channel != SYNTHETIC_S2X && channel != SYNTHETIC_S2Y))
 		return false;
 	peak = synthetic->onset_s + synthetic->at_zero.peak_s[axis_of(channel)];
-	return fabs((double)k - floor(peak * rate_of(synthetic, channel) - count / 2.0 + 1) -
+	return fabs((double)k - floor(peak * synthetic_rate_of(synthetic, channel) - count / 2.0 + 1) -
 	            (count - 1) / 2.0) < count / 2.0;
 }
 
-static bool in_gap(const struct synthetic *synthetic, enum synthetic_channel channel, size_t k)
+static bool synthetic_in_gap(const struct synthetic *synthetic, enum synthetic_channel channel, size_t k)
 {
-	double from = (synthetic->onset_s + synthetic->scene.contact_s + GAP_S) * rate_of(synthetic, channel);
+	double from = (synthetic->onset_s + synthetic->scene.contact_s + GAP_S) *
+	              synthetic_rate_of(synthetic, channel);
 
 	return channel < SYNTHETIC_S2X && (double)k >= from && (double)k < from + synthetic->scene.gap;
 }
@@ -416,12 +418,12 @@ static bool in_gap(const struct synthetic *synthetic, enum synthetic_channel cha
 bool synthetic_keeps(const struct synthetic *synthetic, enum synthetic_channel channel, size_t k)
 {
 	const struct synthetic_scene *scene = &synthetic->scene;
-	double t = (double)k / rate_of(synthetic, channel);
+	double t = (double)k / synthetic_rate_of(synthetic, channel);
 
 	return !near_peak(synthetic, channel, k, scene->lost_at_peak) &&
 	       !near_peak(synthetic, channel, k, scene->zeroed_at_peak) &&
-	       !near_peak(synthetic, channel, k, scene->nan_at_peak) && !in_gap(synthetic, channel, k) &&
-	       !(scene->cut && t > synthetic->onset_s + CUT_S) &&
+	       !near_peak(synthetic, channel, k, scene->nan_at_peak) &&
+	       !synthetic_in_gap(synthetic, channel, k) && !(scene->cut && t > synthetic->onset_s + CUT_S) &&
 	       !(scene->clip_g > 0 && fabs(signal_at(synthetic, channel, t)) >= scene->clip_g);
 }
 
@@ -469,14 +471,14 @@ static void damage(struct synthetic *synthetic, enum synthetic_channel c, size_t
 		channel->value_g[k] = 0;
 	if (near_peak(synthetic, c, k, scene->nan_at_peak))
 		channel->value_g[k] = NAN;
-	if (near_peak(synthetic, c, k, scene->lost_at_peak) || in_gap(synthetic, c, k) ||
+	if (near_peak(synthetic, c, k, scene->lost_at_peak) || synthetic_in_gap(synthetic, c, k) ||
 	    (scene->missing > 0 && gsl_rng_uniform(synthetic->random) < scene->missing)) {
 		channel->value_g[k] = NAN;
 		channel->sample[k] = SAMPLE_LOST;
 	}
 }
 
-static void fill(struct synthetic *synthetic, enum synthetic_channel c, double phase)
+static void synthetic_fill(struct synthetic *synthetic, enum synthetic_channel c, double phase)
 {
 	const struct synthetic_scene *scene = &synthetic->scene;
 	struct channel *channel = &synthetic->record.channels[c];
@@ -511,7 +513,7 @@ void synthetic_drop(struct synthetic *synthetic, unsigned long drop)
 
 		channel->count = (size_t)(end_s * channel->rate_hz);
 		channel->flags = 0;
-		fill(synthetic, (enum synthetic_channel)i, phase);
+		synthetic_fill(synthetic, (enum synthetic_channel)i, phase);
 	}
 	record_finish(&synthetic->record);
 }

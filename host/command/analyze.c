@@ -157,7 +157,7 @@ static int analyze_file(const char *file, const struct arguments *arguments)
 	                                                                : analyze_each(file, arguments);
 }
 
-static int check(const struct arguments *arguments, int argc, char **argv)
+static int analyze_check(const struct arguments *arguments, int argc, char **argv)
 {
 	if (optind == argc)
 		return command_usage("analyze", "no FILE given");
@@ -209,7 +209,7 @@ int command_analyze(int argc, char **argv)
 
 	if (code != OPTIONS_READ)
 		return code;
-	code = check(&arguments, argc, argv);
+	code = analyze_check(&arguments, argc, argv);
 	if (code == COMMAND_DONE && arguments.scene_file != NULL) {
 		code = evaluate_read_scene(&scene, arguments.scene_file, arguments.angle_deg);
 		arguments.evaluate.scene = &scene;

@@ -105,8 +105,8 @@ int archived_read(struct archive *archive, const char *drop, struct record *reco
 }
 
 /* The result does not depend on where the archive stands. */
-static int analyse(struct archive *archive, const char *drop, const struct scene *scene,
-                   struct record *record, char message[ARCHIVE_MESSAGE_MAX])
+static int command_archived_analyse(struct archive *archive, const char *drop, const struct scene *scene,
+                                    struct record *record, char message[ARCHIVE_MESSAGE_MAX])
 {
 	struct evaluated e;
 	struct result said;
@@ -143,7 +143,7 @@ int archived_result(struct archive *archive, const char *series, unsigned number
 	result = archived_read(archive, drop, &record, fault, message);
 	if (result != 0)
 		return result;
-	result = analyse(archive, drop, &scene, &record, message);
+	result = command_archived_analyse(archive, drop, &scene, &record, message);
 	record_free(&record);
 	return result;
 }

@@ -71,7 +71,7 @@ static const struct option_table known_options = {
 };
 
 /* What does not go together. */
-static int check(const struct bridge *bridge)
+static int bridge_check(const struct bridge *bridge)
 {
 	if (bridge->link == NULL)
 		return command_usage("bridge", "no --link given");
@@ -90,7 +90,7 @@ static int32_t ms_until(int64_t at_ms)
 }
 
 /* What DT_STATE says of commands, as it is now. */
-static void tell(struct bridge *bridge)
+static void bridge_tell(struct bridge *bridge)
 {
 	const struct session_view *view = session_view(bridge->session);
 	droptower_state *state = &bridge->publisher->state;
@@ -107,13 +107,13 @@ static void tell(struct bridge *bridge)
 	state->disarmed_in_ms = view->armed ? ms_until(view->armed_until_ms) : 0;
 }
 
-static void on_frame(void *user, const struct frame *frame)
+static void bridge_on_frame(void *user, const struct frame *frame)
 {
 	struct bridge *bridge = user;
 	int result;
 
 	if (bridge->session != NULL && frame->id == WIRE_ID_STATUS)
-		tell(bridge);
+		bridge_tell(bridge);
 	result = publisher_frame(bridge->publisher, frame);
 	if (result != 0)
 		bridge->publish_error = result;
@@ -153,7 +153,7 @@ static void keep_record(const struct bridge *bridge, const droptower_command *co
 
 /* ---- commands ---- */
 
-static void take(struct bridge *bridge, const droptower_command *command)
+static void bridge_take(struct bridge *bridge, const droptower_command *command)
 {
 	if (command->op == WIRE_OP_ABORT) {
 		bridge->abort_asked = true;
@@ -179,7 +179,7 @@ static void on_command(const lcm_recv_buf_t *buffer, const char *channel, void *
 		bridge->taker.refused[MAC_BUSY]++;
 	}
 	if (refusal == MAC_TAKEN) {
-		take(bridge, &command);
+		bridge_take(bridge, &command);
 		return;
 	}
 	bridge->refusal = refusal;
@@ -190,11 +190,11 @@ static void on_command(const lcm_recv_buf_t *buffer, const char *channel, void *
 	}
 }
 
-static int answer(struct bridge *bridge, int64_t counter, int result)
+static int bridge_answer(struct bridge *bridge, int64_t counter, int result)
 {
 	bridge->publisher->state.counter = counter;
 	bridge->publisher->state.result = (int16_t)result;
-	tell(bridge);
+	bridge_tell(bridge);
 	return publisher_state(bridge->publisher);
 }
 
@@ -215,18 +215,18 @@ static int obey_abort(struct bridge *bridge)
 		bridge->publisher->state.aborted_utime = session_utime();
 	if (proven) {
 		keep_record(bridge, &bridge->abort, result);
-		return answer(bridge, bridge->abort.counter, result);
+		return bridge_answer(bridge, bridge->abort.counter, result);
 	}
 	if (bridge->noted_ms == 0 || now_ms - bridge->noted_ms >= SAY_EVERY_MS) {
 		keep_record(bridge, &(droptower_command){.op = WIRE_OP_ABORT, .sender = "unknown"}, result);
 		bridge->noted_ms = now_ms;
 	}
 	say_refused(bridge);
-	tell(bridge);
+	bridge_tell(bridge);
 	return publisher_state(bridge->publisher);
 }
 
-static int carry_out(struct bridge *bridge, const droptower_command *command)
+static int bridge_carry_out(struct bridge *bridge, const droptower_command *command)
 {
 	const struct session_view *view = session_view(bridge->session);
 
@@ -256,17 +256,17 @@ static int obey(struct bridge *bridge)
 		return 0;
 	command = bridge->command;
 	bridge->commanded = false;
-	result = carry_out(bridge, &command);
+	result = bridge_carry_out(bridge, &command);
 	if (result == DT_E_PARAMETERS)
 		command_error(
 		        "bridge: somebody has changed the tower's parameters since they were read: look "
 		        "at them with 'droptower ctl get', then start the bridge again");
 	keep_record(bridge, &command, result);
-	return answer(bridge, command.counter, result);
+	return bridge_answer(bridge, command.counter, result);
 }
 
 /* While a command waits for its reply an ABORT must not wait for it. */
-static bool cancelled(void *user)
+static bool bridge_cancelled(void *user)
 {
 	struct bridge *bridge = user;
 
@@ -304,7 +304,7 @@ static int hand_on_drop(struct bridge *bridge)
 	return result;
 }
 
-static int serve(struct bridge *bridge)
+static int bridge_serve(struct bridge *bridge)
 {
 	int result = 0;
 
@@ -327,7 +327,8 @@ static int serve(struct bridge *bridge)
 
 static int bridge_session(struct bridge *bridge)
 {
-	struct session_options options = {.on_frame = on_frame, .cancelled = cancelled, .user = bridge};
+	struct session_options options = {
+	        .on_frame = bridge_on_frame, .cancelled = bridge_cancelled, .user = bridge};
 	char message[SESSION_MESSAGE_MAX];
 	int code = COMMAND_DONE;
 
@@ -350,12 +351,12 @@ static int bridge_session(struct bridge *bridge)
 			code = command_tower_failed(result, message);
 	}
 	if (code == COMMAND_DONE)
-		code = serve(bridge);
+		code = bridge_serve(bridge);
 	session_close(bridge->session);
 	return code;
 }
 
-static int read_key(struct bridge *bridge)
+static int bridge_read_key(struct bridge *bridge)
 {
 	char message[MAC_MESSAGE_MAX];
 
@@ -377,11 +378,11 @@ int command_bridge(int argc, char **argv)
 	code = option_read(&known_options, &bridge, argc, argv);
 	if (code != OPTIONS_READ)
 		return code;
-	code = check(&bridge);
+	code = bridge_check(&bridge);
 	if (code == COMMAND_DONE && bridge.scene_file != NULL)
 		code = evaluate_read_scene(&bridge.scene, bridge.scene_file, bridge.angle_deg);
 	if (code == COMMAND_DONE && bridge.key_file != NULL)
-		code = read_key(&bridge);
+		code = bridge_read_key(&bridge);
 	if (code != COMMAND_DONE)
 		return code;
 	interrupt_catch();

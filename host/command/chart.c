@@ -84,7 +84,7 @@ static int take_scene(const struct arguments *arguments, struct chart_options *o
 	return COMMAND_DONE;
 }
 
-static int draw(const struct arguments *arguments, const struct subject *subject)
+static int chart_draw(const struct arguments *arguments, const struct subject *subject)
 {
 	char message[CHART_MESSAGE_MAX];
 	struct chart_options options = {.folder = arguments->folder, .seed = arguments->seed};
@@ -114,6 +114,6 @@ int command_chart(int argc, char **argv)
 		return code;
 	for (size_t i = 0; optind + 1 == argc && i < SUBJECTS; i++)
 		if (strcmp(argv[optind], subjects[i].name) == 0)
-			return draw(&arguments, &subjects[i]);
+			return chart_draw(&arguments, &subjects[i]);
 	return command_usage("chart", "say which chart: accuracy, stability, model or model-stability");
 }

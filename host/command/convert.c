@@ -59,7 +59,7 @@ struct converting {
 };
 
 /* OUT with the drop's number in front of its ending; false without memory. */
-static bool name_of(const struct converting *converting, char **name)
+static bool convert_name_of(const struct converting *converting, char **name)
 {
 	const char *out = converting->out, *slash = strrchr(out, '/'), *dot = strrchr(out, '.');
 	size_t stem = dot != NULL && (slash == NULL || dot > slash) ? (size_t)(dot - out) : strlen(out);
@@ -79,7 +79,7 @@ static int convert_drop(void *context, const struct log_capture *capture, struct
 		converting->code = COMMAND_INPUT;
 		return 0;
 	}
-	if (!name_of(converting, &name)) {
+	if (!convert_name_of(converting, &name)) {
 		result = DT_E_MEMORY;
 		command_error("%s: %s", converting->out, error_text(result));
 	} else if (command_is_input("convert", name, converting->in)) {

@@ -58,7 +58,7 @@ static int wait_for_status(struct session *session, bool counters)
 	return view->seen ? 0 : DT_E_TIMEOUT;
 }
 
-static int refused(const char *verb, int result, const struct session_view *view)
+static int ctl_refused(const char *verb, int result, const struct session_view *view)
 {
 	command_error("%s: %s (state %s)", verb, error_text(result), wire_state_name(view->state));
 	for (unsigned i = 0; i < WIRE_CHECKS; i++)
@@ -69,7 +69,7 @@ static int refused(const char *verb, int result, const struct session_view *view
 }
 
 /* abort, clear */
-static int act(struct session *session, const char *verb)
+static int ctl_act(struct session *session, const char *verb)
 {
 	bool abort = strcmp(verb, "abort") == 0;
 	int result = session_command(session, abort ? WIRE_OP_ABORT : WIRE_OP_CLEAR);
@@ -78,12 +78,12 @@ static int act(struct session *session, const char *verb)
 		return COMMAND_DONE;
 	if (result != DT_E_TIMEOUT)
 		(void)wait_for_status(session, false);
-	return refused(verb, result, session_view(session));
+	return ctl_refused(verb, result, session_view(session));
 }
 
 /* ---- arm ---- */
 
-static void say(void *user, const char *line)
+static void ctl_say(void *user, const char *line)
 {
 	(void)user;
 	fprintf(stderr, "%s\n", line);
@@ -114,9 +114,9 @@ static int follow_fall(struct session *session)
 	return command_link_failed("following the fall", result != 0 ? result : DT_E_TIMEOUT);
 }
 
-static int arm(struct session *session, bool unattended)
+static int ctl_arm(struct session *session, bool unattended)
 {
-	struct release release = {.session = session, .unattended = unattended, .say = say};
+	struct release release = {.session = session, .unattended = unattended, .say = ctl_say};
 	const struct session_view *view = session_view(session);
 	char message[SESSION_MESSAGE_MAX];
 	int result = tower_setup_hear(session, message), code;
@@ -158,7 +158,7 @@ static int set(struct session *session, enum wire_parameter_number number, uint3
 		return COMMAND_REFUSED;
 	}
 	(void)wait_for_status(session, false);
-	return refused("set", result, session_view(session));
+	return ctl_refused("set", result, session_view(session));
 }
 
 /* From first to last. */
@@ -294,7 +294,8 @@ static const struct option_table known_options = {
         .words = true,
 };
 
-static int carry_out(struct session *session, const struct arguments *arguments, const struct order *order)
+static int ctl_carry_out(struct session *session, const struct arguments *arguments,
+                         const struct order *order)
 {
 	int result;
 
@@ -304,9 +305,9 @@ static int carry_out(struct session *session, const struct arguments *arguments,
 		return get(session, order->all ? 0 : order->number,
 		           order->all ? WIRE_PARAMETERS - 1 : order->number);
 	if (strcmp(order->verb, "arm") == 0)
-		return arm(session, arguments->unattended);
+		return ctl_arm(session, arguments->unattended);
 	if (strcmp(order->verb, "status") != 0)
-		return act(session, order->verb);
+		return ctl_act(session, order->verb);
 	result = wait_for_status(session, true);
 	if (result != 0) {
 		command_error("%s: no tower heard: %s", arguments->url, error_text(result));
@@ -329,7 +330,7 @@ static int with_session(const struct arguments *arguments, const struct order *o
 		return COMMAND_LINK;
 	}
 	session_hold(session, true); /* whoever collects does it beside us */
-	code = carry_out(session, arguments, order);
+	code = ctl_carry_out(session, arguments, order);
 	session_close(session);
 	return code;
 }

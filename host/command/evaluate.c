@@ -27,7 +27,7 @@ static int write_json_file(const struct report *report, const char *file, char *
 	return result != 0 ? result : whole_close(&whole, report_json(report, whole.out), message, size);
 }
 
-static int write_out(const struct report *report, const struct evaluate_options *options)
+static int evaluate_write_out(const struct report *report, const struct evaluate_options *options)
 {
 	char message[512];
 
@@ -198,7 +198,7 @@ int evaluate(const struct record *record, const struct evaluate_options *options
 		              result == DT_E_EMPTY ? "no good sample in any channel" : error_text(result));
 		return COMMAND_INPUT;
 	}
-	code = write_out(&e.report, options);
+	code = evaluate_write_out(&e.report, options);
 	if (code == COMMAND_DONE && options->strict && e.report.band != NULL && !e.band.verdict.pass) {
 		command_error("%s: outside its band, and --strict was asked for", record->file);
 		code = COMMAND_INPUT;

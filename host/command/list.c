@@ -51,7 +51,7 @@ static const char *seal_text(const struct log_capture *c)
 	return !c->seal_known ? "unknown" : c->seal_agrees ? "agrees" : "differs";
 }
 
-static bool is_whole(const struct log_capture *c)
+static bool list_is_whole(const struct log_capture *c)
 {
 	return c->ended && c->crc_agrees && (c->seal_agrees || !c->seal_known);
 }
@@ -84,7 +84,7 @@ static void marks_text(const struct log_capture *c, char text[MARKS_CHARS])
 	text[strlen(text) > 0 ? strlen(text) - 1 : 0] = '\0';
 }
 
-static void head(struct list *list)
+static void list_head(struct list *list)
 {
 	if (!list->begun)
 		printf("%s\n%5s %5s  %-25s %-21s  %-18s %-8s %s\n", list->file, "N", "drop", "ended", "ticks",
@@ -92,13 +92,13 @@ static void head(struct list *list)
 	list->begun = true;
 }
 
-static int row(void *context, const struct log_capture *c, struct record *record)
+static int list_row(void *context, const struct log_capture *c, struct record *record)
 {
 	struct list *list = context;
 	char time[TIME_CHARS], ticks[32] = "", blocks[32], marks[MARKS_CHARS];
 
 	(void)record; /* none is asked for */
-	head(list);
+	list_head(list);
 	if (c->last_tick_ms - c->first_tick_ms + 1 > 0)
 		snprintf(ticks, sizeof(ticks), "%" PRIu32 "..%" PRIu32, c->first_tick_ms, c->last_tick_ms);
 	blocks_text(c, blocks, sizeof(blocks));
@@ -106,7 +106,7 @@ static int row(void *context, const struct log_capture *c, struct record *record
 	printf("%5u %5u  %-25s %-21s  %-18s %*s%s%s\n", c->number, c->drop_id, time_text(c->time_us, time),
 	       ticks, blocks, marks[0] != '\0' ? -8 : 0, crc_text(c), marks[0] != '\0' ? " " : "", marks);
 	list->drops++;
-	list->whole += is_whole(c);
+	list->whole += list_is_whole(c);
 	return 0;
 }
 
@@ -114,7 +114,7 @@ static int row_of_event(void *context, const struct log_event *e)
 {
 	char time[TIME_CHARS], first[TIME_CHARS];
 
-	head(context);
+	list_head(context);
 	switch (e->kind) {
 	case LOG_START:
 		printf("              %-25s the tower started\n", time_text(e->time_us, time));
@@ -134,7 +134,7 @@ static int row_of_event(void *context, const struct log_event *e)
 
 /* ---- JSON ---- */
 
-static cJSON *start(struct builder *b, const struct list *list, const char *what, int64_t time_us)
+static cJSON *list_start(struct builder *b, const struct list *list, const char *what, int64_t time_us)
 {
 	cJSON *root = cJSON_CreateObject();
 
@@ -170,7 +170,7 @@ static int object(void *context, const struct log_capture *c, struct record *rec
 {
 	struct list *list = context;
 	struct builder b;
-	cJSON *root = start(&b, list, "drop", c->time_us);
+	cJSON *root = list_start(&b, list, "drop", c->time_us);
 
 	(void)record;
 	put_number(&b, root, "number", c->number);
@@ -194,7 +194,7 @@ static int object_of_event(void *context, const struct log_event *e)
 	static const char *const what[] = {
 	        [LOG_START] = "start", [LOG_FAULT] = "fault", [LOG_HEARTBEATS] = "heartbeats"};
 	struct builder b;
-	cJSON *root = start(&b, context, what[e->kind], e->time_us);
+	cJSON *root = list_start(&b, context, what[e->kind], e->time_us);
 
 	if (e->kind == LOG_FAULT) {
 		put_text(&b, root, "fault", wire_fault_name(e->fault));
@@ -213,7 +213,7 @@ int list_drops(const char *file, bool json)
 {
 	struct list list = {.file = file};
 	struct log_visitor visitor = {.context = &list,
-	                              .capture = json ? object : row,
+	                              .capture = json ? object : list_row,
 	                              .event = json ? object_of_event : row_of_event};
 	char message[READ_MESSAGE_MAX] = "";
 	int result = read_list(file, &visitor, message);

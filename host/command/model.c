@@ -16,7 +16,7 @@ static const uint64_t NO_SEED = UINT64_MAX;
 enum { LIST_MAX = 256, HISTORY_MAX = 10000000 };
 
 /* The next word of a list with commas, from *list on; false at its end. */
-static bool next_word(const char **list, char word[LIST_MAX])
+static bool model_next_word(const char **list, char word[LIST_MAX])
 {
 	size_t length = strcspn(*list, ",");
 
@@ -32,7 +32,7 @@ static int take_ask(const struct option_table *table, const char *name, const ch
 	struct model_options *asking = into;
 	char word[LIST_MAX];
 
-	while (next_word(&list, word)) {
+	while (model_next_word(&list, word)) {
 		enum model_question question;
 
 		if (model_question_parse(word, &question) != 0)
@@ -52,7 +52,7 @@ static int take_refine(const struct option_table *table, const char *name, const
 	refined->refinements = 0;
 	if (strcmp(list, "none") == 0)
 		return OPTIONS_READ;
-	while (next_word(&list, word)) {
+	while (model_next_word(&list, word)) {
 		enum model_refinement refinement;
 
 		if (strcmp(word, "none") == 0)
@@ -140,7 +140,7 @@ static int parse_vary(struct ensemble *ensemble, const char *list)
 	char word[LIST_MAX];
 	int code = COMMAND_DONE;
 
-	while (code == COMMAND_DONE && next_word(&list, word)) {
+	while (code == COMMAND_DONE && model_next_word(&list, word)) {
 		if (ensemble->axes == ENSEMBLE_KEYS_MAX)
 			return command_usage("model", "--vary has too many keys, expected %d at most",
 			                     ENSEMBLE_KEYS_MAX);
@@ -208,7 +208,7 @@ static const struct option_table known_options = {
 };
 
 /* What does not go together. */
-static int check(struct model_arguments *a)
+static int model_check(struct model_arguments *a)
 {
 	int tasks = (a->ensemble.axes > 0) + (a->draws > 0) + a->sensitivity + (a->history != NULL);
 
@@ -248,7 +248,7 @@ int command_model(int argc, char **argv)
 	code = option_read(&known_options, &a, argc, argv);
 	if (code != OPTIONS_READ)
 		return code;
-	code = check(&a);
+	code = model_check(&a);
 	if (code == COMMAND_DONE)
 		code = evaluate_read_scene(&scene, a.scene_file, a.angle_deg);
 	if (code != COMMAND_DONE)

@@ -97,7 +97,7 @@ static int write_history(FILE *out, double (*value)[MODEL_AXES], size_t count, d
 	return ferror(out) ? DT_E_SYSTEM : 0;
 }
 
-static int history(const struct model_arguments *a)
+static int model_answer_history(const struct model_arguments *a)
 {
 	const struct ensemble *e = &a->ensemble;
 	char message[512];
@@ -165,5 +165,5 @@ int model_answer(const struct model_arguments *a)
 		return many(a);
 	if (a->sensitivity)
 		return sensitivity(a);
-	return a->history ? history(a) : one(a);
+	return a->history ? model_answer_history(a) : one(a);
 }

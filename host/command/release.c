@@ -17,7 +17,8 @@ enum {
 
 static const uint32_t GUARDS = WIRE_CHECK_ESTOP | WIRE_CHECK_DOOR | WIRE_CHECK_LATCH | WIRE_CHECK_PRODUCT;
 
-static void __attribute__((format(printf, 2, 3))) say(const struct release *release, const char *format, ...)
+static void __attribute__((format(printf, 2, 3)))
+release_say(const struct release *release, const char *format, ...)
 {
 	char line[200];
 	va_list arguments;
@@ -53,7 +54,7 @@ static void tell_checks(struct release *release, uint32_t checks)
 {
 	for (unsigned i = 0; i < WIRE_CHECKS; i++)
 		if ((checks >> i & 1u) != 0)
-			say(release, "check     %-10s %s", wire_check_name(i), wire_check_text(i));
+			release_say(release, "check     %-10s %s", wire_check_name(i), wire_check_text(i));
 	release->checks = checks;
 }
 
@@ -67,7 +68,7 @@ static void follow_checks(struct release *release)
 	    session_now_ms() - release->start_ms < QUIET_MS)
 		return;
 	if (checks == 0)
-		say(release, "checks    all green");
+		release_say(release, "checks    all green");
 	tell_checks(release, checks);
 }
 
@@ -84,14 +85,14 @@ static enum release_phase phase_of(const struct session_view *view)
 }
 
 /* The key that leads on; 0: none does. */
-static int key_of(enum release_phase phase)
+static int release_key_of(enum release_phase phase)
 {
 	static const char keys[] = {[RELEASE_GUARD] = 'c', [RELEASE_READY] = 'a', [RELEASE_ARMED] = 'r'};
 
 	return (size_t)phase < sizeof(keys) ? keys[phase] : 0;
 }
 
-static void enter(struct release *release, enum release_phase phase)
+static void release_enter(struct release *release, enum release_phase phase)
 {
 	static const char *const prompts[] = {
 	        [RELEASE_GUARD] = "a guard was open. Nobody in the tower, nothing in its way? c acknowledges",
@@ -102,19 +103,19 @@ static void enter(struct release *release, enum release_phase phase)
 	const struct session_view *view = session_view(release->session);
 
 	if (phase < RELEASE_WARNING && release->phase >= RELEASE_WARNING)
-		say(release, "disarmed  by the tower");
+		release_say(release, "disarmed  by the tower");
 	release->phase = phase;
 	release->pressed = false;
 	if (phase == RELEASE_READY)
-		say(release, "ready     all checks green");
+		release_say(release, "ready     all checks green");
 	if (phase == RELEASE_WARNING)
-		say(release, "armed     the warning is on, %.1f s",
-		    (double)(view->release_from_ms - session_now_ms()) / 1000.0);
+		release_say(release, "armed     the warning is on, %.1f s",
+		            (double)(view->release_from_ms - session_now_ms()) / 1000.0);
 	if (release->unattended)
 		return;
 	terminal_forget();
-	if (key_of(phase) != 0)
-		say(release, "key       %s", prompts[phase]);
+	if (release_key_of(phase) != 0)
+		release_say(release, "key       %s", prompts[phase]);
 }
 
 /* ---- its ends ---- */
@@ -125,7 +126,7 @@ static bool unanswered(int result)
 }
 
 /* By the person: what is armed, or may be, is disarmed. */
-static int stop(struct release *release, bool asked_to_arm)
+static int release_stop(struct release *release, bool asked_to_arm)
 {
 	const struct session_view *view = session_view(release->session);
 	bool armed = asked_to_arm || view->armed || view->state == WIRE_STATE_ARMED;
@@ -134,7 +135,7 @@ static int stop(struct release *release, bool asked_to_arm)
 	return result == 0 ? command_stopped() : command_link_failed("abort", result);
 }
 
-static int refused(struct release *release, int result)
+static int release_refused(struct release *release, int result)
 {
 	char difference[SESSION_MESSAGE_MAX];
 
@@ -149,11 +150,12 @@ static int refused(struct release *release, int result)
 
 /* A verb is on its way: its outcome shows in a status or two. Refused because something has just changed, it
  * is tried again. */
-static int sent(struct release *release, int result)
+static int release_sent(struct release *release, int result)
 {
 	release->look_at = session_view(release->session)->statuses + 2;
-	return result == 0 || result == DT_E_STATE || result == DT_E_CHECKS ? COMMAND_DONE
-	                                                                    : refused(release, result);
+	return result == 0 || result == DT_E_STATE || result == DT_E_CHECKS
+	               ? COMMAND_DONE
+	               : release_refused(release, result);
 }
 
 /* Unattended what only our own silence has caused is cleared: nothing has fallen, and nobody else will. */
@@ -166,8 +168,8 @@ static int held(struct release *release)
 	if (release->unattended && view->fault == WIRE_FAULT_HOST_LOST) {
 		if (view->statuses < release->look_at)
 			return COMMAND_DONE;
-		say(release, "lost      %s", wire_fault_text(view->fault));
-		return sent(release, session_command(release->session, WIRE_OP_CLEAR));
+		release_say(release, "lost      %s", wire_fault_text(view->fault));
+		return release_sent(release, session_command(release->session, WIRE_OP_CLEAR));
 	}
 	command_error("the tower holds a fault: %s; 'droptower ctl clear' when its cause is gone",
 	              wire_fault_text(view->fault));
@@ -176,25 +178,25 @@ static int held(struct release *release)
 
 /* ---- the verbs ---- */
 
-static int acknowledge(struct release *release)
+static int release_acknowledge(struct release *release)
 {
 	int result = session_command(release->session, WIRE_OP_CLEAR);
 
 	if (result == 0)
-		say(release, "cleared   acknowledged");
-	return sent(release, result);
+		release_say(release, "cleared   acknowledged");
+	return release_sent(release, result);
 }
 
-static int arm(struct release *release)
+static int release_arm(struct release *release)
 {
 	int result = session_command(release->session, WIRE_OP_ARM);
 
 	if (interrupt_came())
-		return stop(release, true);
-	return sent(release, result);
+		return release_stop(release, true);
+	return release_sent(release, result);
 }
 
-static int let_fall(struct release *release)
+static int release_let_fall(struct release *release)
 {
 	int result = session_command(release->session, WIRE_OP_RELEASE);
 
@@ -207,20 +209,20 @@ static int let_fall(struct release *release)
 		return COMMAND_DONE; /* it has disarmed: why is seen in its next status */
 	/* an interrupted release may have worked: what follows aborts it and looks */
 	if (result != 0 && !interrupt_came())
-		return refused(release, result);
-	say(release, "released");
+		return release_refused(release, result);
+	release_say(release, "released");
 	return COMMAND_DONE;
 }
 
-static int act(struct release *release)
+static int release_act(struct release *release)
 {
 	switch (release->phase) {
 	case RELEASE_GUARD:
-		return acknowledge(release);
+		return release_acknowledge(release);
 	case RELEASE_READY:
-		return arm(release);
+		return release_arm(release);
 	case RELEASE_ARMED:
-		return let_fall(release);
+		return release_let_fall(release);
 	case RELEASE_HEARD:
 	case RELEASE_WAIT:
 	case RELEASE_WARNING:
@@ -232,32 +234,33 @@ static int act(struct release *release)
 static int hear_key(struct release *release)
 {
 	const struct session_view *view = session_view(release->session);
-	int wanted = key_of(release->phase), key;
+	int wanted = release_key_of(release->phase), key;
 
 	if (release->pressed)
-		return view->statuses >= release->look_at ? act(release) : COMMAND_DONE;
+		return view->statuses >= release->look_at ? release_act(release) : COMMAND_DONE;
 	if (release->unattended)
-		return wanted != 0 && view->statuses >= release->look_at ? act(release) : COMMAND_DONE;
+		return wanted != 0 && view->statuses >= release->look_at ? release_act(release)
+		                                                         : COMMAND_DONE;
 	key = terminal_key();
 	if (key == 0)
 		return COMMAND_DONE;
 	if (key == wanted)
-		return act(release);
-	if (release->phase == RELEASE_WARNING && key == key_of(RELEASE_ARMED)) {
-		say(release, "early     the warning is not over yet");
+		return release_act(release);
+	if (release->phase == RELEASE_WARNING && key == release_key_of(RELEASE_ARMED)) {
+		release_say(release, "early     the warning is not over yet");
 		return COMMAND_DONE;
 	}
-	return stop(release, false);
+	return release_stop(release, false);
 }
 
-static int turn(struct release *release)
+static int release_turn(struct release *release)
 {
 	const struct session_view *view = session_view(release->session);
 	int result = session_poll(release->session, 20);
 	enum release_phase phase;
 
 	if (interrupt_came())
-		return stop(release, false);
+		return release_stop(release, false);
 	if (result != 0)
 		return command_link_failed("waiting for the checks", result);
 	if (view->state == WIRE_STATE_FAULT_HELD)
@@ -265,11 +268,11 @@ static int turn(struct release *release)
 	follow_checks(release);
 	phase = phase_of(view);
 	if (phase != release->phase)
-		enter(release, phase);
+		release_enter(release, phase);
 	if (release->unattended &&
 	    session_is_over(release->session, release->from_statuses + READY_STATUSES)) {
 		command_error("not released within %d s", READY_STATUSES / SESSION_STATUSES_HZ);
-		return refused(release, DT_E_CHECKS);
+		return release_refused(release, DT_E_CHECKS);
 	}
 	return hear_key(release);
 }
@@ -285,7 +288,7 @@ int release_ask(struct release *release)
 		return COMMAND_REFUSED;
 	}
 	while (code == COMMAND_DONE && !release->released)
-		code = turn(release);
+		code = release_turn(release);
 	terminal_close();
 	return code;
 }

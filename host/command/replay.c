@@ -84,7 +84,7 @@ static bool is_towers(const struct frame *frame)
 	       (frame->id == WIRE_ID_HEARTBEAT_TOWER || frame->id == WIRE_ID_STATUS);
 }
 
-static int refuse(const struct replay *replay)
+static int replay_refuse(const struct replay *replay)
 {
 	command_error("%s: a tower is heard there; --as-host is for a bus without one", replay->to);
 	return COMMAND_REFUSED;
@@ -103,7 +103,7 @@ static int listen_on_link(const struct replay *replay, struct link *to, int64_t 
 		if (result < 0)
 			return command_link_failed(replay->to, result);
 		if (result > 0 && is_towers(&frame))
-			return refuse(replay);
+			return replay_refuse(replay);
 		if (result == 0 && left_ms <= 0)
 			return COMMAND_DONE;
 	} while (!interrupt_came());
@@ -130,8 +130,8 @@ static int send_to_link(struct replay *replay, struct link *to, struct frame *fr
 }
 
 /* To link or publisher. A COMMAND_* code. */
-static int send_frame(struct replay *replay, struct frame *frame, struct link *to,
-                      struct publisher *publisher)
+static int replay_send_frame(struct replay *replay, struct frame *frame, struct link *to,
+                             struct publisher *publisher)
 {
 	int code = COMMAND_DONE, result;
 
@@ -161,7 +161,7 @@ static int replay_frames(struct replay *replay, struct link *from, struct link *
 		else if (is_hosts(&frame) && !copies && !replay->as_host)
 			replay->withheld++;
 		else
-			code = send_frame(replay, &frame, to, publisher);
+			code = replay_send_frame(replay, &frame, to, publisher);
 	}
 	replay->skipped += link_counters(from)->malformed;
 	if (code == COMMAND_DONE && result != DT_E_CLOSED && result != 1)
@@ -203,7 +203,7 @@ static int replay_candump(struct replay *replay)
 
 /* ---- LCM events ---- */
 
-static void on_state(const lcm_recv_buf_t *buffer, const char *channel, void *user)
+static void replay_on_state(const lcm_recv_buf_t *buffer, const char *channel, void *user)
 {
 	struct replay *replay = user;
 
@@ -223,7 +223,7 @@ static int listen_on_lcm(struct replay *replay, struct publisher *publisher, int
 		if (lcm_handle_timeout(publisher->lcm, left_ms > 0 ? (int)left_ms : 0) < 0)
 			return command_link_failed(replay->to, DT_E_LINK);
 		if (replay->states_heard > replay->states_sent)
-			return refuse(replay);
+			return replay_refuse(replay);
 	} while (session_now_ms() < until_ms && !interrupt_came());
 	return COMMAND_DONE;
 }
@@ -252,7 +252,7 @@ static int replay_events(struct replay *replay, struct log_file *log, struct pub
 	int code = COMMAND_DONE;
 
 	if (replay->as_host) {
-		code = publisher_listen(publisher, PUBLISH_STATE, on_state, replay) == 0
+		code = publisher_listen(publisher, PUBLISH_STATE, replay_on_state, replay) == 0
 		               ? listen_on_lcm(replay, publisher, LISTEN_MS)
 		               : command_link_failed(replay->to, DT_E_LINK);
 	}

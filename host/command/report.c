@@ -53,7 +53,7 @@ static int failed(const char *message)
 	return COMMAND_INPUT;
 }
 
-static int write_csv(const struct series_report *request, const char *file)
+static int report_write_csv(const struct series_report *request, const char *file)
 {
 	struct archive_filter filter = archive_filter_none();
 	char message[ARCHIVE_MESSAGE_MAX];
@@ -114,16 +114,16 @@ static int write_pdf(const struct text *page, const char *file)
 	return result == 0 ? COMMAND_DONE : failed(message);
 }
 
-static void tell(void *context, const char *text)
+static void report_tell(void *context, const char *text)
 {
 	(void)context;
 	command_error("%s", text);
 }
 
 /* Whether its drops are what was recorded, when nobody wants a page. */
-static int look(const struct series_report *request)
+static int report_look(const struct series_report *request)
 {
-	int lacks = archive_verify(request->archive, request->series, 0, tell, NULL);
+	int lacks = archive_verify(request->archive, request->series, 0, report_tell, NULL);
 
 	if (lacks < 0)
 		return archived_failed(request->archive);
@@ -135,7 +135,7 @@ static int look(const struct series_report *request)
 }
 
 /* The page is made once for both. */
-static int make(const struct series_report *request, struct text *page)
+static int report_make(const struct series_report *request, struct text *page)
 {
 	char message[ARCHIVE_MESSAGE_MAX] = "";
 	int result = text_open(page);
@@ -147,7 +147,7 @@ static int make(const struct series_report *request, struct text *page)
 	return result == 0 ? COMMAND_DONE : failed(message[0] != '\0' ? message : error_text(result));
 }
 
-static int write_page(const struct arguments *a, const struct text *page)
+static int report_write_page(const struct arguments *a, const struct text *page)
 {
 	char message[ARCHIVE_MESSAGE_MAX];
 
@@ -156,25 +156,25 @@ static int write_page(const struct arguments *a, const struct text *page)
 	return a->pdf != NULL ? write_pdf(page, a->pdf) : COMMAND_DONE;
 }
 
-static int write_all(struct archive *archive, const char *series, const struct arguments *a)
+static int report_write_all(struct archive *archive, const char *series, const struct arguments *a)
 {
 	struct series_report request = {.archive = archive,
 	                                .series = series,
 	                                .undecided = a->undecided,
 	                                .version = DT_VERSION,
 	                                .partial = a->partial,
-	                                .lacking = tell};
+	                                .lacking = report_tell};
 	struct scene scene;
 	struct text page = {.bytes = NULL};
 	int code;
 
 	if (archive_scene(archive, series, &scene) != 0)
 		return archived_failed(archive);
-	code = a->html != NULL || a->pdf != NULL ? make(&request, &page) : look(&request);
+	code = a->html != NULL || a->pdf != NULL ? report_make(&request, &page) : report_look(&request);
 	if (code == COMMAND_DONE && a->csv != NULL)
-		code = write_csv(&request, a->csv);
+		code = report_write_csv(&request, a->csv);
 	if (code == COMMAND_DONE)
-		code = write_page(a, &page);
+		code = report_write_page(a, &page);
 	free(page.bytes);
 	return code;
 }
@@ -196,7 +196,7 @@ int command_report(int argc, char **argv)
 	if (archive == NULL)
 		return failed(message);
 	interrupt_catch();
-	code = write_all(archive, argv[optind], &a);
+	code = report_write_all(archive, argv[optind], &a);
 	archive_close(archive);
 	return code;
 }

@@ -95,7 +95,7 @@ static int choose_scene(struct run *run)
 }
 
 /* What does not go together. */
-static int check(struct run *run)
+static int run_check(struct run *run)
 {
 	int code;
 
@@ -172,7 +172,7 @@ int command_run(int argc, char **argv)
 
 	if (code != OPTIONS_READ)
 		return code;
-	code = check(&run);
+	code = run_check(&run);
 	if (code != COMMAND_DONE)
 		return code;
 	interrupt_catch();

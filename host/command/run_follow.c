@@ -19,7 +19,7 @@ enum {
 
 /* ---- to the release ---- */
 
-static void say(void *user, const char *line)
+static void run_follow_say(void *user, const char *line)
 {
 	run_progress(user, "%s", line);
 }
@@ -39,11 +39,11 @@ static void tell_plan(const struct run *run)
 	             scene->drop_angle_deg, place);
 }
 
-static int let_fall(struct run *run)
+static int run_follow_let_fall(struct run *run)
 {
 	struct release release = {.session = run->session,
 	                          .unattended = run->unattended || run->link == NULL,
-	                          .say = say,
+	                          .say = run_follow_say,
 	                          .user = run};
 	int code;
 
@@ -170,7 +170,7 @@ static int release_and_follow(struct run *run, struct record *record)
 	int code = result == 0 ? run_keep_room(run) : command_tower_failed(result, message);
 
 	if (code == COMMAND_DONE)
-		code = let_fall(run);
+		code = run_follow_let_fall(run);
 	return code == COMMAND_DONE ? follow_to_end(run, record) : code;
 }
 

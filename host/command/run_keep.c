@@ -92,7 +92,7 @@ int run_keep_room(const struct run *run)
 /* ---- after it ---- */
 
 /* The drop is in memory, and shown; what could not be kept of it is told. */
-static int tell_lost(const struct run *run)
+static int run_keep_tell_lost(const struct run *run)
 {
 	command_error("%s: could not be written; the tower holds the drop, the next run fetches it",
 	              run->log);
@@ -138,7 +138,7 @@ static int report_archived(struct run *run, struct record *record)
 
 	if (run->log_failed || archive_finish(run->archive, &run->recording, 0, note) != 0) {
 		(void)evaluate(record, &options);
-		return run->log_failed ? tell_lost(run) : archived_failed(run->archive);
+		return run->log_failed ? run_keep_tell_lost(run) : archived_failed(run->archive);
 	}
 	run_progress(run, "recorded  %s/%u", r->series, r->number);
 	code = archived_analyse(run->archive, r->series, r->number);
@@ -174,7 +174,7 @@ static int report_files(struct run *run, struct record *record)
 		options.html = options.json_file = NULL;
 		(void)evaluate(record, &options);
 		if (run->log_failed)
-			return tell_lost(run);
+			return run_keep_tell_lost(run);
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}

@@ -96,7 +96,7 @@ static const struct option_table known_options = {
 };
 
 /* What does not go together. */
-static int check_options(const struct series_arguments *a)
+static int series_check_options(const struct series_arguments *a)
 {
 	if (a->json && a->csv != NULL)
 		return command_usage("series", "--json and --csv exclude each other");
@@ -134,7 +134,7 @@ static const struct verb {
 enum { VERBS = sizeof(verbs) / sizeof(verbs[0]) };
 
 /* What a verb needs beside its words. */
-static int check(const struct verb *verb, struct series_arguments *a)
+static int series_check(const struct verb *verb, struct series_arguments *a)
 {
 	const char *name = verb->name;
 
@@ -167,7 +167,7 @@ static int run_verb(const struct verb *verb, struct series_arguments *a)
 {
 	char message[ARCHIVE_MESSAGE_MAX];
 	struct archive *archive;
-	int code = check(verb, a);
+	int code = series_check(verb, a);
 
 	if (code != COMMAND_DONE)
 		return code;
@@ -189,7 +189,7 @@ int command_series(int argc, char **argv)
 
 	if (code != OPTIONS_READ)
 		return code;
-	code = check_options(&a);
+	code = series_check_options(&a);
 	if (code != COMMAND_DONE)
 		return code;
 	a.operator_name = archived_operator(a.operator_name);

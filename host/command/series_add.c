@@ -41,7 +41,7 @@ struct adding {
 /* How exactly an angle is set, and how far friction and the gates leave a frame from free fall. */
 static const double ANGLE_DEG = 0.01, HEIGHT_M = 0.0005, SPEED_SHARE = 0.1;
 
-static bool refuse(struct adding *adding)
+static bool series_add_refuse(struct adding *adding)
 {
 	adding->code = COMMAND_INPUT;
 	return false;
@@ -65,7 +65,7 @@ static char *name_beside(const char *file, const char *ending)
 	return asprintf(&name, "%.*s%s", stem, file, ending) < 0 ? NULL : name;
 }
 
-static double number_of(const cJSON *object, const char *key)
+static double series_add_number_of(const cJSON *object, const char *key)
 {
 	const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
 
@@ -88,8 +88,8 @@ static void read_json_beside(struct adding *adding)
 	}
 	scene = cJSON_GetObjectItemCaseSensitive(json, "scene");
 	if (scene != NULL) {
-		adding->angle_deg = number_of(scene, "angle_deg");
-		adding->height_m = number_of(scene, "height_m");
+		adding->angle_deg = series_add_number_of(scene, "angle_deg");
+		adding->height_m = series_add_number_of(scene, "height_m");
 		adding->beside = "in the JSON beside it";
 	}
 	cJSON_Delete(json);
@@ -134,7 +134,7 @@ static bool one_agrees(struct adding *adding, const char *name, const char *what
 		return true;
 	command_error("%s: %s %g %s %s, expected %g %s of series %s", name, what, found, unit, source, wanted,
 	              unit, adding->a->word[0]);
-	return refuse(adding);
+	return series_add_refuse(adding);
 }
 
 /* Mean speed of a frame in free fall between the gates. */
@@ -172,8 +172,8 @@ static bool parameters_agree(struct adding *adding, const char *name, const stru
 	return true;
 }
 
-static bool agrees(struct adding *adding, const char *name, const struct log_capture *capture,
-                   const struct record *record)
+static bool series_add_agrees(struct adding *adding, const char *name, const struct log_capture *capture,
+                              const struct record *record)
 {
 	const struct scene *scene = &adding->scene;
 
@@ -189,7 +189,7 @@ static bool agrees(struct adding *adding, const char *name, const struct log_cap
 
 /* ---- what is there already ---- */
 
-static int key_of(const char *log, char key[ARCHIVE_KEY_MAX])
+static int series_add_key_of(const char *log, char key[ARCHIVE_KEY_MAX])
 {
 	char message[READ_MESSAGE_MAX];
 	struct record record;
@@ -205,7 +205,7 @@ static int key_of(const char *log, char key[ARCHIVE_KEY_MAX])
 }
 
 /* 1: it was said where. */
-static int is_there(struct adding *adding, const char *name, const char *key)
+static int series_add_is_there(struct adding *adding, const char *name, const char *key)
 {
 	char drop[ARCHIVE_NAME_MAX + 16];
 	int found = key != NULL ? archive_find_capture(adding->archive, key, drop)
@@ -339,24 +339,24 @@ static void add_record(struct adding *adding, const struct log_capture *capture,
 	name_drop(adding, capture, name, sizeof(name));
 	if (!drop_has_channel(record)) {
 		command_error("%s: no channel S1X to S2Z, expected a drop of the tower", name);
-		refuse(adding);
+		series_add_refuse(adding);
 		return;
 	}
 	if (record->is_drop)
 		log_capture_key(record, key);
-	if (key[0] != '\0' && is_there(adding, name, key) != 0)
+	if (key[0] != '\0' && series_add_is_there(adding, name, key) != 0)
 		return;
-	if (agrees(adding, name, capture, record))
+	if (series_add_agrees(adding, name, capture, record))
 		take_in(adding, name, capture, record->format, key);
 }
 
-static int add_drop(void *context, const struct log_capture *capture, struct record *record)
+static int series_add_drop(void *context, const struct log_capture *capture, struct record *record)
 {
 	struct adding *adding = context;
 
 	if (record == NULL) {
 		command_error("%s, drop %u: no block of it", adding->file, capture->number);
-		refuse(adding);
+		series_add_refuse(adding);
 		return 0;
 	}
 	add_record(adding, capture, record);
@@ -372,15 +372,15 @@ static void add_log(struct adding *adding, const char *file)
 	if (stat(file, &adding->status) != 0 || !S_ISREG(adding->status.st_mode)) {
 		command_error("%s: %s", file,
 		              stat(file, &adding->status) != 0 ? strerror(errno) : "expected a regular file");
-		refuse(adding);
+		series_add_refuse(adding);
 		return;
 	}
-	if (is_there(adding, file, NULL) != 0)
+	if (series_add_is_there(adding, file, NULL) != 0)
 		return;
 	read_beside(adding);
-	if (read_each(file, NULL, add_drop, adding, message) < 0) {
+	if (read_each(file, NULL, series_add_drop, adding, message) < 0) {
 		command_error("%s", message);
-		refuse(adding);
+		series_add_refuse(adding);
 	}
 }
 
@@ -392,7 +392,7 @@ int series_verb_add(struct archive *archive, struct series_arguments *a)
 	if (code != COMMAND_DONE)
 		return code;
 	if (archive_scene(archive, a->word[0], &adding.scene) != 0 ||
-	    archive_ask_captures(archive, key_of) != 0)
+	    archive_ask_captures(archive, series_add_key_of) != 0)
 		return archived_failed(archive);
 	interrupt_catch();
 	for (int i = 1; i < a->count && !interrupt_came(); i++)

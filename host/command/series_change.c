@@ -61,7 +61,7 @@ static int choose_one(void *context, const struct archive_drop *drop)
 	return 0;
 }
 
-static int choose(struct archive *archive, const char *series, struct chosen *chosen)
+static int series_change_choose(struct archive *archive, const char *series, struct chosen *chosen)
 {
 	struct archive_filter filter = archive_filter_none();
 	int code = series != NULL ? series_must_be(archive, series) : COMMAND_DONE;
@@ -108,7 +108,7 @@ static int decide(struct archive *archive, const struct series_arguments *a, con
 static int accept_series(struct archive *archive, const struct series_arguments *a, const char *series)
 {
 	struct chosen chosen = {.undecided_only = true};
-	int code = choose(archive, series, &chosen);
+	int code = series_change_choose(archive, series, &chosen);
 
 	for (size_t i = 0; i < chosen.count && code == COMMAND_DONE; i++)
 		code = decide(archive, a, chosen.drop[i].name, ARCHIVE_ACCEPTED);
@@ -189,7 +189,7 @@ int series_verb_reanalyse(struct archive *archive, struct series_arguments *a)
 	for (int i = 0; i < a->count && code == COMMAND_DONE; i++) {
 		struct chosen chosen = {0};
 
-		code = choose(archive, a->word[i], &chosen);
+		code = series_change_choose(archive, a->word[i], &chosen);
 		if (code == COMMAND_DONE)
 			code = analyse_chosen(archive, &chosen);
 	}
@@ -210,7 +210,7 @@ int series_rebuild(const struct series_arguments *a)
 		return COMMAND_INPUT;
 	}
 	interrupt_catch();
-	code = choose(archive, NULL, &chosen);
+	code = series_change_choose(archive, NULL, &chosen);
 	if (code == COMMAND_DONE)
 		code = analyse_chosen(archive, &chosen);
 	archive_close(archive);

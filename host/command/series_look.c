@@ -68,7 +68,7 @@ static int print_all(struct job *job, enum table_format format, FILE *out)
 	return print_drops(job->archive, &job->arguments->filter, job->arguments->undecided, format, out);
 }
 
-static int print_table(struct job *job, enum table_format format, FILE *out)
+static int series_look_print_table(struct job *job, enum table_format format, FILE *out)
 {
 	return print_tables(job->archive, &job->arguments->filter, job->arguments->undecided,
 	                    job->arguments->reference, format, out);
@@ -156,7 +156,7 @@ int series_verb_tables(struct archive *archive, struct series_arguments *a)
 		a->filter.campaign = a->word[0];
 	if (a->filter.campaign != NULL)
 		code = campaign_must_be(archive, a->filter.campaign);
-	return code != COMMAND_DONE ? code : print(&(struct job){archive, a, print_table});
+	return code != COMMAND_DONE ? code : print(&(struct job){archive, a, series_look_print_table});
 }
 
 int series_verb_calibrations(struct archive *archive, struct series_arguments *a)

@@ -19,7 +19,7 @@ struct arguments {
 };
 
 /* Options that choose one of three. */
-static int take_choice(const struct option_table *table, const char *name, const char *text, void *into)
+static int srs_take_choice(const struct option_table *table, const char *name, const char *text, void *into)
 {
 	struct spectrum_options *spectrum = &((struct arguments *)into)->spectrum;
 	int chosen;
@@ -57,10 +57,10 @@ static const struct option_row rows[] = {
         OPTION_NUMBER("from", "HZ", struct arguments, spectrum.from_hz, 1e-6, 1e9, "lowest frequency (5)"),
         OPTION_NUMBER("to", "HZ", struct arguments, spectrum.to_hz, 1e-6, 1e9,
                       "highest (2000, or a quarter of the slowest rate); none above half a channel's rate"),
-        OPTION_TAKEN_BY("quantity", "NAME", take_choice,
+        OPTION_TAKEN_BY("quantity", "NAME", srs_take_choice,
                         "acceleration (absolute, g), velocity (pseudo, m/s) or displacement (relative, m)"),
-        OPTION_TAKEN_BY("side", "NAME", take_choice, "positive, negative or maximax (maximax)"),
-        OPTION_TAKEN_BY("part", "NAME", take_choice, "primary, residual or total (total)"),
+        OPTION_TAKEN_BY("side", "NAME", srs_take_choice, "positive, negative or maximax (maximax)"),
+        OPTION_TAKEN_BY("part", "NAME", srs_take_choice, "primary, residual or total (total)"),
         OPTION_TAKEN("offset", "keep", struct arguments, spectrum.keep_offset, take_offset,
                      "leave the offset before the shock in"),
         OPTION_FLAG("no-upsampling", struct arguments, spectrum.srs.keep_rate,
@@ -88,7 +88,7 @@ static const struct option_table known_options = {
         .words = true,
 };
 
-static int check(struct arguments *arguments, int argc, char **argv)
+static int srs_check(struct arguments *arguments, int argc, char **argv)
 {
 	if (optind + 1 != argc)
 		return command_usage("srs", "expected one FILE, %d given", argc - optind);
@@ -104,7 +104,7 @@ static int check(struct arguments *arguments, int argc, char **argv)
 
 /* ---- output ---- */
 
-static int write_csv(const struct spectrum_report *report, const char *file, char *message, size_t size)
+static int srs_write_csv(const struct spectrum_report *report, const char *file, char *message, size_t size)
 {
 	struct whole whole;
 	int result = whole_open(&whole, file, message, size);
@@ -126,7 +126,7 @@ static int write_svg(const struct spectrum_report *report, const char *file, cha
 	return result;
 }
 
-static int write_out(const struct spectrum_report *report, const struct arguments *arguments)
+static int srs_write_out(const struct spectrum_report *report, const struct arguments *arguments)
 {
 	char message[2 * READ_MESSAGE_MAX];
 
@@ -134,7 +134,7 @@ static int write_out(const struct spectrum_report *report, const struct argument
 		command_error("standard output: %s", strerror(errno));
 		return COMMAND_INPUT;
 	}
-	if ((arguments->csv && write_csv(report, arguments->csv, message, sizeof(message)) != 0) ||
+	if ((arguments->csv && srs_write_csv(report, arguments->csv, message, sizeof(message)) != 0) ||
 	    (arguments->svg && write_svg(report, arguments->svg, message, sizeof(message)) != 0)) {
 		command_error("%s", message);
 		return COMMAND_INPUT;
@@ -142,7 +142,7 @@ static int write_out(const struct spectrum_report *report, const struct argument
 	return COMMAND_DONE;
 }
 
-static int judge(const struct spectrum_report *report)
+static int srs_judge(const struct spectrum_report *report)
 {
 	const struct spectrum *s = report->spectrum;
 	bool flagged = false;
@@ -160,7 +160,7 @@ static int judge(const struct spectrum_report *report)
 
 /* ---- work ---- */
 
-static int refuse(const char *file, int result, const struct spectrum_options *options)
+static int srs_refuse(const char *file, int result, const struct spectrum_options *options)
 {
 	if (result == DT_E_ARGUMENT)
 		command_error(
@@ -198,10 +198,10 @@ static int spectrum_of(const struct record *record, const struct arguments *argu
 		return code;
 	result = spectrum_compute(record, &arguments->spectrum, &spectrum);
 	if (result != 0)
-		return refuse(record->file, result, &arguments->spectrum);
-	code = write_out(&report, arguments);
+		return srs_refuse(record->file, result, &arguments->spectrum);
+	code = srs_write_out(&report, arguments);
 	if (code == COMMAND_DONE && arguments->strict)
-		code = judge(&report);
+		code = srs_judge(&report);
 	spectrum_free(&spectrum);
 	return code;
 }
@@ -218,7 +218,7 @@ int command_srs(int argc, char **argv)
 
 	if (code != OPTIONS_READ)
 		return code;
-	code = check(&arguments, argc, argv);
+	code = srs_check(&arguments, argc, argv);
 	if (code != COMMAND_DONE)
 		return code;
 	if (arguments.spectrum.to_hz > 0 && arguments.spectrum.to_hz < arguments.spectrum.from_hz)

@@ -16,7 +16,7 @@
 
 /* ---- an archive, a drop ---- */
 
-static void tell(void *context, const char *text)
+static void verify_tell(void *context, const char *text)
 {
 	(void)context;
 	command_error("%s", text);
@@ -51,7 +51,7 @@ static int proven(struct archive *archive, const char *name)
 
 static int verify_archive(struct archive *archive, const char *name)
 {
-	int told = archive_verify(archive, NULL, 0, tell, NULL);
+	int told = archive_verify(archive, NULL, 0, verify_tell, NULL);
 	struct archive_seal seal;
 
 	if (told < 0 || archive_seal(archive, &seal) != 0)
@@ -91,7 +91,7 @@ static int verify_drop(struct archive *archive, const char *name)
 		              name, archive_folder(archive));
 		return COMMAND_INPUT;
 	}
-	told = archive_verify(archive, series, filter.number, tell, NULL);
+	told = archive_verify(archive, series, filter.number, verify_tell, NULL);
 	if (told < 0)
 		return archived_failed(archive);
 	if (told == 0 && !seen.sealed)
@@ -136,7 +136,7 @@ struct proving {
 	bool doubted;
 };
 
-static void judge(struct proving *proving, const char *name, const struct record *record)
+static void verify_judge(struct proving *proving, const char *name, const struct record *record)
 {
 	const char *why = doubt(record);
 
@@ -170,7 +170,7 @@ static int prove(void *context, const struct log_capture *capture, struct record
 		command_error("%s: cut: no block of it", name);
 		return 0;
 	}
-	judge(proving, name, record);
+	verify_judge(proving, name, record);
 	record_free(record);
 	return 0;
 }

@@ -57,7 +57,7 @@ static char *next_line(const struct evidence *e, char **at)
 }
 
 /* False when there is no such comment. */
-static bool split(struct evidence *e)
+static bool verify_report_split(struct evidence *e)
 {
 	static const char mark[] = "droptower evidence\n";
 	char *at = memmem(e->text, e->size, mark, sizeof(mark) - 1), *line;
@@ -99,7 +99,7 @@ static int load(struct evidence *e)
 		command_error("%s", message);
 	else if (sealed == 0)
 		command_error("%s: not sealed: no report of a series, or one of an older version", e->file);
-	else if (e->text != NULL && split(e))
+	else if (e->text != NULL && verify_report_split(e))
 		return COMMAND_DONE;
 	else
 		command_error("%s: no report of a series: it names no drops", e->file);
@@ -109,7 +109,7 @@ static int load(struct evidence *e)
 /* ---- against the archive ---- */
 
 /* The line of this log; NULL when it is not named. */
-static char *line_of(const struct evidence *e, const char *raw)
+static char *verify_report_line_of(const struct evidence *e, const char *raw)
 {
 	char *at = e->first, *line;
 	size_t length = strlen(raw);
@@ -124,7 +124,7 @@ static char *line_of(const struct evidence *e, const char *raw)
 static int hold_drop(void *context, const struct archive_drop *drop)
 {
 	struct evidence *e = context;
-	const char *hash = line_of(e, drop->raw);
+	const char *hash = verify_report_line_of(e, drop->raw);
 	char text[ARCHIVE_MESSAGE_MAX];
 
 	if (hash == NULL)
@@ -138,12 +138,12 @@ static int hold_drop(void *context, const struct archive_drop *drop)
 	return 0;
 }
 
-static void tell(void *context, const char *text)
+static void verify_report_tell(void *context, const char *text)
 {
 	wrong(context, text);
 }
 
-static unsigned named(const struct evidence *e)
+static unsigned verify_report_named(const struct evidence *e)
 {
 	char *at = e->first, *line;
 	unsigned count = 0;
@@ -153,7 +153,7 @@ static unsigned named(const struct evidence *e)
 	return count;
 }
 
-static int hold(struct evidence *e)
+static int verify_report_hold(struct evidence *e)
 {
 	struct archive_filter filter = archive_filter_none();
 	char text[ARCHIVE_MESSAGE_MAX];
@@ -161,7 +161,7 @@ static int hold(struct evidence *e)
 
 	filter.series = e->series;
 	if (reaches < 0 || archive_each_drop(e->archive, &filter, hold_drop, e) != 0 ||
-	    archive_verify(e->archive, e->series, 0, tell, e) < 0)
+	    archive_verify(e->archive, e->series, 0, verify_report_tell, e) < 0)
 		return archived_failed(e->archive);
 	if (reaches == 0) {
 		snprintf(text, sizeof(text), "%s in %.400s: no entry %lld with the head %s",
@@ -169,9 +169,9 @@ static int hold(struct evidence *e)
 		         e->head);
 		wrong(e, text);
 	}
-	if (e->logs < named(e)) {
+	if (e->logs < verify_report_named(e)) {
 		snprintf(text, sizeof(text), "missing: it names %u drops of %s, %.300s has %u of them",
-		         named(e), e->series, archive_folder(e->archive), e->logs);
+		         verify_report_named(e), e->series, archive_folder(e->archive), e->logs);
 		wrong(e, text);
 	}
 	if (e->wrong > 0)
@@ -183,7 +183,7 @@ static int hold(struct evidence *e)
 }
 
 /* The folder a report stands in, when that is an archive, or one named archive in it. */
-static const char *folder_of(const char *file, const char *given, char beside[ARCHIVE_PATH_MAX])
+static const char *verify_report_folder_of(const char *file, const char *given, char beside[ARCHIVE_PATH_MAX])
 {
 	static const char *const names[] = {"", "/archive"};
 	const char *slash = strrchr(file, '/');
@@ -207,12 +207,13 @@ int verify_report(const char *file, const char *folder)
 	int code = load(&e);
 
 	if (code == COMMAND_DONE) {
-		e.archive = archive_open(folder_of(file, folder, beside), ARCHIVE_READ, message);
+		e.archive =
+		        archive_open(verify_report_folder_of(file, folder, beside), ARCHIVE_READ, message);
 		if (e.archive == NULL) {
 			command_error("%s", message);
 			code = COMMAND_INPUT;
 		} else {
-			code = hold(&e);
+			code = verify_report_hold(&e);
 			archive_close(e.archive);
 		}
 	}

@@ -140,14 +140,14 @@ static void add_tick(struct live *live)
 		live->first++;
 }
 
-static void restart(struct live *live)
+static void console_live_restart(struct live *live)
 {
 	live->started = false;
 	live->first = live->begun = live->settled = live->head;
 }
 
 /* What is old enough, or whole, is waited for no longer. */
-static void settle(struct live *live)
+static void live_settle(struct live *live)
 {
 	enum { BOTH = (1u << WIRE_SENSORS) - 1 };
 
@@ -163,18 +163,18 @@ static void settle(struct live *live)
 }
 
 /* The tick's place, NULL of one that is no longer waited for. *anew: the tower of it started anew. */
-static struct tick *place(struct live *live, uint32_t tick_ms, bool *anew)
+static struct tick *live_place(struct live *live, uint32_t tick_ms, bool *anew)
 {
 	int64_t ahead = live->started ? (int64_t)tick_ms - live->head_ms : 1;
 
 	*anew = ahead < -JOIN_FAR_TICKS;
 	if (*anew || ahead > FORWARDS_TICKS) {
-		restart(live);
+		console_live_restart(live);
 		ahead = 1;
 	}
 	for (int64_t i = 0; i < ahead; i++) {
 		add_tick(live);
-		settle(live);
+		live_settle(live);
 	}
 	if (ahead > 0) {
 		live->started = true;
@@ -202,7 +202,7 @@ static void span_samples(const int16_t *sample, unsigned count, int16_t *low, in
 	*high = largest;
 }
 
-static bool take_block(struct live *live, const struct frame *frame, int64_t now_us)
+static bool live_take_block(struct live *live, const struct frame *frame, int64_t now_us)
 {
 	unsigned sensor = frame->id == WIRE_ID_BLOCK_S2, channel = 3 * sensor;
 	struct wire_block block;
@@ -213,7 +213,7 @@ static bool take_block(struct live *live, const struct frame *frame, int64_t now
 	if (wire_check_block(frame) != 0 || wire_unpack_block(frame, &block) != 0)
 		return false;
 	live->block_us = now_us;
-	tick = place(live, block.tick_ms, &anew);
+	tick = live_place(live, block.tick_ms, &anew);
 	if (tick == NULL || (tick->heard >> sensor & 1u) != 0)
 		return anew;
 	tick->heard |= 1u << sensor;
@@ -223,7 +223,7 @@ static bool take_block(struct live *live, const struct frame *frame, int64_t now
 	span_samples(block.y, WIRE_YZ_PER_TICK, &low[1], &high[1]);
 	span_samples(block.z, WIRE_YZ_PER_TICK, &low[2], &high[2]);
 	live->blocks++;
-	settle(live);
+	live_settle(live);
 	return anew;
 }
 
@@ -234,7 +234,7 @@ static bool take_heartbeat(struct live *live, const struct frame *frame, int64_t
 
 	live->heartbeat_us = now_us;
 	if (anew)
-		restart(live);
+		console_live_restart(live);
 	return anew;
 }
 
@@ -245,7 +245,7 @@ bool live_feed(struct live *live, const struct frame *frame, int64_t now_us)
 	pthread_mutex_lock(&live->lock);
 	count_frame(live, frame, now_us);
 	if (frame->id == WIRE_ID_BLOCK_S1 || frame->id == WIRE_ID_BLOCK_S2)
-		anew = take_block(live, frame, now_us);
+		anew = live_take_block(live, frame, now_us);
 	else if (frame->id == WIRE_ID_HEARTBEAT_TOWER)
 		anew = take_heartbeat(live, frame, now_us);
 	pthread_mutex_unlock(&live->lock);
@@ -255,7 +255,7 @@ bool live_feed(struct live *live, const struct frame *frame, int64_t now_us)
 void live_restart(struct live *live)
 {
 	pthread_mutex_lock(&live->lock);
-	restart(live);
+	console_live_restart(live);
 	pthread_mutex_unlock(&live->lock);
 }
 

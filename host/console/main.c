@@ -44,7 +44,7 @@ struct serve {
 
 static volatile sig_atomic_t stops; /* how often we were asked to end */
 
-static void on_signal(int number)
+static void main_on_signal(int number)
 {
 	(void)number;
 	stops = stops + 1;
@@ -56,7 +56,7 @@ static void catch_signals(void)
 	struct sigaction action;
 
 	memset(&action, 0, sizeof(action));
-	action.sa_handler = on_signal;
+	action.sa_handler = main_on_signal;
 	action.sa_flags = SA_RESTART;
 	sigemptyset(&action.sa_mask);
 	sigaction(SIGINT, &action, NULL);
@@ -175,7 +175,7 @@ static void tell_refused(const struct serve *serve)
 }
 
 /* A series that is not there is an error; whatever else is in the way may pass. */
-static int select_series(struct serve *serve)
+static int main_select_series(struct serve *serve)
 {
 	int status;
 
@@ -314,7 +314,7 @@ static void serve_until_stopped(struct serve *serve)
 	}
 }
 
-static void stop(struct serve *serve)
+static void main_stop(struct serve *serve)
 {
 	struct console *console = &serve->console;
 
@@ -357,7 +357,7 @@ int main(int argc, char **argv)
 	if (code == COMMAND_DONE)
 		code = start_http(&serve);
 	if (code == COMMAND_DONE)
-		code = select_series(&serve);
+		code = main_select_series(&serve);
 	if (code == COMMAND_DONE) {
 		tell_what_to_do(&serve);
 		tell_address(&serve);
@@ -365,6 +365,6 @@ int main(int argc, char **argv)
 		serve_until_stopped(&serve);
 		notify("STOPPING=1");
 	}
-	stop(&serve);
+	main_stop(&serve);
 	return code;
 }

@@ -15,7 +15,7 @@ static bool is_link(const char *url)
 }
 
 /* What does not go together. */
-static int check(const struct options *options)
+static int options_check(const struct options *options)
 {
 	const struct tower_options *tower = &options->tower;
 
@@ -65,7 +65,7 @@ int options_read(struct options *options, int argc, char **argv)
 	options->work.archive = archived_folder(given->archive);
 	options->work.operator_name = archived_operator(given->operator_name);
 	options->work.scenes = given->scenes.word;
-	code = check(options);
+	code = options_check(options);
 	if (code == COMMAND_DONE)
 		code = find_scenes(options);
 	if (code == COMMAND_DONE &&

@@ -77,8 +77,8 @@ static enum MHD_Result send_and_forget(struct MHD_Connection *connection, unsign
 }
 
 /* An answer that needs no job. extra: a header, or NULL. */
-static enum MHD_Result refuse(struct MHD_Connection *connection, unsigned status, const char *text,
-                              const char *extra, const char *value)
+static enum MHD_Result request_refuse(struct MHD_Connection *connection, unsigned status, const char *text,
+                                      const char *extra, const char *value)
 {
 	char body[TEXT_MAX + 16];
 	int size = snprintf(body, sizeof(body), "{\"error\":\"%.*s\"}", TEXT_MAX, text);
@@ -93,7 +93,7 @@ static enum MHD_Result refuse(struct MHD_Connection *connection, unsigned status
 	return send_and_forget(connection, status, response);
 }
 
-static enum MHD_Result answer(struct request *request)
+static enum MHD_Result request_answer(struct request *request)
 {
 	struct job *job = &request->job;
 	struct MHD_Response *response = MHD_create_response_from_buffer(job->answer != NULL ? job->size : 0,
@@ -124,19 +124,20 @@ static enum MHD_Result send_part(struct http *http, struct MHD_Connection *conne
 		if (strcmp(part->name, name) != 0)
 			continue;
 		if (strcmp(method, "GET") != 0 && strcmp(method, "HEAD") != 0)
-			return refuse(connection, 405, "expected GET", MHD_HTTP_HEADER_ALLOW, "GET, HEAD");
+			return request_refuse(connection, 405, "expected GET", MHD_HTTP_HEADER_ALLOW,
+			                      "GET, HEAD");
 		response = MHD_create_response_from_buffer(part->size, bytes.taken, MHD_RESPMEM_PERSISTENT);
 		if (response == NULL)
 			return MHD_NO;
 		add_headers(response, part->type, true);
 		return send_and_forget(connection, 200, response);
 	}
-	return refuse(connection, 404, "no such page", NULL, NULL);
+	return request_refuse(connection, 404, "no such page", NULL, NULL);
 }
 
 /* ---- jobs ---- */
 
-static const char *query(const struct job *job, const char *name)
+static const char *request_query(const struct job *job, const char *name)
 {
 	const struct request *request = job->maker;
 
@@ -196,8 +197,8 @@ static enum MHD_Result open_stream(struct request *request)
 	        stream_open(request->http->streams, request->connection, request->console);
 
 	if (response == NULL)
-		return refuse(request->connection, 503, "too many pages watch already",
-		              MHD_HTTP_HEADER_RETRY_AFTER, "5");
+		return request_refuse(request->connection, 503, "too many pages watch already",
+		                      MHD_HTTP_HEADER_RETRY_AFTER, "5");
 	add_headers(response, "text/event-stream", false);
 	return send_and_forget(request->connection, 200, response);
 }
@@ -229,7 +230,7 @@ static enum MHD_Result give_away(struct request *request)
 	struct job *job = &request->job;
 
 	if (!count_job(http))
-		return refuse(request->connection, 503, "the console is ending", NULL, NULL);
+		return request_refuse(request->connection, 503, "the console is ending", NULL, NULL);
 	request->asked = true;
 	MHD_suspend_connection(request->connection); /* first: the job may be done at once */
 	job->run = request->route->run;
@@ -243,24 +244,25 @@ static enum MHD_Result give_away(struct request *request)
 }
 
 /* The request is whole. */
-static enum MHD_Result begin(struct request *request)
+static enum MHD_Result request_begin(struct request *request)
 {
 	struct http *http = request->http;
 
 	if (request->announced > BODY_MAX && !request->route->always)
-		return refuse(request->connection, 413, "expected at most 16 KiB", NULL, NULL);
+		return request_refuse(request->connection, 413, "expected at most 16 KiB", NULL, NULL);
 	if (request->announced > BODY_MAX)
 		request->announced = 0;
 	if (!parse_body(request))
-		return refuse(request->connection, 400, "expected a JSON object in UTF-8, without NUL", NULL,
-		              NULL);
+		return request_refuse(request->connection, 400,
+		                      "expected a JSON object in UTF-8, without NUL", NULL, NULL);
 	if (request->route->needs_hold && !hold_mine(&http->hold, request->console, session_now_ms()))
-		return refuse(request->connection, 423, "this console does not hold the arm", NULL, NULL);
+		return request_refuse(request->connection, 423, "this console does not hold the arm", NULL,
+		                      NULL);
 	if (request->route->kind == ROUTE_STREAM)
 		return open_stream(request);
 	if (request->route->kind == ROUTE_HOLD) {
 		run_hold(request);
-		return answer(request);
+		return request_answer(request);
 	}
 	return give_away(request);
 }
@@ -324,12 +326,12 @@ static enum MHD_Result abort_at_once(struct http *http, struct MHD_Connection *c
 	struct job *job = calloc(1, sizeof(*job));
 
 	if (job == NULL)
-		return refuse(connection, 503, error_text(DT_E_MEMORY), NULL, NULL);
+		return request_refuse(connection, 503, error_text(DT_E_MEMORY), NULL, NULL);
 	job->console = http->console;
 	job->done = forget_job;
 	job->run = route->run;
 	job->run(job);
-	return refuse(connection, 202, "aborting; the body was not waited for", NULL, NULL);
+	return request_refuse(connection, 202, "aborting; the body was not waited for", NULL, NULL);
 }
 
 static enum MHD_Result check_token(struct http *http, struct MHD_Connection *connection, bool *passed)
@@ -340,10 +342,10 @@ static enum MHD_Result check_token(struct http *http, struct MHD_Connection *con
 		return MHD_YES;
 	}
 	if (!guard_take(&http->wrong, session_now_ms()))
-		return refuse(connection, 429, "too many requests without the token",
-		              MHD_HTTP_HEADER_RETRY_AFTER, "2");
-	return refuse(connection, 401, "expected the token that the console printed when it started",
-	              MHD_HTTP_HEADER_WWW_AUTHENTICATE, "Bearer realm=\"droptower\"");
+		return request_refuse(connection, 429, "too many requests without the token",
+		                      MHD_HTTP_HEADER_RETRY_AFTER, "2");
+	return request_refuse(connection, 401, "expected the token that the console printed when it started",
+	                      MHD_HTTP_HEADER_WWW_AUTHENTICATE, "Bearer realm=\"droptower\"");
 }
 
 static struct request *new_request(struct http *http, struct MHD_Connection *connection,
@@ -361,12 +363,12 @@ static struct request *new_request(struct http *http, struct MHD_Connection *con
 	request->job.console = http->console;
 	request->job.maker = request;
 	request->job.done = wake;
-	request->job.query = query;
+	request->job.query = request_query;
 	request->job.path = rest;
 	return request;
 }
 
-static const char *allowed(const char *path)
+static const char *request_allowed(const char *path)
 {
 	const char *rest;
 	bool other;
@@ -385,22 +387,23 @@ static enum MHD_Result open_request(struct http *http, struct MHD_Connection *co
 	const struct route *route = route_find(method, path, &rest, &other_method);
 
 	if (route == NULL && other_method)
-		return refuse(connection, 405, "another method is expected here", MHD_HTTP_HEADER_ALLOW,
-		              allowed(path));
+		return request_refuse(connection, 405, "another method is expected here",
+		                      MHD_HTTP_HEADER_ALLOW, request_allowed(path));
 	if (route == NULL)
-		return refuse(connection, 404, "no such request, or no such name", NULL, NULL);
+		return request_refuse(connection, 404, "no such request, or no such name", NULL, NULL);
 	if (has_two_lengths(connection))
-		return refuse(connection, 400, "expected one Content-Length", MHD_HTTP_HEADER_CONNECTION,
-		              "close");
+		return request_refuse(connection, 400, "expected one Content-Length",
+		                      MHD_HTTP_HEADER_CONNECTION, "close");
 	if (!route->always && !within_rate(http, console))
-		return refuse(connection, 429, "too many requests", MHD_HTTP_HEADER_RETRY_AFTER, "1");
+		return request_refuse(connection, 429, "too many requests", MHD_HTTP_HEADER_RETRY_AFTER, "1");
 	if (console != NULL && !guard_console_valid(console) && !route->always)
-		return refuse(connection, 400, "X-Console: expected 16 to 64 letters and digits", NULL, NULL);
+		return request_refuse(connection, 400, "X-Console: expected 16 to 64 letters and digits",
+		                      NULL, NULL);
 	if (route->always && (longer_than(connection, BODY_MAX) ||
 	                      header(connection, MHD_HTTP_HEADER_TRANSFER_ENCODING) != NULL))
 		return abort_at_once(http, connection, route);
 	if (longer_than(connection, SWALLOW_MAX))
-		return refuse(connection, 413, "expected at most 16 KiB", NULL, NULL);
+		return request_refuse(connection, 413, "expected at most 16 KiB", NULL, NULL);
 	*context = new_request(http, connection, route, rest, console);
 	return *context != NULL ? MHD_YES : MHD_NO;
 }
@@ -423,9 +426,9 @@ static enum MHD_Result look_at(struct http *http, struct MHD_Connection *connect
 
 	if (info == NULL || getsockname(info->connect_fd, address.any, &size) != 0 ||
 	    !guard_host_agrees(host, address.any))
-		return refuse(connection, 403, "Host is not this console's", NULL, NULL);
+		return request_refuse(connection, 403, "Host is not this console's", NULL, NULL);
 	if (!guard_origin_agrees(header(connection, MHD_HTTP_HEADER_ORIGIN), host))
-		return refuse(connection, 403, "Origin is not this console's", NULL, NULL);
+		return request_refuse(connection, 403, "Origin is not this console's", NULL, NULL);
 	if (strncmp(url, "/api/", 5) != 0)
 		return send_part(http, connection, method, url[0] == '/' ? url + 1 : url);
 	result = check_token(http, connection, &passed);
@@ -465,9 +468,9 @@ enum MHD_Result http_request(void *user, struct MHD_Connection *connection, cons
 	if (request == NULL)
 		return look_at(user, connection, method, url, context);
 	if (request->asked)
-		return answer(request);
+		return request_answer(request);
 	if (*upload_size == 0)
-		return begin(request);
+		return request_begin(request);
 	take_body(request, upload, *upload_size);
 	*upload_size = 0;
 	return request->announced <= SWALLOW_MAX ? MHD_YES : MHD_NO;

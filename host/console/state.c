@@ -52,7 +52,7 @@ bool state_changed(const struct state *a, const struct state *b)
 }
 
 /* JSON has no NaN. */
-static void add_number(cJSON *object, const char *name, double value)
+static void state_add_number(cJSON *object, const char *name, double value)
 {
 	if (isfinite(value))
 		cJSON_AddNumberToObject(object, name, value);
@@ -79,10 +79,11 @@ static void add_tower(cJSON *root, const struct state *state)
 	cJSON_AddBoolToObject(tower, "blocked", view->blocked);
 	cJSON_AddStringToObject(tower, "phase", tower_phase_name(view->phase));
 	cJSON_AddStringToObject(tower, "drop", view->drop);
-	add_number(tower, "armed_s", armed_ms > 0 ? (double)armed_ms / 1000.0 : 0.0);
-	add_number(tower, "warning_s", armed_ms > 0 && warning_ms > 0 ? (double)warning_ms / 1000.0 : 0.0);
-	add_number(tower, "heartbeat_age_s", state->live.heartbeat_age_s);
-	add_number(tower, "drop_id", session->drop_id);
+	state_add_number(tower, "armed_s", armed_ms > 0 ? (double)armed_ms / 1000.0 : 0.0);
+	state_add_number(tower, "warning_s",
+	                 armed_ms > 0 && warning_ms > 0 ? (double)warning_ms / 1000.0 : 0.0);
+	state_add_number(tower, "heartbeat_age_s", state->live.heartbeat_age_s);
+	state_add_number(tower, "drop_id", session->drop_id);
 }
 
 static void add_checks(cJSON *root, const struct session_view *session)
@@ -120,16 +121,16 @@ static void add_losses(cJSON *root, const struct state *state)
 	cJSON *bus = cJSON_AddObjectToObject(root, "bus"), *lost = cJSON_AddObjectToObject(root, "lost");
 	cJSON *counters = cJSON_AddObjectToObject(root, "counters");
 
-	add_number(bus, "load_percent", state->live.bus_load_percent);
-	add_number(bus, "frames_s", state->live.frames_s);
+	state_add_number(bus, "load_percent", state->live.bus_load_percent);
+	state_add_number(bus, "frames_s", state->live.frames_s);
 	cJSON_AddBoolToObject(bus, "classic", state->live.classic);
-	add_number(lost, "blocks", (double)state->live.missing);
-	add_number(lost, "asked_again", (double)session->asked);
-	add_number(lost, "link", (double)(link->receive_lost + link->send_lost + link->malformed));
-	add_number(lost, "errors", (double)link->errors);
+	state_add_number(lost, "blocks", (double)state->live.missing);
+	state_add_number(lost, "asked_again", (double)session->asked);
+	state_add_number(lost, "link", (double)(link->receive_lost + link->send_lost + link->malformed));
+	state_add_number(lost, "errors", (double)link->errors);
 	for (unsigned i = 0; i < WIRE_COUNTERS; i++)
 		if (session->counter_known[i])
-			add_number(counters, wire_counter_name(i), session->counters[i]);
+			state_add_number(counters, wire_counter_name(i), session->counters[i]);
 }
 
 static void add_series(cJSON *root, const struct state *state)
@@ -147,14 +148,14 @@ static void add_series(cJSON *root, const struct state *state)
 	cJSON_AddStringToObject(object, "campaign", series->campaign);
 	cJSON_AddStringToObject(object, "scene", series->scene_name);
 	cJSON_AddStringToObject(object, "title", state->tower.scene.title);
-	add_number(object, "angle_deg", series->angle_deg);
-	add_number(object, "height_m", series->height_m);
-	add_number(object, "planned", series->planned);
-	add_number(object, "recorded", series->recorded);
-	add_number(object, "accepted", series->accepted);
-	add_number(object, "rejected", series->rejected);
-	add_number(object, "partial", series->partial);
-	add_number(object, "faulty", series->faulty);
+	state_add_number(object, "angle_deg", series->angle_deg);
+	state_add_number(object, "height_m", series->height_m);
+	state_add_number(object, "planned", series->planned);
+	state_add_number(object, "recorded", series->recorded);
+	state_add_number(object, "accepted", series->accepted);
+	state_add_number(object, "rejected", series->rejected);
+	state_add_number(object, "partial", series->partial);
+	state_add_number(object, "faulty", series->faulty);
 }
 
 static void add_archive(cJSON *root, const struct work_view *work)
@@ -162,11 +163,11 @@ static void add_archive(cJSON *root, const struct work_view *work)
 	cJSON *disk = cJSON_AddObjectToObject(root, "disk"),
 	      *archive = cJSON_AddObjectToObject(root, "archive");
 
-	add_number(disk, "free_bytes", work->disk_free_bytes);
-	add_number(disk, "drops_left",
-	           fmax(0, floor((work->disk_free_bytes - ROOM_RESERVE_BYTES) / drop_bytes)));
+	state_add_number(disk, "free_bytes", work->disk_free_bytes);
+	state_add_number(disk, "drops_left",
+	                 fmax(0, floor((work->disk_free_bytes - ROOM_RESERVE_BYTES) / drop_bytes)));
 	cJSON_AddStringToObject(disk, "trouble", work->trouble);
-	add_number(archive, "revision", (double)work->revision);
+	state_add_number(archive, "revision", (double)work->revision);
 	if (work->result[0] != '\0')
 		cJSON_AddStringToObject(archive, "result", work->result);
 	else

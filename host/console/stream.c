@@ -70,7 +70,7 @@ void streams_destroy(struct streams *streams)
 }
 
 /* Looks at the others' views; a new state has a new number. */
-static void look(struct streams *streams)
+static void stream_look(struct streams *streams)
 {
 	struct console *console = streams->console;
 	int64_t now_ms = session_now_ms();
@@ -94,7 +94,7 @@ static void look(struct streams *streams)
 	streams->state = now;
 }
 
-static void say(struct stream *stream, const char *text)
+static void stream_say(struct stream *stream, const char *text)
 {
 	size_t length = strlen(text);
 
@@ -127,9 +127,9 @@ static void say_state(struct stream *stream)
 	stream->mine = mine;
 	snprintf(head, sizeof(head), "event: state\ndata: {\"hold\":{\"mine\":%s,\"taken\":%s},",
 	         mine ? "true" : "false", taken ? "true" : "false");
-	say(stream, head);
-	say(stream, streams->state_text + 1); /* behind its brace */
-	say(stream, "\n\n");
+	stream_say(stream, head);
+	stream_say(stream, streams->state_text + 1); /* behind its brace */
+	stream_say(stream, "\n\n");
 }
 
 /* Little endian, whatever this machine is. */
@@ -166,21 +166,21 @@ static bool say_live(struct stream *stream)
 	text[BASE64_ENCODE_RAW_LENGTH(count * TICK_BYTES)] = '\0';
 	snprintf(head, sizeof(head),
 	         "event: live\ndata: {\"first\":%" PRIu64 ",\"ticks\":%zu,\"envelope\":\"", first, count);
-	say(stream, head);
-	say(stream, text);
-	say(stream, "\"}\n\n");
+	stream_say(stream, head);
+	stream_say(stream, text);
+	stream_say(stream, "\"}\n\n");
 	return count == EVENT_TICKS;
 }
 
 /* What is new; nothing of it is kept for later. Once for each time it was woken, so that what comes in the
  * meantime does not go out a crumb at a time. */
-static void compose(struct stream *stream)
+static void stream_compose(struct stream *stream)
 {
 	stream->size = 0;
 	stream->sent = 0;
 	if (stream->told)
 		return;
-	look(stream->streams);
+	stream_look(stream->streams);
 	say_state(stream);
 	stream->told = !say_live(stream);
 }
@@ -210,7 +210,7 @@ static ssize_t read_stream(void *context, uint64_t position, char *out, size_t r
 
 	(void)position;
 	if (stream->sent == stream->size)
-		compose(stream);
+		stream_compose(stream);
 	size = stream->size - stream->sent;
 	if (size == 0)
 		return sleep_or_end(stream);
@@ -239,8 +239,8 @@ static struct stream *free_place(struct streams *streams)
 	return NULL;
 }
 
-static void begin(struct stream *stream, struct streams *streams, struct MHD_Connection *connection,
-                  const char *named)
+static void stream_begin(struct stream *stream, struct streams *streams, struct MHD_Connection *connection,
+                         const char *named)
 {
 	char *text = stream->text;
 	size_t room = stream->room;
@@ -265,7 +265,7 @@ struct MHD_Response *stream_open(struct streams *streams, struct MHD_Connection 
 	pthread_mutex_lock(&streams->lock);
 	stream = free_place(streams);
 	if (stream != NULL)
-		begin(stream, streams, connection, named);
+		stream_begin(stream, streams, connection, named);
 	pthread_mutex_unlock(&streams->lock);
 	if (stream == NULL)
 		return NULL;

@@ -29,14 +29,14 @@ const char *tower_phase_name(enum tower_phase phase)
 
 /* ---- the link ---- */
 
-static bool cancelled(void *user)
+static bool tower_cancelled(void *user)
 {
 	struct tower *tower = user;
 
 	return atomic_load(&tower->stopping) || atomic_load(&tower->aborts) != tower->wanted;
 }
 
-static void on_frame(void *user, const struct frame *frame)
+static void tower_on_frame(void *user, const struct frame *frame)
 {
 	struct tower *tower = user;
 
@@ -44,13 +44,13 @@ static void on_frame(void *user, const struct frame *frame)
 		tower->setup_due = tower->series[0] != '\0';
 }
 
-static void open_link(struct tower *tower)
+static void tower_open_link(struct tower *tower)
 {
 	struct session_options options = {
 	        .program = tower->own ? NULL : "page", /* a simulated tower is nobody's business */
 	        .log = tower->log,
-	        .on_frame = on_frame,
-	        .cancelled = cancelled,
+	        .on_frame = tower_on_frame,
+	        .cancelled = tower_cancelled,
 	        .user = tower};
 
 	tower->open_due_ms = session_now_ms() + OPEN_AGAIN_MS;
@@ -71,7 +71,7 @@ void tower_link_close(struct tower *tower, int delay_ms)
 	tower->open_due_ms = session_now_ms() + delay_ms;
 }
 
-static void poll_link(struct tower *tower)
+static void tower_poll_link(struct tower *tower)
 {
 	int result = session_poll(tower->session, 0);
 
@@ -202,13 +202,13 @@ static void run_jobs(struct tower *tower)
 	}
 }
 
-static void turn(struct tower *tower)
+static void tower_turn(struct tower *tower)
 {
 	if (tower->session == NULL && session_now_ms() >= tower->open_due_ms)
-		open_link(tower);
+		tower_open_link(tower);
 	run_jobs(tower);
 	if (tower->session != NULL)
-		poll_link(tower);
+		tower_poll_link(tower);
 	if (tower->phase == TOWER_IDLE || tower->phase == TOWER_SAVING)
 		(void)tower_set_up(tower);
 	tower_drop_follow(tower);
@@ -216,7 +216,7 @@ static void turn(struct tower *tower)
 	tower_publish(tower);
 }
 
-static void *run(void *user)
+static void *tower_run(void *user)
 {
 	struct tower *tower = user;
 	struct job *job;
@@ -224,7 +224,7 @@ static void *run(void *user)
 	tower->failed = tower->own && tower_bench_start(tower) != 0;
 	sem_post(&tower->started);
 	while (!tower->failed && !atomic_load(&tower->stopping))
-		turn(tower);
+		tower_turn(tower);
 	tower_drop_leave(tower);
 	while ((job = job_take(&tower->console->tower_queue, 0)) != NULL) {
 		job_refuse(job, 503, "the console is ending");
@@ -235,7 +235,7 @@ static void *run(void *user)
 	return NULL;
 }
 
-static bool begin(struct tower *tower, const struct tower_options *options)
+static bool tower_begin(struct tower *tower, const struct tower_options *options)
 {
 	tower->own = options->link == NULL;
 	tower->is_simulated = tower->own || options->control != NULL;
@@ -251,7 +251,7 @@ static bool begin(struct tower *tower, const struct tower_options *options)
 	if (options->control != NULL && tower_bench_control(tower, options->control) != 0)
 		return false;
 	tower_publish(tower);
-	if (pthread_create(&tower->thread, NULL, run, tower) != 0) {
+	if (pthread_create(&tower->thread, NULL, tower_run, tower) != 0) {
 		snprintf(tower->link_trouble, sizeof(tower->link_trouble), "no thread for the tower");
 		return false;
 	}
@@ -262,7 +262,7 @@ static bool begin(struct tower *tower, const struct tower_options *options)
 	return !tower->failed;
 }
 
-static void destroy(struct tower *tower)
+static void console_tower_destroy(struct tower *tower)
 {
 	sem_destroy(&tower->started);
 	pthread_mutex_destroy(&tower->lock);
@@ -280,11 +280,11 @@ struct tower *tower_start(struct console *console, const struct tower_options *o
 	}
 	tower->console = console;
 	console->tower = tower;
-	if (begin(tower, options))
+	if (tower_begin(tower, options))
 		return tower;
 	snprintf(message, SESSION_MESSAGE_MAX, "%s", tower->link_trouble);
 	console->tower = NULL;
-	destroy(tower);
+	console_tower_destroy(tower);
 	return NULL;
 }
 
@@ -300,5 +300,5 @@ void tower_stop(struct tower *tower)
 void tower_free(struct tower *tower)
 {
 	if (tower != NULL)
-		destroy(tower);
+		console_tower_destroy(tower);
 }

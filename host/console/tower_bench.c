@@ -107,7 +107,7 @@ int tower_bench_control(struct tower *tower, const char *path)
 	return 0;
 }
 
-static int send_line(const struct tower *tower, const char *line)
+static int tower_bench_send_line(const struct tower *tower, const char *line)
 {
 	ssize_t sent = sendto(tower->control, line, strlen(line), MSG_DONTWAIT | MSG_NOSIGNAL,
 	                      (const struct sockaddr *)&tower->control_path, sizeof(tower->control_path));
@@ -117,7 +117,7 @@ static int send_line(const struct tower *tower, const char *line)
 
 static int ask_faults(struct tower *tower)
 {
-	int result = send_line(tower, "faults");
+	int result = tower_bench_send_line(tower, "faults");
 
 	tower->answers_due += result == 0;
 	return result;
@@ -132,7 +132,7 @@ void tower_bench_say(struct tower *tower, struct job *job, const char *line)
 		job_done(job);
 		return;
 	}
-	result = tower->control < 0 ? -ENOTCONN : send_line(tower, line);
+	result = tower->control < 0 ? -ENOTCONN : tower_bench_send_line(tower, line);
 	if (result == 0)
 		result = ask_faults(tower);
 	if (result != 0) {
@@ -145,7 +145,7 @@ void tower_bench_say(struct tower *tower, struct job *job, const char *line)
 	tower->simulating_until_ms = session_now_ms() + ANSWER_MS;
 }
 
-static void finish(struct tower *tower)
+static void tower_bench_finish(struct tower *tower)
 {
 	tower_publish(tower);
 	job_done(tower->simulating);
@@ -177,7 +177,7 @@ static void take_faults(struct tower *tower, char *text)
 		return; /* the line's own answer is still to come */
 	if (!tower->line_refused)
 		job_answer_json(tower->simulating, cJSON_CreateObject());
-	finish(tower);
+	tower_bench_finish(tower);
 }
 
 void tower_bench_hear(struct tower *tower)
@@ -200,7 +200,7 @@ void tower_bench_hear(struct tower *tower)
 	if (tower->simulating != NULL && session_now_ms() > tower->simulating_until_ms) {
 		tower->answers_due = 0;
 		job_refuse(tower->simulating, 504, "the simulated tower does not answer");
-		finish(tower);
+		tower_bench_finish(tower);
 	}
 	if (tower->simulating != NULL || session_now_ms() < tower->control_due_ms)
 		return;

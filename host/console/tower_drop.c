@@ -32,7 +32,7 @@ struct tower_drop *tower_drop_new(const struct tower *tower, const char *series)
 
 /* ---- the log ---- */
 
-static bool open_log(struct tower *tower)
+static bool tower_drop_open_log(struct tower *tower)
 {
 	char url[ARCHIVE_PATH_MAX + 8], message[SESSION_MESSAGE_MAX];
 
@@ -68,7 +68,7 @@ void tower_drop_log_failed(struct tower *tower)
 
 /* ---- its phases ---- */
 
-static void enter(struct tower *tower, enum tower_phase phase)
+static void tower_drop_enter(struct tower *tower, enum tower_phase phase)
 {
 	tower->phase = phase;
 	tower->phase_ms = session_now_ms();
@@ -77,7 +77,7 @@ static void enter(struct tower *tower, enum tower_phase phase)
 		tower->armed_until_ms = 0;
 }
 
-static void take(struct tower *tower, struct tower_drop *drop)
+static void tower_drop_take(struct tower *tower, struct tower_drop *drop)
 {
 	tower->drop = drop;
 	tower->fault = WIRE_FAULT_NONE;
@@ -91,25 +91,25 @@ static void take(struct tower *tower, struct tower_drop *drop)
 
 bool tower_drop_begin(struct tower *tower, struct tower_drop *drop)
 {
-	take(tower, drop);
-	if (!open_log(tower)) {
+	tower_drop_take(tower, drop);
+	if (!tower_drop_open_log(tower)) {
 		tower_drop_end(tower);
 		return false;
 	}
-	enter(tower, TOWER_ARMING);
+	tower_drop_enter(tower, TOWER_ARMING);
 	return true;
 }
 
 void tower_drop_armed(struct tower *tower)
 {
-	enter(tower, TOWER_ARMED);
+	tower_drop_enter(tower, TOWER_ARMED);
 	tower->armed_until_ms = session_view(tower->session)->armed_until_ms;
 }
 
 void tower_drop_released(struct tower *tower)
 {
 	tower->drop->released = true;
-	enter(tower, TOWER_MOVING);
+	tower_drop_enter(tower, TOWER_MOVING);
 }
 
 void tower_drop_end(struct tower *tower)
@@ -119,7 +119,7 @@ void tower_drop_end(struct tower *tower)
 		work_discard(tower->console->work, tower->drop);
 	tower->drop = NULL;
 	tower->drop_name[0] = '\0';
-	enter(tower, TOWER_IDLE);
+	tower_drop_enter(tower, TOWER_IDLE);
 }
 
 static void add_note(struct tower_drop *drop, const char *text)
@@ -141,7 +141,8 @@ void tower_drop_leave(struct tower *tower)
 	tower_drop_end(tower);
 }
 
-static void __attribute__((format(printf, 2, 3))) give_up(struct tower *tower, const char *format, ...)
+static void __attribute__((format(printf, 2, 3)))
+tower_drop_give_up(struct tower *tower, const char *format, ...)
 {
 	char why[sizeof(tower->drop_trouble)];
 	va_list arguments;
@@ -171,7 +172,7 @@ static struct tower_drop *without_recording(const struct tower *tower)
 }
 
 /* The drop that the record belongs to, no longer the tower's; NULL without memory. */
-static struct tower_drop *hand_over(struct tower *tower)
+static struct tower_drop *tower_drop_hand_over(struct tower *tower)
 {
 	struct tower_drop *drop = tower->drop;
 
@@ -185,11 +186,11 @@ static struct tower_drop *hand_over(struct tower *tower)
 
 static void collected(struct tower *tower, struct record *record)
 {
-	struct tower_drop *drop = hand_over(tower);
+	struct tower_drop *drop = tower_drop_hand_over(tower);
 
 	if (drop == NULL) {
 		record_free(record);
-		give_up(tower, "the drop is lost: %s", error_text(DT_E_MEMORY));
+		tower_drop_give_up(tower, "the drop is lost: %s", error_text(DT_E_MEMORY));
 		return;
 	}
 	if (tower->abort_moving)
@@ -197,7 +198,7 @@ static void collected(struct tower *tower, struct record *record)
 	else if (tower->fault != WIRE_FAULT_NONE)
 		add_note(drop, wire_fault_text(tower->fault));
 	drop->record = *record;
-	enter(tower, TOWER_SAVING);
+	tower_drop_enter(tower, TOWER_SAVING);
 	work_keep(tower->console->work, drop);
 }
 
@@ -221,7 +222,7 @@ static void take_saved(struct tower *tower)
 	pthread_mutex_unlock(&tower->lock);
 	if (saved && tower->phase == TOWER_SAVING) {
 		tower->drop_name[0] = '\0';
-		enter(tower, TOWER_IDLE);
+		tower_drop_enter(tower, TOWER_IDLE);
 	}
 }
 
@@ -255,8 +256,8 @@ static void follow_idle(struct tower *tower, unsigned state)
 	drop = without_recording(tower);
 	if (drop == NULL)
 		return;
-	take(tower, drop);
-	enter(tower, TOWER_MOVING);
+	tower_drop_take(tower, drop);
+	tower_drop_enter(tower, TOWER_MOVING);
 }
 
 static void follow_armed(struct tower *tower, unsigned state)
@@ -273,11 +274,11 @@ static void follow_drop(struct tower *tower, const struct session_view *view)
 		tower->fault = view->fault;
 	if (tower->phase == TOWER_MOVING &&
 	    (view->state == WIRE_STATE_CAPTURED || view->state == WIRE_STATE_KEEP_OUT))
-		enter(tower, TOWER_COLLECTING);
+		tower_drop_enter(tower, TOWER_COLLECTING);
 	if (settled(tower, session_at_rest(view->state)))
-		give_up(tower, "nothing was captured: %s",
-		        tower->fault != WIRE_FAULT_NONE ? wire_fault_text(tower->fault)
-		                                        : "the frame did not move");
+		tower_drop_give_up(tower, "nothing was captured: %s",
+		                   tower->fault != WIRE_FAULT_NONE ? wire_fault_text(tower->fault)
+		                                                   : "the frame did not move");
 }
 
 static void follow_phase(struct tower *tower, const struct session_view *view)
@@ -307,10 +308,10 @@ static void watch_time(struct tower *tower)
 	bool heard = tower->rest_ms != 0 && now_ms - tower->rest_ms < ARM_LATE_MS;
 
 	if (tower->phase == TOWER_ARMED && !heard && now_ms > tower->armed_until_ms + ARM_LATE_MS)
-		give_up(tower, "armed, and then nothing was heard of the tower");
+		tower_drop_give_up(tower, "armed, and then nothing was heard of the tower");
 	else if ((tower->phase == TOWER_MOVING || tower->phase == TOWER_COLLECTING) &&
 	         now_ms > tower->phase_ms + DROP_MS)
-		give_up(tower, "no capture within %d s of the release", DROP_MS / 1000);
+		tower_drop_give_up(tower, "no capture within %d s of the release", DROP_MS / 1000);
 }
 
 void tower_drop_follow(struct tower *tower)
@@ -325,7 +326,7 @@ void tower_drop_follow(struct tower *tower)
 		if (taken > 0)
 			collected(tower, &record);
 		else if (taken < 0)
-			give_up(tower, "the drop could not be collected: %s", error_text(taken));
+			tower_drop_give_up(tower, "the drop could not be collected: %s", error_text(taken));
 		else
 			follow_phase(tower, session_view(tower->session));
 	}

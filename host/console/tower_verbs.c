@@ -13,7 +13,7 @@
 
 enum { LINE_MAX_CHARACTERS = 150 };
 
-static void finish(struct job *job)
+static void tower_verbs_finish(struct job *job)
 {
 	tower_publish(job->console->tower);
 	job_done(job);
@@ -55,7 +55,7 @@ static void answer_token(struct job *job, const struct session_view *view)
 	job_answer_json(job, tree);
 }
 
-static void arm(struct job *job, struct tower_drop *drop)
+static void tower_verbs_arm(struct job *job, struct tower_drop *drop)
 {
 	struct tower *tower = job->console->tower;
 	const struct session_view *view = session_view(tower->session);
@@ -93,10 +93,10 @@ static void send_arm(struct job *job)
 	else
 		may = tower_check_arm(job);
 	if (may)
-		arm(job, drop);
+		tower_verbs_arm(job, drop);
 	else
 		work_discard(tower->console->work, drop);
-	finish(job);
+	tower_verbs_finish(job);
 }
 
 static void begin_arm(struct job *job)
@@ -131,7 +131,7 @@ void tower_arm(struct job *job)
 /* ---- release, clear ---- */
 
 /* Of a verb without luggage of its own: how many aborts were asked for before it. */
-static void mark(struct job *job)
+static void tower_verbs_mark(struct job *job)
 {
 	job->luggage = (void *)(uintptr_t)atomic_load(&job->console->tower->aborts);
 }
@@ -151,7 +151,7 @@ static bool check_sending(struct job *job)
 	return false;
 }
 
-static void release(struct job *job)
+static void tower_verbs_release(struct job *job)
 {
 	struct tower *tower = job->console->tower;
 	int result = session_command(tower->session, WIRE_OP_RELEASE);
@@ -183,14 +183,14 @@ static void send_release(struct job *job)
 		else if (session_now_ms() < view->release_from_ms)
 			job_refuse(job, 425, "%s", error_text(DT_E_EARLY));
 		else
-			release(job);
+			tower_verbs_release(job);
 	}
-	finish(job);
+	tower_verbs_finish(job);
 }
 
 void tower_release(struct job *job)
 {
-	mark(job);
+	tower_verbs_mark(job);
 	(void)hand_on(job, &job->console->tower_queue, send_release);
 }
 
@@ -206,12 +206,12 @@ static void send_clear(struct job *job)
 		else
 			tower_refuse_result(job, result);
 	}
-	finish(job);
+	tower_verbs_finish(job);
 }
 
 void tower_clear(struct job *job)
 {
-	mark(job);
+	tower_verbs_mark(job);
 	(void)hand_on(job, &job->console->tower_queue, send_clear);
 }
 
@@ -243,7 +243,7 @@ static void answer_abort(struct job *job)
 		job_refuse(job, 504, "ABORT was sent, the tower does not answer");
 	else
 		job_refuse(job, 503, "no tower is heard: %s", error_text(tower->abort_result));
-	finish(job);
+	tower_verbs_finish(job);
 }
 
 void tower_abort(struct job *job)
@@ -280,7 +280,7 @@ static bool change_bench(struct tower *tower, const struct tower_scene *scene)
 	return true;
 }
 
-static void select_series(struct job *job, const struct tower_scene *scene)
+static void tower_verbs_select_series(struct job *job, const struct tower_scene *scene)
 {
 	struct tower *tower = job->console->tower;
 
@@ -310,10 +310,10 @@ static void send_select(struct job *job)
 	if (tower_is_void(tower, scene->aborted))
 		job_refuse(job, 409, "aborted");
 	else if (tower_check_select(job))
-		select_series(job, scene);
+		tower_verbs_select_series(job, scene);
 	free(scene->text);
 	free(scene);
-	finish(job);
+	tower_verbs_finish(job);
 }
 
 static void begin_select(struct job *job)
@@ -346,13 +346,13 @@ void tower_select(struct job *job)
 
 /* ---- simulate ---- */
 
-static void send_line(struct job *job)
+static void tower_verbs_send_line(struct job *job)
 {
 	tower_bench_say(job->console->tower, job, job_text(job, "line", NULL));
 }
 
 /* What breaks the tower; not what commands it, which only who holds the arm may. */
-static bool is_line(const char *text)
+static bool tower_verbs_is_line(const char *text)
 {
 	static const char command[] = "send";
 	size_t length = strlen(text);
@@ -384,8 +384,8 @@ void tower_simulate(struct job *job)
 		job_refuse(job, 404, "this tower is not simulated");
 	else
 		line = job_text(job, "line", NULL);
-	if (line != NULL && is_line(line)) {
-		(void)hand_on(job, &job->console->tower_queue, send_line);
+	if (line != NULL && tower_verbs_is_line(line)) {
+		(void)hand_on(job, &job->console->tower_queue, tower_verbs_send_line);
 		return;
 	}
 	if (line != NULL)

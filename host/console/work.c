@@ -168,7 +168,7 @@ static void *work_run(void *context)
 	return NULL;
 }
 
-static void destroy(struct work *work)
+static void work_destroy(struct work *work)
 {
 	archive_close(work->archive);
 	pthread_mutex_destroy(&work->lock);
@@ -176,7 +176,7 @@ static void destroy(struct work *work)
 	free(work);
 }
 
-static int open_all(struct work *work, char message[ARCHIVE_MESSAGE_MAX])
+static int work_open_all(struct work *work, char message[ARCHIVE_MESSAGE_MAX])
 {
 	int result = work_open_scenes(work, message);
 
@@ -198,13 +198,13 @@ struct work *work_start(struct console *console, const struct work_options *opti
 	work->console = console;
 	work->options = *options;
 	pthread_mutex_init(&work->lock, NULL);
-	if (open_all(work, message) == 0) {
+	if (work_open_all(work, message) == 0) {
 		look_around(work);
 		if (pthread_create(&work->thread, NULL, work_run, work) == 0)
 			return work;
 		snprintf(message, ARCHIVE_MESSAGE_MAX, "no thread for the archive");
 	}
-	destroy(work);
+	work_destroy(work);
 	return NULL;
 }
 
@@ -215,5 +215,5 @@ void work_stop(struct work *work)
 	atomic_store(&work->ending, true);
 	job_queue_close(&work->console->work_queue);
 	pthread_join(work->thread, NULL);
-	destroy(work);
+	work_destroy(work);
 }

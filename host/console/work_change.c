@@ -6,7 +6,7 @@
 
 #include "host/console/work_private.h"
 
-static void finish(struct job *job, int result)
+static void work_change_finish(struct job *job, int result)
 {
 	if (result != 0) {
 		work_refuse(job, result);
@@ -48,7 +48,8 @@ void work_decide(struct job *job)
 		job_done(job);
 		return;
 	}
-	finish(job, archive_decide(work->archive, drop, decision, work->options.operator_name, reason));
+	work_change_finish(
+	        job, archive_decide(work->archive, drop, decision, work->options.operator_name, reason));
 }
 
 void work_note(struct job *job)
@@ -61,5 +62,5 @@ void work_note(struct job *job)
 		job_done(job);
 		return;
 	}
-	finish(job, archive_note(work->archive, drop, work->options.operator_name, text));
+	work_change_finish(job, archive_note(work->archive, drop, work->options.operator_name, text));
 }

@@ -51,7 +51,7 @@ void work_begin(struct job *job, void (*then)(struct job *job))
 
 /* ---- after ---- */
 
-static int send_frame(void *context, const struct frame *frame)
+static int work_keep_send_frame(void *context, const struct frame *frame)
 {
 	return link_send(context, frame);
 }
@@ -71,7 +71,7 @@ static int write_log(struct tower_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
 	log = link_open(url, LINK_WRITE, message, ARCHIVE_MESSAGE_MAX);
 	if (log == NULL)
 		return DT_E_SYSTEM;
-	result = write_frames(&drop->record, send_frame, log);
+	result = write_frames(&drop->record, work_keep_send_frame, log);
 	if (link_close(log) != 0 && result == 0)
 		result = DT_E_SYSTEM;
 	if (result != 0)
@@ -139,7 +139,7 @@ static void rescue(const struct work *work, const struct tower_drop *drop, char 
 	         drop->recording.log[0] != '\0' ? drop->recording.log : "nothing");
 }
 
-static void keep(struct job *way)
+static void work_keep_keep(struct job *way)
 {
 	struct tower_drop *drop = way->maker;
 	struct work *work = way->console->work;
@@ -205,7 +205,7 @@ static void send(struct work *work, struct tower_drop *drop, void (*run)(struct 
 
 void work_keep(struct work *work, struct tower_drop *drop)
 {
-	send(work, drop, keep);
+	send(work, drop, work_keep_keep);
 }
 
 void work_discard(struct work *work, struct tower_drop *drop)

@@ -70,9 +70,9 @@ static int check_series(struct archive *archive, const struct wanted *w)
 	return w->filter.series != NULL ? archive_scene(archive, w->filter.series, &scene) : 0;
 }
 
-static void answer(struct job *job,
-                   int (*print)(struct archive *archive, const struct wanted *wanted, FILE *out),
-                   const char *type)
+static void work_list_answer(struct job *job,
+                             int (*print)(struct archive *archive, const struct wanted *wanted, FILE *out),
+                             const char *type)
 {
 	struct archive *archive = job->console->work->archive;
 	struct wanted wanted;
@@ -111,29 +111,29 @@ static int drops_csv(struct archive *archive, const struct wanted *w, FILE *out)
 	return print_drops(archive, &w->filter, w->undecided, TABLE_CSV, out);
 }
 
-static int tables_json(struct archive *archive, const struct wanted *w, FILE *out)
+static int work_list_tables_json(struct archive *archive, const struct wanted *w, FILE *out)
 {
 	return print_tables(archive, &w->filter, w->undecided, NULL, TABLE_JSON, out);
 }
 
 void work_series(struct job *job)
 {
-	answer(job, series_json, "application/json");
+	work_list_answer(job, series_json, "application/json");
 }
 
 void work_drops(struct job *job)
 {
-	answer(job, drops_json, "application/json");
+	work_list_answer(job, drops_json, "application/json");
 }
 
 void work_tables(struct job *job)
 {
-	answer(job, tables_json, "application/json");
+	work_list_answer(job, work_list_tables_json, "application/json");
 }
 
 void work_csv(struct job *job)
 {
-	answer(job, drops_csv, "text/csv; charset=utf-8");
+	work_list_answer(job, drops_csv, "text/csv; charset=utf-8");
 }
 
 void work_result(struct job *job)

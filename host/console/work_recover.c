@@ -49,7 +49,7 @@ static bool was_accepted(const char *log)
 	return accepted;
 }
 
-static bool is_whole(const char *log)
+static bool work_recover_is_whole(const char *log)
 {
 	char message[READ_MESSAGE_MAX];
 	struct record record;
@@ -69,7 +69,7 @@ static void recover(struct work *work, const char *drop)
 
 	if (archive_resume(work->archive, drop, &r) != 0)
 		return;
-	if (!was_accepted(r.log) || !is_whole(r.log)) {
+	if (!was_accepted(r.log) || !work_recover_is_whole(r.log)) {
 		archive_abandon(&r);
 		return;
 	}

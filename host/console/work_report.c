@@ -46,7 +46,7 @@ static int run_program(struct work_report *r, const char *folder, const char *se
 	return result;
 }
 
-static void forget(struct work_report *r)
+static void work_report_forget(struct work_report *r)
 {
 	temporary_remove(&r->folder);
 	close(r->errors);
@@ -72,7 +72,7 @@ static bool make_files(struct work_report *r)
 	return false;
 }
 
-static void start(struct work *work, struct job *job)
+static void work_report_start(struct work *work, struct job *job)
 {
 	struct work_report *r = &work->report;
 	int result;
@@ -87,7 +87,7 @@ static void start(struct work *work, struct job *job)
 	if (result == 0)
 		return;
 	job_refuse(job, 500, "droptower report: %s", strerror(result));
-	forget(r);
+	work_report_forget(r);
 }
 
 void work_report(struct job *job)
@@ -101,7 +101,7 @@ void work_report(struct job *job)
 		return;
 	}
 	if (work->report.job == NULL && at_rest(work)) {
-		start(work, job);
+		work_report_start(work, job);
 		return;
 	}
 	job_refuse(job, 409, "%s",
@@ -139,5 +139,5 @@ void work_report_look(struct work *work, bool now)
 		job_answer_bytes(r->job, "text/html; charset=utf-8", page, size);
 	else
 		refuse_report(r);
-	forget(r);
+	work_report_forget(r);
 }

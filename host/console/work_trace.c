@@ -150,7 +150,8 @@ static void add_channel(struct curves *c, const struct channel *channel, double 
 		to[k] = sample_bits(channel->value_g[k]);
 }
 
-static void add_resultant(struct curves *c, const struct report *report, const char *sensor, double zero_s)
+static void work_trace_add_resultant(struct curves *c, const struct report *report, const char *sensor,
+                                     double zero_s)
 {
 	struct curves_axes axes;
 	uint32_t *to;
@@ -172,8 +173,8 @@ static void answer_trace(struct job *job, const struct report *report)
 	c.failed = !curves_open(&c, &zero);
 	for (size_t i = 0; i < report->record->channel_count; i++)
 		add_channel(&c, &report->record->channels[i], zero.time_s);
-	add_resultant(&c, report, "S1", zero.time_s);
-	add_resultant(&c, report, "S2", zero.time_s);
+	work_trace_add_resultant(&c, report, "S1", zero.time_s);
+	work_trace_add_resultant(&c, report, "S2", zero.time_s);
 	answer_curves(job, &c);
 }
 

@@ -42,7 +42,7 @@ static double noise_of_differences(const struct trace *trace, double *scratch)
 }
 
 /* Of a quiet part that is long enough. */
-static void measure(struct quiet *quiet, struct estimate_baseline *found)
+static void baseline_measure(struct quiet *quiet, struct estimate_baseline *found)
 {
 	const struct trace *trace = quiet->trace;
 	double half_s = (double)(quiet->until - quiet->from) / (2 * trace->rate_hz), sigma = 0;
@@ -79,13 +79,13 @@ static void measure_quietest(struct quiet *quiet, struct estimate_baseline *foun
 {
 	bool restless;
 
-	measure(quiet, found);
+	baseline_measure(quiet, found);
 	restless = quiet_restless(quiet, found->noise_g);
 	if (!restless && !found->doubtful)
 		return;
 	if (quiet_settled(quiet)) {
 		*found = nothing_found;
-		measure(quiet, found);
+		baseline_measure(quiet, found);
 		found->doubtful = found->unsettled = true;
 		return;
 	}
@@ -96,11 +96,11 @@ static void measure_quietest(struct quiet *quiet, struct estimate_baseline *foun
 		return;
 	*found = nothing_found;
 	found->doubtful = true;
-	measure(quiet, found);
+	baseline_measure(quiet, found);
 }
 
 /* The largest good sample, signed, and its place. */
-static double largest(const struct trace *trace, size_t *at)
+static double baseline_largest(const struct trace *trace, size_t *at)
 {
 	double most = 0;
 
@@ -121,7 +121,7 @@ static bool begins_in_motion(const struct trace *trace, double noise_g)
 
 	if (trace->count < QUIET_SAMPLES_MIN)
 		return false;
-	peak = largest(trace, &at);
+	peak = baseline_largest(trace, &at);
 	sign = peak < 0 ? -1 : 1;
 	first = sign * quiet_glance(trace, 0, BEGINNING, NULL);
 	for (size_t k = 0; k < at; k++)
@@ -164,7 +164,7 @@ static bool ends_elsewhere(const struct quiet *quiet, const struct estimate_base
 	if (last >= quiet->from + QUIET_SAMPLES_MIN)
 		before = mean_off(trace, found, last - QUIET_SAMPLES_MIN, last, &m);
 	return fabs(off - before) < AT_REST * fabs(off) && fabs(off) > LIMIT_SURE * noise / sqrt(n) &&
-	       fabs(off) > ESTIMATE_TOLERANCE * fabs(largest(trace, &at) - found->offset_g);
+	       fabs(off) > ESTIMATE_TOLERANCE * fabs(baseline_largest(trace, &at) - found->offset_g);
 }
 
 void baseline_find(const struct trace *trace, double *scratch, struct estimate_baseline *baseline)

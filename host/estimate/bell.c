@@ -32,7 +32,7 @@ struct scene {
 
 /* The pulse of height 1 at the angle whose cosine is c, and its derivative by the angle; row gets those by
  * height, power and bulge. */
-static inline double shape(const double p[PARAMETERS], double c, double sine, double row[PARAMETERS])
+static inline double bell_shape(const double p[PARAMETERS], double c, double sine, double row[PARAMETERS])
 {
 	double logarithm = log(c), flank = exp(p[POWER] * logarithm), rise = 1 - c * c;
 	double value = flank * (1 + p[BULGE] * rise);
@@ -57,7 +57,7 @@ static struct walk start_walk(const struct scene *scene, const double p[PARAMETE
 	return (struct walk){angle, step, phasor_at(angle, step)};
 }
 
-static inline void turn(struct walk *walk)
+static inline void bell_turn(struct walk *walk)
 {
 	phasor_turn(&walk->at);
 	walk->angle += walk->step;
@@ -68,8 +68,8 @@ static inline bool is_inside(const struct walk *walk)
 	return fabs(walk->angle) < UNITS_PI / 2 && walk->at.cosine > 0;
 }
 
-static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
-                     double right[CHOLESKY_MAX], double *squares)
+static size_t bell_normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
+                          double right[CHOLESKY_MAX], double *squares)
 {
 	const struct scene *scene = model;
 	double prior = scene->noise_g / BULGE_PRIOR;
@@ -81,7 +81,7 @@ static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_
 		return 0;
 	walk = start_walk(scene, p);
 	gram_start(&gram, PARAMETERS);
-	for (size_t k = scene->first; k < scene->last; k++, turn(&walk)) {
+	for (size_t k = scene->first; k < scene->last; k++, bell_turn(&walk)) {
 		double row[COLUMNS], residual = scene->trace->value_g[k];
 
 		if (!trace_usable(scene->trace, k))
@@ -91,7 +91,7 @@ static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_
 			*squares += residual * residual;
 			continue;
 		}
-		row[CENTRE] = shape(p, walk.at.cosine, walk.at.sine, row);
+		row[CENTRE] = bell_shape(p, walk.at.cosine, walk.at.sine, row);
 		row[BASE] = -row[CENTRE] * walk.angle / p[BASE];
 		row[CENTRE] *= -UNITS_PI / p[BASE];
 		row[RESIDUAL] = residual - p[HEIGHT] * row[HEIGHT];
@@ -106,7 +106,7 @@ static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_
 
 /* From the widths at half and at a tenth of the height: of a half-sine 2/3 and 0.9362 of the base, of a
  * haversine 1/2 and 0.7952. */
-static bool start(const struct trace *trace, const struct peak *peak, double p[PARAMETERS])
+static bool bell_start(const struct trace *trace, const struct peak *peak, double p[PARAMETERS])
 {
 	double height = fabs(peak->result.value_g), from[2], until[2], ratio;
 	static const double level[] = {0.5, 0.1};
@@ -131,12 +131,12 @@ static double lopsided(const struct scene *scene, const double p[PARAMETERS])
 	double odd_odd = 0, odd_centre = 0, centre_centre = 0, odd_residual = 0;
 	struct walk walk = start_walk(scene, p);
 
-	for (size_t k = scene->first; k < scene->last; k++, turn(&walk)) {
+	for (size_t k = scene->first; k < scene->last; k++, bell_turn(&walk)) {
 		double row[PARAMETERS], value, odd, centre;
 
 		if (!trace_usable(scene->trace, k) || !is_inside(&walk))
 			continue;
-		centre = shape(p, walk.at.cosine, walk.at.sine, row);
+		centre = bell_shape(p, walk.at.cosine, walk.at.sine, row);
 		value = p[HEIGHT] * row[HEIGHT];
 		odd = value * walk.at.sine;
 		odd_odd += odd * odd;
@@ -152,11 +152,12 @@ bool bell_fit(const struct trace *trace, const struct peak *peak, struct bell *b
 	static const double centre_row[PARAMETERS] = {[CENTRE] = 1};
 	double noise = fmax(trace->noise_g, LIMIT_MISFIT * fabs(peak->result.value_g));
 	struct scene scene = {.trace = trace, .noise_g = noise};
-	struct lm_problem problem = {.size = PARAMETERS, .model = &scene, .normal = normal, .kink = KINK};
+	struct lm_problem problem = {
+	        .size = PARAMETERS, .model = &scene, .normal = bell_normal, .kink = KINK};
 	struct lm_result result;
 	double p[PARAMETERS], freedom;
 
-	if (peak->lopsided || !start(trace, peak, p))
+	if (peak->lopsided || !bell_start(trace, peak, p))
 		return false;
 	scene.first = trace_index(trace, p[CENTRE] - REACH_BASES * p[BASE]);
 	scene.last = trace_index(trace, p[CENTRE] + REACH_BASES * p[BASE]);

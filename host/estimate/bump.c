@@ -7,7 +7,7 @@
 
 enum { SHORTEST = 8, LONGEST = 128 };
 
-static double value_of(const struct trace *trace, size_t k)
+static double bump_value_of(const struct trace *trace, size_t k)
 {
 	return trace_good(trace, k) ? trace->value_g[k] : 0;
 }
@@ -21,10 +21,10 @@ bool bump_find(const struct trace *trace, struct bump *bump)
 		double sum = 0;
 
 		for (size_t k = trace->first; k < trace->last; k++) {
-			sum += value_of(trace, k);
+			sum += bump_value_of(trace, k);
 			if (k < trace->first + width)
 				continue;
-			sum -= value_of(trace, k - width);
+			sum -= bump_value_of(trace, k - width);
 			if (fabs(sum) > best.sigmas * unit)
 				best = (struct bump){trace_time(trace, k + 1 - width),
 				                     trace_time(trace, k + 1), fabs(sum) / unit};

@@ -38,7 +38,7 @@ struct surface {
 };
 
 /* Half of the square's value, slope and curvature. */
-static void square_at(const struct surface *surface, double time_s, double half[3])
+static void crest_square_at(const struct surface *surface, double time_s, double half[3])
 {
 	half[0] = half[1] = half[2] = 0;
 	for (unsigned i = 0; i < surface->count; i++) {
@@ -59,7 +59,7 @@ static bool newton(const struct surface *surface, double step_s, double *time_s,
 	for (int i = 0; i < CREST_NEWTON; i++) {
 		double move;
 
-		square_at(surface, time, half);
+		crest_square_at(surface, time, half);
 		if (!(half[2] < 0))
 			return false;
 		move = half[1] / half[2];
@@ -74,7 +74,7 @@ static bool newton(const struct surface *surface, double step_s, double *time_s,
 }
 
 /* The highest instant within reach of the centre: 0 inside, -1 or +1 at that end of the reach. */
-static int summit(const struct surface *surface, double *time_s)
+static int crest_summit(const struct surface *surface, double *time_s)
 {
 	double centre = surface->axis[0].centre_s, reach = REACH * surface->axis[0].half_s;
 	double step = 2 * reach / CREST_STEPS, best = -1, half[3], left[3], right[3];
@@ -82,12 +82,12 @@ static int summit(const struct surface *surface, double *time_s)
 
 	/* Most often it is where it was looked for. */
 	*time_s = centre;
-	square_at(surface, centre - reach, left);
-	square_at(surface, centre + reach, right);
+	crest_square_at(surface, centre - reach, left);
+	crest_square_at(surface, centre + reach, right);
 	if (newton(surface, 2 * step, time_s, half) && half[0] > fmax(left[0], right[0]))
 		return 0;
 	for (int i = 0; i <= CREST_STEPS; i++) {
-		square_at(surface, centre - reach + i * step, half);
+		crest_square_at(surface, centre - reach + i * step, half);
 		if (half[0] > best) {
 			best = half[0];
 			at = i;
@@ -114,7 +114,7 @@ static bool climb(struct surface *surface, const struct trace *const axes[], uns
 		for (unsigned i = 0; i < count; i++)
 			if (!local_fit(&surface->axis[i], axes[i], *near_s, half_s, span, order))
 				return false;
-		side = summit(surface, &top);
+		side = crest_summit(surface, &top);
 		if (side == 0 && fabs(top - *near_s) * axes[0]->rate_hz < OFF_CENTRE) {
 			*near_s = top;
 			return true;
@@ -151,7 +151,7 @@ static void propagate(const struct surface *surface, const struct trace *const a
 {
 	double half[3], variance = 0, slope_variance = 0;
 
-	square_at(surface, crest->time_s, half);
+	crest_square_at(surface, crest->time_s, half);
 	for (unsigned i = 0; i < surface->count; i++) {
 		double d[3], noise = crest_noise(&surface->axis[i], axes[i]);
 

@@ -81,8 +81,8 @@ static void block_mean(const struct scene *scene, double complex pole, double co
 }
 
 /* Blocks count as often as they have samples. */
-static void add_blocks(const struct scene *scene, const struct respond *respond, const double *p,
-                       struct gram *gram)
+static void driven_add_blocks(const struct scene *scene, const struct respond *respond, const double *p,
+                              struct gram *gram)
 {
 	double weight = sqrt((double)scene->block_size), step = (double)scene->block_size * scene->sample_s;
 	double past = scene->block_from_s - p[DELAY] - respond->end_s, gain = p[GAIN];
@@ -110,8 +110,8 @@ static void add_blocks(const struct scene *scene, const struct respond *respond,
 	}
 }
 
-static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
-                     double right[CHOLESKY_MAX], double *squares)
+static size_t driven_normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
+                            double right[CHOLESKY_MAX], double *squares)
 {
 	const struct scene *scene = model;
 	struct respond respond;
@@ -137,7 +137,7 @@ static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_
 		row[RESIDUAL] = single->value_g - p[GAIN] * point.value - p[OFFSET] * single->ramp;
 		gram_add(&gram, row);
 	}
-	add_blocks(scene, &respond, p, &gram);
+	driven_add_blocks(scene, &respond, p, &gram);
 	return gram_finish(&gram, matrix, right, squares);
 }
 
@@ -196,8 +196,8 @@ static void add_block(struct scene *scene, const struct trace *trace, size_t fir
 }
 
 /* From the input's beginning, or the response's, to some cycles after its end or the next contact. */
-static void collect(const struct driven_axis *axis, double delay_s, double window_s, double omega,
-                    struct scene *scene)
+static void driven_collect(const struct driven_axis *axis, double delay_s, double window_s, double omega,
+                           struct scene *scene)
 {
 	const struct trace *s1 = axis->trace[0], *s2 = axis->trace[1];
 	double length = scene->input->count * scene->input->step_s, end = scene->input->from_s + length;
@@ -250,13 +250,14 @@ struct solution {
 };
 
 /* What S1 is later by than an oscillator is no more than the contact and a swing. */
-static bool same_contact(const struct driven_axis *axis, const struct solution *solution)
+static bool driven_same_contact(const struct driven_axis *axis, const struct solution *solution)
 {
 	return fabs(solution->p[DELAY]) < axis->peak[1]->width_s + 2 * UNITS_PI / solution->p[OMEGA];
 }
 
-static bool judge(const struct driven_axis *axis, const struct scene *scene, const struct respond *respond,
-                  const struct lm_result *result, struct solution *solution)
+static bool driven_judge(const struct driven_axis *axis, const struct scene *scene,
+                         const struct respond *respond, const struct lm_result *result,
+                         struct solution *solution)
 {
 	double row[PARAMETERS] = {0, 0, 1, 0, 0}, freedom = (double)(result->used - PARAMETERS);
 	double noise = fmax(axis->trace[0]->noise_g, LIMIT_MISFIT * fabs(axis->peak[0]->result.value_g));
@@ -264,7 +265,7 @@ static bool judge(const struct driven_axis *axis, const struct scene *scene, con
 	struct respond_crest crest;
 	struct respond_point top;
 
-	if (result->squares > UNEXPLAINED_MAX * scene->squares || !same_contact(axis, solution) ||
+	if (result->squares > UNEXPLAINED_MAX * scene->squares || !driven_same_contact(axis, solution) ||
 	    !respond_crest(respond, axis->peak[1]->sign, &crest))
 		return false;
 	row[DECAY] = crest.time_by_decay;
@@ -288,13 +289,13 @@ static bool judge(const struct driven_axis *axis, const struct scene *scene, con
 
 /* From the ring-down's frequency and damping, and S1's peak or, when that is of a later swing, from so many
  * half cycles before it. */
-static bool solve(const struct driven_axis *axis, struct scene *scene, double cycles, unsigned back,
-                  struct solution *solution)
+static bool driven_solve(const struct driven_axis *axis, struct scene *scene, double cycles, unsigned back,
+                         struct solution *solution)
 {
 	const struct estimate_ringdown *ring = &axis->ringdown->result;
 	const struct estimate_peak *peak = &axis->peak[0]->result;
 	double *p = solution->p, part = ring->damping_ratio, half_s;
-	struct lm_problem problem = {.size = PARAMETERS, .model = scene, .normal = normal};
+	struct lm_problem problem = {.size = PARAMETERS, .model = scene, .normal = driven_normal};
 	struct lm_result result;
 	struct respond respond;
 	struct respond_crest crest;
@@ -311,11 +312,11 @@ static bool solve(const struct driven_axis *axis, struct scene *scene, double cy
 	p[DELAY] = peak->time_s - crest.time_s - back * half_s;
 	p[GAIN] = (back % 2 ? -1 : 1) * peak->value_g / crest.value * exp(back * p[DECAY] * half_s);
 	p[OFFSET] = 0;
-	collect(axis, p[DELAY], cycles * 2 * UNITS_PI / p[OMEGA], p[OMEGA], scene);
+	driven_collect(axis, p[DELAY], cycles * 2 * UNITS_PI / p[OMEGA], p[OMEGA], scene);
 	if (!lm_fit(&problem, p, &result))
 		return false;
 	respond_make(&respond, scene->input, p[DECAY], p[OMEGA]);
-	return judge(axis, scene, &respond, &result, solution);
+	return driven_judge(axis, scene, &respond, &result, solution);
 }
 
 static bool better(const struct solution *a, const struct solution *than)
@@ -327,13 +328,13 @@ static bool better(const struct solution *a, const struct solution *than)
 static bool solve_window(const struct driven_axis *axis, struct scene *scene, double cycles,
                          struct solution *solution)
 {
-	bool found = solve(axis, scene, cycles, 0, solution);
+	bool found = driven_solve(axis, scene, cycles, 0, solution);
 	unsigned late = solution->late;
 	struct solution first;
 
 	/* with a delay of its own S1 peaks later by up to one more */
 	for (unsigned back = late; back > 0 && back + 2 > late && !(found && !solution->refused); back--) {
-		if (!solve(axis, scene, cycles, back, &first) || (found && !better(&first, solution)))
+		if (!driven_solve(axis, scene, cycles, back, &first) || (found && !better(&first, solution)))
 			continue;
 		*solution = first;
 		found = true;
@@ -350,7 +351,7 @@ static bool has_peak(const struct peak *peak, enum estimate_status *status)
 }
 
 /* Whether there is something to work on; why not goes into the status. */
-static bool possible(const struct driven_axis *axis, enum estimate_status *status)
+static bool driven_possible(const struct driven_axis *axis, enum estimate_status *status)
 {
 	const struct estimate_ringdown *ring = &axis->ringdown->result;
 
@@ -395,8 +396,8 @@ static bool solve_both(const struct driven_axis *axis, struct scene *scene, stru
 
 /* A refused fit may miss the peak by as much as it misses S1's own. input_s: what noise as input moves it by.
  */
-static void express(const struct driven_axis *axis, const struct solution *solution, double from_s,
-                    double sigma_from_s, double input_s, struct driven *driven)
+static void driven_express(const struct driven_axis *axis, const struct solution *solution, double from_s,
+                           double sigma_from_s, double input_s, struct driven *driven)
 {
 	double fit = solution->spread_s * solution->noise_g, sigma, strain;
 
@@ -422,7 +423,8 @@ static void express(const struct driven_axis *axis, const struct solution *solut
 	driven->sigma_peak_s = strain * fit;
 }
 
-static void draw(const struct solution *solution, const struct driven *driven, struct driven_curve *curve)
+static void driven_draw(const struct solution *solution, const struct driven *driven,
+                        struct driven_curve *curve)
 {
 	respond_make(&curve->respond, &curve->input, solution->p[DECAY], solution->p[OMEGA]);
 	curve->gain = solution->p[GAIN];
@@ -449,7 +451,7 @@ void driven_find(const struct driven_axis *axis, struct driven *driven, struct d
 	                          .free_s = NAN,
 	                          .chi_square = NAN,
 	                          .status = ESTIMATE_SHORT};
-	if (!possible(axis, &driven->status))
+	if (!driven_possible(axis, &driven->status))
 		return;
 	driven->status = ESTIMATE_NOT_CONVERGED;
 	driven->flags = flaws(axis);
@@ -466,13 +468,13 @@ void driven_find(const struct driven_axis *axis, struct driven *driven, struct d
 		has_sampled = solve_both(axis, &scene, &sampled);
 	}
 	if (has_sampled && !(has_smooth && !better(&sampled, &smooth)))
-		express(axis, &sampled, peak->result.time_s, peak->result.sigma_time_s,
-		        sampled.input_spread_s * s2->noise_g, driven);
+		driven_express(axis, &sampled, peak->result.time_s, peak->result.sigma_time_s,
+		               sampled.input_spread_s * s2->noise_g, driven);
 	else if (has_smooth)
-		express(axis, &smooth, bell.centre_s, bell.sigma_centre_s, 0, driven);
+		driven_express(axis, &smooth, bell.centre_s, bell.sigma_centre_s, 0, driven);
 	if (isnan(driven->peak_g))
 		return;
-	draw(has_sampled ? &sampled : &smooth, driven, curve);
+	driven_draw(has_sampled ? &sampled : &smooth, driven, curve);
 	if (!has_sampled)
 		driven->free_s = smooth.free_s;
 }

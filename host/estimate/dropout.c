@@ -30,7 +30,7 @@ static bool stands_off(const struct trace *trace, size_t k, double noise_g)
 }
 
 /* Marks the runs that begin in samples [from, until). */
-static bool mark_in(struct trace *trace, size_t from, size_t until, double noise_g)
+static bool dropout_mark_in(struct trace *trace, size_t from, size_t until, double noise_g)
 {
 	bool marked = false;
 	size_t first, end;
@@ -59,7 +59,8 @@ bool dropout_mark(struct trace *trace, double noise_g)
 
 		/* A run begins beside a reading that stands off. */
 		if (loud || was_loud)
-			marked |= mark_in(trace, from, until < trace->count ? until : trace->count, noise_g);
+			marked |= dropout_mark_in(trace, from, until < trace->count ? until : trace->count,
+			                          noise_g);
 		was_loud = loud;
 	}
 	if (marked)

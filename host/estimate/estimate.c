@@ -18,7 +18,7 @@
 #define EVENT_BEFORE_S 0.02
 #define EVENT_AFTER_S 0.1
 
-static int prepare(const struct desk *desk, size_t i, struct estimate_baseline *baseline)
+static int estimate_prepare(const struct desk *desk, size_t i, struct estimate_baseline *baseline)
 {
 	const struct estimate_options *options = desk->options;
 	struct trace *trace = &desk->work[i].trace;
@@ -140,10 +140,10 @@ static bool has_good_sample(const struct desk *desk)
 	return false;
 }
 
-static int analyse(const struct desk *desk, struct analysis *analysis)
+static int estimate_analyse(const struct desk *desk, struct analysis *analysis)
 {
 	for (size_t i = 0; i < analysis->channel_count; i++) {
-		int status = prepare(desk, i, &analysis->channels[i].baseline);
+		int status = estimate_prepare(desk, i, &analysis->channels[i].baseline);
 
 		if (status)
 			return status;
@@ -162,7 +162,7 @@ static int analyse(const struct desk *desk, struct analysis *analysis)
 	return 0;
 }
 
-static bool allowed(double option)
+static bool estimate_allowed(double option)
 {
 	return option >= 0 && isfinite(option);
 }
@@ -211,16 +211,16 @@ int estimate_record(const struct record *record, const struct estimate_options *
 
 	if (record->channel_count == 0)
 		return DT_E_EMPTY;
-	if (!allowed(options->lowpass_hz) || !allowed(options->iepe_time_constant_s) ||
-	    !allowed(options->tolerance) || !allowed(options->impact_speed_m_s) ||
-	    !allowed(options->gravity_m_s2) || (unsigned)options->family >= ESTIMATE_FAMILIES)
+	if (!estimate_allowed(options->lowpass_hz) || !estimate_allowed(options->iepe_time_constant_s) ||
+	    !estimate_allowed(options->tolerance) || !estimate_allowed(options->impact_speed_m_s) ||
+	    !estimate_allowed(options->gravity_m_s2) || (unsigned)options->family >= ESTIMATE_FAMILIES)
 		return DT_E_ARGUMENT;
 	desk.work = calloc(record->channel_count, sizeof(*desk.work));
 	found.channels = calloc(record->channel_count, sizeof(*found.channels));
 	if (desk.work && found.channels)
 		samples = lay_out(&desk);
 	if (samples)
-		status = analyse(&desk, &found);
+		status = estimate_analyse(&desk, &found);
 	free(samples);
 	free(desk.work);
 	if (status) {

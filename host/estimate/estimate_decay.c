@@ -19,7 +19,7 @@
 /* A plate beside a case that rings too starts its decay at this many times the case's. */
 #define PLATE_OVER_CASE 2.0
 
-static bool measured(const struct analysis *analysis, size_t i)
+static bool estimate_decay_measured(const struct analysis *analysis, size_t i)
 {
 	return i < analysis->channel_count && isfinite(analysis->channels[i].pulse.end_s);
 }
@@ -32,13 +32,13 @@ static size_t contact_channel(const struct desk *desk, const struct analysis *an
 
 	if (desk->record->channels[i].sensor == 0)
 		return i;
-	if (measured(analysis, x) && measured(analysis, y))
+	if (estimate_decay_measured(analysis, x) && estimate_decay_measured(analysis, y))
 		return fabs(analysis->channels[y].peak.value_g) > fabs(analysis->channels[x].peak.value_g)
 		               ? y
 		               : x;
-	if (measured(analysis, x))
+	if (estimate_decay_measured(analysis, x))
 		return x;
-	if (measured(analysis, y))
+	if (estimate_decay_measured(analysis, y))
 		return y;
 	return x < analysis->channel_count ? x : i;
 }

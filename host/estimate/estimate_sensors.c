@@ -33,8 +33,8 @@ static bool find_sensor(const struct desk *desk, const char *name, struct sensor
 
 /* An axis of S1 on S2: its peak, and when its decay is free, which the contact's pulse alone knows less well.
  */
-static void drive(const struct desk *desk, unsigned i, const struct sensor *s2, struct sensor *s1,
-                  struct driven *driven, struct driven_curve *curve)
+static void estimate_sensors_drive(const struct desk *desk, unsigned i, const struct sensor *s2,
+                                   struct sensor *s1, struct driven *driven, struct driven_curve *curve)
 {
 	struct work *work = &desk->work[s1->at[i]];
 	const struct driven_axis axis = {
@@ -64,7 +64,7 @@ static void time_weak(const struct desk *desk, struct analysis *analysis)
 	}
 }
 
-static void add_resultant(const char *name, struct sensor *sensor, struct analysis *analysis)
+static void estimate_sensors_add_resultant(const char *name, struct sensor *sensor, struct analysis *analysis)
 {
 	struct estimate_resultant *result = &analysis->resultants[analysis->resultant_count++];
 
@@ -87,15 +87,15 @@ void estimate_sensors(const struct desk *desk, struct analysis *analysis)
 	for (unsigned i = 0; analysis->has_lag && i < 2; i++) {
 		struct estimate_channel *channel = &analysis->channels[s1.at[i]];
 
-		drive(desk, i, &s2, &s1, &driven[i], &curve[i]);
+		estimate_sensors_drive(desk, i, &s2, &s1, &driven[i], &curve[i]);
 		channel->peak = desk->work[s1.at[i]].peak.result;
 		channel->ringdown = desk->work[s1.at[i]].ringdown.result;
 	}
 	time_weak(desk, analysis);
 	if (has_s1)
-		add_resultant("S1", &s1, analysis);
+		estimate_sensors_add_resultant("S1", &s1, analysis);
 	if (has_s2)
-		add_resultant("S2", &s2, analysis);
+		estimate_sensors_add_resultant("S2", &s2, analysis);
 	if (!analysis->has_lag)
 		return;
 	lag_find(&(struct lag_sensor){s1.axes, &s1.resultant}, &(struct lag_sensor){s2.axes, &s2.resultant},

@@ -19,7 +19,7 @@ struct filter_section filter_section(double corner, double damping)
 	        .b = w * w * scale, .a1 = 2 * (w * w - 1) * scale, .a2 = (1 - damping * w + w * w) * scale};
 }
 
-static void settle(struct filter_section *section, size_t sections, double value)
+static void filter_settle(struct filter_section *section, size_t sections, double value)
 {
 	for (size_t i = 0; i < sections; i++) {
 		section[i].s1 = value * (1 - section[i].b);
@@ -27,7 +27,7 @@ static void settle(struct filter_section *section, size_t sections, double value
 	}
 }
 
-static double step(struct filter_section *section, size_t sections, double value)
+static double filter_step(struct filter_section *section, size_t sections, double value)
 {
 	for (size_t i = 0; i < sections; i++) {
 		struct filter_section *s = &section[i];
@@ -55,12 +55,12 @@ static void filter_run(struct filter_section *section, size_t sections, double *
 	}
 	for (size_t i = 0; i < count; i++)
 		padded[reflect + i] = run[i];
-	settle(section, sections, padded[0]);
+	filter_settle(section, sections, padded[0]);
 	for (size_t i = 0; i < all; i++)
-		padded[i] = step(section, sections, padded[i]);
-	settle(section, sections, padded[all - 1]);
+		padded[i] = filter_step(section, sections, padded[i]);
+	filter_settle(section, sections, padded[all - 1]);
 	for (size_t i = all; i-- > 0;)
-		padded[i] = step(section, sections, padded[i]);
+		padded[i] = filter_step(section, sections, padded[i]);
 	for (size_t i = 0; i < count; i++)
 		run[i] = padded[reflect + i];
 }

@@ -45,7 +45,7 @@ static double edge_cosine(const struct bell *curve, double level)
 }
 
 /* What a sample says beyond the curve, in the pulse's direction. */
-static double beyond(const struct guide *guide, const struct trace *trace, size_t k)
+static double guide_beyond(const struct guide *guide, const struct trace *trace, size_t k)
 {
 	double over = trace->value_g[k] - bell_at(&guide->curve, trace_time(trace, k));
 
@@ -78,9 +78,10 @@ bool guide_edge(const struct guide *guide, const struct trace *trace, int step, 
 		edge->stays = outside;
 		edge->taken = 1 - outside;
 	}
-	edge->time_s +=
-	        step * ((1 - place) * beyond(guide, trace, after - 1) + place * beyond(guide, trace, after)) /
-	        edge->slope_g_s;
+	edge->time_s += step *
+	                ((1 - place) * guide_beyond(guide, trace, after - 1) +
+	                 place * guide_beyond(guide, trace, after)) /
+	                edge->slope_g_s;
 	return true;
 }
 

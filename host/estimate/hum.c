@@ -33,7 +33,7 @@ enum { TONE_HALVINGS = 14 };
 #define COLOUR_MAX 3.0
 
 /* Adds up the normal equations, means taken from that of the first block on. */
-static void add_blocks(struct hum_line *line, const struct quiet *quiet, double half_s, struct gram *gram)
+static void hum_add_blocks(struct hum_line *line, const struct quiet *quiet, double half_s, struct gram *gram)
 {
 	const struct quiet_block *block = quiet->block;
 	const unsigned first = line->has_slope ? 2 : 1;
@@ -71,7 +71,7 @@ static bool fit_line(struct hum_line *line, const struct quiet *quiet, double ha
 	line->terms = 1u + (line->has_slope ? 1 : 0) + 2 * line->hums;
 	line->squares = 0;
 	gram_start(&gram, line->terms);
-	add_blocks(line, quiet, half_s, &gram);
+	hum_add_blocks(line, quiet, half_s, &gram);
 	gram_finish(&gram, normal, right, &line->squares);
 	if (!cholesky_factor(&factor, line->terms, normal))
 		return false;
@@ -101,8 +101,8 @@ static void try_hz(struct hum_line *best, const struct quiet *quiet, double half
 }
 
 /* The frequency of hum h within reach_hz of what it is. */
-static void refine(struct hum_line *line, const struct quiet *quiet, double half_s, unsigned h,
-                   double reach_hz)
+static void hum_refine(struct hum_line *line, const struct quiet *quiet, double half_s, unsigned h,
+                       double reach_hz)
 {
 	for (int i = 0; i < TONE_HALVINGS; i++, reach_hz /= 2) {
 		double hz = line->hum_hz[h];
@@ -118,7 +118,7 @@ static void refine_all(struct hum_line *line, const struct quiet *quiet, double 
 	for (unsigned h = 0; h < line->hums; h++) {
 		struct hum_line trial = *line;
 
-		refine(&trial, quiet, half_s, h, 0.5 / (2 * half_s));
+		hum_refine(&trial, quiet, half_s, h, 0.5 / (2 * half_s));
 		if (line->squares - trial.squares > LIMIT_F * left(&trial, quiet->count))
 			*line = trial;
 	}
@@ -177,7 +177,7 @@ static struct hum_line one_more(const struct hum_line *line, const struct quiet 
 	if (!(most > 0) || !fit_line(&best, quiet, half_s) ||
 	    !(line->squares - best.squares > LIMIT_F * left(&best, quiet->count)))
 		return *line;
-	refine(&best, quiet, half_s, best.hums - 1, step / 2);
+	hum_refine(&best, quiet, half_s, best.hums - 1, step / 2);
 	return best;
 }
 

@@ -87,12 +87,12 @@ static double cross_correlation(const struct lag_sensor *s1, const struct lag_se
 	return (at + top_of(before, middle, after)) * step;
 }
 
-static bool usable(const struct resultant *resultant)
+static bool lag_usable(const struct resultant *resultant)
 {
 	return isfinite(resultant->result.time_s);
 }
 
-static void combine(const struct driven axis[2], struct estimate_lag *lag)
+static void lag_combine(const struct driven axis[2], struct estimate_lag *lag)
 {
 	double weight[2] = {0, 0}, sum = 0, both, apart;
 	unsigned tried = 0;
@@ -144,11 +144,11 @@ void lag_find(const struct lag_sensor *s1, const struct lag_sensor *s2, const st
 	        .status = r2->result.how.status,
 	};
 
-	if (found.status == ESTIMATE_OK || !usable(r1))
+	if (found.status == ESTIMATE_OK || !lag_usable(r1))
 		found.status = r1->result.how.status;
 	*lag = found;
-	combine(driven, lag);
-	if (!usable(r1) || !usable(r2))
+	lag_combine(driven, lag);
+	if (!lag_usable(r1) || !lag_usable(r2))
 		return;
 	lag->largest_peak_s = r1->result.time_s - r2->result.time_s;
 	lag->first_peak_s = r1->first_peak_s - r2->first_peak_s;

@@ -36,8 +36,8 @@ static bool stand(const struct lm_problem *problem, const double *p, struct plac
 }
 
 /* The damped step from a place, and what of the sum of squares the straight model promises for it. */
-static bool step(const struct lm_problem *problem, const struct place *place, double damping, double *change,
-                 double *promise)
+static bool lm_step(const struct lm_problem *problem, const struct place *place, double damping,
+                    double *change, double *promise)
 {
 	double damped[CHOLESKY_MAX][CHOLESKY_MAX];
 	struct cholesky factor;
@@ -55,7 +55,7 @@ static bool step(const struct lm_problem *problem, const struct place *place, do
 }
 
 /* The sum of squares that the unknowns themselves would make as a step. */
-static double squares_of(const struct lm_problem *problem, const struct place *place, const double *p)
+static double lm_squares_of(const struct lm_problem *problem, const struct place *place, const double *p)
 {
 	double sum = 0;
 
@@ -75,8 +75,8 @@ static bool is_last(const struct lm_problem *problem, double promise, double bef
 	       (!(problem->kink > 0) && promise <= variance && promise * promise <= end * before);
 }
 
-static bool finish(const struct lm_problem *problem, struct place *place, double promise,
-                   struct lm_result *result)
+static bool lm_finish(const struct lm_problem *problem, struct place *place, double promise,
+                      struct lm_result *result)
 {
 	result->squares = fmax(place->squares - promise, 0);
 	result->used = place->used;
@@ -94,25 +94,25 @@ bool lm_fit(const struct lm_problem *problem, double *p, struct lm_result *resul
 		return false;
 	/* A step that promises no more of the sum of squares, or is no larger a part of the unknowns. */
 	rounding = fmax(LIMIT_ROUNDING * here->squares,
-	                LIMIT_ROUNDING * LIMIT_ROUNDING * squares_of(problem, here, p));
+	                LIMIT_ROUNDING * LIMIT_ROUNDING * lm_squares_of(problem, here, p));
 	result->iterations = 1;
 	while (result->iterations < LM_ITERATIONS) {
 		double change[CHOLESKY_MAX], trial[CHOLESKY_MAX], promise, gain, variance;
 		struct place *swap;
 
-		if (!step(problem, here, damping, change, &promise))
+		if (!lm_step(problem, here, damping, change, &promise))
 			return false;
 		for (unsigned i = 0; i < problem->size; i++)
 			trial[i] = p[i] + change[i];
 		variance = here->squares / (double)(here->used - problem->size);
 		if (damping < DAMPING_FELT && is_last(problem, promise, before, variance)) {
 			memcpy(p, trial, problem->size * sizeof(*p));
-			return finish(problem, here, promise, result);
+			return lm_finish(problem, here, promise, result);
 		}
 		result->iterations++;
 		if (!stand(problem, trial, there) || there->squares > here->squares) {
 			if (promise <= rounding || damping > DAMPING_MAX)
-				return finish(problem, here, 0, result);
+				return lm_finish(problem, here, 0, result);
 			damping = fmax(damping / DAMPING_DOWN, felt);
 			before = 0;
 			continue;
@@ -127,7 +127,7 @@ bool lm_fit(const struct lm_problem *problem, double *p, struct lm_result *resul
 		variance = here->squares / (double)(here->used - problem->size);
 		if (promise <= LM_STEP * LM_STEP * variance || promise <= rounding ||
 		    (result->iterations > LM_PATIENCE && gain <= problem->kink * variance))
-			return finish(problem, here, 0, result);
+			return lm_finish(problem, here, 0, result);
 	}
 	return false;
 }

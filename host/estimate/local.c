@@ -14,8 +14,8 @@ struct sums {
 	size_t used;
 };
 
-static inline void add_up(struct sums *sums, const struct trace *trace, size_t first, size_t last,
-                          double start, double step, unsigned terms)
+static inline void local_add_up(struct sums *sums, const struct trace *trace, size_t first, size_t last,
+                                double start, double step, unsigned terms)
 {
 	for (size_t k = first; k < last; k++) {
 		double x = start + (double)(k - first) * step, value = trace->value_g[k];
@@ -52,11 +52,11 @@ bool local_fit(struct local *local, const struct trace *trace, double centre_s, 
 	step = 1 / (trace->rate_hz * half_s);
 	/* The orders in use, so that the compiler knows how often the loops go round. */
 	if (terms == 7)
-		add_up(&sums, trace, first, last, start, step, 7);
+		local_add_up(&sums, trace, first, last, start, step, 7);
 	else if (terms == 5)
-		add_up(&sums, trace, first, last, start, step, 5);
+		local_add_up(&sums, trace, first, last, start, step, 5);
 	else
-		add_up(&sums, trace, first, last, start, step, terms);
+		local_add_up(&sums, trace, first, last, start, step, terms);
 	if (sums.used < terms + 2)
 		return false;
 	for (unsigned i = 0; i < terms; i++) {

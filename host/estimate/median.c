@@ -5,7 +5,7 @@
 
 enum { SORT_MAX = 24 };
 
-static void sort(double *v, size_t n)
+static void median_sort(double *v, size_t n)
 {
 	for (size_t i = 1; i < n; i++) {
 		double here = v[i];
@@ -59,7 +59,7 @@ static void select(double *v, size_t n, size_t rank)
 		n -= below + equal;
 		rank -= below + equal;
 	}
-	sort(v, n);
+	median_sort(v, n);
 }
 
 double median_find(double *value, size_t n)

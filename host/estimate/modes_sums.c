@@ -30,7 +30,7 @@ struct view {
 	double swing[DECAYS_MAX][2];     /* their cosines and sines */
 };
 
-static struct view look(const struct modes_problem *problem, const double *p)
+static struct view modes_sums_look(const struct modes_problem *problem, const double *p)
 {
 	const struct modes *modes = problem->modes;
 	const struct series *series = problem->series;
@@ -75,7 +75,7 @@ static inline struct complex_pair plus(struct complex_pair a, struct complex_pai
 	return (struct complex_pair){a.re + b.re, a.im + b.im};
 }
 
-static inline struct complex_pair scale(PAIR factor, struct complex_pair a)
+static inline struct complex_pair modes_sums_scale(PAIR factor, struct complex_pair a)
 {
 	return (struct complex_pair){factor * a.re, factor * a.im};
 }
@@ -94,8 +94,8 @@ static void sum_geometric(struct complex_pair w, unsigned n, struct complex_pair
 	while (bit <= n / 2)
 		bit *= 2;
 	while (bit >>= 1) {
-		struct complex_pair late = plus(sum[1], scale(m, sum[0]));
-		struct complex_pair later = plus(sum[2], scale(m, plus(sum[1], late)));
+		struct complex_pair late = plus(sum[1], modes_sums_scale(m, sum[0]));
+		struct complex_pair later = plus(sum[2], modes_sums_scale(m, plus(sum[1], late)));
 
 		sum[0] = plus(sum[0], times(power, sum[0]));
 		sum[1] = plus(sum[1], times(power, late));
@@ -104,8 +104,8 @@ static void sum_geometric(struct complex_pair w, unsigned n, struct complex_pair
 		m += m;
 		if (n & bit) {
 			sum[0] = plus(sum[0], power);
-			sum[1] = plus(sum[1], scale(m, power));
-			sum[2] = plus(sum[2], scale(m * m, power));
+			sum[1] = plus(sum[1], modes_sums_scale(m, power));
+			sum[2] = plus(sum[2], modes_sums_scale(m * m, power));
 			power = times(power, w);
 			m += one;
 		}
@@ -116,10 +116,10 @@ static void sum_geometric(struct complex_pair w, unsigned n, struct complex_pair
 static void by_time(struct complex_pair sum[3], struct complex_pair start, const struct view *view)
 {
 	const PAIR first = {view->first_s, view->first_s}, step = {view->step_s, view->step_s};
-	struct complex_pair late = plus(scale(first, sum[0]), scale(step, sum[1]));
-	struct complex_pair later = plus(scale(step, sum[1]), late);
+	struct complex_pair late = plus(modes_sums_scale(first, sum[0]), modes_sums_scale(step, sum[1]));
+	struct complex_pair later = plus(modes_sums_scale(step, sum[1]), late);
 
-	later = plus(scale(first, later), scale(step * step, sum[2]));
+	later = plus(modes_sums_scale(first, later), modes_sums_scale(step * step, sum[2]));
 	sum[0] = times(start, sum[0]);
 	sum[1] = times(start, late);
 	sum[2] = times(start, later);
@@ -168,8 +168,8 @@ static inline void take_off(struct complex_pair sum[3], struct complex_pair valu
 {
 	const PAIR minus = {-1, -1}, later = {time, time};
 
-	value = scale(minus, value);
-	for (unsigned i = 0; i < 3; i++, value = scale(later, value))
+	value = modes_sums_scale(minus, value);
+	for (unsigned i = 0; i < 3; i++, value = modes_sums_scale(later, value))
 		sum[i] = plus(sum[i], value);
 }
 
@@ -262,7 +262,7 @@ static unsigned make_columns(struct column column[CHOLESKY_MAX], const struct mo
 	return n;
 }
 
-static inline double both(PAIR pair)
+static inline double modes_sums_both(PAIR pair)
 {
 	return pair[0] + pair[1];
 }
@@ -280,19 +280,19 @@ size_t modes_undisturbed(const void *context, const double *p, double normal[CHO
 
 	if (!modes_possible(problem->modes, p))
 		return 0;
-	view = look(problem, p);
+	view = modes_sums_look(problem, p);
 	sum_up(&sums, &view);
 	n = make_columns(column, problem->modes, p);
 	normal[MODES_OFFSET][MODES_OFFSET] = problem->series->used;
-	right[MODES_OFFSET] = both(sums.residual.sum);
-	*squares = both(sums.residual.squares);
+	right[MODES_OFFSET] = modes_sums_both(sums.residual.sum);
+	*squares = modes_sums_both(sums.residual.squares);
 	for (unsigned i = 0; i < n; i++) {
 		const struct column a = column[i];
 		const struct complex_pair of = sums.of[a.decay][a.late];
 
 		normal[1 + i][MODES_OFFSET] = a.c * of.re[0] + a.s * of.im[0];
-		right[1 + i] =
-		        both(a.c * sums.residual.c[a.decay][a.late] + a.s * sums.residual.s[a.decay][a.late]);
+		right[1 + i] = modes_sums_both(a.c * sums.residual.c[a.decay][a.late] +
+		                               a.s * sums.residual.s[a.decay][a.late]);
 		for (unsigned j = 0; j <= i; j++) {
 			const struct column b = column[j];
 			const struct complex_pair with = sums.with[a.decay][b.decay][a.late + b.late];

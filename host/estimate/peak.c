@@ -129,7 +129,7 @@ static double hole(const struct trace *trace, double time_s)
 }
 
 /* The raw sample; it stands at a hole, or at an end of the trace. */
-static void take_sample(const struct trace *trace, struct peak *peak)
+static void peak_take_sample(const struct trace *trace, struct peak *peak)
 {
 	struct estimate_peak *result = &peak->result;
 	size_t k = peak->at;
@@ -144,8 +144,8 @@ static void take_sample(const struct trace *trace, struct peak *peak)
 
 /* The parabola through the highest sample and its neighbours: its top is shift samples later and rise
  * higher. False where it has none there. */
-static bool parabola(const struct trace *trace, const struct peak *peak, double *shift, double *rise,
-                     double *bend)
+static bool peak_parabola(const struct trace *trace, const struct peak *peak, double *shift, double *rise,
+                          double *bend)
 {
 	size_t k = peak->at;
 	double before, after;
@@ -167,7 +167,7 @@ static bool take_parabola(const struct trace *trace, struct peak *peak)
 	struct estimate_peak *result = &peak->result;
 	double shift, rise, bend, late;
 
-	if (!parabola(trace, peak, &shift, &rise, &bend))
+	if (!peak_parabola(trace, peak, &shift, &rise, &bend))
 		return false;
 	late = hypot(trace->noise_g / (sqrt(2.0) * bend), shift / 2);
 	result->how.method = "parabola";
@@ -186,7 +186,7 @@ static bool take_crest(const struct trace *trace, struct peak *peak)
 	struct crest crest;
 
 	peak_tried(&result->how, "poly4/poly6");
-	if (parabola(trace, peak, &shift, &rise, &bend))
+	if (peak_parabola(trace, peak, &shift, &rise, &bend))
 		near += shift / trace->rate_hz;
 	if (!crest_fit(&crest, axes, 1, near, peak->width_s, &peak->span))
 		return false;
@@ -210,7 +210,7 @@ void peak_take_samples(const struct trace *trace, struct peak *peak)
 	struct estimate_how *how = &peak->result.how;
 
 	if (!take_parabola(trace, peak))
-		take_sample(trace, peak);
+		peak_take_sample(trace, peak);
 	peak_tried(how, how->method);
 }
 

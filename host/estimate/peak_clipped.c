@@ -98,8 +98,8 @@ static double sigma_of_all(const struct trace *trace, struct peak *peak)
 }
 
 /* The family was not given. */
-static void take_choice(const struct trace *trace, enum shape_verdict verdict, const struct clipped *clipped,
-                        struct peak *peak)
+static void peak_clipped_take_choice(const struct trace *trace, enum shape_verdict verdict,
+                                     const struct clipped *clipped, struct peak *peak)
 {
 	double *sigma_g = &peak->result.sigma_g;
 
@@ -127,7 +127,7 @@ static void extrapolate(const struct trace *trace, const struct estimate_options
 	else
 		take_suspect(peak, clipped);
 	if (options->family == ESTIMATE_FAMILY_AUTO)
-		take_choice(trace, verdict, clipped, peak);
+		peak_clipped_take_choice(trace, verdict, clipped, peak);
 	peak->result.how.flags |= ESTIMATE_FLAG_EXTRAPOLATED;
 }
 

@@ -15,8 +15,8 @@
 
 /* S1's largest sample may lie above the oscillator by some of the peak and noise; higher, it is of another
  * contact. */
-static bool same_contact(const struct driven_axis *axis, const struct driven *driven,
-                         const struct driven_curve *curve)
+static bool peak_driven_same_contact(const struct driven_axis *axis, const struct driven *driven,
+                                     const struct driven_curve *curve)
 {
 	const struct trace *trace = axis->trace[0];
 	size_t at = axis->peak[0]->at;
@@ -50,7 +50,7 @@ static double apart(const struct estimate_peak *s1, const struct driven *driven,
 	return sqrt(fmax(beyond, 0));
 }
 
-static void take(const struct driven *driven, double sigma_g, struct estimate_peak *s1)
+static void peak_driven_take(const struct driven *driven, double sigma_g, struct estimate_peak *s1)
 {
 	s1->value_g = driven->peak_g;
 	s1->sigma_g = sigma_g;
@@ -72,13 +72,13 @@ bool peak_driven(const struct driven_axis *axis, const struct driven *driven,
 	bool clipped = s1->how.status == ESTIMATE_CLIPPED, taken;
 	double sigma;
 
-	if (isnan(driven->peak_g) || !same_contact(axis, driven, curve))
+	if (isnan(driven->peak_g) || !peak_driven_same_contact(axis, driven, curve))
 		return false;
 	sigma = hypot(driven->sigma_peak_g,
 	              clipped ? LIMIT_UNSEEN * driven->peak_g : apart(s1, driven, curve));
 	taken = knows_better(axis, sigma);
 	if (taken)
-		take(driven, sigma, s1);
+		peak_driven_take(driven, sigma, s1);
 	else
 		s1->sigma_time_s = hypot(s1->sigma_time_s, s1->time_s - driven->peak_s);
 	peak_flag_tolerance(peak, options);

@@ -14,7 +14,7 @@ struct edge {
 };
 
 /* Second difference around sample k, 0 where a neighbour is missing. */
-static double bend(const struct trace *trace, size_t k)
+static double pulse_bend(const struct trace *trace, size_t k)
 {
 	if (k == 0 || k + 1 >= trace->count || !trace_good(trace, k - 1) || !trace_good(trace, k) ||
 	    !trace_good(trace, k + 1))
@@ -65,8 +65,8 @@ static bool find_edge(const struct trace *trace, const struct peak *peak, int st
 	rise = trace->value_g[after] - trace->value_g[before];
 	missing = after - before > 1 ? gap / sqrt(12.0) : 0;
 	edge->slope_g_s = fabs(rise) / gap;
-	bend0 = bend(trace, before);
-	bend1 = bend(trace, after);
+	bend0 = pulse_bend(trace, before);
+	bend1 = pulse_bend(trace, after);
 	bent = after - before == 1 ? agreed(bend0, bend1) : 0;
 	place = (edge->time_s - trace_time(trace, before)) / gap;
 	/* linear + bent u (u - 1) / 2 meets the level this much of the interval later */
@@ -143,9 +143,9 @@ static void take_velocity_sigma(const struct trace *trace, const struct estimate
 	pulse->sigma_velocity_m_s = baseline->samples > 0 ? UNITS_G_M_S2 * hypot(sigma_g_s, zero) : NAN;
 }
 
-static void velocity(const struct trace *trace, const struct peak *peak,
-                     const struct estimate_baseline *baseline, const struct edge edge[2],
-                     struct estimate_pulse *pulse)
+static void pulse_velocity(const struct trace *trace, const struct peak *peak,
+                           const struct estimate_baseline *baseline, const struct edge edge[2],
+                           struct estimate_pulse *pulse)
 {
 	double from, until, length, hole, step = 1 / trace->rate_hz, sigma;
 	/* Standard deviation of the trapezoid's error at a kink, over its place x between two samples, in
@@ -179,8 +179,8 @@ static bool fit(const struct trace *trace, const struct peak *peak, enum estimat
 /* The best of those that are not refused; best stays AUTO when all are. Families that the noise lets pass
  * differ in their base by more than either's own uncertainty: half of it is added to the best one's. False
  * where no symmetric pulse will do. */
-static bool choose(const struct trace *trace, const struct peak *peak, enum estimate_family family,
-                   struct shape *best, struct estimate_how *how)
+static bool pulse_choose(const struct trace *trace, const struct peak *peak, enum estimate_family family,
+                         struct shape *best, struct estimate_how *how)
 {
 	unsigned tried = 0;
 
@@ -221,8 +221,8 @@ static bool choose(const struct trace *trace, const struct peak *peak, enum esti
 
 /* True with a guide to the samples: the family where none of its questions is open, otherwise a pulse without
  * one. */
-static bool contact(const struct trace *trace, const struct peak *peak, enum estimate_family family,
-                    struct estimate_pulse *pulse, struct guide *guide)
+static bool pulse_contact(const struct trace *trace, const struct peak *peak, enum estimate_family family,
+                          struct estimate_pulse *pulse, struct guide *guide)
 {
 	struct estimate_how *how = &pulse->contact;
 	struct shape shape = {.family = ESTIMATE_FAMILY_AUTO};
@@ -231,7 +231,7 @@ static bool contact(const struct trace *trace, const struct peak *peak, enum est
 	how->status = pulse->status;
 	how->flags = peak->result.how.flags &
 	             (ESTIMATE_FLAG_GAPS | ESTIMATE_FLAG_SPIKE | ESTIMATE_FLAG_EXTRAPOLATED);
-	symmetric = choose(trace, peak, family, &shape, how);
+	symmetric = pulse_choose(trace, peak, family, &shape, how);
 	if (shape.family == ESTIMATE_FAMILY_AUTO) {
 		how->flags |= ESTIMATE_FLAG_MODEL;
 		how->status = ESTIMATE_NOT_CONVERGED;
@@ -317,10 +317,10 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	pulse->sigma_duration_s =
 	        hypot(hypot(edge[0].sigma_s, edge[1].sigma_s), LIMIT_EDGE * peak->result.sigma_g * tilt);
 	/* In a peak near its noise a curve may have found one hump: its feet then are not the pulse's. */
-	guided = peak->model != PEAK_MODEL_NONE && contact(trace, peak, family, pulse, &guide) &&
+	guided = peak->model != PEAK_MODEL_NONE && pulse_contact(trace, peak, family, pulse, &guide) &&
 	         fabs(peak->result.value_g) > LIMIT_SURE * trace->noise_g;
 	if (!guided) {
-		velocity(trace, peak, baseline, edge, pulse);
+		pulse_velocity(trace, peak, baseline, edge, pulse);
 		return;
 	}
 	guided_velocity(trace, peak, baseline, &guide, pulse);

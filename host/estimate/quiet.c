@@ -40,7 +40,7 @@ double quiet_glance(const struct trace *trace, size_t from, size_t until, double
 }
 
 /* The largest good sample about middle_g; count when none differs from it. */
-static size_t largest(const struct trace *trace, double middle_g)
+static size_t quiet_largest(const struct trace *trace, double middle_g)
 {
 	size_t at = trace->count;
 	double most = 0;
@@ -78,13 +78,13 @@ static double find_peak(const struct trace *trace, size_t *peak)
 {
 	double sigma = 0, middle = quiet_glance(trace, 0, trace->count, &sigma), level;
 
-	*peak = largest(trace, middle);
+	*peak = quiet_largest(trace, middle);
 	if (*peak == trace->count)
 		return middle;
 	level = LIMIT_EDGE * fabs(trace->value_g[*peak] - middle);
 	if (sigma > level && starts_at_rest(trace, level)) {
 		middle = quiet_glance(trace, 0, QUIET_SAMPLES_MIN, NULL);
-		*peak = largest(trace, middle);
+		*peak = quiet_largest(trace, middle);
 	}
 	return middle;
 }
@@ -149,8 +149,8 @@ static void add_plain(const struct quiet *quiet, size_t from, size_t until, doub
 }
 
 /* Adds the samples [from, until) that lie within reach of about; zero, unless NULL, begins there. */
-static void add_up(const struct quiet *quiet, size_t from, size_t until, double about, double reach,
-                   struct zero *zero, struct sums *sums)
+static void quiet_add_up(const struct quiet *quiet, size_t from, size_t until, double about, double reach,
+                         struct zero *zero, struct sums *sums)
 {
 	const double *value = quiet->trace->value_g;
 	PAIR first = {0}, second = {0};
@@ -196,7 +196,7 @@ struct quiet_moments quiet_take(struct quiet *quiet, double about, double reach)
 		if (plain || is_plain(quiet, k, end, about, reach))
 			add_plain(quiet, k, end, about, &here);
 		else
-			add_up(quiet, k, end, about, reach, quiet->zero ? &zero : NULL, &here);
+			quiet_add_up(quiet, k, end, about, reach, quiet->zero ? &zero : NULL, &here);
 		block->weight = (double)here.used;
 		block->mean = here.used > 0 ? about + here.first / (double)here.used : about;
 		block->place = (double)(k + end - 2 * quiet->from) / all - 1;
@@ -215,7 +215,7 @@ struct quiet_moments quiet_take(struct quiet *quiet, double about, double reach)
 }
 
 /* What noise there is in the samples of a block, by their extremes; 0 where nobody can tell. */
-static double spread_of(const struct trace *trace, size_t block)
+static double quiet_spread_of(const struct trace *trace, size_t block)
 {
 	const struct trace_block *b = &trace->block[block];
 
@@ -225,7 +225,7 @@ static double spread_of(const struct trace *trace, size_t block)
 bool quiet_restless(const struct quiet *quiet, double noise_g)
 {
 	for (size_t i = quiet->from / TRACE_BLOCK + 1; (i + 1) * TRACE_BLOCK <= quiet->until; i++) {
-		double spread = spread_of(quiet->trace, i);
+		double spread = quiet_spread_of(quiet->trace, i);
 
 		if (spread > 0 && spread < QUIET_SPREAD * noise_g)
 			return true;
@@ -239,7 +239,7 @@ bool quiet_narrow(struct quiet *quiet)
 	double least = INFINITY, most = 0;
 
 	for (size_t i = first; i < last; i++) {
-		double spread = spread_of(quiet->trace, i);
+		double spread = quiet_spread_of(quiet->trace, i);
 
 		least = spread > 0 ? fmin(least, spread) : least;
 		most = fmax(most, spread);
@@ -247,7 +247,7 @@ bool quiet_narrow(struct quiet *quiet)
 	if (!(most > LIMIT_SURE * least))
 		return false;
 	for (size_t i = first; i < last; i++) {
-		run = spread_of(quiet->trace, i) <= QUIET_SPREAD * least ? run + 1 : 0;
+		run = quiet_spread_of(quiet->trace, i) <= QUIET_SPREAD * least ? run + 1 : 0;
 		if (run > longest) {
 			longest = run;
 			quiet->from = (i + 1 - run) * TRACE_BLOCK;
@@ -270,7 +270,7 @@ double quiet_noise(const struct trace *trace, size_t from, size_t until)
 }
 
 /* Whether the means of its quarters fall, or rise, each by more than noise and no faster at the end. */
-static bool decays(const struct trace *trace, size_t from, size_t until)
+static bool quiet_decays(const struct trace *trace, size_t from, size_t until)
 {
 	double mean[4] = {0}, noise = quiet_noise(trace, from, until), sign;
 	size_t length = (until - from) / 4;
@@ -300,7 +300,7 @@ bool quiet_settled(struct quiet *quiet)
 	bool any = false;
 
 	while (quiet->until - quiet->from >= 4 * QUIET_SAMPLES_MIN &&
-	       decays(quiet->trace, quiet->from, quiet->until)) {
+	       quiet_decays(quiet->trace, quiet->from, quiet->until)) {
 		quiet->from = quiet->until - (quiet->until - quiet->from) / 2;
 		any = true;
 	}

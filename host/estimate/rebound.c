@@ -19,7 +19,7 @@ double rebound_again_g(const struct trace *trace, double peak_g)
 	return fmax(LIMIT_AGAIN * fabs(peak_g), LIMIT_NOISE * trace->noise_g);
 }
 
-static bool measured(const struct rebound_axes *axes, unsigned i)
+static bool rebound_measured(const struct rebound_axes *axes, unsigned i)
 {
 	return isfinite(axes->pulse[i]->velocity_change_m_s);
 }
@@ -30,7 +30,7 @@ static unsigned strongest(const struct rebound_axes *axes)
 	unsigned at = axes->count;
 
 	for (unsigned i = 0; i < axes->count; i++)
-		if (measured(axes, i) && !(axes->peak[i]->result.how.flags & ESTIMATE_FLAG_WEAK) &&
+		if (rebound_measured(axes, i) && !(axes->peak[i]->result.how.flags & ESTIMATE_FLAG_WEAK) &&
 		    (at == axes->count ||
 		     fabs(axes->peak[i]->result.value_g) > fabs(axes->peak[at]->result.value_g)))
 			at = i;
@@ -44,7 +44,7 @@ static void by_velocity(const struct rebound_axes *axes, double speed_m_s, struc
 	for (unsigned i = 0; i < axes->count; i++) {
 		const struct estimate_pulse *pulse = axes->pulse[i];
 
-		if (!measured(axes, i))
+		if (!rebound_measured(axes, i))
 			continue;
 		if (pulse->status == ESTIMATE_CLIPPED)
 			rebound->status = ESTIMATE_CLIPPED;
@@ -87,7 +87,7 @@ static bool second_impact(const struct rebound_axes *axes, unsigned strong, doub
 }
 
 /* Where the first contact is over. */
-static double contact_end(const struct rebound_axes *axes, unsigned strong, double *sigma_s)
+static double rebound_contact_end(const struct rebound_axes *axes, unsigned strong, double *sigma_s)
 {
 	const struct estimate_pulse *pulse = axes->pulse[strong];
 	const struct peak *peak = axes->peak[strong];
@@ -110,7 +110,7 @@ static void by_flight(const struct rebound_axes *axes, double speed_m_s, double 
 	if (strong == axes->count || !second_impact(axes, strong, &impact, &sigma))
 		return;
 	rebound->second_impact_s = impact;
-	end = contact_end(axes, strong, &sigma_end);
+	end = rebound_contact_end(axes, strong, &sigma_end);
 	sigma = hypot(sigma, FOOT_PART * axes->pulse[strong]->duration_s);
 	rebound->flight_ratio = ratio_s * (impact - end);
 	rebound->sigma_flight_ratio = ratio_s * hypot(sigma, sigma_end);

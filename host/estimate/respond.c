@@ -122,8 +122,8 @@ static void after_input(const struct respond *respond, double past_s, struct res
 }
 
 /* At part x of the step from a to b. */
-static void between(const struct respond_knot *a, const struct respond_knot *b, double x, double step,
-                    struct respond_point *point)
+static void respond_between(const struct respond_knot *a, const struct respond_knot *b, double x, double step,
+                            struct respond_point *point)
 {
 	double to_b = x * x * (3 - 2 * x), to_a = 1 - to_b, bend = 6 * x * (1 - x) / step;
 	double slope_a = x * (1 - x) * (1 - x) * step, slope_b = x * x * (x - 1) * step;
@@ -152,7 +152,7 @@ void respond_at(const struct respond *respond, double time_s, struct respond_poi
 		return;
 	}
 	k = (unsigned)place;
-	between(&respond->knot[k], &respond->knot[k + 1], place - k, step, point);
+	respond_between(&respond->knot[k], &respond->knot[k + 1], place - k, step, point);
 }
 
 void respond_bend(const struct respond *respond, double time_s, double derivative[3])

@@ -19,7 +19,7 @@ enum { STEPS = 8, NEWTON = 8 };
 
 /* Magnitude at a sample of axis i, the other axis interpolated; false where either is missing. Good enough
  * to know where to look. */
-static bool magnitude(const struct resultant_axes *axes, unsigned i, size_t k, double *value_g)
+static bool resultant_magnitude(const struct resultant_axes *axes, unsigned i, size_t k, double *value_g)
 {
 	double value = axes->trace[i]->value_g[k], other;
 
@@ -53,7 +53,8 @@ static struct local_span reaching(const struct resultant_axes *axes, double leve
 
 /* The instants of the faster axis; count when there is none that has both axes. One of the axes must reach
  * the stronger one's peak over the square root of two there. */
-static size_t largest(const struct resultant_axes *axes, unsigned i, double strong_g, double *value_g)
+static size_t resultant_largest(const struct resultant_axes *axes, unsigned i, double strong_g,
+                                double *value_g)
 {
 	const struct trace *trace = axes->trace[i];
 	struct local_span span = reaching(axes, 0.99 * strong_g / sqrt(2.0));
@@ -63,7 +64,7 @@ static size_t largest(const struct resultant_axes *axes, unsigned i, double stro
 	*value_g = 0;
 	for (size_t k = trace_index(trace, span.from_s - step);
 	     k < trace->last && trace_time(trace, k) <= span.until_s + step; k++) {
-		if (magnitude(axes, i, k, &value) && value > *value_g) {
+		if (resultant_magnitude(axes, i, k, &value) && value > *value_g) {
 			*value_g = value;
 			at = k;
 		}
@@ -81,7 +82,7 @@ static size_t first_local(const struct resultant_axes *axes, unsigned i, size_t 
 	size_t at = largest_at;
 
 	for (size_t k = trace_index(axes->trace[i], span.from_s); k < largest_at; k++) {
-		if (!magnitude(axes, i, k, &value))
+		if (!resultant_magnitude(axes, i, k, &value))
 			continue;
 		if (value > top) {
 			top = value;
@@ -113,7 +114,7 @@ static struct local_span span_around(const struct resultant_axes *axes, unsigned
 	return span;
 }
 
-static bool usable(const struct peak *peak)
+static bool resultant_usable(const struct peak *peak)
 {
 	return peak->result.how.status != ESTIMATE_SHORT && peak->result.how.status != ESTIMATE_NO_PEAK;
 }
@@ -129,7 +130,7 @@ static bool model_at(const struct resultant_axes *axes, unsigned i, double time_
 }
 
 /* Half of the square's value, slope and curvature at an instant, by the axes' own models. */
-static bool square_at(const struct resultant_axes *axes, double time_s, double half[3])
+static bool resultant_square_at(const struct resultant_axes *axes, double time_s, double half[3])
 {
 	half[0] = half[1] = half[2] = 0;
 	for (unsigned i = 0; i < 2; i++) {
@@ -145,7 +146,7 @@ static bool square_at(const struct resultant_axes *axes, double time_s, double h
 }
 
 /* The highest instant between the peaks of the axes. */
-static bool summit(const struct resultant_axes *axes, double *time_s, double half[3])
+static bool resultant_summit(const struct resultant_axes *axes, double *time_s, double half[3])
 {
 	double x = axes->peak[0]->result.time_s, y = axes->peak[1]->result.time_s, best = -1;
 	double slack = fabs(y - x) / STEPS + 1e-7;
@@ -154,7 +155,7 @@ static bool summit(const struct resultant_axes *axes, double *time_s, double hal
 	for (int i = 0; i <= STEPS; i++) {
 		double time = x + (y - x) * i / STEPS;
 
-		if (!square_at(axes, time, half))
+		if (!resultant_square_at(axes, time, half))
 			return false;
 		if (half[0] > best) {
 			best = half[0];
@@ -164,7 +165,7 @@ static bool summit(const struct resultant_axes *axes, double *time_s, double hal
 	for (int i = 0; i < NEWTON; i++) {
 		double step;
 
-		if (!square_at(axes, *time_s, half) || !(half[2] < 0))
+		if (!resultant_square_at(axes, *time_s, half) || !(half[2] < 0))
 			return false;
 		step = half[1] / half[2];
 		*time_s -= step;
@@ -176,7 +177,7 @@ static bool summit(const struct resultant_axes *axes, double *time_s, double hal
 
 /* Noise through the models, as in crest.h, and what the axes' own uncertainties hold beyond it, the models'
  * error. Variances of half the square's value and of its slope. */
-static void spread(const struct resultant_axes *axes, double time_s, double variance[2])
+static void resultant_spread(const struct resultant_axes *axes, double time_s, double variance[2])
 {
 	variance[0] = variance[1] = 0;
 	for (unsigned i = 0; i < 2; i++) {
@@ -196,7 +197,7 @@ static void spread(const struct resultant_axes *axes, double time_s, double vari
 
 /* Models of different swings or pulses say nothing together; a polynomial does not reach that far, a curve
  * and a family do. */
-static bool reach(const struct resultant_axes *axes, double width_s)
+static bool resultant_reach(const struct resultant_axes *axes, double width_s)
 {
 	double apart = fabs(axes->peak[1]->result.time_s - axes->peak[0]->result.time_s);
 
@@ -208,18 +209,18 @@ static bool reach(const struct resultant_axes *axes, double width_s)
 }
 
 /* By the axes' own models. False when they are not of the pulse whose largest sample is at near_s. */
-static bool combine(const struct resultant_axes *axes, unsigned strong, double near_s,
-                    struct resultant *found)
+static bool resultant_combine(const struct resultant_axes *axes, unsigned strong, double near_s,
+                              struct resultant *found)
 {
 	const struct peak *lead = axes->peak[strong];
 	struct estimate_resultant *result = &found->result;
 	double x = axes->peak[0]->result.time_s, y = axes->peak[1]->result.time_s;
 	double slack = SAME_PULSE * found->width_s, time, half[3], variance[2];
 
-	if (!(near_s >= fmin(x, y) - slack && near_s <= fmax(x, y) + slack) || !reach(axes, found->width_s) ||
-	    !summit(axes, &time, half))
+	if (!(near_s >= fmin(x, y) - slack && near_s <= fmax(x, y) + slack) ||
+	    !resultant_reach(axes, found->width_s) || !resultant_summit(axes, &time, half))
 		return false;
-	spread(axes, time, variance);
+	resultant_spread(axes, time, variance);
 	result->how.method = lead->result.how.method;
 	result->how.chi_square = lead->result.how.chi_square;
 	result->peak_g = sqrt(2 * half[0]);
@@ -298,7 +299,7 @@ static bool was_read(const struct trace *trace, const struct local_span *span)
 }
 
 /* What the other axis reads counts unless it is silent. False where its samples are missing. */
-static bool follow(const struct resultant_axes *axes, unsigned strong, struct resultant *found)
+static bool resultant_follow(const struct resultant_axes *axes, unsigned strong, struct resultant *found)
 {
 	const struct estimate_peak *lead = &axes->peak[strong]->result;
 	const struct trace *other = axes->trace[1 - strong];
@@ -312,15 +313,16 @@ static bool follow(const struct resultant_axes *axes, unsigned strong, struct re
 }
 
 /* near_s: the largest sample. */
-static bool solve(const struct resultant_axes *axes, unsigned strong, double near_s, struct resultant *found)
+static bool resultant_solve(const struct resultant_axes *axes, unsigned strong, double near_s,
+                            struct resultant *found)
 {
-	bool two = usable(axes->peak[0]) && usable(axes->peak[1]);
+	bool two = resultant_usable(axes->peak[0]) && resultant_usable(axes->peak[1]);
 
-	if (two && (share(axes, strong, found) || combine(axes, strong, near_s, found)))
+	if (two && (share(axes, strong, found) || resultant_combine(axes, strong, near_s, found)))
 		return true;
-	if (leads(axes, strong) ? follow(axes, strong, found) : refit(axes, near_s, found))
+	if (leads(axes, strong) ? resultant_follow(axes, strong, found) : refit(axes, near_s, found))
 		return true;
-	return two && combine(axes, strong, axes->peak[strong]->result.time_s, found);
+	return two && resultant_combine(axes, strong, axes->peak[strong]->result.time_s, found);
 }
 
 /* X and Y against each other, and what a hole or a limit under the pulse does to the resultant. */
@@ -329,11 +331,11 @@ static void compare_axes(const struct resultant_axes *axes, unsigned strong, str
 	const struct peak *x = axes->peak[0], *y = axes->peak[1];
 	enum estimate_status status = axes->peak[strong]->result.how.status;
 
-	if (usable(x) && usable(y)) {
+	if (resultant_usable(x) && resultant_usable(y)) {
 		found->result.axes_apart_s = y->result.time_s - x->result.time_s;
 		found->result.axes_coincide = fabs(found->result.axes_apart_s) <= RESULTANT_COINCIDE_S;
 	}
-	if (status == ESTIMATE_OK && usable(axes->peak[1 - strong]))
+	if (status == ESTIMATE_OK && resultant_usable(axes->peak[1 - strong]))
 		status = axes->peak[1 - strong]->result.how.status;
 	if (trace_any(axes->trace[0], found->span.from_s, found->span.until_s, SAMPLE_CLIPPED) ||
 	    trace_any(axes->trace[1], found->span.from_s, found->span.until_s, SAMPLE_CLIPPED))
@@ -354,7 +356,7 @@ static void take_flags(const struct resultant_axes *axes, struct resultant *foun
 	unsigned *flags = &found->result.how.flags;
 
 	for (unsigned i = 0; i < 2; i++)
-		if (usable(axes->peak[i]))
+		if (resultant_usable(axes->peak[i]))
 			*flags |= axes->peak[i]->result.how.flags;
 	*flags &= ~(unsigned)ESTIMATE_FLAG_TOLERANCE;
 	if (!meets(axes, found))
@@ -383,7 +385,8 @@ static void find_first(const struct resultant_axes *axes, unsigned fast, unsigne
 void resultant_find(const struct resultant_axes *axes, struct resultant *resultant)
 {
 	const struct peak *x = axes->peak[0], *y = axes->peak[1];
-	unsigned strong = !usable(x) || (usable(y) && fabs(y->result.value_g) > fabs(x->result.value_g));
+	unsigned strong = !resultant_usable(x) ||
+	                  (resultant_usable(y) && fabs(y->result.value_g) > fabs(x->result.value_g));
 	unsigned fast = axes->trace[1]->rate_hz > axes->trace[0]->rate_hz;
 	const struct peak *lead = axes->peak[strong];
 	struct resultant found = {.result = {.peak_g = NAN,
@@ -398,17 +401,17 @@ void resultant_find(const struct resultant_axes *axes, struct resultant *resulta
 
 	found.result.how.status = lead->result.how.status;
 	*resultant = found;
-	if (!usable(lead))
+	if (!resultant_usable(lead))
 		return;
 	resultant->result.how.status = ESTIMATE_SHORT;
 	found.width_s = lead->width_s;
-	at = largest(axes, fast, fabs(axes->trace[strong]->value_g[lead->at]), &top);
+	at = resultant_largest(axes, fast, fabs(axes->trace[strong]->value_g[lead->at]), &top);
 	/* Where no instant has both axes, their models may meet all the same; a curve knows its own pulse. */
 	near = at < axes->trace[fast]->count && axes->curve[strong] == NULL
 	               ? trace_time(axes->trace[fast], at)
 	               : lead->result.time_s;
 	found.span = span_around(axes, strong, near);
-	if (!solve(axes, strong, near, &found))
+	if (!resultant_solve(axes, strong, near, &found))
 		return;
 	found.result.how.path[0] = found.result.how.method;
 	find_first(axes, fast, strong, at, top, &found);

@@ -35,17 +35,17 @@ bool ringdown_decays(const struct modes *modes, unsigned m)
 }
 
 /* Of the mode that the values are of. */
-static bool decays(const struct modes *modes)
+static bool estimate_ringdown_decays(const struct modes *modes)
 {
 	return ringdown_decays(modes, modes_stronger(modes));
 }
 
-static enum estimate_status judge(const struct ringdown_job *job)
+static enum estimate_status ringdown_judge(const struct ringdown_job *job)
 {
 	if (ringdown_explained(job) < EXPLAINED_MIN || ringdown_gain(job) < GAIN_MIN ||
 	    modes_swing_g(&job->modes, 0) < RINGDOWN_SWING_LEVEL * job->span->peak_g)
 		return ESTIMATE_NO_PEAK;
-	return decays(&job->modes) ? ESTIMATE_OK : ESTIMATE_NOT_CONVERGED;
+	return estimate_ringdown_decays(&job->modes) ? ESTIMATE_OK : ESTIMATE_NOT_CONVERGED;
 }
 
 /* From the block fit to whatever the residual needs. */
@@ -79,8 +79,8 @@ static double start_swing_g(const struct ringdown_job *job, unsigned m)
 	                   (job->span->from_s - trace_time(job->trace, job->first)));
 }
 
-static double spread(const struct ringdown_job *job, unsigned m, double by_decay, double by_omega,
-                     double sigma)
+static double ringdown_spread(const struct ringdown_job *job, unsigned m, double by_decay, double by_omega,
+                              double sigma)
 {
 	double row[CHOLESKY_MAX] = {0};
 
@@ -141,7 +141,7 @@ static void express_mean(const struct ringdown_job *job, struct estimate_ringdow
 }
 
 /* Values and uncertainties of the stronger mode, and the other's values. */
-static void express(const struct ringdown_job *job, struct ringdown *ringdown)
+static void ringdown_express(const struct ringdown_job *job, struct ringdown *ringdown)
 {
 	struct estimate_ringdown *result = &ringdown->result;
 	const unsigned m = modes_stronger(&job->modes);
@@ -151,11 +151,12 @@ static void express(const struct ringdown_job *job, struct ringdown *ringdown)
 	double sigma = ringdown_sigma_point(job, &job->modes);
 
 	result->frequency_hz = omega / (2 * UNITS_PI);
-	result->sigma_hz = spread(job, m, 0, 1, sigma) / (2 * UNITS_PI);
+	result->sigma_hz = ringdown_spread(job, m, 0, 1, sigma) / (2 * UNITS_PI);
 	result->natural_frequency_hz = natural / (2 * UNITS_PI);
-	result->sigma_natural_hz = spread(job, m, decay / natural, omega / natural, sigma) / (2 * UNITS_PI);
+	result->sigma_natural_hz =
+	        ringdown_spread(job, m, decay / natural, omega / natural, sigma) / (2 * UNITS_PI);
 	result->damping_ratio = decay / natural;
-	result->sigma_damping = spread(job, m, omega * omega / cube, -decay * omega / cube, sigma);
+	result->sigma_damping = ringdown_spread(job, m, omega * omega / cube, -decay * omega / cube, sigma);
 	result->amplitude_g = start_swing_g(job, m);
 	if (job->modes.count > 1) {
 		const double *other = job->modes.p + (m ? 0 : MODES_EACH);
@@ -228,11 +229,11 @@ static bool has_tried(const struct ringdown_job *job, const char *method)
 	return false;
 }
 
-static void conclude(struct ringdown_job *job, struct ringdown *ringdown)
+static void ringdown_conclude(struct ringdown_job *job, struct ringdown *ringdown)
 {
 	struct estimate_how *how = &ringdown->result.how;
 
-	express(job, ringdown);
+	ringdown_express(job, ringdown);
 	if (!ringdown_passes(job, &job->modes))
 		job->flags |= ESTIMATE_FLAG_MODEL;
 	else if (!meets_tolerance(job, &ringdown->result))
@@ -247,7 +248,8 @@ static void conclude(struct ringdown_job *job, struct ringdown *ringdown)
 	memcpy(how->path, job->path, sizeof(how->path));
 }
 
-static void begin(struct ringdown_job *job, const struct trace *trace, const struct ringdown_span *span)
+static void ringdown_begin(struct ringdown_job *job, const struct trace *trace,
+                           const struct ringdown_span *span)
 {
 	memset(job, 0, offsetof(struct ringdown_job, series));
 	job->trace = trace;
@@ -264,7 +266,7 @@ void ringdown_refine(const struct trace *trace, const struct ringdown_span *span
 
 	if (before->how.status != ESTIMATE_OK || before->how.flags & RICHER)
 		return;
-	begin(&job, trace, span);
+	ringdown_begin(&job, trace, span);
 	if (job.first + SAMPLES_MIN > job.last ||
 	    !ringdown_restart(&job, omega, omega * part / sqrt(1 - part * part)))
 		return;
@@ -274,8 +276,8 @@ void ringdown_refine(const struct trace *trace, const struct ringdown_span *span
 	}
 	if (strcmp(before->how.method, "full") == 0 && !ringdown_full(&job))
 		return;
-	if (decays(&job.modes) && ringdown_passes(&job, &job.modes))
-		conclude(&job, ringdown);
+	if (estimate_ringdown_decays(&job.modes) && ringdown_passes(&job, &job.modes))
+		ringdown_conclude(&job, ringdown);
 }
 
 void ringdown_find(const struct trace *trace, const struct ringdown_span *span, struct ringdown *ringdown)
@@ -295,24 +297,24 @@ void ringdown_find(const struct trace *trace, const struct ringdown_span *span, 
 	struct ringdown_job job;
 	enum estimate_status *status = &found.result.how.status;
 
-	begin(&job, trace, span);
+	ringdown_begin(&job, trace, span);
 	*status = ESTIMATE_SHORT;
 	if (isfinite(span->from_s) && job.first + SAMPLES_MIN <= job.last &&
 	    (span->peak_g > 0 || trace->noise_g > 0)) {
 		*status = ringdown_start(&job);
 		if (*status == ESTIMATE_OK)
-			*status = judge(&job);
+			*status = ringdown_judge(&job);
 		if (*status == ESTIMATE_OK) {
 			escalate(&job);
 			ringdown_reach_back(&job);
 			/* outliers may have taken the last sample to spare */
 			if (job.series.used <= modes_size(&job.modes))
 				*status = ESTIMATE_SHORT;
-			else if (!decays(&job.modes))
+			else if (!estimate_ringdown_decays(&job.modes))
 				*status = ESTIMATE_NOT_CONVERGED;
 		}
 		if (*status == ESTIMATE_OK) {
-			conclude(&job, &found);
+			ringdown_conclude(&job, &found);
 			found.result.three_cycle_frequency_hz = three_cycles(&job);
 		}
 	}

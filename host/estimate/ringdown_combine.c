@@ -46,7 +46,7 @@ static struct value mean_of_laws(double a, double sigma_a, double b, double sigm
 	return mean;
 }
 
-static double mean_of(double a, double b)
+static double ringdown_combine_mean_of(double a, double b)
 {
 	return isnan(a) ? b : isnan(b) ? a : (a + b) / 2;
 }
@@ -78,9 +78,10 @@ void ringdown_combine(const struct ringdown *x, const struct ringdown *y, struct
 	found.damping_ratio = mean.value;
 	found.sigma_damping = hypot(mean.sigma, COMMON * fmin(a->sigma_damping, b->sigma_damping));
 	agree = agree && mean.agree;
-	found.small_swing_hz = mean_of(a->small_swing_hz, b->small_swing_hz);
+	found.small_swing_hz = ringdown_combine_mean_of(a->small_swing_hz, b->small_swing_hz);
 	found.amplitude_g = hypot(a->amplitude_g, b->amplitude_g);
-	found.three_cycle_frequency_hz = mean_of(a->three_cycle_frequency_hz, b->three_cycle_frequency_hz);
+	found.three_cycle_frequency_hz =
+	        ringdown_combine_mean_of(a->three_cycle_frequency_hz, b->three_cycle_frequency_hz);
 	found.how.flags = flags | (agree ? 0u : ESTIMATE_FLAG_MODEL);
 	*combined = found;
 }

@@ -52,7 +52,7 @@ unsigned ringdown_block(const struct ringdown_job *job, double omega)
 }
 
 /* Blocks, unless a sample is missing. */
-static void take(struct ringdown_job *job, size_t end, unsigned block)
+static void ringdown_span_take(struct ringdown_job *job, size_t end, unsigned block)
 {
 	series_take(&job->series, job->trace, job->first, end, job->span->from_s, block);
 	if (job->series.used < job->series.count && block > 1)
@@ -60,7 +60,7 @@ static void take(struct ringdown_job *job, size_t end, unsigned block)
 }
 
 /* One mode from a start, over a window that follows it: a start is good for a few cycles only. */
-static bool settle(struct ringdown_job *job, double omega, double decay)
+static bool ringdown_span_settle(struct ringdown_job *job, double omega, double decay)
 {
 	double most_s = CYCLES_START * 2 * UNITS_PI / omega;
 	struct modes *modes = &job->modes;
@@ -71,7 +71,7 @@ static bool settle(struct ringdown_job *job, double omega, double decay)
 	for (int i = 0; i < WINDOWS; i++) {
 		size_t wish;
 
-		take(job, end, block);
+		ringdown_span_take(job, end, block);
 		if (job->series.used < 2 * modes_size(modes) ||
 		    (i == 0 && !modes_linear(modes, &job->series)) || !modes_fit(modes, &job->series))
 			return false;
@@ -92,7 +92,8 @@ static bool settle_by_scan(struct ringdown_job *job)
 {
 	struct scan scan;
 
-	return scan_find(&scan, job->trace, job->first, job->last) && settle(job, scan.omega, scan.decay);
+	return scan_find(&scan, job->trace, job->first, job->last) &&
+	       ringdown_span_settle(job, scan.omega, scan.decay);
 }
 
 enum estimate_status ringdown_start(struct ringdown_job *job)
@@ -111,7 +112,7 @@ enum estimate_status ringdown_start(struct ringdown_job *job)
 	if (!begun && !(noise > 0))
 		return ESTIMATE_NO_PEAK;
 	/* A start that explains less is doubted. */
-	if (begun && settle(job, omega, decay) && ringdown_explained(job) > LIMIT_MOST)
+	if (begun && ringdown_span_settle(job, omega, decay) && ringdown_explained(job) > LIMIT_MOST)
 		return ESTIMATE_OK;
 	return settle_by_scan(job) ? ESTIMATE_OK : begun ? ESTIMATE_NOT_CONVERGED : ESTIMATE_NO_PEAK;
 }
@@ -121,8 +122,8 @@ bool ringdown_restart(struct ringdown_job *job, double omega, double decay)
 	struct modes *modes = &job->modes;
 
 	*modes = (struct modes){.count = 1, .p = {0, decay, omega}};
-	take(job, window_end(job, omega, decay, SURE_TIME_CONSTANTS, INFINITY),
-	     ringdown_block(job, omega * RINGDOWN_FINER));
+	ringdown_span_take(job, window_end(job, omega, decay, SURE_TIME_CONSTANTS, INFINITY),
+	                   ringdown_block(job, omega * RINGDOWN_FINER));
 	if (job->series.used < 2 * modes_size(modes) || !modes_linear(modes, &job->series) ||
 	    !modes_fit(modes, &job->series))
 		return false;
@@ -139,7 +140,8 @@ bool ringdown_lengthen(struct ringdown_job *job)
 		return true;
 	end = trace_index(job->trace, job->span->from_s + fmin(LONG_TIME_CONSTANTS / decay,
 	                                                       CYCLES_MOST * 2 * UNITS_PI / omega));
-	take(job, end < job->last ? end : job->last, ringdown_block(job, omega * RINGDOWN_FINER));
+	ringdown_span_take(job, end < job->last ? end : job->last,
+	                   ringdown_block(job, omega * RINGDOWN_FINER));
 	if (!modes_fit(&job->single, &job->series))
 		return false;
 	job->modes = job->single;

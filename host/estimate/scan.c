@@ -93,7 +93,7 @@ bool scan_find(struct scan *scan, const struct trace *trace, size_t first, size_
 }
 
 /* Sum and sum of squares of the usable samples [k, end). Returns how many there are. */
-static size_t add_up(const struct trace *trace, size_t k, size_t end, double *sum, double *squares)
+static size_t scan_add_up(const struct trace *trace, size_t k, size_t end, double *sum, double *squares)
 {
 	PAIR sums[2] = {{0}, {0}}, squared[2] = {{0}, {0}};
 	size_t n = 0;
@@ -140,7 +140,7 @@ bool scan_worth(const struct trace *trace, size_t first, size_t last, double noi
 		size_t k = end;
 
 		end = last - first > length ? first + length : last;
-		n += add_up(trace, k, end, &sum, &squares);
+		n += scan_add_up(trace, k, end, &sum, &squares);
 		if (n > 0 && squares - sum * sum / (double)n >
 		                     noise_g * noise_g * ((double)n + LIMIT_CHI * sqrt(2 * (double)n)))
 			return true;

@@ -71,7 +71,8 @@ static void take_blocks(const struct trace *trace, size_t samples, struct blocks
 }
 
 /* Least squares of a constant and one more function of the block's number. */
-static void fit_two(const struct blocks *blocks, const double *function, struct fit *fit, double *factor)
+static void settle_fit_two(const struct blocks *blocks, const double *function, struct fit *fit,
+                           double *factor)
 {
 	double n = 0, f = 0, ff = 0, y = 0, fy = 0, left = 0, below;
 
@@ -103,7 +104,7 @@ static double try_rate(const struct blocks *blocks, double rate, struct fit *fit
 	for (size_t i = 0; i < blocks->count; i++, value *= part)
 		function[i] = value;
 	*fit = (struct fit){.rate = rate};
-	fit_two(blocks, function, fit, &fit->amplitude);
+	settle_fit_two(blocks, function, fit, &fit->amplitude);
 	return fit->leaves;
 }
 
@@ -158,7 +159,7 @@ static double leaves_by_slope(const struct blocks *blocks)
 
 	for (size_t i = 0; i < blocks->count; i++)
 		function[i] = (double)i;
-	fit_two(blocks, function, &fit, &factor);
+	settle_fit_two(blocks, function, &fit, &factor);
 	return fit.leaves;
 }
 
@@ -230,7 +231,7 @@ static size_t largest_without(const struct trace *trace, const struct settle *se
 
 /* The most samples, from the first on, that are one, without what may be the foot of something else; 0 if
  * none are. */
-static size_t grow(const struct trace *trace)
+static size_t settle_grow(const struct trace *trace)
 {
 	double before = INFINITY;
 	size_t samples = FIRST, fits = 0;
@@ -266,7 +267,7 @@ bool settle_find(const struct trace *trace, struct settle *settle)
 
 	if (!may_settle(trace))
 		return false;
-	samples = grow(trace);
+	samples = settle_grow(trace);
 	if (samples == 0)
 		return false;
 	take_blocks(trace, samples, &blocks);

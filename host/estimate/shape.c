@@ -64,7 +64,7 @@ static struct share censored(double over, double noise_g)
 	return (struct share){ratio * (ratio - over), ratio * noise_g, -2 * noise_g * noise_g * log(tail)};
 }
 
-static bool possible(const struct shape_problem *m, const double *p)
+static bool shape_possible(const struct shape_problem *m, const double *p)
 {
 	if (!(p[SHAPE_BASE] < BASE_RANGE * m->base_s && p[SHAPE_BASE] * BASE_RANGE > m->base_s) ||
 	    !(fabs(p[SHAPE_TIME]) < m->base_s) || !isfinite(p[SHAPE_PEAK]))
@@ -129,7 +129,7 @@ static inline PAIR two_samples(const struct shape_problem *m, size_t k, size_t l
 	return value;
 }
 
-static inline void add_up(struct sums *sums, PAIR phi, PAIR u, PAIR v, PAIR r)
+static inline void shape_add_up(struct sums *sums, PAIR phi, PAIR u, PAIR v, PAIR r)
 {
 	const PAIR late = phi * v;
 
@@ -171,13 +171,13 @@ static struct sums sum_under(const struct shape_problem *m, const double *p, con
 			const PAIR rest = count * (PAIR){exp(less[0]), exp(less[1])};
 			const PAIR u = rest * cosine, v = -p[SHAPE_POWER] * rest * s, w = u * logarithm;
 
-			add_up(&sums, phi, u, v, value - p[SHAPE_PEAK] * u);
+			shape_add_up(&sums, phi, u, v, value - p[SHAPE_PEAK] * u);
 			add_power(&sums, phi, u, v, w, value - p[SHAPE_PEAK] * u);
 		} else {
 			PAIR u = m->family == ESTIMATE_FAMILY_HALF_SINE ? count * c : count * c * c;
 			PAIR v = m->family == ESTIMATE_FAMILY_HALF_SINE ? -count * s : -2 * count * c * s;
 
-			add_up(&sums, phi, u, v, value - p[SHAPE_PEAK] * u);
+			shape_add_up(&sums, phi, u, v, value - p[SHAPE_PEAK] * u);
 		}
 		phi += 2 * under->step;
 		phasor_pair_turn(&at);
@@ -185,12 +185,12 @@ static struct sums sum_under(const struct shape_problem *m, const double *p, con
 	return sums;
 }
 
-static inline double both(PAIR pair)
+static inline double shape_both(PAIR pair)
 {
 	return pair[0] + pair[1];
 }
 
-static double squares_of(const struct shape_problem *m, size_t from, size_t until)
+static double shape_squares_of(const struct shape_problem *m, size_t from, size_t until)
 {
 	PAIR squares = {0, 0}, count;
 
@@ -199,12 +199,12 @@ static double squares_of(const struct shape_problem *m, size_t from, size_t unti
 
 		squares += value * value;
 	}
-	return both(squares);
+	return shape_both(squares);
 }
 
 double shape_squares_beyond(const struct shape_problem *m, const struct shape_under *under)
 {
-	return squares_of(m, m->first, under->first) + squares_of(m, under->last, m->last);
+	return shape_squares_of(m, m->first, under->first) + shape_squares_of(m, under->last, m->last);
 }
 
 size_t shape_count_used(const struct shape_problem *m)
@@ -218,33 +218,33 @@ size_t shape_count_used(const struct shape_problem *m)
 	return used;
 }
 
-static size_t normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
-                     double right[CHOLESKY_MAX], double *squares)
+static size_t shape_normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
+                           double right[CHOLESKY_MAX], double *squares)
 {
 	const struct shape_problem *m = model;
 	const double by_base = -p[SHAPE_PEAK] / p[SHAPE_BASE], by_time = UNITS_PI * by_base;
 	struct shape_under under;
 	struct sums sums;
 
-	if (!possible(m, p))
+	if (!shape_possible(m, p))
 		return 0;
 	under = shape_under_pulse(m, p);
 	sums = sum_under(m, p, &under);
-	matrix[SHAPE_PEAK][SHAPE_PEAK] = both(sums.uu);
-	matrix[SHAPE_TIME][SHAPE_PEAK] = by_time * both(sums.uv);
-	matrix[SHAPE_TIME][SHAPE_TIME] = by_time * by_time * both(sums.vv);
-	matrix[SHAPE_BASE][SHAPE_PEAK] = by_base * both(sums.phi_uv);
-	matrix[SHAPE_BASE][SHAPE_TIME] = by_base * by_time * both(sums.phi_vv);
-	matrix[SHAPE_BASE][SHAPE_BASE] = by_base * by_base * both(sums.phi2_vv);
-	matrix[SHAPE_POWER][SHAPE_PEAK] = p[SHAPE_PEAK] * both(sums.uw);
-	matrix[SHAPE_POWER][SHAPE_TIME] = p[SHAPE_PEAK] * by_time * both(sums.vw);
-	matrix[SHAPE_POWER][SHAPE_BASE] = p[SHAPE_PEAK] * by_base * both(sums.phi_vw);
-	matrix[SHAPE_POWER][SHAPE_POWER] = p[SHAPE_PEAK] * p[SHAPE_PEAK] * both(sums.ww);
-	right[SHAPE_PEAK] = both(sums.ru);
-	right[SHAPE_TIME] = by_time * both(sums.rv);
-	right[SHAPE_BASE] = by_base * both(sums.phi_rv);
-	right[SHAPE_POWER] = p[SHAPE_PEAK] * both(sums.rw);
-	*squares = both(sums.rr) + shape_squares_beyond(m, &under);
+	matrix[SHAPE_PEAK][SHAPE_PEAK] = shape_both(sums.uu);
+	matrix[SHAPE_TIME][SHAPE_PEAK] = by_time * shape_both(sums.uv);
+	matrix[SHAPE_TIME][SHAPE_TIME] = by_time * by_time * shape_both(sums.vv);
+	matrix[SHAPE_BASE][SHAPE_PEAK] = by_base * shape_both(sums.phi_uv);
+	matrix[SHAPE_BASE][SHAPE_TIME] = by_base * by_time * shape_both(sums.phi_vv);
+	matrix[SHAPE_BASE][SHAPE_BASE] = by_base * by_base * shape_both(sums.phi2_vv);
+	matrix[SHAPE_POWER][SHAPE_PEAK] = p[SHAPE_PEAK] * shape_both(sums.uw);
+	matrix[SHAPE_POWER][SHAPE_TIME] = p[SHAPE_PEAK] * by_time * shape_both(sums.vw);
+	matrix[SHAPE_POWER][SHAPE_BASE] = p[SHAPE_PEAK] * by_base * shape_both(sums.phi_vw);
+	matrix[SHAPE_POWER][SHAPE_POWER] = p[SHAPE_PEAK] * p[SHAPE_PEAK] * shape_both(sums.ww);
+	right[SHAPE_PEAK] = shape_both(sums.ru);
+	right[SHAPE_TIME] = by_time * shape_both(sums.rv);
+	right[SHAPE_BASE] = by_base * shape_both(sums.phi_rv);
+	right[SHAPE_POWER] = p[SHAPE_PEAK] * shape_both(sums.rw);
+	*squares = shape_both(sums.rr) + shape_squares_beyond(m, &under);
 	if (!m->plain)
 		censor(m, p, matrix, right, squares);
 	return shape_count_used(m);
@@ -265,7 +265,7 @@ static double unit_area(const struct shape *shape, double power)
 	return shape_mean_cosine(power);
 }
 
-static void express(const struct shape_problem *m, const double *p, struct shape *shape)
+static void shape_express(const struct shape_problem *m, const double *p, struct shape *shape)
 {
 	double unit[SHAPE_UNKNOWNS][CHOLESKY_MAX] = {{1}, {0, 1}, {0, 0, 1}}, area[CHOLESKY_MAX] = {0};
 	double height = unit_area(shape, p[SHAPE_POWER]), h = 1e-4;
@@ -315,7 +315,7 @@ bool shape_fit(struct shape *shape, const struct trace *trace, enum estimate_fam
 	                                .base_s = base,
 	                                .noise_g = fmax(trace->noise_g, LIMIT_SMALL * fabs(start->peak_g)),
 	                                .limit_first = trace_index(trace, start->limit_from_s)};
-	struct lm_problem lm = {shape_unknowns(family), &problem, normal, KINK_GAIN};
+	struct lm_problem lm = {shape_unknowns(family), &problem, shape_normal, KINK_GAIN};
 	struct shape found = {
 	        .family = family, .chi_square = NAN, .skew_z = NAN, .power_z = NAN, .noise_g = NAN};
 	struct lm_result result;
@@ -329,7 +329,7 @@ bool shape_fit(struct shape *shape, const struct trace *trace, enum estimate_fam
 	found.factor = result.factor;
 	if (!shape_question(&problem, p, &found))
 		return false;
-	express(&problem, p, &found);
+	shape_express(&problem, p, &found);
 	if (!isfinite(found.sigma_peak_g) || !isfinite(found.sigma_peak_s))
 		return false;
 	*shape = found;

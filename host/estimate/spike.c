@@ -18,7 +18,7 @@ enum {
 #define WIDE_BENDS 4.0
 
 /* |second difference| about sample k */
-static double bend(const double *v)
+static double spike_bend(const double *v)
 {
 	return fabs(v[-1] - 2 * v[0] + v[1]);
 }
@@ -28,7 +28,8 @@ static double bends_around(const double *v, int wide)
 {
 	double bridge = (v[wide] - v[-1]) / (wide + 1);
 	double before = fabs(v[-1] - v[-2] - bridge), after = fabs(v[wide + 1] - v[wide] - bridge);
-	double far = fmax(fmax(bend(v - 2), bend(v - 3)), fmax(bend(v + wide + 1), bend(v + wide + 2)));
+	double far = fmax(fmax(spike_bend(v - 2), spike_bend(v - 3)),
+	                  fmax(spike_bend(v + wide + 1), spike_bend(v + wide + 2)));
 
 	return fmax(far, fmax(before, after));
 }
@@ -65,7 +66,7 @@ struct around {
 };
 
 /* Sample skip is left out; k itself where none is. */
-static bool gather(const struct trace *trace, size_t k, size_t skip, struct around *around)
+static bool spike_gather(const struct trace *trace, size_t k, size_t skip, struct around *around)
 {
 	for (int side = -1; side <= 1; side += 2) {
 		int found = 0;
@@ -107,7 +108,7 @@ static bool stands_alone_by_hole(const struct trace *trace, size_t k, size_t ski
 	struct around a;
 	double span, near, far;
 
-	if (!gather(trace, k, skip, &a))
+	if (!spike_gather(trace, k, skip, &a))
 		return false;
 	span = -a.time[m - 1] * a.time[m + 1] / 2;
 	near = fmax(curvature(&a, m - 2, m - 1, m + 1), curvature(&a, m - 1, m + 1, m + 2));
@@ -169,7 +170,7 @@ static size_t spike_at(const struct trace *trace, size_t k, double noise_g)
 	return 0;
 }
 
-static bool is_whole(const struct trace *trace, size_t i)
+static bool spike_is_whole(const struct trace *trace, size_t i)
 {
 	return i >= trace_blocks(trace) || trace->block[i].whole;
 }
@@ -188,12 +189,13 @@ static bool is_calm(const double *v, double bend_g)
 }
 
 /* In block i. */
-static bool mark_in(struct trace *trace, size_t i, double noise_g)
+static bool spike_mark_in(struct trace *trace, size_t i, double noise_g)
 {
 	const size_t from = i * TRACE_BLOCK;
 	const size_t until =
 	        from + TRACE_BLOCK + SIDE < trace->count ? from + TRACE_BLOCK : trace->count - SIDE;
-	const bool whole = is_whole(trace, i - 1) && is_whole(trace, i) && is_whole(trace, i + 1);
+	const bool whole =
+	        spike_is_whole(trace, i - 1) && spike_is_whole(trace, i) && spike_is_whole(trace, i + 1);
 	const double *value = trace->value_g, calm_g = LIMIT_NOISE * noise_g;
 	bool marked = false;
 
@@ -206,7 +208,7 @@ static bool mark_in(struct trace *trace, size_t i, double noise_g)
 		}
 		/* A spike bends by no less than it stands off. */
 		if ((whole || (trace_good(trace, k - 1) && trace_good(trace, k + 1))) &&
-		    !(bend(value + k) > calm_g))
+		    !(spike_bend(value + k) > calm_g))
 			continue;
 		wide = spike_at(trace, k, noise_g);
 		second = wide > 0 ? wide - 1 : second_spike(trace, k, noise_g);
@@ -237,8 +239,8 @@ static bool stands_at_end(const struct trace *trace, size_t k, double noise_g)
 	if (beyond > 1)
 		around = fmax(around, fabs(v[-in] - v[-2 * in] - bridge));
 	for (ptrdiff_t away = 2; away <= SIDE; away++)
-		around = fmax(around, bend(v + away * in));
-	return bend(v) / 2 > WIDE_BENDS * around + 2 * LIMIT_NOISE * noise_g;
+		around = fmax(around, spike_bend(v + away * in));
+	return spike_bend(v) / 2 > WIDE_BENDS * around + 2 * LIMIT_NOISE * noise_g;
 }
 
 /* All but the very first and last: a pulse that is cut off there looks the same. */
@@ -269,7 +271,7 @@ bool spike_mark(struct trace *trace, double noise_g)
 		const struct trace_block *block = &trace->block[i];
 
 		if (block->high_g - block->low_g > LIMIT_NOISE * noise_g)
-			marked |= mark_in(trace, i, noise_g);
+			marked |= spike_mark_in(trace, i, noise_g);
 	}
 	marked |= mark_ends(trace, noise_g);
 	if (marked)

@@ -83,7 +83,7 @@ double spring_softness(const double *p)
 }
 
 /* The angle from one state to the next. */
-static double turned(const struct state *from, const struct state *to)
+static double spring_turned(const struct state *from, const struct state *to)
 {
 	return atan2(from->v * to->x - from->x * to->v, from->x * to->x + from->v * to->v);
 }
@@ -103,12 +103,12 @@ double spring_mean_hz(const double *p, unsigned cycles)
 
 		spring_step(&s, step);
 		time += step;
-		left -= turned(&before, &s.at);
+		left -= spring_turned(&before, &s.at);
 	}
 	return cycles * s.omega0 / time;
 }
 
-static bool possible(const double *p)
+static bool spring_possible(const double *p)
 {
 	double swing = p[MODES_COSINE] * p[MODES_COSINE] + p[MODES_SINE] * p[MODES_SINE];
 
@@ -174,7 +174,7 @@ static inline PAIR pair_step(struct pair *s)
 }
 
 /* The next block's mean of each solution. */
-static void block_means(struct pair pair[PAIRS], unsigned block, double mean[2 * PAIRS])
+static void spring_block_means(struct pair pair[PAIRS], unsigned block, double mean[2 * PAIRS])
 {
 	for (unsigned i = 0; i < PAIRS; i++) {
 		struct pair here = pair[i];
@@ -196,7 +196,7 @@ size_t spring_normal(const struct series *series, const double *p, double normal
 	double difference[SPRING_SIZE];
 	struct gram gram;
 
-	if (!possible(p))
+	if (!spring_possible(p))
 		return 0;
 	start_all(s, difference, p, series);
 	s[SPRING_SIZE] = s[0]; /* one too few for pairs */
@@ -206,7 +206,7 @@ size_t spring_normal(const struct series *series, const double *p, double normal
 	for (unsigned k = 0; k < series->count; k++) {
 		double mean[2 * PAIRS], row[SPRING_SIZE + 1];
 
-		block_means(pair, series->block, mean);
+		spring_block_means(pair, series->block, mean);
 		for (unsigned i = 0; i < SPRING_SIZE; i++)
 			row[i] = (mean[i] - mean[MODES_OFFSET]) / difference[i];
 		row[MODES_OFFSET] = 1;

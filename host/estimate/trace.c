@@ -12,7 +12,7 @@
 /* Beyond any sensor; keeps squares and sums far from overflow. */
 #define VALUE_MAX_G 1e9
 
-static size_t smaller(size_t a, size_t b)
+static size_t trace_smaller(size_t a, size_t b)
 {
 	return a < b ? a : b;
 }
@@ -29,7 +29,7 @@ static double more(double a, double b)
 
 /* Copies TRACE_BLOCK good values, in strands that need not wait for each other. False, and nothing else is
  * known, when one of them is no acceleration. */
-static bool take_block(double *to, const double *from, struct trace_block *block)
+static bool trace_take_block(double *to, const double *from, struct trace_block *block)
 {
 	PAIR low[2] = {pair_load(from), pair_load(from + 2)}, high[2] = {low[0], low[1]};
 	PAIR sum[2] = {{0}, {0}}; /* finite unless a value is not */
@@ -58,7 +58,7 @@ static bool take_block(double *to, const double *from, struct trace_block *block
 /* Sample by sample, from sample k on, marking what is bad. */
 static void look_closely(struct trace *trace, size_t k, struct trace_block *block)
 {
-	size_t end = k + smaller(TRACE_BLOCK, trace->count - k);
+	size_t end = k + trace_smaller(TRACE_BLOCK, trace->count - k);
 
 	*block = (struct trace_block){INFINITY, -INFINITY, true};
 	for (; k < end; k++) {
@@ -95,16 +95,16 @@ static uint64_t marks_of(const uint8_t *sample)
 }
 
 /* The block that begins at sample k, from values that lie elsewhere or in the trace itself. */
-static void look(struct trace *trace, size_t k, const double *from)
+static void trace_look(struct trace *trace, size_t k, const double *from)
 {
 	struct trace_block *block = &trace->block[k / TRACE_BLOCK];
 	double *to = trace->value_g + k;
 
 	if (trace->count - k >= TRACE_BLOCK && marks_of(trace->sample + k) == 0 &&
-	    take_block(to, from, block))
+	    trace_take_block(to, from, block))
 		return;
 	if (from != to)
-		memcpy(to, from, smaller(TRACE_BLOCK, trace->count - k) * sizeof(*to));
+		memcpy(to, from, trace_smaller(TRACE_BLOCK, trace->count - k) * sizeof(*to));
 	look_closely(trace, k, block);
 }
 
@@ -113,13 +113,13 @@ static void copy(struct trace *trace, const struct channel *channel)
 	if (trace->count > 0)
 		memcpy(trace->sample, channel->sample, trace->count);
 	for (size_t k = 0; k < trace->count; k += TRACE_BLOCK)
-		look(trace, k, channel->value_g + k);
+		trace_look(trace, k, channel->value_g + k);
 }
 
 void trace_changed(struct trace *trace)
 {
 	for (size_t k = 0; k < trace->count; k += TRACE_BLOCK)
-		look(trace, k, trace->value_g + k);
+		trace_look(trace, k, trace->value_g + k);
 }
 
 void trace_marked(struct trace *trace)
@@ -128,7 +128,7 @@ void trace_marked(struct trace *trace)
 
 	for (size_t k = 0; k < trace->count; k += TRACE_BLOCK)
 		if (trace->count - k < TRACE_BLOCK || marks_of(trace->sample + k) & bad)
-			look(trace, k, trace->value_g + k);
+			trace_look(trace, k, trace->value_g + k);
 	clip_mark(trace);
 }
 

@@ -158,7 +158,7 @@ static double stiffer(const struct drop *d)
 	           (2.0 * d->sine * d->cosine));
 }
 
-static void fill_plate(const struct drop *d, struct numbers *n)
+static void auto_fill_plate(const struct drop *d, struct numbers *n)
 {
 	const struct scene *s = d->scene;
 	double cycles = d->plate_omega * s->contact_duration_s / (2.0 * UNITS_PI),
@@ -182,7 +182,7 @@ static void fill_plate(const struct drop *d, struct numbers *n)
 	n->value[DAMPING] = d->plate_zeta;
 }
 
-static bool between(double value, double low, double high)
+static bool auto_between(double value, double low, double high)
 {
 	return value >= low && value <= high;
 }
@@ -195,20 +195,21 @@ static bool numbers_of(const struct drop *d, struct numbers *n)
 	*n = (struct numbers){.value = {[ONE] = 1.0,
 	                                [REBOUND] = s->contact_restitution,
 	                                [REBOUND2] = s->contact_restitution * s->contact_restitution}};
-	if (!between(s->drop_angle_deg, ANGLE_MIN_DEG, ANGLE_MAX_DEG) ||
-	    !between(s->contact_restitution, REBOUND_MIN, REBOUND_MAX) || !(s->contact_stiffness_n_m15 > 0.0))
+	if (!auto_between(s->drop_angle_deg, ANGLE_MIN_DEG, ANGLE_MAX_DEG) ||
+	    !auto_between(s->contact_restitution, REBOUND_MIN, REBOUND_MAX) ||
+	    !(s->contact_stiffness_n_m15 > 0.0))
 		return false;
 	fill_contact(d, n);
 	n->value[STIFFER] = stiffer(d);
-	if (!between(n->value[LEVER], 0.0, LEVER_MAX) ||
-	    !between(n->value[STIFFER], -STIFFER_MAX, STIFFER_MAX))
+	if (!auto_between(n->value[LEVER], 0.0, LEVER_MAX) ||
+	    !auto_between(n->value[STIFFER], -STIFFER_MAX, STIFFER_MAX))
 		return false;
 	if (!d->has_plate)
 		return true;
-	fill_plate(d, n);
-	return between(n->value[PLATE], 0.0, PLATE_MAX) &&
-	       between(n->value[CYCLES], log(CYCLES_MIN), log(CYCLES_MAX)) &&
-	       between(d->plate_zeta, 0.0, DAMPING_MAX) && s->mount_softening <= SOFTENING_MAX;
+	auto_fill_plate(d, n);
+	return auto_between(n->value[PLATE], 0.0, PLATE_MAX) &&
+	       auto_between(n->value[CYCLES], log(CYCLES_MIN), log(CYCLES_MAX)) &&
+	       auto_between(d->plate_zeta, 0.0, DAMPING_MAX) && s->mount_softening <= SOFTENING_MAX;
 }
 
 static double doubt_of(const struct numbers *n, enum answer answer)
@@ -343,8 +344,9 @@ static struct model_options options_of(const struct model_options *options, enum
 	return o;
 }
 
-static int solve(const struct drop *drop, enum model_fidelity rung, const struct model_options *options,
-                 const char *why, struct model_prediction *p, char *message)
+static int model_auto_solve(const struct drop *drop, enum model_fidelity rung,
+                            const struct model_options *options, const char *why, struct model_prediction *p,
+                            char *message)
 {
 	struct model_options o = options_of(options, rung);
 
@@ -368,14 +370,14 @@ static int sdof_serves(const struct drop *drop, const struct model_options *opti
 
 	if (!(off <= options->accuracy))
 		return 0;
-	error = solve(drop, MODEL_SDOF, options, why, p, NULL);
+	error = model_auto_solve(drop, MODEL_SDOF, options, why, p, NULL);
 	if (error)
 		return ends(error) ? error : 0;
 	p->difference = p->next_change = off;
 	p->next = MODEL_COUPLED;
 	if (off <= CHECK_SHARE * options->accuracy)
 		return 1;
-	error = solve(drop, MODEL_COUPLED, options, why, &above, NULL);
+	error = model_auto_solve(drop, MODEL_COUPLED, options, why, &above, NULL);
 	if (error)
 		return ends(error) ? error : 0;
 	apart = auto_apart(p, &above, options->asked);
@@ -392,7 +394,7 @@ static int coupled_serves(const struct drop *drop, const struct model_options *o
 
 	if (!(off <= options->accuracy))
 		return 0;
-	error = solve(drop, MODEL_COUPLED, options, why, p, NULL);
+	error = model_auto_solve(drop, MODEL_COUPLED, options, why, p, NULL);
 	if (error)
 		return ends(error) ? error : 0;
 	p->difference = p->next_change = off;
@@ -404,12 +406,12 @@ static int coupled_serves(const struct drop *drop, const struct model_options *o
 static int planar_or_sdof(const struct drop *drop, const struct model_options *options, const char *why,
                           struct model_prediction *p, char *message)
 {
-	int error = solve(drop, MODEL_PLANAR, options, why, p, message);
+	int error = model_auto_solve(drop, MODEL_PLANAR, options, why, p, message);
 
 	if (ends(error))
 		return error;
 	if (error)
-		return solve(drop, MODEL_SDOF, options, "planar has no answer here", p, message);
+		return model_auto_solve(drop, MODEL_SDOF, options, "planar has no answer here", p, message);
 	p->difference = 0.0;
 	return 0;
 }

@@ -49,7 +49,7 @@ static double fade(double x)
 }
 
 /* D = x/(1 - exp(-x)) - 1 */
-static double damping(double x)
+static double contact_damping(double x)
 {
 	double sum = 0.0, term = 0.5;
 
@@ -147,7 +147,7 @@ static double panels(double x, double from, double to, bool release,
 static int contact_integral(double x, double to, double *value)
 {
 	gsl_integration_glfixed_table *table = gsl_integration_glfixed_table_alloc(NODES);
-	double turn = log1p(damping(x)); /* h at the largest depth */
+	double turn = log1p(contact_damping(x)); /* h at the largest depth */
 	double after = x - turn, slow = 0.0;
 
 	if (!table)
@@ -178,7 +178,7 @@ int contact_law_begin(struct contact_law *law, double restitution)
 		return error;
 	if (l.spread < SPREAD_ELASTIC)
 		l.spread = SPREAD_ELASTIC;
-	l.damping = damping(l.spread);
+	l.damping = contact_damping(l.spread);
 	l.duration = 3.218 + 0.386 * (1.0 / restitution - 1.0);
 	l.depth = pow(-2.5 * gsl_sf_log_1plusx_mx(l.damping) / (l.damping * l.damping), 0.4);
 	*law = l;

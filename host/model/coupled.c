@@ -14,7 +14,7 @@ enum { DEPTH, SINKING, OFFSET, OPENING, STATES };
 #define FIRST_STEP 1e-3
 #define FIRST_STEP_ROUGH 0.1
 
-static double contact_force(const struct coupled *c, const double y[])
+static double coupled_contact_force(const struct coupled *c, const double y[])
 {
 	double force;
 
@@ -25,20 +25,20 @@ static double contact_force(const struct coupled *c, const double y[])
 	return force > 0.0 ? force : 0.0;
 }
 
-static double mount_force(const struct coupled *c, const double y[])
+static double coupled_mount_force(const struct coupled *c, const double y[])
 {
 	return c->mount_n_m * y[OFFSET] + c->mount_damping_n_s_m * y[OPENING];
 }
 
-static void rates(const void *context, const double y[], double rate[])
+static void coupled_rates(const void *context, const double y[], double rate[])
 {
 	const struct coupled *c = context;
-	double force = contact_force(c, y);
+	double force = coupled_contact_force(c, y);
 
 	rate[DEPTH] = y[SINKING];
 	rate[SINKING] = c->gravity_m_s2 - force / c->case_mass_kg;
 	if (c->plate_mass_kg > 0.0) {
-		double mount = mount_force(c, y);
+		double mount = coupled_mount_force(c, y);
 
 		rate[SINKING] -= mount / c->case_mass_kg;
 		rate[OFFSET] = y[OPENING];
@@ -46,10 +46,11 @@ static void rates(const void *context, const double y[], double rate[])
 	}
 }
 
-static void signals(const void *context, const double y[], double value[])
+static void coupled_signals(const void *context, const double y[], double value[])
 {
 	const struct coupled *c = context;
-	double force = contact_force(c, y), mount = c->plate_mass_kg > 0.0 ? mount_force(c, y) : 0.0;
+	double force = coupled_contact_force(c, y),
+	       mount = c->plate_mass_kg > 0.0 ? coupled_mount_force(c, y) : 0.0;
 
 	value[COUPLED_BOX] = (force + mount) / c->case_mass_kg;
 	value[COUPLED_PLATE] = c->plate_mass_kg > 0.0 ? -mount / c->plate_mass_kg : value[COUPLED_BOX];
@@ -59,13 +60,13 @@ static void signals(const void *context, const double y[], double value[])
 	value[COUPLED_TRAVEL] = c->plate_mass_kg > 0.0 ? y[OFFSET] : 0.0;
 }
 
-static void start(const struct coupled *c, struct ode *ode)
+static void coupled_start(const struct coupled *c, struct ode *ode)
 {
 	const double y[STATES] = {[SINKING] = c->speed_m_s};
 	double depth = contact_depth(&c->law, c->case_mass_kg, c->speed_m_s, c->stiffness_n_m15);
 
 	ode->count = c->plate_mass_kg > 0.0 ? STATES : OFFSET;
-	ode->rates = rates;
+	ode->rates = coupled_rates;
 	ode->context = c;
 	ode->tolerance = c->tolerance;
 	ode->scale[DEPTH] = ode->scale[OFFSET] = depth;
@@ -80,13 +81,13 @@ static void start(const struct coupled *c, struct ode *ode)
 	ode_start(ode, y, (c->rough ? FIRST_STEP_ROUGH : FIRST_STEP) * depth / c->speed_m_s);
 }
 
-static double contact_end(const struct coupled *c)
+static double coupled_contact_end(const struct coupled *c)
 {
 	return CONTACTS_MAX * contact_duration(&c->law, c->case_mass_kg, c->speed_m_s, c->stiffness_n_m15);
 }
 
 /* One step; *released when the box leaves the mat in it, which then ends there. */
-static int step(struct ode *ode, double until, bool *released)
+static int coupled_step(struct ode *ode, double until, bool *released)
 {
 	int error = ode_step(ode, until);
 
@@ -112,7 +113,7 @@ static void later(struct watch_peak *peak, double value, double time_s)
 }
 
 /* The first extreme of the plate's acceleration, and of its travel, after the release. */
-static int peaks_in_flight(const struct coupled *c, const struct ode *ode, struct coupled_result *r)
+static int coupled_peaks_in_flight(const struct coupled *c, const struct ode *ode, struct coupled_result *r)
 {
 	double z = ode->y[OFFSET], v = ode->y[OPENING], plate, rise, at,
 	       share = c->plate_mass_kg / c->case_mass_kg;
@@ -121,7 +122,7 @@ static int peaks_in_flight(const struct coupled *c, const struct ode *ode, struc
 
 	if (error)
 		return error;
-	plate = -mount_force(c, ode->y) / c->plate_mass_kg;
+	plate = -coupled_mount_force(c, ode->y) / c->plate_mass_kg;
 	rise = -(c->mount_n_m * v + c->mount_damping_n_s_m * ode->rate[0][OPENING]) / c->plate_mass_kg;
 	at = oscillator_turn(&mount, plate, rise);
 	oscillator_move(&mount, at, &plate, &rise);
@@ -135,8 +136,8 @@ static int peaks_in_flight(const struct coupled *c, const struct ode *ode, struc
 	return 0;
 }
 
-static void conclude(const struct coupled *c, const struct ode *ode, const struct watch *w, bool released,
-                     struct coupled_result *r)
+static void coupled_conclude(const struct coupled *c, const struct ode *ode, const struct watch *w,
+                             bool released, struct coupled_result *r)
 {
 	double sinking = ode->y[SINKING], opening = c->plate_mass_kg > 0.0 ? ode->y[OPENING] : 0.0;
 
@@ -157,7 +158,7 @@ static void conclude(const struct coupled *c, const struct ode *ode, const struc
 }
 
 /* What the flight tells of peaks that nobody asked for. */
-static void forget(const struct coupled *c, struct coupled_result *r)
+static void coupled_forget(const struct coupled *c, struct coupled_result *r)
 {
 	struct watch_peak *const peaks[] = {
 	        [COUPLED_BOX] = &r->box,
@@ -176,29 +177,29 @@ int coupled_solve(const struct coupled *c, struct coupled_result *result)
 	struct coupled_result r;
 	struct ode ode;
 	struct watch watch = {.count = COUPLED_SIGNALS,
-	                      .signals = signals,
+	                      .signals = coupled_signals,
 	                      .context = c,
 	                      .skipped = c->skipped,
 	                      .rough = c->rough};
-	double end = contact_end(c);
+	double end = coupled_contact_end(c);
 	bool released = false;
 	int error = 0;
 
-	start(c, &ode);
+	coupled_start(c, &ode);
 	watch_start(&watch, &ode);
 	while (!error && !released && ode.t < end) {
-		error = step(&ode, end, &released);
+		error = coupled_step(&ode, end, &released);
 		if (!error)
 			watch_step(&watch, &ode);
 	}
 	if (error)
 		return error;
 	watch_end(&watch, &ode);
-	conclude(c, &ode, &watch, released, &r);
+	coupled_conclude(c, &ode, &watch, released, &r);
 	if (released && c->plate_mass_kg > 0.0)
-		error = peaks_in_flight(c, &ode, &r);
+		error = coupled_peaks_in_flight(c, &ode, &r);
 	if (!error) {
-		forget(c, &r);
+		coupled_forget(c, &r);
 		*result = r;
 	}
 	return error;
@@ -206,15 +207,15 @@ int coupled_solve(const struct coupled *c, struct coupled_result *result)
 
 /* ---- the history ---- */
 
-static struct coupled_sample sample_of(const struct coupled *c, const double y[])
+static struct coupled_sample coupled_sample_of(const struct coupled *c, const double y[])
 {
 	double value[COUPLED_SIGNALS];
 
-	signals(c, y, value);
+	coupled_signals(c, y, value);
 	return (struct coupled_sample){
 	        .box = value[COUPLED_BOX],
 	        .plate = value[COUPLED_PLATE],
-	        .force_n = contact_force(c, y),
+	        .force_n = coupled_contact_force(c, y),
 	        .depth_m = fmax(value[COUPLED_DENT], 0.0),
 	        .travel_m = value[COUPLED_TRAVEL],
 	};
@@ -231,7 +232,7 @@ static struct coupled_sample sample_in_flight(const struct coupled *c, const str
 	y[OFFSET] = release->y[OFFSET];
 	y[OPENING] = release->y[OPENING];
 	oscillator_move(mount, t - release->t, &y[OFFSET], &y[OPENING]);
-	return sample_of(c, y);
+	return coupled_sample_of(c, y);
 }
 
 int coupled_history(const struct coupled *c, double start_s, double step_s, struct coupled_sample *samples,
@@ -242,7 +243,7 @@ int coupled_history(const struct coupled *c, double start_s, double step_s, stru
 	bool released = false;
 	int error = c->plate_mass_kg > 0.0 ? flight(c, &mount) : 0;
 
-	start(c, &ode);
+	coupled_start(c, &ode);
 	for (size_t i = 0; i < count && !error; i++) {
 		double t = start_s + (double)i * step_s, y[STATES];
 
@@ -251,12 +252,12 @@ int coupled_history(const struct coupled *c, double start_s, double step_s, stru
 			continue;
 		}
 		while (!error && !released && ode.t < t)
-			error = step(&ode, fmax(t, contact_end(c)), &released);
+			error = coupled_step(&ode, fmax(t, coupled_contact_end(c)), &released);
 		if (released && t > ode.t) {
 			samples[i] = sample_in_flight(c, &mount, &ode, t);
 		} else {
 			ode_at(&ode, t, y);
-			samples[i] = sample_of(c, y);
+			samples[i] = coupled_sample_of(c, y);
 		}
 	}
 	return error;

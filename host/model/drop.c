@@ -21,7 +21,7 @@ int drop_refuse(char *message, int code, const char *format, ...)
 
 /* What every rung divides by or takes the root of. A scene that was checked on reading passes; one made or
  * changed in memory may not. */
-static int check(const struct scene *s, char *message)
+static int model_drop_check(const struct scene *s, char *message)
 {
 	const struct {
 		const char *key;
@@ -67,7 +67,7 @@ int drop_of_scene(const struct scene *scene, struct drop *drop, char *message)
 {
 	double angle = UNITS_RAD(scene->drop_angle_deg), s1 = angle + UNITS_RAD(scene->sensor_s1_yaw_deg);
 	struct drop d = {.scene = scene, .angle = angle, .cosine = cos(angle), .sine = sin(angle)};
-	int error = check(scene, message);
+	int error = model_drop_check(scene, message);
 
 	if (error)
 		return error;

@@ -85,7 +85,7 @@ static double uniform(uint64_t *state)
 	return ((double)((z ^ (z >> 31)) >> 12) + 0.5) * 0x1p-52;
 }
 
-static double normal(uint64_t *state)
+static double ensemble_normal(uint64_t *state)
 {
 	double radius = sqrt(-2.0 * log(uniform(state)));
 
@@ -102,7 +102,7 @@ void ensemble_random_scene(const struct ensemble *e, size_t point, struct scene 
 		double middle = vary_get(e->scene, &axis->key);
 
 		for (int k = 0; k < DRAWS_MAX; k++) {
-			value[i] = middle + axis->sd * normal(&state);
+			value[i] = middle + axis->sd * ensemble_normal(&state);
 			if (value[i] >= axis->key.min && value[i] <= axis->key.max)
 				break;
 		}
@@ -175,7 +175,7 @@ struct draws {
 	double *value; /* one row of points for each output; NAN: no drop */
 };
 
-static void draw(void *context, size_t first, size_t count, int thread)
+static void ensemble_draw(void *context, size_t first, size_t count, int thread)
 {
 	struct draws *d = context;
 	const struct ensemble *e = d->ensemble;
@@ -194,7 +194,7 @@ static void draw(void *context, size_t first, size_t count, int thread)
 	}
 }
 
-static int drawn(void *context, size_t first, size_t count, int thread)
+static int ensemble_drawn(void *context, size_t first, size_t count, int thread)
 {
 	(void)context;
 	(void)first;
@@ -211,7 +211,7 @@ static int ascending(const void *a, const void *b)
 }
 
 /* Sorts; NANs were taken out. */
-static struct ensemble_spread spread_of(double *value, size_t count)
+static struct ensemble_spread ensemble_spread_of(double *value, size_t count)
 {
 	struct ensemble_spread s = {(double)NAN, (double)NAN, (double)NAN, (double)NAN};
 	double sum = 0.0, squares = 0.0;
@@ -241,7 +241,7 @@ int ensemble_monte_carlo(const struct ensemble *e, size_t draws,
 	d.value = malloc((draws ? draws : 1) * d.count * sizeof(*d.value));
 	if (!d.value)
 		return DT_E_MEMORY;
-	error = ensemble_run(draws, draw, drawn, &d);
+	error = ensemble_run(draws, ensemble_draw, ensemble_drawn, &d);
 	for (size_t i = 0; i < d.count; i++) {
 		double *row = &d.value[i * draws];
 		size_t kept = 0;
@@ -249,7 +249,7 @@ int ensemble_monte_carlo(const struct ensemble *e, size_t draws,
 		for (size_t k = 0; k < draws; k++)
 			if (!isnan(row[k]))
 				row[kept++] = row[k];
-		spread[i] = spread_of(row, kept);
+		spread[i] = ensemble_spread_of(row, kept);
 		if (kept > most)
 			most = kept;
 	}

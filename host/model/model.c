@@ -99,7 +99,7 @@ static void to_g(struct model_peak *peak)
 	peak->value_g /= UNITS_G_M_S2;
 }
 
-static int check_options(const struct model_options *o, char *message)
+static int model_check_options(const struct model_options *o, char *message)
 {
 	if (!(o->tolerance == 0.0 || (o->tolerance >= MODEL_TOLERANCE_MIN && o->tolerance <= 0.01)))
 		return drop_refuse(message, DT_E_ARGUMENT, "tolerance is %g, expected %g to 0.01",
@@ -177,7 +177,7 @@ int model_solve(const struct scene *scene, enum model_fidelity fidelity, const s
 {
 	const struct model_options *o = options ? options : &model_defaults;
 	struct drop drop;
-	int error = check_options(o, message);
+	int error = model_check_options(o, message);
 
 	if (!error)
 		error = drop_of_scene(scene, &drop, message);
@@ -235,7 +235,7 @@ int model_histories(const struct scene *scene, enum model_fidelity fidelity,
 {
 	enum model_fidelity taken = fidelity == MODEL_AUTO ? MODEL_PLANAR : fidelity;
 	struct drop drop;
-	int error = check_options(options ? options : &model_defaults, message);
+	int error = model_check_options(options ? options : &model_defaults, message);
 
 	if (!error && (!isfinite(start_s) || !(step_s > 0.0) || !isfinite(step_s)))
 		error = drop_refuse(message, DT_E_ARGUMENT, "times from %g in steps of %g", start_s, step_s);

@@ -55,7 +55,7 @@ static void stages(struct ode *ode, double h, double y1[])
 }
 
 /* Order 5 less order 4, the worst state's, in units of the tolerance. */
-static double error_of(const struct ode *ode, double h)
+static double ode_error_of(const struct ode *ode, double h)
 {
 	const double(*k)[ODE_STATES_MAX] = ode->rate;
 	double worst = 0.0;
@@ -81,7 +81,7 @@ static double extension(const struct ode *ode, size_t i)
 	       1453857185.0 / 822651844.0 * k[5][i] + 69997945.0 / 29380423.0 * k[6][i];
 }
 
-static void keep(struct ode *ode, double h, const double y1[])
+static void ode_keep(struct ode *ode, double h, const double y1[])
 {
 	struct ode_piece *p = &ode->last;
 
@@ -114,12 +114,12 @@ int ode_step(struct ode *ode, double until)
 		if (!(h > 16.0 * DBL_EPSILON * ode->t) || !(h > 0.0))
 			return DT_E_NUMERIC;
 		stages(ode, h, y1);
-		error = error_of(ode, h);
+		error = ode_error_of(ode, h);
 		factor = SAFETY * pow(error, -0.2);
 		if (!(factor > SHRINK_MAX)) /* a NaN shrinks the step as well */
 			factor = SHRINK_MAX;
 		if (error <= 1.0) {
-			keep(ode, h, y1);
+			ode_keep(ode, h, y1);
 			if (h == left)
 				ode->t = ode->last.end = until;
 			if (h < left ||

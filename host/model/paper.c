@@ -16,7 +16,7 @@ static double damped(double zeta)
 	return sqrt((1.0 - zeta) * (1.0 + zeta));
 }
 
-static void contact(const struct paper_input *in, struct paper_result *r)
+static void paper_contact(const struct paper_input *in, struct paper_result *r)
 {
 	double ratio = in->width_m / in->length_m, cosine = cos(in->angle_rad);
 
@@ -86,7 +86,7 @@ int paper_solve(const struct paper_input *in, struct paper_result *result)
 	    !(in->radius_m > 0.0) || !(in->case_damping_ratio >= 0.0) || !(in->case_damping_ratio < 1.0) ||
 	    !(in->mount_damping_ratio >= 0.0) || !(in->mount_damping_ratio < 1.0))
 		return DT_E_ARGUMENT;
-	contact(in, &r);
+	paper_contact(in, &r);
 	if (!(r.contact_time_s > 0.0) || !isfinite(r.contact_time_s))
 		return DT_E_ARGUMENT;
 	box(in, &r);

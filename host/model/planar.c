@@ -70,7 +70,7 @@ struct load {
 	double creep; /* rate of the tangential deflection */
 };
 
-static double corner_up(const struct planar *p, double cosine, double sine)
+static double planar_corner_up(const struct planar *p, double cosine, double sine)
 {
 	return -(p->lever_x_m * cosine + p->lever_y_m * sine);
 }
@@ -81,7 +81,7 @@ static struct body body_of(const struct planar *p)
 	        .in = p,
 	        .cosine = cos(p->angle_rad),
 	        .sine = sin(p->angle_rad),
-	        .corner_up_m = corner_up(p, cos(p->angle_rad), sin(p->angle_rad)),
+	        .corner_up_m = planar_corner_up(p, cos(p->angle_rad), sin(p->angle_rad)),
 	        .yaw_cosine = cos(p->s1_yaw_rad),
 	        .yaw_sine = sin(p->s1_yaw_rad),
 	};
@@ -134,7 +134,7 @@ static void pull(const struct body *b, const double off[], double spin, struct l
 
 /* Of the angle at the touch plus turn. A box turns little during a contact: series are exact to the last
  * digit below SMALL_TURN and cost less. */
-static void turned(const struct body *b, double turn, double *cosine, double *sine)
+static void planar_turned(const struct body *b, double turn, double *cosine, double *sine)
 {
 	double t2 = turn * turn, c, s;
 
@@ -154,9 +154,9 @@ static struct load load_of(const struct body *b, const double y[])
 	const struct planar *p = b->in;
 	struct load l = {.normal = 0.0};
 
-	turned(b, y[TURN], &l.cosine, &l.sine);
+	planar_turned(b, y[TURN], &l.cosine, &l.sine);
 	l.lever_across = p->lever_y_m * l.cosine - p->lever_x_m * l.sine;
-	l.lever_up = corner_up(p, l.cosine, l.sine);
+	l.lever_up = planar_corner_up(p, l.cosine, l.sine);
 	l.depth = b->corner_up_m - l.lever_up - y[UP];
 	if (l.depth > 0.0)
 		press(p, y, &l);
@@ -171,7 +171,7 @@ static double angular_acceleration(const struct planar *p, const struct load *l)
 	return (l->lever_up * l->along - l->lever_across * l->normal) / p->inertia_kg_m2;
 }
 
-static void rates(const void *context, const double y[], double rate[])
+static void planar_rates(const void *context, const double y[], double rate[])
 {
 	const struct body *b = context;
 	const struct planar *p = b->in;
@@ -239,7 +239,7 @@ static void along_body(const struct load *l, double across, double up, double *x
 	*y = up * l->sine - across * l->cosine;
 }
 
-static void signals(const void *context, const double y[], double value[])
+static void planar_signals(const void *context, const double y[], double value[])
 {
 	const struct body *b = context;
 	const struct planar *p = b->in;
@@ -269,7 +269,7 @@ static void signals(const void *context, const double y[], double value[])
 	}
 }
 
-static void start(const struct body *b, struct ode *ode)
+static void planar_start(const struct body *b, struct ode *ode)
 {
 	const struct planar *p = b->in;
 	const double y[STATES] = {[V_UP] = -p->speed_m_s};
@@ -277,7 +277,7 @@ static void start(const struct body *b, struct ode *ode)
 	double stiff = 1.0, reach = sqrt(p->lever_x_m * p->lever_x_m + p->lever_y_m * p->lever_y_m);
 
 	ode->count = p->plate_mass_kg > 0.0 ? STATES : PLATE;
-	ode->rates = rates;
+	ode->rates = planar_rates;
 	ode->context = b;
 	ode->tolerance = p->tolerance;
 	ode->scale[UP] = ode->scale[GRIP] = depth;
@@ -301,7 +301,7 @@ static double depth_then(double t, void *context)
 }
 
 /* One step; *released when the corner leaves the mat in it, which then ends there. */
-static int step(struct ode *ode, double until, bool *released)
+static int planar_step(struct ode *ode, double until, bool *released)
 {
 	double at;
 	int error = ode_step(ode, until);
@@ -415,7 +415,7 @@ static int fly_on(const struct body *b, struct ode *ode, struct ring *ring, stru
 
 /* Whether anything asked for may peak after the release. Of the box's signals none does above a light plate.
  */
-static bool peaks_in_flight(const struct planar *p)
+static bool planar_peaks_in_flight(const struct planar *p)
 {
 	const unsigned plate = 1u << PLANAR_S1X | 1u << PLANAR_S1Y | 1u << PLANAR_S1R | 1u << PLANAR_TRAVEL;
 
@@ -428,7 +428,7 @@ int planar_solve(const struct planar *planar, struct planar_result *result)
 	const struct body body = body_of(planar);
 	struct planar_result r = {.ring_hz = (double)NAN, .ring_damping = (double)NAN};
 	struct watch watch = {.count = PLANAR_SIGNALS,
-	                      .signals = signals,
+	                      .signals = planar_signals,
 	                      .context = &body,
 	                      .skipped = planar->skipped,
 	                      .rough = planar->rough};
@@ -437,10 +437,10 @@ int planar_solve(const struct planar *planar, struct planar_result *result)
 	bool released = false, flies;
 	int error = 0;
 
-	start(&body, &ode);
+	planar_start(&body, &ode);
 	watch_start(&watch, &ode);
 	while (!released && !r.cut_short && ode.t < body.contact_end_s) {
-		error = step(&ode, body.contact_end_s, &released);
+		error = planar_step(&ode, body.contact_end_s, &released);
 		if (error)
 			return error;
 		watch_step(&watch, &ode);
@@ -448,7 +448,7 @@ int planar_solve(const struct planar *planar, struct planar_result *result)
 		              all_passed(planar, &watch);
 	}
 	conclude_contact(&body, &ode, released, &r);
-	flies = released && peaks_in_flight(planar);
+	flies = released && planar_peaks_in_flight(planar);
 	if (flies)
 		error = fly(&body, &ode, &watch, &ring, &r);
 	watch_end(&watch, &ode);
@@ -469,12 +469,12 @@ int planar_solve(const struct planar *planar, struct planar_result *result)
 
 /* ---- the history ---- */
 
-static struct planar_sample sample_of(const struct body *b, const double y[])
+static struct planar_sample planar_sample_of(const struct body *b, const double y[])
 {
 	double value[PLANAR_SIGNALS];
 	struct planar_sample s;
 
-	signals(b, y, value);
+	planar_signals(b, y, value);
 	for (int i = 0; i < PLANAR_AXES; i++)
 		s.axis[i] = value[i];
 	s.force_n = load_of(b, y).normal;
@@ -493,7 +493,7 @@ int planar_history(const struct planar *planar, double start_s, double step_s, s
 	bool released = false;
 	int error = 0;
 
-	start(&body, &ode);
+	planar_start(&body, &ode);
 	for (size_t i = 0; i < count && !error; i++) {
 		double t = start_s + (double)i * step_s, y[ODE_STATES_MAX];
 
@@ -502,11 +502,11 @@ int planar_history(const struct planar *planar, double start_s, double step_s, s
 			continue;
 		}
 		while (!error && ode.t < t)
-			error = released ? ode_step(&ode, end) : step(&ode, end, &released);
+			error = released ? ode_step(&ode, end) : planar_step(&ode, end, &released);
 		if (error)
 			break;
 		ode_at(&ode, t, y);
-		samples[i] = sample_of(&body, y);
+		samples[i] = planar_sample_of(&body, y);
 	}
 	return error;
 }

@@ -148,7 +148,7 @@ static void share_out(const struct drop *drop, double s1, double box, double val
 	value[MODEL_S2Y] = box * (drop->share[MODEL_S2Y] - drop->turning);
 }
 
-static void fill_plate(const struct drop *drop, struct model_prediction *p)
+static void rungs_closed_fill_plate(const struct drop *drop, struct model_prediction *p)
 {
 	p->plate_damping_ratio = drop->plate_zeta;
 	p->plate_frequency_hz = drop->plate_zeta < 1.0
@@ -191,7 +191,7 @@ static int steady_predict(const struct drop *drop, const struct model_options *o
 	                                   duration / 2.0 + phase / (UNITS_PI / duration)},
 	               p);
 	if (drop->has_plate)
-		fill_plate(drop, p);
+		rungs_closed_fill_plate(drop, p);
 	return 0;
 }
 
@@ -256,7 +256,7 @@ static int sdof_predict(const struct drop *drop, const struct model_options *opt
 			return drop_refuse(message, error,
 			                   "stiffness_n_m: the plate swings over %d times within the contact",
 			                   SDOF_CYCLES_MAX);
-		fill_plate(drop, p);
+		rungs_closed_fill_plate(drop, p);
 	}
 	fill_half_sine(drop, s1, p);
 	return 0;

@@ -76,7 +76,7 @@ static unsigned refinements_of(const struct model_options *options, unsigned kno
 }
 
 /* A right-angled edge leaves an imprint as wide as the tangents of both its flanks add up to. */
-static double wedge(const struct scene *s)
+static double rungs_contact_wedge(const struct scene *s)
 {
 	double angle = fmin(fmax(s->drop_angle_deg, WEDGE_ANGLE_MIN_DEG), 90.0 - WEDGE_ANGLE_MIN_DEG);
 
@@ -101,7 +101,7 @@ static int contact_of(const struct drop *drop, unsigned refinements, struct cont
 		*stiffness_n_m15 = given;
 	}
 	if (refinements & MODEL_WEDGE)
-		*stiffness_n_m15 *= wedge(drop->scene);
+		*stiffness_n_m15 *= rungs_contact_wedge(drop->scene);
 	return 0;
 }
 
@@ -244,7 +244,7 @@ static int check_refinements(const struct scene *s, unsigned refinements, char *
 	return 0;
 }
 
-static void refine(const struct drop *drop, unsigned refinements, struct planar *p)
+static void rungs_contact_refine(const struct drop *drop, unsigned refinements, struct planar *p)
 {
 	const struct scene *s = drop->scene;
 
@@ -300,7 +300,7 @@ static int planar_of(const struct drop *drop, const struct model_options *option
 	error = contact_of(drop, refinements, &p->law, &p->stiffness_n_m15, message);
 	if (error)
 		return error;
-	refine(drop, refinements, p);
+	rungs_contact_refine(drop, refinements, p);
 	p->count_ring = options->ring && p->softening > 0.0;
 	return 0;
 }

@@ -67,7 +67,7 @@ static double complex triple(double complex p, double complex ep, double complex
 }
 
 /* z and z' under the base acceleration -exp(i pulse_omega t), from rest. */
-static void respond(const struct sdof *sdof, double t, double complex *z, double complex *v)
+static void sdof_respond(const struct sdof *sdof, double t, double complex *z, double complex *v)
 {
 	const struct oscillator *o = &sdof->mount;
 	double complex slow, fast, e_slow, e_fast, pulse = sdof->pulse_omega * t * I, e_pulse, both;
@@ -108,7 +108,7 @@ static struct sdof_motion motion_in_pulse(const struct sdof *sdof, double t)
 {
 	double complex z, v;
 
-	respond(sdof, t, &z, &v);
+	sdof_respond(sdof, t, &z, &v);
 	return motion(sdof, -sdof->amplitude * cimag(z), -sdof->amplitude * cimag(v));
 }
 
@@ -179,13 +179,13 @@ static struct scan scan_make(const struct sdof *sdof, int steps)
 
 	oscillator_move(&sdof->mount, s.step_s, &s.even_z, &s.even_v);
 	oscillator_move(&sdof->mount, s.step_s, &s.odd_z, &s.odd_v);
-	respond(sdof, s.step_s, &s.z, &s.v);
+	sdof_respond(sdof, s.step_s, &s.z, &s.v);
 	s.turn = cos(UNITS_PI / steps) + sin(UNITS_PI / steps) * I;
 	return s;
 }
 
 /* Keeps the two largest extremes, the larger first. */
-static void keep(struct bracket best[2], struct bracket b)
+static void sdof_keep(struct bracket best[2], struct bracket b)
 {
 	if (b.about > best[0].about) {
 		best[1] = best[0];
@@ -195,7 +195,7 @@ static void keep(struct bracket best[2], struct bracket b)
 	}
 }
 
-static void scan(const struct sdof *sdof, int steps, struct bracket best[2])
+static void sdof_scan(const struct sdof *sdof, int steps, struct bracket best[2])
 {
 	const struct scan s = scan_make(sdof, steps);
 	double complex phase = 1.0;
@@ -211,8 +211,8 @@ static void scan(const struct sdof *sdof, int steps, struct bracket best[2])
 		phase *= s.turn;
 		next_j = jerk_of(sdof, m, sdof->amplitude * cimag(phase));
 		if (j * next_j < 0.0)
-			keep(best, (struct bracket){k * s.step_s, (k + 1) * s.step_s,
-			                            fabs(a + 0.5 * s.step_s * j * j / (j - next_j))});
+			sdof_keep(best, (struct bracket){k * s.step_s, (k + 1) * s.step_s,
+			                                 fabs(a + 0.5 * s.step_s * j * j / (j - next_j))});
 		z = next_z;
 		v = next_v;
 		a = m.acceleration;
@@ -221,7 +221,7 @@ static void scan(const struct sdof *sdof, int steps, struct bracket best[2])
 }
 
 /* Takes time_s to the extreme within the bracket when that is larger than the one at time_s. */
-static int refine(struct sdof *sdof, const struct bracket *b, double *time_s)
+static int sdof_refine(struct sdof *sdof, const struct bracket *b, double *time_s)
 {
 	double t;
 	int error = 0;
@@ -247,11 +247,11 @@ static int peak_in_pulse(const struct sdof *sdof, double *time_s)
 
 	if (!(cycles <= SDOF_CYCLES_MAX))
 		return DT_E_NUMERIC;
-	scan(sdof, (int)(SCAN_PER_CYCLE * (cycles + 1.0)), best);
+	sdof_scan(sdof, (int)(SCAN_PER_CYCLE * (cycles + 1.0)), best);
 	*time_s = sdof->pulse_s;
-	error = refine(&copy, &best[0], time_s);
+	error = sdof_refine(&copy, &best[0], time_s);
 	if (!error && best[1].about > RIVAL_SHARE * best[0].about)
-		error = refine(&copy, &best[1], time_s);
+		error = sdof_refine(&copy, &best[1], time_s);
 	return error;
 }
 

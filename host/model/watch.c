@@ -14,7 +14,7 @@ enum { ROUNDS = sizeof(round_share) / sizeof(round_share[0]), KINK_STEPS = 60, C
 #define GOLDEN 0.6180339887498949
 #define ROUGH_SHARE 0.2
 
-static void sample(struct watch *w, const struct ode *ode, double t)
+static void watch_sample(struct watch *w, const struct ode *ode, double t)
 {
 	double y[ODE_STATES_MAX];
 
@@ -36,12 +36,12 @@ static void record(struct watch *w, size_t signal, double t, const double value[
 void watch_start(struct watch *w, const struct ode *ode)
 {
 	w->seen = 0;
-	sample(w, ode, ode->t);
+	watch_sample(w, ode, ode->t);
 	for (size_t i = 0; i < w->count; i++)
 		record(w, i, ode->t, w->value[2]);
 }
 
-static double magnitude(const struct watch *w, const struct ode *ode, size_t signal, double t)
+static double watch_magnitude(const struct watch *w, const struct ode *ode, size_t signal, double t)
 {
 	double y[ODE_STATES_MAX], value[WATCH_SIGNALS_MAX];
 
@@ -76,12 +76,12 @@ static bool close_in(const struct watch *w, const struct ode *ode, size_t signal
 		if (at[0] < time_s[0] || at[2] > time_s[2])
 			return false;
 		for (int k = 0; k < 3; k++)
-			f[k] = magnitude(w, ode, signal, at[k]);
+			f[k] = watch_magnitude(w, ode, signal, at[k]);
 		*t = vertex(at, f);
 		within = *t > at[0] && *t < at[2];
 		most = fmax(fmax(f[0], f[1]), f[2]);
 	}
-	return within && magnitude(w, ode, signal, *t) >= most * (1.0 - 1e-12);
+	return within && watch_magnitude(w, ode, signal, *t) >= most * (1.0 - 1e-12);
 }
 
 /* The largest between two instants that have one peak between them, whatever its shape. */
@@ -89,7 +89,7 @@ static double golden_section(const struct watch *w, const struct ode *ode, size_
                              double high)
 {
 	double a = high - GOLDEN * (high - low), b = low + GOLDEN * (high - low);
-	double at_a = magnitude(w, ode, signal, a), at_b = magnitude(w, ode, signal, b);
+	double at_a = watch_magnitude(w, ode, signal, a), at_b = watch_magnitude(w, ode, signal, b);
 
 	for (int i = 0; i < KINK_STEPS; i++) {
 		if (at_a > at_b) {
@@ -97,13 +97,13 @@ static double golden_section(const struct watch *w, const struct ode *ode, size_
 			b = a;
 			at_b = at_a;
 			a = high - GOLDEN * (high - low);
-			at_a = magnitude(w, ode, signal, a);
+			at_a = watch_magnitude(w, ode, signal, a);
 		} else {
 			low = a;
 			a = b;
 			at_a = at_b;
 			b = low + GOLDEN * (high - low);
-			at_b = magnitude(w, ode, signal, b);
+			at_b = watch_magnitude(w, ode, signal, b);
 		}
 	}
 	return 0.5 * (low + high);
@@ -119,13 +119,13 @@ static double vertex_again(const struct watch *w, const struct ode *ode, size_t 
 	if (at[0] < time_s[0] || at[2] > time_s[2])
 		return t;
 	for (int k = 0; k < 3; k++)
-		f[k] = magnitude(w, ode, signal, at[k]);
+		f[k] = watch_magnitude(w, ode, signal, at[k]);
 	return vertex(at, f);
 }
 
 /* The middle one of three instants is where the signal is largest, as far as known; f: its magnitudes. */
-static void refine(struct watch *w, const struct ode *ode, size_t signal, const double time_s[3],
-                   const double f[3])
+static void watch_refine(struct watch *w, const struct ode *ode, size_t signal, const double time_s[3],
+                         const double f[3])
 {
 	double t = vertex(time_s, f), y[ODE_STATES_MAX], value[WATCH_SIGNALS_MAX];
 
@@ -150,9 +150,9 @@ static void refine(struct watch *w, const struct ode *ode, size_t signal, const 
 /* How near the end of all its slope is looked at. */
 #define END_SHARE 1e-3
 
-static void look(struct watch *w, const struct ode *ode, double t)
+static void watch_look(struct watch *w, const struct ode *ode, double t)
 {
-	sample(w, ode, t);
+	watch_sample(w, ode, t);
 	if (w->seen < 3)
 		return;
 	for (size_t i = 0; i < w->count; i++) {
@@ -160,30 +160,30 @@ static void look(struct watch *w, const struct ode *ode, double t)
 
 		if (!(w->skipped >> i & 1u) && f[1] >= f[0] && f[1] > f[2] &&
 		    f[1] * HIDDEN_SHARE > fabs(w->peak[i].value))
-			refine(w, ode, i, w->time_s, f);
+			watch_refine(w, ode, i, w->time_s, f);
 	}
 }
 
 void watch_step(struct watch *w, const struct ode *ode)
 {
-	look(w, ode, 0.5 * (ode->last.from + ode->last.end));
-	look(w, ode, ode->last.end);
+	watch_look(w, ode, 0.5 * (ode->last.from + ode->last.end));
+	watch_look(w, ode, ode->last.end);
 }
 
 /* Between the last two samples, where no later one tells of a peak. */
-static void look_at_end(struct watch *w, const struct ode *ode, size_t signal)
+static void watch_look_at_end(struct watch *w, const struct ode *ode, size_t signal)
 {
 	double from = w->time_s[1], to = w->time_s[2], half[3] = {from, 0.5 * (from + to), to};
 	double edge[3] = {half[1], to - END_SHARE * (to - from), to}, end = fabs(w->value[2][signal]);
-	double middle = magnitude(w, ode, signal, half[1]);
+	double middle = watch_magnitude(w, ode, signal, half[1]);
 	double before = fabs(w->value[1][signal]), slope;
 
 	if (middle >= end && middle >= before) {
-		refine(w, ode, signal, half, (const double[]){before, middle, end});
+		watch_refine(w, ode, signal, half, (const double[]){before, middle, end});
 	} else if (middle < end) {
-		slope = magnitude(w, ode, signal, edge[1]);
+		slope = watch_magnitude(w, ode, signal, edge[1]);
 		if (slope > end)
-			refine(w, ode, signal, edge, (const double[]){middle, slope, end});
+			watch_refine(w, ode, signal, edge, (const double[]){middle, slope, end});
 	}
 	if (end > fabs(w->peak[signal].value))
 		record(w, signal, to, w->value[2]);
@@ -200,7 +200,7 @@ void watch_end(struct watch *w, const struct ode *ode)
 {
 	for (size_t i = 0; i < w->count; i++)
 		if (!(w->skipped >> i & 1u) && fabs(w->value[2][i]) * HIDDEN_SHARE > fabs(w->peak[i].value))
-			look_at_end(w, ode, i);
+			watch_look_at_end(w, ode, i);
 }
 
 double watch_crossing(const struct ode *ode, size_t state)

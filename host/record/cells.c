@@ -6,7 +6,7 @@
 
 #include "common/base/number.h"
 
-static bool is_blank(char c)
+static bool cells_is_blank(char c)
 {
 	return c == ' ' || c == '\t';
 }
@@ -32,7 +32,7 @@ static char decimal_of(const char *text, size_t length)
 
 static size_t skip_blanks(const char *text, size_t length, size_t at)
 {
-	while (at < length && is_blank(text[at]))
+	while (at < length && cells_is_blank(text[at]))
 		at++;
 	return at;
 }
@@ -43,20 +43,21 @@ static size_t cell_end(char separator, char decimal, const char *text, size_t le
 	for (; at < length; at++) {
 		char c = text[at];
 
-		if (separator ? c == separator : is_blank(c) || c == ';' || (c == ',' && decimal != ','))
+		if (separator ? c == separator
+		              : cells_is_blank(c) || c == ';' || (c == ',' && decimal != ','))
 			break;
 	}
 	return at;
 }
 
 /* A cell without the blanks and quotes around it. */
-static struct piece trim(struct piece cell)
+static struct piece cells_trim(struct piece cell)
 {
-	while (cell.length > 0 && is_blank(cell.text[0])) {
+	while (cell.length > 0 && cells_is_blank(cell.text[0])) {
 		cell.text++;
 		cell.length--;
 	}
-	while (cell.length > 0 && is_blank(cell.text[cell.length - 1]))
+	while (cell.length > 0 && cells_is_blank(cell.text[cell.length - 1]))
 		cell.length--;
 	if (cell.length >= 2 && cell.text[0] == '"' && cell.text[cell.length - 1] == '"')
 		cell = (struct piece){cell.text + 1, cell.length - 2};
@@ -84,7 +85,7 @@ void cells_split(struct cells_style style, const char *text, size_t length, stru
 		}
 		end = cell_end(style.separator, cells->decimal, text, length, end);
 		if (cells->count < CELLS_MAX)
-			cells->cell[cells->count] = trim((struct piece){text + start, end - start});
+			cells->cell[cells->count] = cells_trim((struct piece){text + start, end - start});
 		cells->count++;
 		if (style.separator != '\t')
 			end = skip_blanks(text, length, end);
@@ -152,7 +153,7 @@ static bool has_unit(struct piece cell, char decimal)
 		return true;
 	/* "9.81 m/s2" */
 	length = 0;
-	while (length < cell.length && !is_blank(cell.text[length]))
+	while (length < cell.length && !cells_is_blank(cell.text[length]))
 		length++;
 	return length < cell.length && number_parse(cell.text, length, decimal, &value);
 }
@@ -235,7 +236,7 @@ static void split_words(const char *text, size_t length, struct cells *cells)
 		size_t end = at;
 		struct piece cell;
 
-		while (end < length && !is_blank(text[end]))
+		while (end < length && !cells_is_blank(text[end]))
 			end++;
 		cell = (struct piece){text + at, end - at};
 		if (cells->count > 0 && cells->count <= CELLS_MAX && is_bracket(cell)) {

@@ -43,7 +43,7 @@ uint32_t drop_ticks(const struct record *record)
 	return record->last_tick_ms - record->first_tick_ms + 1;
 }
 
-static void put_axis(struct channel *channel, size_t at, const int16_t *counts, size_t count)
+static void drop_put_axis(struct channel *channel, size_t at, const int16_t *counts, size_t count)
 {
 	for (size_t i = 0; i < count; i++) {
 		double value_g = (double)counts[i] / WIRE_COUNTS_PER_G;
@@ -63,9 +63,9 @@ void drop_put(struct record *record, unsigned sensor, uint32_t tick, const int16
 {
 	struct channel *axes = record->channels + 3 * (size_t)(sensor - 1);
 
-	put_axis(&axes[0], (size_t)tick * WIRE_X_PER_TICK, x, WIRE_X_PER_TICK);
-	put_axis(&axes[1], (size_t)tick * WIRE_YZ_PER_TICK, y, WIRE_YZ_PER_TICK);
-	put_axis(&axes[2], (size_t)tick * WIRE_YZ_PER_TICK, z, WIRE_YZ_PER_TICK);
+	drop_put_axis(&axes[0], (size_t)tick * WIRE_X_PER_TICK, x, WIRE_X_PER_TICK);
+	drop_put_axis(&axes[1], (size_t)tick * WIRE_YZ_PER_TICK, y, WIRE_YZ_PER_TICK);
+	drop_put_axis(&axes[2], (size_t)tick * WIRE_YZ_PER_TICK, z, WIRE_YZ_PER_TICK);
 }
 
 static void get_axis(const struct channel *channel, size_t at, int16_t *counts, size_t count)

@@ -28,7 +28,7 @@ static int path_of_helper(char path[PATH_MAX])
 }
 
 /* The helper's one line of complaint. */
-static int complain(char *message, const char *file, int err, int status)
+static int hdf5_complain(char *message, const char *file, int err, int status)
 {
 	char text[256] = "";
 	ssize_t length = pread(err, text, sizeof(text) - 1, 0);
@@ -55,7 +55,7 @@ static int run_helper(const char *verb, const struct process_streams *streams, c
 	status = process_filter(words, streams);
 	if (status < 0)
 		return source_refuse(message, DT_E_SYSTEM, file, 0, "%s: %s", HELPER, strerror(-status));
-	return status == 0 ? 0 : complain(message, file, streams->fd[2], status);
+	return status == 0 ? 0 : hdf5_complain(message, file, streams->fd[2], status);
 }
 
 /* The helper works on files in memory. */

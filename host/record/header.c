@@ -20,7 +20,7 @@ static bool are_units(const struct cells *cells)
 	return any;
 }
 
-static bool has_name(const struct cells *cells)
+static bool header_has_name(const struct cells *cells)
 {
 	double value;
 
@@ -45,7 +45,7 @@ void header_offer(struct header *header, struct cells_style style, const struct 
 	if (are_units(&header->work)) {
 		header->units = header->work;
 		header->units_line = line->number;
-	} else if (has_name(&header->work)) {
+	} else if (header_has_name(&header->work)) {
 		header->names = header->work;
 		header->names_line = line->number;
 	}

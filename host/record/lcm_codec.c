@@ -9,7 +9,7 @@
 #include "common/wire.h"
 #include "host/record/drop.h"
 
-static int block_sensor(uint32_t id)
+static int lcm_codec_block_sensor(uint32_t id)
 {
 	switch (id) {
 	case WIRE_ID_BLOCK_S1:
@@ -25,7 +25,7 @@ static int block_sensor(uint32_t id)
 
 int lcm_codec_block(const struct frame *frame, droptower_block *block)
 {
-	int sensor = block_sensor(frame->id);
+	int sensor = lcm_codec_block_sensor(frame->id);
 	int error = sensor ? wire_check_block(frame) : DT_E_UNKNOWN;
 	struct wire_block wire;
 
@@ -48,7 +48,7 @@ int lcm_codec_block(const struct frame *frame, droptower_block *block)
 	return 0;
 }
 
-static bool fits(int64_t value, int64_t max)
+static bool lcm_codec_fits(int64_t value, int64_t max)
 {
 	return value >= 0 && value <= max;
 }
@@ -64,9 +64,9 @@ int lcm_codec_frame(const droptower_block *block, struct frame *frame)
 	        .io = (uint16_t)block->io,
 	};
 
-	if (block->sensor < 1 || block->sensor > WIRE_SENSORS || !fits(block->drop_id, UINT16_MAX) ||
-	    !fits(block->tick_ms, UINT32_MAX) || !fits(block->status, UINT8_MAX) ||
-	    !fits(block->io, UINT16_MAX))
+	if (block->sensor < 1 || block->sensor > WIRE_SENSORS ||
+	    !lcm_codec_fits(block->drop_id, UINT16_MAX) || !lcm_codec_fits(block->tick_ms, UINT32_MAX) ||
+	    !lcm_codec_fits(block->status, UINT8_MAX) || !lcm_codec_fits(block->io, UINT16_MAX))
 		return DT_E_RANGE;
 	memcpy(wire.x, block->x, sizeof(wire.x));
 	memcpy(wire.y, block->y, sizeof(wire.y));
@@ -138,7 +138,7 @@ static void fill_measured(const struct record *record, droptower_drop *drop)
 	drop->trigger_latency_us = measured->trigger_latency_us;
 }
 
-static bool allocate(droptower_drop *drop)
+static bool lcm_codec_allocate(droptower_drop *drop)
 {
 	size_t gaps = (size_t)drop->gap_count + 1 + WIRE_SENSORS, x = (size_t)drop->x_count,
 	       yz = (size_t)drop->yz_count;
@@ -181,7 +181,7 @@ int lcm_codec_drop(const struct record *record, int64_t utime, droptower_drop *d
 	message.gap_count = (int32_t)record->gap_count;
 	message.x_count = (int32_t)(drop_ticks(record) * WIRE_X_PER_TICK);
 	message.yz_count = (int32_t)(drop_ticks(record) * WIRE_YZ_PER_TICK);
-	if (!allocate(&message)) {
+	if (!lcm_codec_allocate(&message)) {
 		lcm_codec_free_drop(&message);
 		return DT_E_MEMORY;
 	}
@@ -207,7 +207,7 @@ static bool counters_fit(const droptower_drop *drop)
 	                            drop->gaps,   drop->resent,   drop->conflicting};
 
 	for (size_t i = 0; i < sizeof(counters) / sizeof(counters[0]); i++)
-		if (!fits(counters[i], (int64_t)1 << 53))
+		if (!lcm_codec_fits(counters[i], (int64_t)1 << 53))
 			return false;
 	return true;
 }
@@ -215,35 +215,40 @@ static bool counters_fit(const droptower_drop *drop)
 static bool parameters_fit(const droptower_drop *drop)
 {
 	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
-		if (!fits(drop->parameter[i], UINT32_MAX))
+		if (!lcm_codec_fits(drop->parameter[i], UINT32_MAX))
 			return false;
-	return fits(drop->parameters_held, RECORD_PARAMETERS_ALL);
+	return lcm_codec_fits(drop->parameters_held, RECORD_PARAMETERS_ALL);
 }
 
 static bool measured_fits(const droptower_drop *drop)
 {
-	return fits(drop->dropout_us, UINT16_MAX) && fits(drop->dropout_used_us, UINT16_MAX) &&
-	       fits(drop->separation_mm_s, UINT16_MAX) && fits(drop->separation_um, UINT32_MAX) &&
-	       fits(drop->acceleration_mm_s2, UINT16_MAX) && fits(drop->latch_delay_us, UINT16_MAX) &&
-	       fits(drop->trigger_latency_us, UINT16_MAX);
+	return lcm_codec_fits(drop->dropout_us, UINT16_MAX) &&
+	       lcm_codec_fits(drop->dropout_used_us, UINT16_MAX) &&
+	       lcm_codec_fits(drop->separation_mm_s, UINT16_MAX) &&
+	       lcm_codec_fits(drop->separation_um, UINT32_MAX) &&
+	       lcm_codec_fits(drop->acceleration_mm_s2, UINT16_MAX) &&
+	       lcm_codec_fits(drop->latch_delay_us, UINT16_MAX) &&
+	       lcm_codec_fits(drop->trigger_latency_us, UINT16_MAX);
 }
 
 static bool message_fits(const droptower_drop *drop)
 {
 	int64_t ticks;
 
-	if (!fits(drop->first_tick_ms, UINT32_MAX) || !fits(drop->last_tick_ms, UINT32_MAX))
+	if (!lcm_codec_fits(drop->first_tick_ms, UINT32_MAX) ||
+	    !lcm_codec_fits(drop->last_tick_ms, UINT32_MAX))
 		return false;
 	ticks = (uint32_t)(drop->last_tick_ms - drop->first_tick_ms + 1);
-	return fits(drop->drop_id, UINT16_MAX) && fits(drop->marks, UINT16_MAX) && counters_fit(drop) &&
-	       drop->gap_count <= ticks + 2 * WIRE_SENSORS && drop->trigger_us <= UINT32_MAX &&
-	       fits(drop->crc32, UINT32_MAX) && fits(drop->seal, UINT32_MAX) &&
-	       fits(drop->parameters_crc32, UINT32_MAX) && parameters_fit(drop) && measured_fits(drop) &&
-	       fits(drop->frame_speed_mm_s, UINT16_MAX) && drop->x_count == ticks * WIRE_X_PER_TICK &&
-	       drop->yz_count == ticks * WIRE_YZ_PER_TICK;
+	return lcm_codec_fits(drop->drop_id, UINT16_MAX) && lcm_codec_fits(drop->marks, UINT16_MAX) &&
+	       counters_fit(drop) && drop->gap_count <= ticks + 2 * WIRE_SENSORS &&
+	       drop->trigger_us <= UINT32_MAX && lcm_codec_fits(drop->crc32, UINT32_MAX) &&
+	       lcm_codec_fits(drop->seal, UINT32_MAX) && lcm_codec_fits(drop->parameters_crc32, UINT32_MAX) &&
+	       parameters_fit(drop) && measured_fits(drop) &&
+	       lcm_codec_fits(drop->frame_speed_mm_s, UINT16_MAX) &&
+	       drop->x_count == ticks * WIRE_X_PER_TICK && drop->yz_count == ticks * WIRE_YZ_PER_TICK;
 }
 
-static bool in_gap(const droptower_drop *drop, unsigned sensor, uint32_t tick_ms)
+static bool lcm_codec_in_gap(const droptower_drop *drop, unsigned sensor, uint32_t tick_ms)
 {
 	for (int32_t i = 0; i < drop->gap_count; i++)
 		if (drop->gap_sensor[i] == (int)sensor &&
@@ -313,9 +318,9 @@ int lcm_codec_record(const droptower_drop *drop, struct record *record)
 	for (uint32_t tick = 0; tick < drop_ticks(&filled); tick++) {
 		size_t x = (size_t)tick * WIRE_X_PER_TICK, yz = (size_t)tick * WIRE_YZ_PER_TICK;
 
-		if (!in_gap(drop, 1, filled.first_tick_ms + tick))
+		if (!lcm_codec_in_gap(drop, 1, filled.first_tick_ms + tick))
 			drop_put(&filled, 1, tick, drop->s1_x + x, drop->s1_y + yz, drop->s1_z + yz);
-		if (!in_gap(drop, 2, filled.first_tick_ms + tick))
+		if (!lcm_codec_in_gap(drop, 2, filled.first_tick_ms + tick))
 			drop_put(&filled, 2, tick, drop->s2_x + x, drop->s2_y + yz, drop->s2_z + yz);
 	}
 	fill_record(drop, &filled);
@@ -358,7 +363,7 @@ struct cursor {
 	size_t size, at;
 };
 
-static int64_t take(struct cursor *cursor, unsigned count)
+static int64_t lcm_codec_take(struct cursor *cursor, unsigned count)
 {
 	uint64_t value = cursor->at < cursor->size && cursor->bytes[cursor->at] & 0x80 ? UINT64_MAX : 0;
 
@@ -371,13 +376,13 @@ static int64_t take(struct cursor *cursor, unsigned count)
 static size_t announced(const uint8_t *bytes, size_t size, droptower_drop *drop)
 {
 	struct cursor cursor = {bytes, size, GAP_COUNT};
-	int64_t gaps = take(&cursor, 4), x, yz;
+	int64_t gaps = lcm_codec_take(&cursor, 4), x, yz;
 
 	if (gaps < 0 || gaps > INT_MAX / GAP_BYTES)
 		return 0;
 	cursor.at += (size_t)gaps * GAP_BYTES;
-	x = take(&cursor, 4);
-	yz = take(&cursor, 4);
+	x = lcm_codec_take(&cursor, 4);
+	yz = lcm_codec_take(&cursor, 4);
 	if (cursor.at > size || x < 0 || yz < 0)
 		return 0;
 	drop->gap_count = (int32_t)gaps;
@@ -398,7 +403,7 @@ static bool decode_fixed(const uint8_t *bytes, droptower_drop *drop)
 static void take_samples(struct cursor *cursor, int16_t *samples, int32_t count)
 {
 	for (int32_t i = 0; i < count; i++)
-		samples[i] = (int16_t)take(cursor, sizeof(int16_t));
+		samples[i] = (int16_t)lcm_codec_take(cursor, sizeof(int16_t));
 }
 
 /* Ticks of a sensor that are there to the last sample; at is where the cursor was behind its Z. */
@@ -428,11 +433,11 @@ static int64_t decode_arrays(const uint8_t *bytes, size_t size, droptower_drop *
 	int64_t s1, s2;
 
 	for (int32_t i = 0; i < drop->gap_count; i++)
-		drop->gap_sensor[i] = (int8_t)take(&cursor, 1);
+		drop->gap_sensor[i] = (int8_t)lcm_codec_take(&cursor, 1);
 	for (int32_t i = 0; i < drop->gap_count; i++)
-		drop->gap_first_tick_ms[i] = take(&cursor, 8);
+		drop->gap_first_tick_ms[i] = lcm_codec_take(&cursor, 8);
 	for (int32_t i = 0; i < drop->gap_count; i++)
-		drop->gap_last_tick_ms[i] = take(&cursor, 8);
+		drop->gap_last_tick_ms[i] = lcm_codec_take(&cursor, 8);
 	cursor.at += 8;
 	take_samples(&cursor, drop->s1_x, drop->x_count);
 	take_samples(&cursor, drop->s1_y, drop->yz_count);
@@ -458,7 +463,7 @@ int lcm_codec_decode_drop(const void *bytes, size_t size, bool cut, droptower_dr
 	decoded.gap_count = counts.gap_count;
 	decoded.x_count = counts.x_count;
 	decoded.yz_count = counts.yz_count;
-	if (!allocate(&decoded)) {
+	if (!lcm_codec_allocate(&decoded)) {
 		lcm_codec_free_drop(&decoded);
 		return DT_E_MEMORY;
 	}

@@ -39,7 +39,7 @@ static bool length_holds(struct log_file *log, uint64_t data, size_t size, uint6
 }
 
 /* Its length leads beyond the log's end, and nothing that is there follows it: the end has cut it. */
-static bool is_cut(struct log_file *log, uint64_t data, size_t size, uint64_t end)
+static bool lcm_log_is_cut(struct log_file *log, uint64_t data, size_t size, uint64_t end)
 {
 	const uint8_t *bytes;
 	size_t held;
@@ -75,7 +75,7 @@ static bool event_at(struct log_file *log, uint64_t *at, uint64_t end, struct lc
 	*at += HEADER_BYTES + channel;
 	/* all of it and the next sync word into the window at once */
 	(void)bytes_at(log, event->at, HEADER_BYTES + channel + data + SYNC_BYTES, &held);
-	if (event->cut ? !is_cut(log, *at, data, end) : !length_holds(log, *at, data, end)) {
+	if (event->cut ? !lcm_log_is_cut(log, *at, data, end) : !length_holds(log, *at, data, end)) {
 		*at = event->at;
 		return false;
 	}
@@ -96,7 +96,7 @@ bool lcm_log_is(struct log_file *log)
 }
 
 /* To the next byte that a sync word may begin with. */
-static void step(struct log_file *log, struct lcm_log_walk *walk, uint64_t end)
+static void lcm_log_step(struct log_file *log, struct lcm_log_walk *walk, uint64_t end)
 {
 	size_t held;
 	const uint8_t *bytes = bytes_at(log, ++walk->at, LOOK_BYTES, &held), *found;
@@ -122,7 +122,7 @@ bool lcm_log_next(struct log_file *log, struct lcm_log_walk *walk, struct lcm_lo
 		}
 		walk->skipped += in_step;
 		in_step = false;
-		step(log, walk, end);
+		lcm_log_step(log, walk, end);
 	}
 	return false;
 }

@@ -10,7 +10,7 @@
 
 enum { WINDOW_BYTES = 1 << 20 };
 
-static int refuse(const struct log_file *log, int code, const char *why, char *message)
+static int log_file_refuse(const struct log_file *log, int code, const char *why, char *message)
 {
 	return source_refuse(message, code, log->file, 0, "%s, expected %s", why, log->expected);
 }
@@ -21,19 +21,19 @@ static int open_regular(struct log_file *log, char *message)
 
 	log->descriptor = open(log->file, O_RDONLY | O_CLOEXEC);
 	if (log->descriptor < 0 || fstat(log->descriptor, &status) != 0)
-		return refuse(log, DT_E_SYSTEM, strerror(errno), message);
+		return log_file_refuse(log, DT_E_SYSTEM, strerror(errno), message);
 	if (status.st_size == 0)
-		return refuse(log, DT_E_EMPTY, "empty file", message);
+		return log_file_refuse(log, DT_E_EMPTY, "empty file", message);
 	log->size = (uint64_t)status.st_size;
 	log->room = WINDOW_BYTES;
 	log->window = malloc(log->room);
 	if (log->window == NULL)
-		return refuse(log, DT_E_MEMORY, error_text(DT_E_MEMORY), message);
+		return log_file_refuse(log, DT_E_MEMORY, error_text(DT_E_MEMORY), message);
 	return 0;
 }
 
 /* Spreadsheets put a byte order mark in front of UTF-8; source_load has taken it away. */
-static void skip_mark(struct log_file *log)
+static void log_file_skip_mark(struct log_file *log)
 {
 	size_t held;
 	const char *head = log_file_get(log, 0, 3, &held);
@@ -56,7 +56,7 @@ int log_file_open(struct log_file *log, const char *file, const char *expected,
 	if (opened.whole.bytes != NULL)
 		opened.size = opened.whole.size;
 	else if (!error)
-		skip_mark(&opened);
+		log_file_skip_mark(&opened);
 	if (error)
 		log_file_close(&opened);
 	else
@@ -75,7 +75,7 @@ void log_file_close(struct log_file *log)
 }
 
 /* Room for so many bytes from the window's beginning on. */
-static bool make_room(struct log_file *log, size_t want)
+static bool log_file_make_room(struct log_file *log, size_t want)
 {
 	size_t room = log->room;
 	char *window;
@@ -95,7 +95,7 @@ static bool make_room(struct log_file *log, size_t want)
 }
 
 /* Reads on until the window is full or the file ends. */
-static void fill(struct log_file *log)
+static void log_file_fill(struct log_file *log)
 {
 	while (log->held < log->room && log->failed == 0) {
 		uint64_t place = log->at + log->held;
@@ -145,8 +145,8 @@ const char *log_file_get(struct log_file *log, uint64_t offset, size_t want, siz
 	if (offset < log->at || offset - log->at > log->held ||
 	    log->held - (size_t)(offset - log->at) < want) {
 		slide(log, offset);
-		if (make_room(log, want))
-			fill(log);
+		if (log_file_make_room(log, want))
+			log_file_fill(log);
 	}
 	*held = log->held - (size_t)(offset - log->at);
 	return log->window + (offset - log->at);
@@ -156,8 +156,9 @@ int log_file_error(const struct log_file *log, char message[READ_MESSAGE_MAX])
 {
 	if (log->failed == 0)
 		return 0;
-	return refuse(log, DT_E_SYSTEM,
-	              log->failed == ENODATA ? "cut while it was read" : strerror(log->failed), message);
+	return log_file_refuse(log, DT_E_SYSTEM,
+	                       log->failed == ENODATA ? "cut while it was read" : strerror(log->failed),
+	                       message);
 }
 
 /* Where the line that begins at `at` ends, looked for beyond what a line may have. */

@@ -65,7 +65,7 @@ static char *index_name(const struct log_file *log)
 /* ---- reading ---- */
 
 /* Whether all of it is there, by its last line. */
-static bool is_whole(FILE *index)
+static bool log_index_is_whole(FILE *index)
 {
 	char line[LINE_MAX_BYTES], wanted[LINE_MAX_BYTES], digest[DIGEST_CHARS];
 	struct sha256_ctx hash, copy;
@@ -109,7 +109,7 @@ FILE *log_index_open(struct log_file *log)
 		return NULL;
 	if (is_of(index, log)) {
 		rewind(index);
-		if (is_whole(index))
+		if (log_index_is_whole(index))
 			return index;
 	}
 	fclose(index);
@@ -205,7 +205,8 @@ struct making {
 	uint64_t lines;
 };
 
-__attribute__((format(printf, 2, 3))) static void put(struct making *making, const char *format, ...)
+__attribute__((format(printf, 2, 3))) static void log_index_put(struct making *making, const char *format,
+                                                                ...)
 {
 	char text[LINE_MAX_BYTES];
 	va_list list;
@@ -226,32 +227,35 @@ static int put_capture(void *context, const struct log_capture *c, struct record
 	struct making *making = context;
 	const struct record_counters *n = &c->counters;
 
-	put(making,
-	    "capture %u %u %" PRIu64 " %" PRIu64 " %" PRId64 " %u %u %u %" PRIu32 " %" PRIu32 " %08" PRIx32
-	    " %u %u %u %u %08" PRIx32 " %" PRIu64 " %" PRIu64 " %" PRIu64 " %" PRIu64 " %" PRIu64 " %" PRIu64
-	    " %" PRIu64,
-	    c->number, c->alone, c->from, c->to, c->time_us, c->ended, c->drop_id, c->marks, c->first_tick_ms,
-	    c->last_tick_ms, c->crc32, c->frame_speed_mm_s, c->crc_agrees, c->seal_known, c->seal_agrees,
-	    c->seal, n->blocks, n->repeated, n->reordered, n->corrupt, n->gaps, n->resent, n->conflicting);
+	log_index_put(making,
+	              "capture %u %u %" PRIu64 " %" PRIu64 " %" PRId64 " %u %u %u %" PRIu32 " %" PRIu32
+	              " %08" PRIx32 " %u %u %u %u %08" PRIx32 " %" PRIu64 " %" PRIu64 " %" PRIu64 " %" PRIu64
+	              " %" PRIu64 " %" PRIu64 " %" PRIu64,
+	              c->number, c->alone, c->from, c->to, c->time_us, c->ended, c->drop_id, c->marks,
+	              c->first_tick_ms, c->last_tick_ms, c->crc32, c->frame_speed_mm_s, c->crc_agrees,
+	              c->seal_known, c->seal_agrees, c->seal, n->blocks, n->repeated, n->reordered,
+	              n->corrupt, n->gaps, n->resent, n->conflicting);
 	for (unsigned i = 0; i < WIRE_PARAMETERS; i++)
 		if (c->parameters.known[i])
-			put(making, " %x=%u", wire_parameters[i].index, (unsigned)c->parameters.value[i]);
-	put(making, "\n");
+			log_index_put(making, " %x=%u", wire_parameters[i].index,
+			              (unsigned)c->parameters.value[i]);
+	log_index_put(making, "\n");
 	return making->to->capture(making->to->context, c, record);
 }
 
-static int put_event(void *context, const struct log_event *e)
+static int log_index_put_event(void *context, const struct log_event *e)
 {
 	struct making *making = context;
 
 	if (e->kind == LOG_START)
-		put(making, "start %" PRIu64 " %" PRId64 "\n", e->at, e->time_us);
+		log_index_put(making, "start %" PRIu64 " %" PRId64 "\n", e->at, e->time_us);
 	else if (e->kind == LOG_FAULT)
-		put(making, "fault %" PRIu64 " %" PRId64 " %u %x %" PRIu32 "\n", e->at, e->time_us, e->fault,
-		    e->emcy, e->tick_ms);
+		log_index_put(making, "fault %" PRIu64 " %" PRId64 " %u %x %" PRIu32 "\n", e->at, e->time_us,
+		              e->fault, e->emcy, e->tick_ms);
 	else
-		put(making, "heartbeats %" PRIu64 " %" PRId64 " %" PRIu64 " %" PRId64 " %" PRId64 "\n", e->at,
-		    e->time_us, e->count, e->first_us, e->longest_us);
+		log_index_put(making,
+		              "heartbeats %" PRIu64 " %" PRId64 " %" PRIu64 " %" PRId64 " %" PRId64 "\n",
+		              e->at, e->time_us, e->count, e->first_us, e->longest_us);
 	return making->to->event != NULL ? making->to->event(making->to->context, e) : 0;
 }
 
@@ -273,18 +277,18 @@ static bool may_write(const char *name)
 	return ours;
 }
 
-static void begin(struct making *making, const char *name, const char *lines)
+static void log_index_begin(struct making *making, const char *name, const char *lines)
 {
 	char message[READ_MESSAGE_MAX];
 
 	sha256_init(&making->hash);
 	if (name != NULL && may_write(name))
 		making->open = whole_open(&making->whole, name, message, sizeof(message)) == 0;
-	put(making, "%s", lines);
+	log_index_put(making, "%s", lines);
 }
 
 /* Kept if the log was walked to its end and is still the one that was opened. */
-static void end(struct making *making, struct log_file *log, int result, const char *lines)
+static void log_index_end(struct making *making, struct log_file *log, int result, const char *lines)
 {
 	char now[LINE_MAX_BYTES], message[READ_MESSAGE_MAX], digest[DIGEST_CHARS];
 	struct sha256_ctx hash = making->hash;
@@ -303,17 +307,19 @@ int log_index_walk(struct log_file *log, struct log_visitor *visitor, struct log
                    char message[READ_MESSAGE_MAX])
 {
 	struct making making = {.to = visitor};
-	struct log_visitor put_first = {
-	        .context = &making, .wanted = visitor->wanted, .capture = put_capture, .event = put_event};
+	struct log_visitor put_first = {.context = &making,
+	                                .wanted = visitor->wanted,
+	                                .capture = put_capture,
+	                                .event = log_index_put_event};
 	char lines[LINE_MAX_BYTES], *name;
 	int result;
 
 	if (!describe(log, lines))
 		return log_walk(log, 0, log->size, visitor, contents, message);
 	name = index_name(log);
-	begin(&making, name, lines);
+	log_index_begin(&making, name, lines);
 	result = log_walk(log, 0, log->size, &put_first, contents, message);
-	end(&making, log, result == 0 && contents->captures == 0 ? DT_E_EMPTY : result, lines);
+	log_index_end(&making, log, result == 0 && contents->captures == 0 ? DT_E_EMPTY : result, lines);
 	free(name);
 	return result;
 }

@@ -51,7 +51,7 @@ static uint64_t place_before(const struct log_walk *walk, uint32_t first_ms)
 
 /* ---- captures on their way to the visitor ---- */
 
-static void give_held(struct log_walk *walk, bool is_last)
+static void log_walk_give_held(struct log_walk *walk, bool is_last)
 {
 	struct log_capture *capture = &walk->held;
 
@@ -72,9 +72,10 @@ static void give_held(struct log_walk *walk, bool is_last)
 		record_free(walk->held_record);
 }
 
-static void hold(struct log_walk *walk, const struct log_capture *capture, const struct record *record)
+static void log_walk_hold(struct log_walk *walk, const struct log_capture *capture,
+                          const struct record *record)
 {
-	give_held(walk, false);
+	log_walk_give_held(walk, false);
 	walk->held = *capture;
 	walk->held.number = ++walk->number;
 	walk->held.counters.corrupt += walk->corrupt;
@@ -94,7 +95,8 @@ static bool is_wanted(const struct log_walk *walk)
 }
 
 /* What the join has, with its samples if they are wanted. DT_E_EMPTY only without a capture end. */
-static int take(struct log_walk *walk, struct log_capture *capture, struct record *record, bool *has_record)
+static int log_walk_take(struct log_walk *walk, struct log_capture *capture, struct record *record,
+                         bool *has_record)
 {
 	int error = DT_E_EMPTY;
 
@@ -115,15 +117,15 @@ static int take(struct log_walk *walk, struct log_capture *capture, struct recor
 }
 
 /* The capture that the join has, complete or never to be. */
-static void take_capture(struct log_walk *walk)
+static void log_walk_take_capture(struct log_walk *walk)
 {
 	struct log_capture capture = walk->ended;
 	struct record record;
 	bool has_record;
 
-	if (take(walk, &capture, &record, &has_record) != 0)
+	if (log_walk_take(walk, &capture, &record, &has_record) != 0)
 		return;
-	hold(walk, &capture, has_record ? &record : NULL);
+	log_walk_hold(walk, &capture, has_record ? &record : NULL);
 	walk->held_is_ended = true;
 }
 
@@ -137,7 +139,7 @@ static void take_run(struct log_walk *walk, bool seen)
 	                              .parameters = walk->parameters};
 	struct record record;
 	bool has_record;
-	int error = take(walk, &capture, &record, &has_record);
+	int error = log_walk_take(walk, &capture, &record, &has_record);
 
 	walk->begun = false;
 	if (error == 0)
@@ -146,7 +148,7 @@ static void take_run(struct log_walk *walk, bool seen)
 		capture.from = place_before(walk, 0);
 	else
 		return;
-	hold(walk, &capture, has_record ? &record : NULL);
+	log_walk_hold(walk, &capture, has_record ? &record : NULL);
 	forget_places(walk, walk->at);
 }
 
@@ -155,7 +157,7 @@ static void take_lost(void *context, enum join_loss what)
 	struct log_walk *walk = context;
 
 	if (join_has_capture(walk->join) && (what == JOIN_LOSS_CAPTURE || walk->begun))
-		take_capture(walk);
+		log_walk_take_capture(walk);
 	if (what == JOIN_LOSS_RUN && walk->begun)
 		take_run(walk, true);
 }
@@ -205,13 +207,13 @@ static void follow_tail(struct log_walk *walk)
 
 /* ---- what the frames say ---- */
 
-static void note_state(struct log_walk *walk, unsigned state, unsigned drop_id)
+static void log_walk_note_state(struct log_walk *walk, unsigned state, unsigned drop_id)
 {
 	if (!wire_state_moving(state) || (walk->ended_in_run && walk->ended.drop_id == drop_id))
 		return;
 	if (walk->begun && walk->begun_drop != drop_id) {
 		if (join_has_capture(walk->join))
-			take_capture(walk);
+			log_walk_take_capture(walk);
 		take_run(walk, true);
 	}
 	walk->begun = true;
@@ -230,10 +232,10 @@ static void note_block(struct log_walk *walk, const struct frame *frame)
 		return;
 	if (walk->ended_in_run && (int32_t)(block.tick_ms - walk->ended.last_tick_ms) <= 0)
 		return; /* late, from before the last capture's end */
-	note_state(walk, block.status & 15u, block.drop_id);
+	log_walk_note_state(walk, block.status & 15u, block.drop_id);
 }
 
-static int tell(struct log_walk *walk, struct log_event *event)
+static int log_walk_tell(struct log_walk *walk, struct log_event *event)
 {
 	if (walk->result == 0 && walk->visitor->event != NULL)
 		walk->result = walk->visitor->event(walk->visitor->context, event);
@@ -243,7 +245,7 @@ static int tell(struct log_walk *walk, struct log_event *event)
 static void tell_heartbeats(struct log_walk *walk)
 {
 	if (walk->heartbeats.count > 0)
-		tell(walk, &walk->heartbeats);
+		log_walk_tell(walk, &walk->heartbeats);
 	walk->heartbeats = (struct log_event){.kind = LOG_HEARTBEATS};
 }
 
@@ -270,7 +272,7 @@ static void note_fault(struct log_walk *walk, const struct frame *frame)
 	event.emcy = emcy.code;
 	event.fault = emcy.fault;
 	event.tick_ms = emcy.tick_ms;
-	tell(walk, &event);
+	log_walk_tell(walk, &event);
 }
 
 /* A value read, or one written once the tower has said so. */
@@ -310,7 +312,7 @@ static void note_frame(struct log_walk *walk, const struct frame *frame)
 		break;
 	case WIRE_ID_STATUS:
 		if (!walk->live && wire_unpack_status(frame, &status) == 0)
-			note_state(walk, status.state, walk->armed_drop);
+			log_walk_note_state(walk, status.state, walk->armed_drop);
 		break;
 	case WIRE_ID_CHALLENGE:
 		if (wire_unpack_challenge(frame, &armed) == 0)
@@ -341,7 +343,7 @@ static void start_again(struct log_walk *walk)
 	struct log_event event = {.kind = LOG_START, .at = walk->at, .time_us = walk->time_us};
 
 	tell_heartbeats(walk);
-	tell(walk, &event);
+	log_walk_tell(walk, &event);
 	walk->parameters = (struct log_capture_parameters){0};
 	walk->ended_in_run = walk->tail_open = walk->begun = walk->live = false;
 	forget_places(walk, walk->at);
@@ -358,7 +360,7 @@ void log_walk_frame(struct log_walk *walk, const struct frame *frame)
 	note_place(walk);
 	note_frame(walk, frame);
 	if (join_complete(walk->join) && join_is_news(walk->join, frame))
-		take_capture(walk); /* nothing more comes of it */
+		log_walk_take_capture(walk); /* nothing more comes of it */
 	ended = join_feed(walk->join, frame);
 	if (join_restarts(walk->join) != restarts)
 		start_again(walk);
@@ -371,7 +373,7 @@ void log_walk_frame(struct log_walk *walk, const struct frame *frame)
 		forget_places(walk, walk->next); /* it came again */
 	/* as soon as it is complete with what follows its end, as a live host does */
 	if (join_complete(walk->join) && (join_told(walk->join) || frame->id == WIRE_ID_CHALLENGE))
-		take_capture(walk);
+		log_walk_take_capture(walk);
 }
 
 void log_walk_drop(struct log_walk *walk, struct record *record)
@@ -387,7 +389,7 @@ void log_walk_drop(struct log_walk *walk, struct record *record)
 	walk->ended.drop_id = record->drop_id;
 	walk->ended.last_tick_ms = record->last_tick_ms;
 	walk->ended_in_run = true;
-	hold(walk, &capture, wanted ? record : NULL);
+	log_walk_hold(walk, &capture, wanted ? record : NULL);
 	forget_places(walk, walk->next);
 	if (!wanted)
 		record_free(record);
@@ -432,14 +434,14 @@ const char *log_format(struct log_file *log)
 	return lcm_log_is(log) ? "lcm" : "candump";
 }
 
-static void end(struct log_walk *walk)
+static void log_walk_end(struct log_walk *walk)
 {
 	walk->at = walk->next;
 	if (join_has_capture(walk->join))
-		take_capture(walk);
+		log_walk_take_capture(walk);
 	if (walk->begun || walk->number == 0)
 		take_run(walk, walk->begun);
-	give_held(walk, true);
+	log_walk_give_held(walk, true);
 	tell_heartbeats(walk);
 }
 
@@ -468,7 +470,7 @@ int log_walk(struct log_file *log, uint64_t from, uint64_t to, struct log_visito
 	result = walk->result != 0 ? walk->result : log_file_error(log, message);
 	if (result != 0)
 		walk->result = result;
-	end(walk);
+	log_walk_end(walk);
 	if (result == 0)
 		result = walk->result;
 	contents->captures = walk->number;

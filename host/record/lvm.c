@@ -47,8 +47,8 @@ static void take_style(struct lvm *lvm, const struct source_line *line)
 }
 
 /* Number of a cell; false for one that says nothing. */
-static int take_number(const struct cells *cells, size_t i, double *value, const struct source_line *line,
-                       const char *file, char *message)
+static int lvm_take_number(const struct cells *cells, size_t i, double *value, const struct source_line *line,
+                           const char *file, char *message)
 {
 	if (cells->cell[i].length == 0 || cells_number(cells, i, value))
 		return 0;
@@ -74,7 +74,7 @@ static int take_column(struct lvm *lvm, const struct cells *cells, size_t i, con
 	else if (is_key(cells, "Time"))
 		column->time = cells->cell[i];
 	else
-		error = take_number(cells, i, &value, line, file, message);
+		error = lvm_take_number(cells, i, &value, line, file, message);
 	if (error || isnan(value))
 		return error;
 	if (is_key(cells, "Delta_X") && value > 0)
@@ -89,7 +89,7 @@ static int take_column(struct lvm *lvm, const struct cells *cells, size_t i, con
 }
 
 /* A line of the second header that has a value for each column. */
-static int take_line(struct lvm *lvm, const struct source_line *line, const char *file, char *message)
+static int lvm_take_line(struct lvm *lvm, const struct source_line *line, const char *file, char *message)
 {
 	static const char *const keys[] = {"Delta_X",     "X0",   "Samples", "Y_Unit_Label",
 	                                   "X_Dimension", "Date", "Time",    "X_Unit_Label"};
@@ -138,7 +138,7 @@ int lvm_read(struct lvm *lvm, const struct source *source, struct source_line *l
 		if (ends == 0)
 			take_style(lvm, line);
 		else
-			error = take_line(lvm, line, source->file, message);
+			error = lvm_take_line(lvm, line, source->file, message);
 	}
 	for (size_t i = 0; i < COLUMNS_MAX; i++) {
 		lvm->column[i].delta_s /= lvm->x_divisor;
@@ -188,8 +188,8 @@ static int check_stamp(const struct lvm *lvm, size_t first, size_t i, const char
 	        (int)b->time.length, b->time.text ? b->time.text : "");
 }
 
-static int check_channel(const struct lvm *lvm, const struct columns *columns, size_t i, const char *file,
-                         char *message)
+static int lvm_check_channel(const struct lvm *lvm, const struct columns *columns, size_t i, const char *file,
+                             char *message)
 {
 	const struct lvm_column *column = &lvm->column[i];
 	const struct unit *unit =
@@ -226,7 +226,7 @@ int lvm_check(const struct lvm *lvm, const struct columns *columns, const char *
 		if (columns->column[i].kind != COLUMN_CHANNEL)
 			continue;
 		first = first == columns->count ? i : first;
-		error = check_channel(lvm, columns, i, file, message);
+		error = lvm_check_channel(lvm, columns, i, file, message);
 		if (!error)
 			error = check_stamp(lvm, first, i, file, message);
 	}

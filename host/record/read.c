@@ -25,8 +25,8 @@ static int refuse_columns(const char *file, char *message)
 	                     "this format names its channels itself, expected no --columns");
 }
 
-static int dispatch(struct record *record, const struct source *source, const char *columns,
-                    char message[READ_MESSAGE_MAX])
+static int read_dispatch(struct record *record, const struct source *source, const char *columns,
+                         char message[READ_MESSAGE_MAX])
 {
 	int (*reader)(struct record *, const struct source *, char *) = NULL;
 	int sealed, result;
@@ -51,7 +51,8 @@ static int dispatch(struct record *record, const struct source *source, const ch
 }
 
 /* The one recording of the log, which a pipe has left in memory. */
-static int read_one(struct record *record, const struct log_file *log, const char *columns, char *message)
+static int read_read_one(struct record *record, const struct log_file *log, const char *columns,
+                         char *message)
 {
 	struct source loaded = {0}, source = log->whole;
 	int error = 0;
@@ -61,7 +62,7 @@ static int read_one(struct record *record, const struct log_file *log, const cha
 		source = loaded;
 	}
 	if (!error)
-		error = dispatch(record, &source, columns, message);
+		error = read_dispatch(record, &source, columns, message);
 	if (!error)
 		strcpy(record->file, log->file);
 	source_free(&loaded);
@@ -147,7 +148,7 @@ int read_each(const char *file, const char *columns,
 	if (log_is(&log)) {
 		result = each_of_log(&of, message);
 	} else {
-		result = read_one(&record, &log, columns, message);
+		result = read_read_one(&record, &log, columns, message);
 		if (result == 0)
 			result = each(context, NULL, &record);
 	}
@@ -167,7 +168,7 @@ struct found {
 	struct log_visitor *visitor; /* of a search for the only one: with a second, no more samples */
 };
 
-static void keep(struct found *found, const struct log_capture *capture, struct record *record)
+static void read_keep(struct found *found, const struct log_capture *capture, struct record *record)
 {
 	found->found = true;
 	found->capture = *capture;
@@ -176,7 +177,7 @@ static void keep(struct found *found, const struct log_capture *capture, struct 
 		found->record = *record;
 }
 
-static int find(void *context, const struct log_capture *capture, struct record *record)
+static int read_find(void *context, const struct log_capture *capture, struct record *record)
 {
 	struct found *found = context;
 
@@ -184,7 +185,7 @@ static int find(void *context, const struct log_capture *capture, struct record 
 	found->held += capture->counters.blocks > 0;
 	if (found->wanted != 0 ? capture->number == found->wanted
 	                       : found->held == 1 && capture->counters.blocks > 0)
-		keep(found, capture, record);
+		read_keep(found, capture, record);
 	else if (record != NULL)
 		record_free(record);
 	if (found->visitor != NULL && found->held > 1)
@@ -192,7 +193,7 @@ static int find(void *context, const struct log_capture *capture, struct record 
 	return 0;
 }
 
-static void forget(struct found *found)
+static void read_forget(struct found *found)
 {
 	if (found->has_record)
 		record_free(&found->record);
@@ -204,16 +205,16 @@ static bool read_span(struct log_file *log, struct found *found)
 {
 	const struct log_capture indexed = found->capture;
 	struct found span = {.wanted = 1};
-	struct log_visitor visitor = {.context = &span, .wanted = 1, .capture = find};
+	struct log_visitor visitor = {.context = &span, .wanted = 1, .capture = read_find};
 	struct log_contents contents;
 	char message[READ_MESSAGE_MAX];
 	int error = log_walk(log, indexed.from, indexed.to, &visitor, &contents, message);
 
 	if (error || !span.found || !log_capture_equal(&span.capture, &indexed)) {
-		forget(&span);
+		read_forget(&span);
 		return false;
 	}
-	keep(found, &indexed, span.has_record ? &span.record : NULL);
+	read_keep(found, &indexed, span.has_record ? &span.record : NULL);
 	if (found->has_record)
 		found->record.counters.corrupt = indexed.counters.corrupt;
 	return true;
@@ -221,7 +222,7 @@ static bool read_span(struct log_file *log, struct found *found)
 
 static bool find_in_index(struct log_file *log, struct found *found)
 {
-	struct log_visitor visitor = {.context = found, .capture = find};
+	struct log_visitor visitor = {.context = found, .capture = read_find};
 	FILE *index = log_index_open(log);
 	bool done = false;
 
@@ -231,13 +232,13 @@ static bool find_in_index(struct log_file *log, struct found *found)
 		done = !found->found || read_span(log, found);
 	fclose(index);
 	if (!done)
-		forget(found);
+		read_forget(found);
 	return done;
 }
 
-static int find_drop(struct log_file *log, struct found *found, char *message)
+static int read_find_drop(struct log_file *log, struct found *found, char *message)
 {
-	struct log_visitor visitor = {.context = found, .wanted = found->wanted, .capture = find};
+	struct log_visitor visitor = {.context = found, .wanted = found->wanted, .capture = read_find};
 	struct log_contents contents;
 	int error;
 
@@ -249,7 +250,7 @@ static int find_drop(struct log_file *log, struct found *found, char *message)
 
 static int find_only(struct log_file *log, struct found *found, char *message)
 {
-	struct log_visitor visitor = {.context = found, .wanted = LOG_EVERY, .capture = find};
+	struct log_visitor visitor = {.context = found, .wanted = LOG_EVERY, .capture = read_find};
 	struct log_contents contents;
 	int error;
 
@@ -267,7 +268,7 @@ static int find_only(struct log_file *log, struct found *found, char *message)
 static int read_of_log(struct record *record, struct log_file *log, unsigned number, char *message)
 {
 	struct found found = {.wanted = number};
-	int error = number != 0 ? find_drop(log, &found, message) : find_only(log, &found, message);
+	int error = number != 0 ? read_find_drop(log, &found, message) : find_only(log, &found, message);
 
 	if (error == 0 && !found.found)
 		error = source_refuse(message, DT_E_ARGUMENT, log->file, 0,
@@ -276,7 +277,7 @@ static int read_of_log(struct record *record, struct log_file *log, unsigned num
 	if (error == 0 && !found.has_record)
 		error = source_refuse(message, DT_E_EMPTY, log->file, 0, "drop %u: no block of it", number);
 	if (error != 0) {
-		forget(&found);
+		read_forget(&found);
 		return error;
 	}
 	*record = found.record;
@@ -297,7 +298,7 @@ int read_nth(struct record *record, const char *file, const char *columns, unsig
 	else if (number > 1)
 		error = source_refuse(message, DT_E_ARGUMENT, file, 0, "no drop %u, 1 is there", number);
 	else
-		error = read_one(record, &log, columns, message);
+		error = read_read_one(record, &log, columns, message);
 	log_file_close(&log);
 	return error;
 }
@@ -313,7 +314,7 @@ static int list_one(const struct log_file *log, struct log_visitor *visitor, cha
 {
 	struct log_capture capture = {.number = 1, .alone = true, .to = log->size};
 	struct record record;
-	int error = read_one(&record, log, NULL, message);
+	int error = read_read_one(&record, log, NULL, message);
 
 	if (error)
 		return error;

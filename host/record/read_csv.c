@@ -31,7 +31,7 @@ static bool starts_with(const struct source_line *line, const char *text)
 	return line->length >= length && memcmp(line->text, text, length) == 0;
 }
 
-static bool is_line(const struct source_line *line, const char *text)
+static bool read_csv_is_line(const struct source_line *line, const char *text)
 {
 	return starts_with(line, text) && line->length == strlen(text);
 }
@@ -39,7 +39,7 @@ static bool is_line(const struct source_line *line, const char *text)
 /* ---- the header ---- */
 
 /* "rate_hz=7000 start_s=0 range_g=500 count=3500 uneven=0 name=S1X" */
-static int read_channel(struct reading *reading, const char *text)
+static int read_csv_channel(struct reading *reading, const char *text)
 {
 	double rate_hz, start_s, range_g;
 	struct channel *channel;
@@ -67,13 +67,13 @@ static int read_channel(struct reading *reading, const char *text)
 	return 0;
 }
 
-static int read_key(struct reading *reading, const char *key, const char *text)
+static int read_csv_key(struct reading *reading, const char *key, const char *text)
 {
 	const struct fields_entry *entry = fields_find(key);
 	double value;
 
 	if (strcmp(key, "channel") == 0)
-		return read_channel(reading, text);
+		return read_csv_channel(reading, text);
 	if (!entry)
 		return REFUSE(reading, DT_E_FORMAT, "unknown key \"%.80s\"", key);
 	if (!number_parse(text, strlen(text), '.', &value) || fields_set(reading->record, entry, value) != 0)
@@ -86,7 +86,7 @@ static int read_key(struct reading *reading, const char *key, const char *text)
 static int read_header(struct reading *reading)
 {
 	if (!source_next_line(reading->source, &reading->line) ||
-	    !is_line(&reading->line, "# droptower csv 1"))
+	    !read_csv_is_line(&reading->line, "# droptower csv 1"))
 		return REFUSE(reading, DT_E_FORMAT, "unknown version, expected \"# droptower csv 1\"");
 	while (source_next_line(reading->source, &reading->line)) {
 		const struct source_line *line = &reading->line;
@@ -104,7 +104,7 @@ static int read_header(struct reading *reading)
 		if (text[1] != ' ' || !value)
 			return REFUSE(reading, DT_E_FORMAT, "\"%.80s\", expected \"# key value\"", text);
 		*value++ = '\0';
-		error = read_key(reading, text + 2, value);
+		error = read_csv_key(reading, text + 2, value);
 		if (error)
 			return error;
 	}
@@ -195,7 +195,7 @@ static size_t count_cells(const struct source_line *line)
 	return cells;
 }
 
-static int read_row(struct reading *reading)
+static int read_csv_row(struct reading *reading)
 {
 	const struct source_line *line = &reading->line;
 	size_t expected = reading->record->channel_count + 1, found = count_cells(line);
@@ -230,7 +230,7 @@ static int read_rows(struct reading *reading)
 		if (starts_with(&reading->line, "# " SEAL_WORD) &&
 		    reading->line.next == reading->source->size)
 			break; /* read_record has checked it */
-		error = read_row(reading);
+		error = read_csv_row(reading);
 		if (error)
 			return error;
 	}
@@ -241,7 +241,7 @@ static int read_rows(struct reading *reading)
 	return 0;
 }
 
-static int read_all(struct reading *reading)
+static int read_csv_all(struct reading *reading)
 {
 	int error = read_header(reading);
 
@@ -268,7 +268,7 @@ int read_csv(struct record *record, const struct source *source, char message[RE
 	int error;
 
 	record_init(&filled);
-	error = read_all(&reading);
+	error = read_csv_all(&reading);
 	if (error) {
 		record_free(&filled);
 		return error;

@@ -53,7 +53,7 @@ static int refuse_memory(const struct reading *reading)
 	                     error_text(DT_E_MEMORY));
 }
 
-static bool is_blank(const struct source_line *line)
+static bool read_delimited_is_blank(const struct source_line *line)
 {
 	for (size_t i = 0; i < line->length; i++)
 		if (line->text[i] != ' ' && line->text[i] != '\t')
@@ -76,7 +76,7 @@ static bool next_row(struct reading *reading)
 	struct source_line *line = &reading->line;
 
 	while (source_next_line(reading->source, line)) {
-		if (is_blank(line))
+		if (read_delimited_is_blank(line))
 			continue;
 		if (is_comment(line)) {
 			if (reading->rows == 0)
@@ -144,7 +144,7 @@ static int find_data(struct reading *reading)
 
 /* ---- the rows ---- */
 
-static int allocate(struct reading *reading)
+static int read_delimited_allocate(struct reading *reading)
 {
 	const struct columns *columns = &reading->columns;
 	const char *at = reading->source->bytes + reading->line.next;
@@ -203,7 +203,7 @@ static void note_number(struct reading *reading, size_t i)
 
 /* Whether the last cell of a line without an end is no number, or one without digits that the row before has.
  */
-static bool is_cut(const struct reading *reading, size_t i)
+static bool read_delimited_is_cut(const struct reading *reading, size_t i)
 {
 	double value;
 
@@ -212,7 +212,7 @@ static bool is_cut(const struct reading *reading, size_t i)
 	        (reading->rows > 0 && cells_tail(&reading->row, i) < reading->tail[i]));
 }
 
-static int take_time(struct reading *reading, size_t i)
+static int read_delimited_take_time(struct reading *reading, size_t i)
 {
 	double value, digit;
 	int digits;
@@ -222,7 +222,7 @@ static int take_time(struct reading *reading, size_t i)
 
 		return error ? error : REFUSE(reading, DT_E_FORMAT, "no number in the time column");
 	}
-	if (is_cut(reading, i))
+	if (read_delimited_is_cut(reading, i))
 		return REFUSE(reading, DT_E_FORMAT, "the file ends within a time, expected a line end");
 	digit = cells_last_digit(&reading->row, i, &digits);
 	reading->digit = reading->rows == 0 ? digit : fmin(reading->digit, digit);
@@ -234,10 +234,11 @@ static int take_time(struct reading *reading, size_t i)
 	return 0;
 }
 
-static int take_sample(struct reading *reading, size_t i, struct channel *channel)
+static int read_delimited_take_sample(struct reading *reading, size_t i, struct channel *channel)
 {
 	size_t k = reading->rows;
-	bool empty = i >= reading->row.count || reading->row.cell[i].length == 0, cut = is_cut(reading, i);
+	bool empty = i >= reading->row.count || reading->row.cell[i].length == 0,
+	     cut = read_delimited_is_cut(reading, i);
 	double value;
 
 	channel->sample[k] = SAMPLE_BAD;
@@ -270,9 +271,9 @@ static int take_row(struct reading *reading)
 	        reading->line.text + reading->line.length == reading->source->bytes + reading->source->size;
 	for (size_t i = 0; i < columns->count && !error; i++) {
 		if (columns->column[i].kind == COLUMN_TIME)
-			error = take_time(reading, i);
+			error = read_delimited_take_time(reading, i);
 		if (columns->column[i].kind == COLUMN_CHANNEL)
-			error = take_sample(reading, i, channel++);
+			error = read_delimited_take_sample(reading, i, channel++);
 	}
 	reading->rows++;
 	return error;
@@ -358,8 +359,8 @@ static int finish_lvm(struct reading *reading, size_t i, struct channel *channel
 	                     channel->name);
 }
 
-static int finish_channel(struct reading *reading, size_t i, const struct timebase *timebase,
-                          struct channel *channel)
+static int read_delimited_finish_channel(struct reading *reading, size_t i, const struct timebase *timebase,
+                                         struct channel *channel)
 {
 	int error = 0;
 
@@ -381,7 +382,7 @@ static int finish_channel(struct reading *reading, size_t i, const struct timeba
 	return error;
 }
 
-static int finish(struct reading *reading)
+static int read_delimited_finish(struct reading *reading)
 {
 	struct record *record = reading->record;
 	struct channel *channel = record->channels;
@@ -390,7 +391,7 @@ static int finish(struct reading *reading)
 
 	for (size_t i = 0; i < reading->columns.count && !error; i++)
 		if (reading->columns.column[i].kind == COLUMN_CHANNEL)
-			error = finish_channel(reading, i, &timebase, channel++);
+			error = read_delimited_finish_channel(reading, i, &timebase, channel++);
 	timebase_free(&timebase);
 	if (error)
 		return error;
@@ -433,15 +434,15 @@ static int read_headers(struct reading *reading)
 	               : lvm_check(&reading->lvm, &reading->columns, source->file, reading->message);
 }
 
-static int read_all(struct reading *reading)
+static int read_delimited_all(struct reading *reading)
 {
 	int error = read_headers(reading);
 
 	if (!error)
-		error = allocate(reading);
+		error = read_delimited_allocate(reading);
 	if (!error)
 		error = take_rows(reading);
-	return error ? error : finish(reading);
+	return error ? error : read_delimited_finish(reading);
 }
 
 int read_delimited(struct record *record, const struct source *source, const char *columns,
@@ -469,7 +470,7 @@ int read_delimited(struct record *record, const struct source *source, const cha
 	error = columns_parse(&reading->columns, columns, message);
 	record_init(&filled);
 	if (!error)
-		error = read_all(reading);
+		error = read_delimited_all(reading);
 	free(reading->time_s);
 	free(reading->row_line);
 	free(reading);

@@ -16,7 +16,7 @@ struct reading {
 	char digest[DIGEST_CHARS];
 };
 
-static int take_drop(struct log_walk *walk, const struct lcm_log_event *event)
+static int read_lcm_take_drop(struct log_walk *walk, const struct lcm_log_event *event)
 {
 	droptower_drop drop;
 	struct record record;
@@ -31,7 +31,7 @@ static int take_drop(struct log_walk *walk, const struct lcm_log_event *event)
 	return error;
 }
 
-static int take_block(struct log_walk *walk, const struct lcm_log_event *event)
+static int read_lcm_take_block(struct log_walk *walk, const struct lcm_log_event *event)
 {
 	droptower_block block;
 	struct frame frame;
@@ -69,11 +69,11 @@ static int take_event(struct reading *reading, const struct lcm_log_event *event
 		return 0;
 	if (is_drop) {
 		digest_of(event->data, event->size, reading->digest);
-		error = take_drop(reading->walk, event);
+		error = read_lcm_take_drop(reading->walk, event);
 	} else if (strcmp(event->channel, LCM_LOG_SEAL) == 0) {
 		error = take_seal(reading, event);
 	} else if (strcmp(event->channel, LCM_CODEC_BLOCK) == 0) {
-		error = take_block(reading->walk, event);
+		error = read_lcm_take_block(reading->walk, event);
 	}
 	reading->has_drop = is_drop;
 	return error;

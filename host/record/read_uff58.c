@@ -56,7 +56,7 @@ static void name_channel(const struct reading *reading, const struct uff58_head 
 		snprintf(name, 32, "channel %zu", reading->record->channel_count + 1);
 }
 
-static int check_channel(struct reading *reading, const struct uff58_head *head)
+static int read_uff58_check_channel(struct reading *reading, const struct uff58_head *head)
 {
 	struct source_line at = reading->text.line;
 	int error = 0;
@@ -115,11 +115,11 @@ static int settle_times(struct reading *reading, const struct uff58_head *head, 
 	return error ? UFF58_REFUSE(&reading->text, error, "%s", error_text(error)) : 0;
 }
 
-static int read_channel(struct reading *reading, const struct uff58_head *head)
+static int read_uff58_channel(struct reading *reading, const struct uff58_head *head)
 {
 	struct channel *channel;
 	double *time_s = NULL;
-	int error = check_channel(reading, head);
+	int error = read_uff58_check_channel(reading, head);
 	uint64_t line;
 	char name[32];
 
@@ -197,7 +197,7 @@ static int read_own_channel(struct reading *reading, const struct uff58_head *he
 }
 
 /* The line of sample k of one of the first channels of ours; 0 of another. */
-static uint64_t line_of(const struct reading *reading, const struct channel *channel, size_t k)
+static uint64_t read_uff58_line_of(const struct reading *reading, const struct channel *channel, size_t k)
 {
 	size_t i = (size_t)(channel - reading->record->channels);
 
@@ -210,7 +210,7 @@ static int check_good(const struct reading *reading, const struct channel *chann
 	for (size_t k = 0; k < channel->count; k++)
 		if (!isfinite(channel->value_g[k]) && !(channel->sample[k] & (SAMPLE_LOST | SAMPLE_BAD)))
 			return source_refuse(reading->text.message, DT_E_FORMAT, reading->text.source->file,
-			                     line_of(reading, channel, k),
+			                     read_uff58_line_of(reading, channel, k),
 			                     "sample %zu of %s is no number and its mask calls it good, "
 			                     "expected a number",
 			                     k + 1, channel->name);
@@ -218,7 +218,7 @@ static int check_good(const struct reading *reading, const struct channel *chann
 }
 
 /* The samples of a drop are counts. */
-static int check_counts(const struct reading *reading)
+static int read_uff58_check_counts(const struct reading *reading)
 {
 	for (size_t i = 0; i < reading->record->channel_count; i++) {
 		const struct channel *channel = &reading->record->channels[i];
@@ -226,7 +226,8 @@ static int check_counts(const struct reading *reading)
 		for (size_t k = 0; k < channel->count; k++)
 			if (isfinite(channel->value_g[k]) && !drop_is_count(channel->value_g[k]))
 				return source_refuse(reading->text.message, DT_E_FORMAT,
-				                     reading->text.source->file, line_of(reading, channel, k),
+				                     reading->text.source->file,
+				                     read_uff58_line_of(reading, channel, k),
 				                     "%.15g g for %s, expected a whole count of 1/32 g "
 				                     "within full scale",
 				                     channel->value_g[k], channel->name);
@@ -282,7 +283,7 @@ static int read_dataset(struct reading *reading)
 		error = read_mask(reading, &head);
 	} else if (head.function == UFF58_TIME_RESPONSE &&
 	           (head.quantity == UFF58_ACCELERATION || head.quantity == UFF58_UNKNOWN)) {
-		error = read_channel(reading, &head);
+		error = read_uff58_channel(reading, &head);
 		if (!error && own)
 			error = read_own_channel(reading, &head);
 		reading->foreign |= !own;
@@ -290,7 +291,7 @@ static int read_dataset(struct reading *reading)
 	return error ? error : uff58_skip_dataset(&reading->text);
 }
 
-static int read_all(struct reading *reading)
+static int read_uff58_all(struct reading *reading)
 {
 	char number[16];
 	int error = 0;
@@ -318,7 +319,7 @@ static int read_all(struct reading *reading)
 	return error;
 }
 
-static int finish(struct reading *reading)
+static int read_uff58_finish(struct reading *reading)
 {
 	struct record *record = reading->record;
 	int error;
@@ -329,7 +330,7 @@ static int finish(struct reading *reading)
 		record_finish(record);
 		return 0;
 	}
-	error = check_counts(reading);
+	error = read_uff58_check_counts(reading);
 	if (error)
 		return error;
 	error = drop_check(record);
@@ -347,9 +348,9 @@ int read_uff58(struct record *record, const struct source *source, char message[
 	int error;
 
 	record_init(&filled);
-	error = read_all(&reading);
+	error = read_uff58_all(&reading);
 	if (!error)
-		error = finish(&reading);
+		error = read_uff58_finish(&reading);
 	if (error) {
 		record_free(&filled);
 		return error;

@@ -71,7 +71,7 @@ const struct channel *record_axis(const struct record *record, const char *which
 	return NULL;
 }
 
-static void finish_channel(struct record *record, struct channel *channel)
+static void record_finish_channel(struct record *record, struct channel *channel)
 {
 	const double full_scale_g = (double)WIRE_SAMPLE_FULL_SCALE / WIRE_COUNTS_PER_G;
 	const unsigned readers = RECORD_FLAG_UNEVEN | RECORD_FLAG_NO_LINE_END | RECORD_FLAG_SAME_NAMES;
@@ -136,7 +136,7 @@ void record_finish(struct record *record)
 	record->lost_samples = 0;
 	record->flags = 0;
 	for (size_t i = 0; i < record->channel_count; i++)
-		finish_channel(record, &record->channels[i]);
+		record_finish_channel(record, &record->channels[i]);
 	if (!record->is_drop)
 		return;
 	record->flags |= flags_of_marks(record->marks);

@@ -40,7 +40,7 @@ static int refuse_system(char *message, const struct source *source)
 }
 
 /* Makes room for at least one more byte, or says why not. */
-static int grow(struct source *source, size_t *room, char *message)
+static int source_grow(struct source *source, size_t *room, char *message)
 {
 	char *bytes;
 
@@ -58,10 +58,10 @@ static int grow(struct source *source, size_t *room, char *message)
 	return 0;
 }
 
-static int read_all(struct source *source, int descriptor, size_t room, char *message)
+static int source_read_all(struct source *source, int descriptor, size_t room, char *message)
 {
 	for (;;) {
-		int error = grow(source, &room, message);
+		int error = source_grow(source, &room, message);
 		ssize_t count;
 
 		if (error)
@@ -81,7 +81,7 @@ static int read_all(struct source *source, int descriptor, size_t room, char *me
 }
 
 /* Spreadsheets put a byte order mark in front of UTF-8. */
-static void skip_mark(struct source *source)
+static void source_skip_mark(struct source *source)
 {
 	static const char mark[] = {(char)0xEF, (char)0xBB, (char)0xBF};
 
@@ -105,12 +105,12 @@ int source_load(struct source *source, const char *file, const char *expected, c
 		room = (size_t)stat.st_size + 1; /* the byte that finds the end */
 	loaded.bytes = malloc(room);
 	if (loaded.bytes)
-		error = read_all(&loaded, descriptor, room, message);
+		error = source_read_all(&loaded, descriptor, room, message);
 	else
 		error = source_refuse(message, DT_E_MEMORY, file, 0, "no memory for %zu bytes", room);
 	close(descriptor);
 	if (!error)
-		skip_mark(&loaded);
+		source_skip_mark(&loaded);
 	if (error) {
 		source_free(&loaded);
 		return error;

@@ -32,8 +32,8 @@ struct search {
 	struct timebase_fault *fault;
 };
 
-__attribute__((format(printf, 3, 4))) static int refuse(const struct search *search, size_t row,
-                                                        const char *format, ...)
+__attribute__((format(printf, 3, 4))) static int timebase_refuse(const struct search *search, size_t row,
+                                                                 const char *format, ...)
 {
 	va_list list;
 
@@ -44,7 +44,7 @@ __attribute__((format(printf, 3, 4))) static int refuse(const struct search *sea
 	return DT_E_FORMAT;
 }
 
-static double step(const struct search *search, size_t k)
+static double timebase_step(const struct search *search, size_t k)
 {
 	return search->time_s[k + 1] - search->time_s[k];
 }
@@ -66,7 +66,7 @@ static double worst_of(const struct search *search, double step_s, const size_t 
 	return worst;
 }
 
-static int compare(const void *a, const void *b)
+static int timebase_compare(const void *a, const void *b)
 {
 	double x, y;
 
@@ -90,17 +90,18 @@ static int find_median(struct search *search)
 	if (!steps)
 		return DT_E_MEMORY;
 	for (size_t k = 0; k < count; k++)
-		steps[k] = step(search, k);
-	qsort(steps, count, sizeof(*steps), compare);
+		steps[k] = timebase_step(search, k);
+	qsort(steps, count, sizeof(*steps), timebase_compare);
 	search->median_s = steps[at];
 	if (count > 1 && search->digit_s <= COARSE * search->median_s) {
 		for (size_t k = 0; k + 1 < count; k++)
-			steps[k] = (step(search, k) + step(search, k + 1)) / 2;
-		qsort(steps, count - 1, sizeof(*steps), compare);
+			steps[k] = (timebase_step(search, k) + timebase_step(search, k + 1)) / 2;
+		qsort(steps, count - 1, sizeof(*steps), timebase_compare);
 		search->median_s = steps[(count - 2) / 2];
 		for (size_t k = 0; k < count; k++)
-			if (fabs(step(search, k) - search->median_s) <= room_of(search, search->median_s)) {
-				sum_s += step(search, k);
+			if (fabs(timebase_step(search, k) - search->median_s) <=
+			    room_of(search, search->median_s)) {
+				sum_s += timebase_step(search, k);
 				near++;
 			}
 		search->median_s = near > 0 ? sum_s / (double)near : search->median_s;
@@ -115,8 +116,8 @@ static int check_order(const struct search *search, bool equal_allowed)
 		double before = search->time_s[k - 1], now = search->time_s[k];
 
 		if (!(now > before) && !(equal_allowed && now >= before))
-			return refuse(search, k, "time %.9g s after %.9g s, expected it to increase", now,
-			              before);
+			return timebase_refuse(search, k, "time %.9g s after %.9g s, expected it to increase",
+			                       now, before);
 	}
 	return 0;
 }
@@ -131,7 +132,7 @@ static bool place_rows(const struct search *search, size_t *place)
 
 	place[0] = 0;
 	for (size_t k = 0; k + 1 < search->rows; k++) {
-		double d = step(search, k), many = fmax(round(d / search->median_s), 1);
+		double d = timebase_step(search, k), many = fmax(round(d / search->median_s), 1);
 
 		if (fabs(d - many * search->median_s) > room ||
 		    (double)place[k] + many > (MISSING_MOST + 1) * (double)search->rows)
@@ -173,12 +174,13 @@ static int find_missing(const struct search *search, struct timebase *timebase)
 /* Steps from k on that are of one level, which is not the median's. */
 static size_t run_at(const struct search *search, size_t k)
 {
-	double level = step(search, k), room = fmax(LEVEL / 2 * level, LEVEL_DIGITS * search->digit_s);
+	double level = timebase_step(search, k),
+	       room = fmax(LEVEL / 2 * level, LEVEL_DIGITS * search->digit_s);
 	size_t end = k;
 
 	if (fabs(level - search->median_s) <= fmax(LEVEL * search->median_s, LEVEL_DIGITS * search->digit_s))
 		return 0;
-	while (end + 1 < search->rows && fabs(step(search, end) - level) <= room)
+	while (end + 1 < search->rows && fabs(timebase_step(search, end) - level) <= room)
 		end++;
 	return end - k;
 }
@@ -192,11 +194,12 @@ static int check_rates(const struct search *search)
 		double level = run ? (search->time_s[k + run] - search->time_s[k]) / (double)run : 0;
 
 		if ((double)run >= least)
-			return refuse(search, k ? k + 1 : run + 1,
-			              "two rates: time steps by %.6g s (%.6g Hz) above and by %.6g s "
-			              "(%.6g Hz) from here on, expected one: cut the file here",
-			              k ? search->median_s : level, 1 / (k ? search->median_s : level),
-			              k ? level : search->median_s, 1 / (k ? level : search->median_s));
+			return timebase_refuse(
+			        search, k ? k + 1 : run + 1,
+			        "two rates: time steps by %.6g s (%.6g Hz) above and by %.6g s "
+			        "(%.6g Hz) from here on, expected one: cut the file here",
+			        k ? search->median_s : level, 1 / (k ? search->median_s : level),
+			        k ? level : search->median_s, 1 / (k ? level : search->median_s));
 		k += run ? run : 1;
 	}
 	return 0;
@@ -205,7 +208,7 @@ static int check_rates(const struct search *search)
 /* ---- columns printed as coarsely as their steps ---- */
 
 /* The spread about the straight line of least squares. */
-static double spread_of(const struct search *search, double *slope_s)
+static double timebase_spread_of(const struct search *search, double *slope_s)
 {
 	double n = (double)search->rows, mean_t = 0, top = 0, low = INFINITY, high = -INFINITY;
 	double below = n * (n * n - 1) / 12;
@@ -228,10 +231,10 @@ static double spread_of(const struct search *search, double *slope_s)
 static int find_coarse(const struct search *search, struct timebase *timebase)
 {
 	size_t twice = 0, more = 0, other = 0;
-	double slope_s = 0, spread = spread_of(search, &slope_s);
+	double slope_s = 0, spread = timebase_spread_of(search, &slope_s);
 
 	for (size_t k = 0; k + 1 < search->rows; k++) {
-		double d = step(search, k) / search->median_s;
+		double d = timebase_step(search, k) / search->median_s;
 
 		twice += d > 1.5 && d <= 2.5;
 		more += d > 2.5;
@@ -245,10 +248,11 @@ static int find_coarse(const struct search *search, struct timebase *timebase)
 	if (other == 0 && (twice == 0 || (more == 0 && spread > DIGIT_SPREAD * search->digit_s &&
 	                                  (double)twice <= LONELY * (double)search->rows)))
 		return find_missing(search, timebase);
-	return refuse(search, 0,
-	              "times printed to %.3g s at steps of %.3g s: rounding and missing rows cannot be told "
-	              "apart, expected more digits, or name:unit@RATE without a time column",
-	              search->digit_s, search->median_s);
+	return timebase_refuse(
+	        search, 0,
+	        "times printed to %.3g s at steps of %.3g s: rounding and missing rows cannot be told "
+	        "apart, expected more digits, or name:unit@RATE without a time column",
+	        search->digit_s, search->median_s);
 }
 
 /* ---- the order of it all ---- */
@@ -259,18 +263,19 @@ static int refuse_rest(const struct search *search)
 	double room = room_of(search, search->median_s);
 
 	for (size_t k = 0; k + 1 < search->rows; k++) {
-		double d = step(search, k), many = fmax(round(d / search->median_s), 1);
+		double d = timebase_step(search, k), many = fmax(round(d / search->median_s), 1);
 
 		if (fabs(d - many * search->median_s) > room || many > MISSING_MOST * (double)search->rows)
-			return refuse(search, k + 1,
-			              "time steps by %.6g s, others by %.6g s, expected one step and whole "
-			              "multiples of it where rows are missing",
-			              d, search->median_s);
+			return timebase_refuse(
+			        search, k + 1,
+			        "time steps by %.6g s, others by %.6g s, expected one step and whole "
+			        "multiples of it where rows are missing",
+			        d, search->median_s);
 	}
 	(void)worst_of(search, search->step_s, NULL, &row);
-	return refuse(search, row,
-	              "times are up to %.3g steps off an even grid of %.6g s, expected an even one",
-	              worst_of(search, search->step_s, NULL, &row) / search->step_s, search->step_s);
+	return timebase_refuse(search, row,
+	                       "times are up to %.3g steps off an even grid of %.6g s, expected an even one",
+	                       worst_of(search, search->step_s, NULL, &row) / search->step_s, search->step_s);
 }
 
 static int find_uneven(struct search *search, double worst, struct timebase *timebase)
@@ -294,7 +299,7 @@ static int find_uneven(struct search *search, double worst, struct timebase *tim
 }
 
 /* A header's step has few digits at times, and its column is rounded. */
-static bool agrees(const struct search *search, double step_s)
+static bool timebase_agrees(const struct search *search, double step_s)
 {
 	double steps = (double)(search->rows - 1);
 	size_t row = 0;
@@ -316,16 +321,17 @@ int timebase_find(const double *time_s, size_t rows, double digit_s, double step
 		return error;
 	search.step_s = (time_s[rows - 1] - time_s[0]) / (double)(rows - 1);
 	if (!isfinite(1 / search.step_s))
-		return refuse(&search, rows - 1, "time column without a rate, expected it to increase");
-	if (step_s > 0 && agrees(&search, step_s)) {
+		return timebase_refuse(&search, rows - 1,
+		                       "time column without a rate, expected it to increase");
+	if (step_s > 0 && timebase_agrees(&search, step_s)) {
 		found.step_s = step_s;
 		*timebase = found;
 		return 0;
 	}
 	if (step_s > 0)
-		return refuse(&search, rows - 1,
-		              "time column steps by %.9g s, expected Delta_X = %.9g s, evenly", search.step_s,
-		              step_s);
+		return timebase_refuse(&search, rows - 1,
+		                       "time column steps by %.9g s, expected Delta_X = %.9g s, evenly",
+		                       search.step_s, step_s);
 	worst = worst_of(&search, search.step_s, NULL, &row);
 	room = fmax(EVEN * search.step_s, digit_s <= COARSE * search.step_s ? DIGIT * digit_s : 0);
 	if (worst <= room)

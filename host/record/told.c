@@ -10,7 +10,7 @@ void told_begin(struct told *told, uint16_t drop_id)
 	*told = (struct told){.begun = true, .drop_id = drop_id};
 }
 
-static int feed_measured(struct told *told, const struct frame *frame)
+static int told_feed_measured(struct told *told, const struct frame *frame)
 {
 	struct wire_measured measured;
 	int result = wire_check_measured(frame);
@@ -26,7 +26,7 @@ static int feed_measured(struct told *told, const struct frame *frame)
 	return 0;
 }
 
-static int feed_parameter(struct told *told, const struct frame *frame)
+static int told_feed_parameter(struct told *told, const struct frame *frame)
 {
 	struct wire_parameter parameter;
 	int result = wire_unpack_parameter(frame, &parameter);
@@ -51,7 +51,8 @@ int told_feed(struct told *told, const struct frame *frame)
 {
 	if (!told->begun)
 		return 0;
-	return frame->id == WIRE_ID_MEASURED ? feed_measured(told, frame) : feed_parameter(told, frame);
+	return frame->id == WIRE_ID_MEASURED ? told_feed_measured(told, frame)
+	                                     : told_feed_parameter(told, frame);
 }
 
 bool told_whole(const struct told *told, const struct wire_capture_end *end)

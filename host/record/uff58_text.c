@@ -25,7 +25,7 @@ void uff58_take(const struct source_line *line, size_t first, size_t width, char
 	field[length] = '\0';
 }
 
-static bool take_number(const struct source_line *line, size_t first, size_t width, double *value)
+static bool uff58_text_take_number(const struct source_line *line, size_t first, size_t width, double *value)
 {
 	char field[32];
 
@@ -37,7 +37,7 @@ static bool take_number(const struct source_line *line, size_t first, size_t wid
 }
 
 /* A field left blank is 0, as in Fortran. */
-static bool take_whole(const struct source_line *line, size_t first, size_t width, int *value)
+static bool uff58_text_take_whole(const struct source_line *line, size_t first, size_t width, int *value)
 {
 	double number = 0;
 	char field[32];
@@ -83,9 +83,9 @@ static int read_record_6(struct uff58_text *text, struct uff58_head *head)
 
 	if (error)
 		return error;
-	if (!take_whole(&text->line, 0, 5, &head->function) ||
-	    !take_whole(&text->line, 41, 10, &head->node) ||
-	    !take_whole(&text->line, 51, 4, &head->direction))
+	if (!uff58_text_take_whole(&text->line, 0, 5, &head->function) ||
+	    !uff58_text_take_whole(&text->line, 41, 10, &head->node) ||
+	    !uff58_text_take_whole(&text->line, 51, 4, &head->direction))
 		return UFF58_REFUSE(text, DT_E_FORMAT,
 		                    "record 6, expected whole numbers in columns 1-5, 42-51 and 52-55");
 	return 0;
@@ -98,9 +98,11 @@ static int read_record_7(struct uff58_text *text, struct uff58_head *head)
 
 	if (error)
 		return error;
-	if (!take_whole(&text->line, 0, 10, &head->precision) || !take_whole(&text->line, 10, 10, &count) ||
-	    !take_whole(&text->line, 20, 10, &spacing) || !take_number(&text->line, 30, 13, &head->start_s) ||
-	    !take_number(&text->line, 43, 13, &head->step_s) || count < 0)
+	if (!uff58_text_take_whole(&text->line, 0, 10, &head->precision) ||
+	    !uff58_text_take_whole(&text->line, 10, 10, &count) ||
+	    !uff58_text_take_whole(&text->line, 20, 10, &spacing) ||
+	    !uff58_text_take_number(&text->line, 30, 13, &head->start_s) ||
+	    !uff58_text_take_number(&text->line, 43, 13, &head->step_s) || count < 0)
 		return UFF58_REFUSE(
 		        text, DT_E_FORMAT,
 		        "record 7, expected three whole numbers in 10 columns each and two numbers in "
@@ -120,7 +122,7 @@ static int read_axes(struct uff58_text *text, struct uff58_head *head)
 			return error;
 		if (record != 9)
 			continue;
-		if (!take_whole(&text->line, 0, 10, &head->quantity))
+		if (!uff58_text_take_whole(&text->line, 0, 10, &head->quantity))
 			return UFF58_REFUSE(text, DT_E_FORMAT,
 			                    "record 9, expected a whole number in columns 1-10");
 		uff58_take(&text->line, 47, 20, head->unit, sizeof(head->unit));
@@ -169,7 +171,7 @@ static int next_cell(struct uff58_text *text, struct cells *cells, size_t width,
 		return UFF58_REFUSE(text, DT_E_FORMAT,
 		                    "fewer numbers than announced, expected one in columns %zu-%zu",
 		                    cells->column + 1, cells->column + width);
-	if (!take_number(&text->line, cells->column, width, value))
+	if (!uff58_text_take_number(&text->line, cells->column, width, value))
 		*value = NAN;
 	cells->column += width;
 	cells->next++;
@@ -204,5 +206,5 @@ bool uff58_is(const struct source *source)
 
 	return source_next_line(source, &line) && uff58_is_delimiter(&line) && line.length >= 6 &&
 	       line.text[4] == '-' && source_next_line(source, &line) && line.length >= 6 &&
-	       line.text[5] != ' ' && take_whole(&line, 0, 6, &number);
+	       line.text[5] != ' ' && uff58_text_take_whole(&line, 0, 6, &number);
 }

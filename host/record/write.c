@@ -109,7 +109,7 @@ int write_frames(const struct record *record, int (*send)(void *context, const s
 
 /* ---- CSV ---- */
 
-static void put_number(FILE *out, double value)
+static void write_put_number(FILE *out, double value)
 {
 	char text[NUMBER_CHARS];
 
@@ -117,7 +117,7 @@ static void put_number(FILE *out, double value)
 	fputs(text, out);
 }
 
-static void put_drop(const struct record *record, FILE *out)
+static void write_put_drop(const struct record *record, FILE *out)
 {
 	const struct fields_entry *entry;
 
@@ -126,33 +126,33 @@ static void put_drop(const struct record *record, FILE *out)
 			continue;
 		fprintf(out, "# %s ", entry->name);
 		if (entry->kind == FIELDS_REAL)
-			put_number(out, fields_real(record, entry));
+			write_put_number(out, fields_real(record, entry));
 		else
 			fprintf(out, "%" PRId64, fields_whole(record, entry));
 		fputc('\n', out);
 	}
 }
 
-static void put_channel(const struct channel *channel, FILE *out)
+static void write_put_channel(const struct channel *channel, FILE *out)
 {
 	fputs("# channel rate_hz=", out);
-	put_number(out, channel->rate_hz);
+	write_put_number(out, channel->rate_hz);
 	fputs(" start_s=", out);
-	put_number(out, channel->start_s);
+	write_put_number(out, channel->start_s);
 	fputs(" range_g=", out);
-	put_number(out, channel->range_g);
+	write_put_number(out, channel->range_g);
 	fprintf(out, " count=%zu uneven=%d name=%s\n", channel->count,
 	        (channel->flags & RECORD_FLAG_UNEVEN) != 0, channel->name);
 }
 
-static void put_cell(const struct channel *channel, size_t k, FILE *out)
+static void write_put_cell(const struct channel *channel, size_t k, FILE *out)
 {
 	if (channel->sample[k] & SAMPLE_LOST)
 		fputs("lost", out);
 	else if (channel->sample[k] & SAMPLE_BAD || !isfinite(channel->value_g[k]))
 		fputs("bad", out);
 	else
-		put_number(out, channel->value_g[k]);
+		write_put_number(out, channel->value_g[k]);
 	if (channel->sample[k] & SAMPLE_CLIPPED)
 		fputc('*', out);
 }
@@ -163,7 +163,7 @@ static double sample_time(const struct channel *channel, size_t k)
 }
 
 /* One row per instant at which any channel has a sample. */
-static void put_rows(const struct record *record, size_t *next, FILE *out)
+static void write_put_rows(const struct record *record, size_t *next, FILE *out)
 {
 	for (;;) {
 		double now = INFINITY;
@@ -173,19 +173,19 @@ static void put_rows(const struct record *record, size_t *next, FILE *out)
 				now = fmin(now, sample_time(&record->channels[i], next[i]));
 		if (isinf(now))
 			return;
-		put_number(out, now);
+		write_put_number(out, now);
 		for (size_t i = 0; i < record->channel_count; i++) {
 			const struct channel *channel = &record->channels[i];
 
 			fputc(',', out);
 			if (next[i] < channel->count && sample_time(channel, next[i]) <= now)
-				put_cell(channel, next[i]++, out);
+				write_put_cell(channel, next[i]++, out);
 		}
 		fputc('\n', out);
 	}
 }
 
-static bool can_name(const char *name)
+static bool write_can_name(const char *name)
 {
 	for (const char *p = name; *p; p++)
 		if ((unsigned char)*p < ' ' || *p == ',')
@@ -198,21 +198,21 @@ int write_csv(const struct record *record, FILE *out)
 	size_t *next;
 
 	for (size_t i = 0; i < record->channel_count; i++)
-		if (!can_name(record->channels[i].name))
+		if (!write_can_name(record->channels[i].name))
 			return DT_E_ARGUMENT;
 	next = calloc(record->channel_count + 1, sizeof(*next));
 	if (!next)
 		return DT_E_MEMORY;
 	fputs("# droptower csv 1\n", out);
 	if (record->is_drop)
-		put_drop(record, out);
+		write_put_drop(record, out);
 	for (size_t i = 0; i < record->channel_count; i++)
-		put_channel(&record->channels[i], out);
+		write_put_channel(&record->channels[i], out);
 	fputs("time_s", out);
 	for (size_t i = 0; i < record->channel_count; i++)
 		fprintf(out, ",%s_g", record->channels[i].name);
 	fputc('\n', out);
-	put_rows(record, next, out);
+	write_put_rows(record, next, out);
 	free(next);
 	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
 }
@@ -236,7 +236,7 @@ static int write_candump(const struct record *record, FILE *out)
 	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
 }
 
-static int put_event(FILE *out, int64_t time_us, char *channel, uint8_t *bytes, int size)
+static int write_put_event(FILE *out, int64_t time_us, char *channel, uint8_t *bytes, int size)
 {
 	lcm_eventlog_t log = {.f = out};
 	lcm_eventlog_event_t event = {
@@ -269,10 +269,10 @@ static int write_lcm(const struct record *record, FILE *out)
 	else if (droptower_drop_encode(bytes, 0, size, &drop) != size)
 		error = DT_E_FORMAT;
 	else
-		error = put_event(out, time_us, channel, bytes, size);
+		error = write_put_event(out, time_us, channel, bytes, size);
 	if (!error) {
 		digest_of(bytes, (size_t)size, seal + strlen(SEAL_WORD));
-		error = put_event(out, time_us, of_seal, (uint8_t *)seal, sizeof(seal) - 1);
+		error = write_put_event(out, time_us, of_seal, (uint8_t *)seal, sizeof(seal) - 1);
 	}
 	free(bytes);
 	lcm_codec_free_drop(&drop);

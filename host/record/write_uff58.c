@@ -28,12 +28,12 @@ struct dataset {
 	struct axis ordinate;
 };
 
-static void put_axis(FILE *out, struct axis axis)
+static void write_uff58_put_axis(FILE *out, struct axis axis)
 {
 	fprintf(out, "%10d%5d%5d%5d %-20s %-20s\n", axis.quantity, 0, 0, 0, axis.label, axis.unit);
 }
 
-static void put_head(FILE *out, const struct dataset *dataset)
+static void write_uff58_put_head(FILE *out, const struct dataset *dataset)
 {
 	const struct axis none = {UFF58_UNKNOWN, "NONE", "NONE"};
 
@@ -44,16 +44,16 @@ static void put_head(FILE *out, const struct dataset *dataset)
 	        dataset->entity, dataset->node, dataset->direction, "NONE", 0, 0);
 	fprintf(out, "%10d%10zu%10d%13.5E%13.5E%13.5E\n", dataset->precision, dataset->count, 1,
 	        dataset->start_s, dataset->step_s, 0.0);
-	put_axis(out, (struct axis){UFF58_TIME, "Time", "s"});
-	put_axis(out, dataset->ordinate);
-	put_axis(out, none);
-	put_axis(out, none);
+	write_uff58_put_axis(out, (struct axis){UFF58_TIME, "Time", "s"});
+	write_uff58_put_axis(out, dataset->ordinate);
+	write_uff58_put_axis(out, none);
+	write_uff58_put_axis(out, none);
 }
 
 /* ---- a channel ---- */
 
 /* Blanks at the ends of a line do not survive it. */
-static bool can_name(const char *name)
+static bool write_uff58_can_name(const char *name)
 {
 	size_t length = strlen(name);
 
@@ -64,7 +64,7 @@ static bool can_name(const char *name)
 }
 
 /* What a modal program is to know of it: sensor 1 or 2 and the axis for a drop's, else its number. */
-static void place(const struct record *record, size_t i, struct dataset *dataset)
+static void write_uff58_place(const struct record *record, size_t i, struct dataset *dataset)
 {
 	dataset->node = (int)(record->is_drop ? i / 3 + 1 : i + 1);
 	dataset->direction = record->is_drop ? (int)(i % 3) + 1 : 0;
@@ -122,7 +122,7 @@ static void fill_line(const struct record *record, size_t *next, char line[UFF58
 	}
 }
 
-static void put_channel(const struct record *record, size_t i, size_t *next_field, FILE *out)
+static void write_uff58_put_channel(const struct record *record, size_t i, size_t *next_field, FILE *out)
 {
 	const struct channel *channel = &record->channels[i];
 	char rate[NUMBER_CHARS], start[NUMBER_CHARS], range[NUMBER_CHARS];
@@ -145,8 +145,8 @@ static void put_channel(const struct record *record, size_t i, size_t *next_fiel
 	         (channel->flags & RECORD_FLAG_UNEVEN) != 0);
 	for (int k = i == 0; k < 4; k++)
 		fill_line(record, next_field, line[k]);
-	place(record, i, &dataset);
-	put_head(out, &dataset);
+	write_uff58_place(record, i, &dataset);
+	write_uff58_put_head(out, &dataset);
 	put_values(out, channel);
 
 	dataset.id[1] = UFF58_OWN "mask: 1 lost, 2 not taken, 4 beyond the range";
@@ -155,7 +155,7 @@ static void put_channel(const struct record *record, size_t i, size_t *next_fiel
 	dataset.function = UFF58_UNKNOWN;
 	dataset.precision = UFF58_SINGLE;
 	dataset.ordinate = (struct axis){UFF58_UNKNOWN, "Mask", "NONE"};
-	put_head(out, &dataset);
+	write_uff58_put_head(out, &dataset);
 	put_mask(out, channel);
 }
 
@@ -164,10 +164,10 @@ int write_uff58(const struct record *record, FILE *out)
 	size_t next_field = 0;
 
 	for (size_t i = 0; i < record->channel_count; i++)
-		if (!can_name(record->channels[i].name))
+		if (!write_uff58_can_name(record->channels[i].name))
 			return DT_E_ARGUMENT;
 	for (size_t i = 0; i < record->channel_count; i++)
-		put_channel(record, i, &next_field, out);
+		write_uff58_put_channel(record, i, &next_field, out);
 	if (record->is_drop && fields_entry(next_field) != NULL)
 		return DT_E_FULL; /* a number that no line has room for */
 	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;

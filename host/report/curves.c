@@ -23,7 +23,7 @@ bool curves_axes(const struct report *report, const char *sensor, struct curves_
 	return true;
 }
 
-static double value_at(const struct channel *c, double offset_g, double time_s)
+static double curves_value_at(const struct channel *c, double offset_g, double time_s)
 {
 	double place = (time_s - c->start_s) * c->rate_hz, whole = floor(place);
 	size_t k;
@@ -42,7 +42,7 @@ double curves_resultant(const struct curves_axes *axes, size_t k)
 
 	if (!script_good(y, k))
 		return (double)NAN;
-	return hypot(value_at(axes->x, axes->x_offset_g, script_time(y, k)),
+	return hypot(curves_value_at(axes->x, axes->x_offset_g, script_time(y, k)),
 	             y->value_g[k] - axes->y_offset_g);
 }
 

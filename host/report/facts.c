@@ -95,7 +95,7 @@ static bool tell_end(const struct record *r, char *line, size_t size)
 }
 
 /* "27 samples lost in 1 gap, 1 block" */
-static void tell_lost(const struct record *r, char *line, size_t size)
+static void facts_tell_lost(const struct record *r, char *line, size_t size)
 {
 	uint64_t blocks = missing_ticks(r);
 
@@ -114,7 +114,7 @@ bool report_verdict(const struct report *report, char *line, size_t size)
 	char end[96], lost[96];
 	bool open = tell_end(r, end, sizeof(end)), altered = (r->flags & RECORD_FLAG_ALTERED) != 0;
 
-	tell_lost(r, lost, sizeof(lost));
+	facts_tell_lost(r, lost, sizeof(lost));
 	if (r->lost_samples)
 		snprintf(line, size, "INCOMPLETE: %s%s%s", end, open ? "; " : "", lost);
 	else if (!r->is_drop)
@@ -290,7 +290,8 @@ struct noting {
 	unsigned flag;
 };
 
-static void note(struct noting *noting, double value, unsigned flags, const char *subject, const char *what)
+static void facts_note(struct noting *noting, double value, unsigned flags, const char *subject,
+                       const char *what)
 {
 	struct report_note *next = &noting->notes[noting->count];
 
@@ -313,18 +314,18 @@ size_t report_notes(const struct report *report, struct report_note notes[REPORT
 			const struct estimate_channel *e = &a->channels[i];
 			const char *name = report->record->channels[i].name;
 
-			note(&noting, e->peak.value_g, e->peak.how.flags, name, "peak");
-			note(&noting, e->pulse.velocity_change_m_s, e->pulse.flags & ESTIMATE_FLAG_ZERO, name,
-			     "velocity change");
-			note(&noting, e->pulse.contact_time_s, e->pulse.contact.flags, name, "contact");
+			facts_note(&noting, e->peak.value_g, e->peak.how.flags, name, "peak");
+			facts_note(&noting, e->pulse.velocity_change_m_s, e->pulse.flags & ESTIMATE_FLAG_ZERO,
+			           name, "velocity change");
+			facts_note(&noting, e->pulse.contact_time_s, e->pulse.contact.flags, name, "contact");
 		}
 		for (size_t i = 0; i < a->resultant_count; i++)
-			note(&noting, a->resultants[i].peak_g, a->resultants[i].how.flags,
-			     a->resultants[i].sensor, "resultant");
+			facts_note(&noting, a->resultants[i].peak_g, a->resultants[i].how.flags,
+			           a->resultants[i].sensor, "resultant");
 		if (report_driven(report))
-			note(&noting, a->lag.driven_s, a->lag.driven.flags, "S1", "driven lag");
+			facts_note(&noting, a->lag.driven_s, a->lag.driven.flags, "S1", "driven lag");
 		if (a->has_plate)
-			note(&noting, a->plate.frequency_hz, a->plate.how.flags, "plate", "frequency");
+			facts_note(&noting, a->plate.frequency_hz, a->plate.how.flags, "plate", "frequency");
 	}
 	return noting.count;
 }
@@ -449,7 +450,7 @@ static void measured_frequency(const struct estimate_ringdown *plate, struct rep
 }
 
 /* Rows of one prediction, with what was measured. */
-static size_t compare(const struct report *report, struct report_row rows[REPORT_ROWS_MAX])
+static size_t facts_compare(const struct report *report, struct report_row rows[REPORT_ROWS_MAX])
 {
 	const struct analysis *a = report->analysis;
 	const struct model_prediction *p = report->prediction;
@@ -491,12 +492,12 @@ size_t report_compare(const struct report *report, struct report_row rows[REPORT
 {
 	struct report_row below[REPORT_ROWS_MAX];
 	struct report lower = *report;
-	size_t count = compare(report, rows);
+	size_t count = facts_compare(report, rows);
 
 	lower.prediction = report->prediction ? report->below : NULL;
 	for (size_t i = 0; i < count; i++)
 		rows[i].rungs_apart = (double)NAN;
-	if (compare(&lower, below) == count)
+	if (facts_compare(&lower, below) == count)
 		for (size_t i = 0; i < count; i++)
 			rows[i].rungs_apart = fabs(below[i].predicted - rows[i].predicted);
 	return count;

@@ -11,7 +11,7 @@
 enum { CELL_MAX = 48, ROW_MAX = CELL_MAX * (ENSEMBLE_OUTPUTS + ENSEMBLE_KEYS_MAX) };
 
 /* A column is as wide as its head. */
-static int width_of(const char *key, int least)
+static int forecast_width_of(const char *key, int least)
 {
 	int length = (int)strlen(key);
 
@@ -129,7 +129,7 @@ struct sweep {
 	bool json;
 };
 
-static size_t cell(const struct sweep *s, char *to, const char *key, double value, bool first)
+static size_t forecast_cell(const struct sweep *s, char *to, const char *key, double value, bool first)
 {
 	const char *comma = first ? "" : s->json ? "," : " ";
 
@@ -137,10 +137,11 @@ static size_t cell(const struct sweep *s, char *to, const char *key, double valu
 		return (size_t)snprintf(to, CELL_MAX, "%s\"%s\":%.10g", comma, key, value);
 	if (s->json)
 		return (size_t)snprintf(to, CELL_MAX, "%s\"%s\":null", comma, key);
-	return (size_t)snprintf(to, CELL_MAX, "%s%*.6g", comma, width_of(key, 12), value);
+	return (size_t)snprintf(to, CELL_MAX, "%s%*.6g", comma, forecast_width_of(key, 12), value);
 }
 
-static size_t row(const struct sweep *s, char *to, const double varied[], const struct model_prediction *p)
+static size_t forecast_row(const struct sweep *s, char *to, const double varied[],
+                           const struct model_prediction *p)
 {
 	const struct ensemble *e = s->ensemble;
 	size_t at = 0;
@@ -148,10 +149,10 @@ static size_t row(const struct sweep *s, char *to, const double varied[], const 
 	if (s->json)
 		to[at++] = '{';
 	for (size_t i = 0; i < e->axes; i++)
-		at += cell(s, to + at, e->axis[i].key.key, varied[i], i == 0);
+		at += forecast_cell(s, to + at, e->axis[i].key.key, varied[i], i == 0);
 	for (size_t i = 0; i < s->count; i++)
-		at += cell(s, to + at, s->outputs[i]->key, p ? ensemble_value(p, s->outputs[i]) : (double)NAN,
-		           false);
+		at += forecast_cell(s, to + at, s->outputs[i]->key,
+		                    p ? ensemble_value(p, s->outputs[i]) : (double)NAN, false);
 	if (s->json)
 		at += (size_t)sprintf(to + at, ",\"fidelity\":%s%s%s}", p ? "\"" : "",
 		                      p ? p->fidelity : "null", p ? "\"" : "");
@@ -179,7 +180,7 @@ static void sweep_block(void *context, size_t first, size_t count, int thread)
 			s->text[thread][at++] = ',';
 		if (s->json && k > 0)
 			s->text[thread][at++] = '\n';
-		at += row(s, s->text[thread] + at, varied, drops ? &p : NULL);
+		at += forecast_row(s, s->text[thread] + at, varied, drops ? &p : NULL);
 		if (!s->json)
 			s->text[thread][at++] = '\n';
 	}
@@ -320,7 +321,7 @@ static void sensitivity_row(const struct vary_key *key, void *context)
 		if (t->builder)
 			put_number(t->builder, item, t->outputs[i]->key, percent[i]);
 		else
-			fprintf(t->out, " %*.4f", width_of(t->outputs[i]->key, 9), percent[i]);
+			fprintf(t->out, " %*.4f", forecast_width_of(t->outputs[i]->key, 9), percent[i]);
 	if (!t->builder)
 		fputc('\n', t->out);
 }

@@ -18,7 +18,7 @@ static const char *title(const struct report *report)
 	return slash ? slash + 1 : report->record->file;
 }
 
-static void head(struct page *page)
+static void html_head(struct page *page)
 {
 	const struct report *report = page->report;
 	const struct record *r = report->record;
@@ -80,7 +80,7 @@ static const char *axes_note(const struct estimate_resultant *r)
 	return r->axes_coincide ? "X and Y peak together" : "X and Y peak apart";
 }
 
-static void cards(struct page *page)
+static void html_cards(struct page *page)
 {
 	const struct analysis *a = page->report->analysis;
 	FILE *out = page->out;
@@ -186,11 +186,11 @@ static void foot(struct page *page)
 	page_end(out, page->report->version);
 }
 
-static void write_page(struct page *page)
+static void html_write_page(struct page *page)
 {
-	head(page);
+	html_head(page);
 	band(page);
-	cards(page);
+	html_cards(page);
 	flags(page);
 	page_pictures(page);
 	page_tables(page);
@@ -210,7 +210,7 @@ int report_html(const struct report *report, const char *file, char *message, si
 	snprintf(message, size, "%s", error_text(DT_E_MEMORY));
 	if (result)
 		return result;
-	write_page(&page);
+	html_write_page(&page);
 	result = text_close(&text, page.error);
 	if (!result)
 		result = whole_write(file, text.bytes, text.size, message, size);

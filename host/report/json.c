@@ -65,8 +65,8 @@ static cJSON *put_all(struct builder *b, cJSON *json, enum quantity_object which
 	return json;
 }
 
-static void put_channel(struct builder *b, cJSON *array, const struct channel *channel,
-                        const struct estimate_channel *e)
+static void json_put_channel(struct builder *b, cJSON *array, const struct channel *channel,
+                             const struct estimate_channel *e)
 {
 	cJSON *item = put_append(b, array), *pulse;
 
@@ -98,7 +98,7 @@ static void put_processing(struct builder *b, cJSON *root, const struct report *
 	put_all(b, item, QUANTITY_PROCESSING, done);
 }
 
-static void put_drop(struct builder *b, cJSON *root, const struct record *r, bool unattended)
+static void json_put_drop(struct builder *b, cJSON *root, const struct record *r, bool unattended)
 {
 	cJSON *drop, *counters, *gaps;
 
@@ -236,12 +236,12 @@ static cJSON *build(struct builder *b, const struct report *report)
 	put_flags(b, root, report_flags(report), record_flag_name);
 	put_all(b, root, QUANTITY_RECORD, r);
 	put_processing(b, root, report);
-	put_drop(b, root, r, report->unattended);
+	json_put_drop(b, root, r, report->unattended);
 	put_tower(b, root, r);
 	put_scene(b, root, report->scene);
 	channels = put_array(b, root, "channels");
 	for (size_t i = 0; i < a->channel_count; i++)
-		put_channel(b, channels, &r->channels[i], &a->channels[i]);
+		json_put_channel(b, channels, &r->channels[i], &a->channels[i]);
 	put_resultants(b, root, a);
 	lag = put_if(b, root, "lag", a->has_lag, QUANTITY_LAG, &a->lag);
 	if (lag)

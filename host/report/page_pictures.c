@@ -65,7 +65,7 @@ static bool any_model(const struct report *report)
 	return false;
 }
 
-static void legend(struct page *page)
+static void page_pictures_legend(struct page *page)
 {
 	const struct record *r = page->report->record;
 	bool two = record_axis(r, "S2X") != NULL;
@@ -105,7 +105,7 @@ static void traces(struct page *page)
 	fputs(any_model(page->report) ? ". The model is laid so that its S2 peaks where S2 did.</p>\n"
 	                              : ".</p>\n",
 	      page->out);
-	legend(page);
+	page_pictures_legend(page);
 	fputs("<div class=\"grid\">", page->out);
 	for (size_t i = 0; i < sizeof(order) / sizeof(order[0]); i++)
 		tower += record_axis(r, order[i]) != NULL;

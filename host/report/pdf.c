@@ -45,7 +45,7 @@ static bool find_browser(char program[PROGRAM_MAX])
 }
 
 /* Starts it in folder, where page.html is and page.pdf is wanted; 0 or errno. */
-static int start(const char *program, const char *folder, pid_t *pid)
+static int pdf_start(const char *program, const char *folder, pid_t *pid)
 {
 	char profile[FOLDER_MAX + 32], home[FOLDER_MAX + 32], temporary[FOLDER_MAX + 32],
 	        path[PROGRAM_MAX + 32];
@@ -76,7 +76,7 @@ static int start(const char *program, const char *folder, pid_t *pid)
 	                     pid);
 }
 
-static long now_ms(void)
+static long pdf_now_ms(void)
 {
 	struct timespec t;
 
@@ -85,16 +85,16 @@ static long now_ms(void)
 }
 
 /* Until it ends by itself, or is ended: 0, DT_E_TIMEOUT, DT_E_CLOSED, DT_E_SYSTEM. */
-static int wait_for(pid_t pid, int (*stop)(void))
+static int pdf_wait_for(pid_t pid, int (*stop)(void))
 {
 	struct pollfd end = {.fd = pidfd_open(pid, 0), .events = POLLIN};
-	long until_ms = now_ms() + LIMIT_MS;
+	long until_ms = pdf_now_ms() + LIMIT_MS;
 	int result = end.fd >= 0 ? 0 : DT_E_SYSTEM;
 
 	while (!result && poll(&end, 1, ASK_MS) <= 0) {
 		if (stop && stop())
 			result = DT_E_CLOSED;
-		else if (now_ms() >= until_ms)
+		else if (pdf_now_ms() >= until_ms)
 			result = DT_E_TIMEOUT;
 	}
 	if (end.fd >= 0)
@@ -103,7 +103,7 @@ static int wait_for(pid_t pid, int (*stop)(void))
 	return process_wait(pid) != 0 && result == 0 ? DT_E_SYSTEM : result;
 }
 
-static int fail(int result, const char *why, char *message, size_t size)
+static int pdf_fail(int result, const char *why, char *message, size_t size)
 {
 	snprintf(message, size, "no PDF: %s", why);
 	return result;
@@ -114,22 +114,22 @@ static int print_in(const char *folder, const char *program, int (*stop)(void), 
 {
 	char file[FOLDER_MAX + 32];
 	pid_t pid;
-	int result = start(program, folder, &pid);
+	int result = pdf_start(program, folder, &pid);
 
 	if (result) {
 		snprintf(message, size, "no PDF: %s: %s", program, strerror(result));
 		return DT_E_SYSTEM;
 	}
-	result = wait_for(pid, stop);
+	result = pdf_wait_for(pid, stop);
 	if (result == DT_E_TIMEOUT)
-		return fail(result, "the browser did not end within a minute", message, size);
+		return pdf_fail(result, "the browser did not end within a minute", message, size);
 	if (result == DT_E_CLOSED)
-		return fail(result, "interrupted", message, size);
+		return pdf_fail(result, "interrupted", message, size);
 	snprintf(file, sizeof(file), "%s/page.pdf", folder);
 	*pdf = result ? NULL : durable_read(file, pdf_length);
 	if (!*pdf || *pdf_length < 5 || memcmp(*pdf, "%PDF-", 5) != 0) {
 		free(*pdf);
-		return fail(DT_E_SYSTEM, "the browser failed", message, size);
+		return pdf_fail(DT_E_SYSTEM, "the browser failed", message, size);
 	}
 	return 0;
 }
@@ -143,10 +143,11 @@ int pdf_print(const char *page, size_t length, int (*stop)(void), char **pdf, si
 	int result;
 
 	if (!find_browser(program))
-		return fail(DT_E_UNKNOWN, "neither chromium, chromium-browser nor google-chrome is on PATH",
-		            message, size);
+		return pdf_fail(DT_E_UNKNOWN,
+		                "neither chromium, chromium-browser nor google-chrome is on PATH", message,
+		                size);
 	if (temporary_make(&folder, "pdf") != 0)
-		return fail(DT_E_SYSTEM, "no temporary folder", message, size);
+		return pdf_fail(DT_E_SYSTEM, "no temporary folder", message, size);
 	snprintf(file, sizeof(file), "%s/page.html", folder.path);
 	result = whole_write(file, page, length, message, size);
 	if (!result)

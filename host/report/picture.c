@@ -9,7 +9,7 @@
 #include "common/base/process.h"
 
 /* gnuplot's complaint: the first line of its error stream that says something. */
-static void complain(int fd, char *message, size_t size)
+static void picture_complain(int fd, char *message, size_t size)
 {
 	size_t length;
 	char *text = process_read(fd, &length);
@@ -19,7 +19,8 @@ static void complain(int fd, char *message, size_t size)
 	free(text);
 }
 
-static int collect(const struct process_streams *streams, int status, char **svg, char *message, size_t size)
+static int picture_collect(const struct process_streams *streams, int status, char **svg, char *message,
+                           size_t size)
 {
 	size_t length;
 	char *text;
@@ -35,7 +36,7 @@ static int collect(const struct process_streams *streams, int status, char **svg
 		return DT_E_SYSTEM;
 	}
 	if (status > 0 || !strstr(text, "</svg>")) {
-		complain(streams->fd[2], message, size);
+		picture_complain(streams->fd[2], message, size);
 		free(text);
 		return DT_E_SYSTEM;
 	}
@@ -53,7 +54,7 @@ int picture_draw(const char *script, size_t length, char **svg, char *message, s
 		snprintf(message, size, "no file in memory for gnuplot: %s", strerror(result));
 		return DT_E_SYSTEM;
 	}
-	result = collect(&streams, process_filter(gnuplot, &streams), svg, message, size);
+	result = picture_collect(&streams, process_filter(gnuplot, &streams), svg, message, size);
 	process_streams_close(&streams);
 	return result;
 }

@@ -84,7 +84,7 @@ static void put_property(struct builder *b, cJSON *properties, const struct quan
 }
 
 /* The schema of the object at a place: "pulse.contact" is contact within pulse. */
-static cJSON *at(struct builder *b, cJSON *root, const struct quantity_home *home)
+static cJSON *schema_at(struct builder *b, cJSON *root, const struct quantity_home *home)
 {
 	cJSON *node = root;
 	const char *path = home->path;
@@ -120,7 +120,7 @@ int report_schema(FILE *out)
 	put_text(&b, version, "description", "version of this table");
 	put_text(&b, version, "const", quantity_version());
 	for (int p = 0; p < QUANTITY_PLACES; p++) {
-		cJSON *node = at(&b, root, &quantity_homes[p]);
+		cJSON *node = schema_at(&b, root, &quantity_homes[p]);
 		cJSON *properties = within(&b, node, "properties"),
 		      *required = put_array(&b, node, "required");
 		const struct quantity *q = NULL;

@@ -14,7 +14,7 @@
 /* ---- what the archive has ---- */
 
 /* Texts of the archive are valid during a call: each is copied, and its pointer set to the copy. */
-static void keep(char to[ARCHIVE_TEXT_MAX + 1], const char **text)
+static void series_keep(char to[ARCHIVE_TEXT_MAX + 1], const char **text)
 {
 	if (!*text)
 		return;
@@ -22,7 +22,7 @@ static void keep(char to[ARCHIVE_TEXT_MAX + 1], const char **text)
 	*text = to;
 }
 
-static int take_series(void *context, const struct archive_series *series)
+static int series_take_series(void *context, const struct archive_series *series)
 {
 	struct series_page *page = context;
 	struct archive_series *s = &page->series;
@@ -31,11 +31,11 @@ static int take_series(void *context, const struct archive_series *series)
 	*s = *series;
 	s->scene = "";
 	for (size_t i = 0; i < sizeof(texts) / sizeof(texts[0]); i++)
-		keep(page->text[i], texts[i]);
+		series_keep(page->text[i], texts[i]);
 	return 0;
 }
 
-static int take_drop(void *context, const struct archive_drop *drop)
+static int series_take_drop(void *context, const struct archive_drop *drop)
 {
 	struct series_page *page = context;
 	struct series_drop *d = calloc(1, sizeof(*d)), **more = page->drop;
@@ -59,7 +59,7 @@ static int take_drop(void *context, const struct archive_drop *drop)
 	                                    &a->note,    &a->raw,      &a->sha256,    &a->time,
 	                                    &a->version, &a->flags,    &a->quantities};
 	for (size_t i = 0; i < SERIES_TEXTS; i++)
-		keep(d->text[i], texts[i]);
+		series_keep(d->text[i], texts[i]);
 	return 0;
 }
 
@@ -214,7 +214,7 @@ static int tell_all_lacking(struct series_page *page)
 	return DT_E_CORRUPT;
 }
 
-static int gather(struct series_page *page)
+static int series_gather(struct series_page *page)
 {
 	struct archive *archive = page->request->archive;
 	struct archive_filter filter = archive_filter_none();
@@ -222,9 +222,9 @@ static int gather(struct series_page *page)
 
 	filter.series = page->request->series;
 	if (result == 0)
-		result = archive_each_series(archive, &filter, take_series, page);
+		result = archive_each_series(archive, &filter, series_take_series, page);
 	if (result == 0)
-		result = archive_each_drop(archive, &filter, take_drop, page);
+		result = archive_each_drop(archive, &filter, series_take_drop, page);
 	if (result == 0)
 		result = archive_seal(archive, &page->seal);
 	if (result == 0)
@@ -246,7 +246,7 @@ static int gather(struct series_page *page)
 	return result;
 }
 
-static void release(struct series_page *page)
+static void series_release(struct series_page *page)
 {
 	for (size_t i = 0; i < page->count; i++) {
 		free(page->drop[i]->analysis.channels);
@@ -271,7 +271,7 @@ size_t series_counted(const struct series_page *page)
 	return counted;
 }
 
-static int write_page(struct series_page *page)
+static int series_write_page(struct series_page *page)
 {
 	series_head(page);
 	series_subject(page);
@@ -301,9 +301,9 @@ int series_report_html(const struct series_report *request, FILE *out, char *mes
 		return DT_E_MEMORY;
 	page->request = request;
 	page->page = (struct page){.out = out, .message = message, .size = size};
-	result = gather(page);
+	result = series_gather(page);
 	if (result == 0)
-		result = write_page(page);
-	release(page);
+		result = series_write_page(page);
+	series_release(page);
 	return result;
 }

@@ -161,7 +161,7 @@ static void card(struct series_page *page, const char *label, enum archive_value
 	page_end_card(page->page.out, unit, note);
 }
 
-static void cards(struct series_page *page)
+static void series_head_cards(struct series_page *page)
 {
 	fputs("<div class=\"cards\">", page->page.out);
 	card(page, "S1, resultant peak, mean", ARCHIVE_S1_R, 1.0, 1, "g");
@@ -197,7 +197,7 @@ void series_head(struct series_page *page)
 	fprintf(out, "</span></p>\n<div class=\"verdict %s\">%s %s</div>\n", good ? "good" : "bad",
 	        good ? "&#10003;" : "&#9888;", line);
 	simulated(page);
-	cards(page);
+	series_head_cards(page);
 }
 
 /* ---- what and how ---- */

@@ -12,7 +12,7 @@ static bool any_clipped(const struct series_page *page)
 	return false;
 }
 
-static void legend(const struct series_page *page)
+static void series_pictures_legend(const struct series_page *page)
 {
 	FILE *out = page->page.out;
 
@@ -146,7 +146,7 @@ void series_pictures(struct series_page *page)
 	      out);
 	fputs(page->has_model ? " The model is laid so that its S2 peaks where S2 did.</p>\n" : "</p>\n",
 	      out);
-	legend(page);
+	series_pictures_legend(page);
 	fputs("<div class=\"grid\">", out);
 	picture_over(page, 0, 'X');
 	picture_over(page, 1, 'X');

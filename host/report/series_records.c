@@ -105,7 +105,7 @@ static void add_statuses(struct remarks *remarks, const struct series_drop *drop
 	add_status(remarks, drop, ARCHIVE_FREQUENCY, "plate", a->plate.how.status);
 }
 
-static void add_drop(struct remarks *remarks, const struct series_drop *drop)
+static void series_records_add_drop(struct remarks *remarks, const struct series_drop *drop)
 {
 	struct report_note note[REPORT_NOTES_MAX];
 	size_t notes = report_notes(&drop->report, note);
@@ -130,7 +130,7 @@ static void add_drop(struct remarks *remarks, const struct series_drop *drop)
 }
 
 /* All remarks with the flag of the first one, in one sentence; marks them as told. */
-static void tell(FILE *out, struct remarks *remarks, size_t first, size_t counted)
+static void series_records_tell(FILE *out, struct remarks *remarks, size_t first, size_t counted)
 {
 	const struct remark *head = &remarks->item[first];
 	unsigned flag = head->flag;
@@ -176,12 +176,12 @@ void series_remarks(struct series_page *page)
 	}
 	for (size_t i = 0; i < page->count; i++)
 		if (page->drop[i]->counts && page->drop[i]->has_result)
-			add_drop(remarks, page->drop[i]);
+			series_records_add_drop(remarks, page->drop[i]);
 	if (remarks->count)
 		fputs("<h2>Remarks on the drops that count</h2>\n<ul>", out);
 	for (size_t i = 0; i < remarks->count; i++)
 		if (remarks->item[i].flag)
-			tell(out, remarks, i, series_counted(page));
+			series_records_tell(out, remarks, i, series_counted(page));
 	if (remarks->count)
 		fputs("</ul>\n", out);
 	free(remarks);
@@ -288,7 +288,7 @@ static int history_row(void *context, const struct archive_event *event)
 	return 0;
 }
 
-static int history(struct series_page *page)
+static int series_records_history(struct series_page *page)
 {
 	struct history h = {.out = page->page.out};
 	int result = 0;
@@ -327,7 +327,7 @@ void series_records(struct series_page *page)
 
 	if (page->count) {
 		logs(page);
-		result = history(page);
+		result = series_records_history(page);
 	}
 	fputs("<h2>Calibrations noted</h2>\n", h.out);
 	if (result == 0)

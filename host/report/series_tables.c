@@ -19,7 +19,7 @@ struct drop_row {
 	struct table_value value[ARCHIVE_VALUE_COUNT];
 };
 
-static void put_drop(struct table *table, const struct series_drop *drop)
+static void series_tables_put_drop(struct table *table, const struct series_drop *drop)
 {
 	struct drop_row row = {.decision = series_decision(drop)};
 
@@ -76,7 +76,7 @@ static void put_table(const struct series_page *page, bool in_g)
 	}
 	table_begin(&table, column, count);
 	for (size_t i = 0; i < page->count; i++)
-		put_drop(&table, page->drop[i]);
+		series_tables_put_drop(&table, page->drop[i]);
 	if (page->cell.drops)
 		put_total(&table, &page->cell);
 	(void)table_end(&table);

@@ -51,8 +51,8 @@ static struct script_range range_of(const struct series_page *page, char axis)
 }
 
 /* $name, the model with its first touch at touch_s; false when there is none to lay. */
-static bool write_model(FILE *out, const struct series_page *page, const char *name, enum model_axis axis,
-                        double touch_s)
+static bool series_traces_write_model(FILE *out, const struct series_page *page, const char *name,
+                                      enum model_axis axis, double touch_s)
 {
 	double value_g[SCRIPT_CURVE_POINTS];
 
@@ -82,7 +82,8 @@ static double mean_touch(const struct series_page *page)
 bool series_traces_over(FILE *out, const struct series_page *page, size_t sensor, char axis)
 {
 	size_t drawn = 0;
-	bool model = write_model(out, page, "model", model_axis(sensor, axis), mean_touch(page));
+	bool model =
+	        series_traces_write_model(out, page, "model", model_axis(sensor, axis), mean_touch(page));
 
 	for (size_t i = 0; i < page->count; i++) {
 		const struct series_drop *d = page->drop[i];
@@ -112,8 +113,8 @@ struct layer {
 	bool samples, clipped, model;
 };
 
-static struct layer write_layer(FILE *out, const struct series_page *page, const struct series_drop *drop,
-                                size_t sensor, char axis)
+static struct layer series_traces_write_layer(FILE *out, const struct series_page *page,
+                                              const struct series_drop *drop, size_t sensor, char axis)
 {
 	const struct channel *c = channel_of(drop, sensor, axis);
 	struct script_window window = window_of(page, drop);
@@ -127,7 +128,7 @@ static struct layer write_layer(FILE *out, const struct series_page *page, const
 	snprintf(name, sizeof(name), "%sclipped", sensors[sensor]);
 	layer.clipped = script_clipped(out, name, c, offset_of(drop, c), drop->zero.time_s, window) > 0;
 	snprintf(name, sizeof(name), "%smodel", sensors[sensor]);
-	layer.model = write_model(out, page, name, model_axis(sensor, axis), drop->model_s);
+	layer.model = series_traces_write_model(out, page, name, model_axis(sensor, axis), drop->model_s);
 	script_bands(out, c, drop->zero.time_s, window);
 	return layer;
 }
@@ -137,7 +138,7 @@ bool series_traces_drop(FILE *out, const struct series_page *page, const struct 
 	struct layer layer[2];
 
 	for (size_t s = 0; s < 2; s++)
-		layer[s] = write_layer(out, page, drop, s, axis);
+		layer[s] = series_traces_write_layer(out, page, drop, s, axis);
 	if (!layer[0].samples && !layer[1].samples)
 		return false;
 	script_axes(out, 560, 250, page->window, 0.0, range_of(page, axis));

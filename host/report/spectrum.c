@@ -106,8 +106,8 @@ static void put_limit(struct builder *b, cJSON *item, const struct spectrum_repo
 	put_number(b, limit, "checked_frequencies", (double)verdict->checked);
 }
 
-static void put_channel(struct builder *b, cJSON *array, const struct spectrum_report *report,
-                        const struct spectrum_channel *c)
+static void spectrum_put_channel(struct builder *b, cJSON *array, const struct spectrum_report *report,
+                                 const struct spectrum_channel *c)
 {
 	const struct spectrum *s = report->spectrum;
 	const char *unit = srs_quantity_units[report->options->srs.quantity];
@@ -146,7 +146,7 @@ int spectrum_json(const struct spectrum_report *report, FILE *out)
 		put_item(&b, root, "pass", cJSON_CreateNull());
 	channels = put_array(&b, root, "channels");
 	for (size_t c = 0; c < report->spectrum->channel_count; c++)
-		put_channel(&b, channels, report, &report->spectrum->channel[c]);
+		spectrum_put_channel(&b, channels, report, &report->spectrum->channel[c]);
 	return put_out(&b, root, out);
 }
 

@@ -10,7 +10,7 @@
 
 enum { TEXT_GAPS_MAX = 8, TEXT_WIDTH = 90 };
 
-static void cell(FILE *out, int width, int decimals, double value)
+static void text_cell(FILE *out, int width, int decimals, double value)
 {
 	if (isfinite(value))
 		fprintf(out, " %*.*f", width, decimals, value);
@@ -20,7 +20,7 @@ static void cell(FILE *out, int width, int decimals, double value)
 
 /* Writes text behind what ends at column, a blank before each word, its last one followed by end; no line
  * becomes longer than the table. Returns the column after it. */
-static int fill(FILE *out, int column, const char *text, const char *end)
+static int text_fill(FILE *out, int column, const char *text, const char *end)
 {
 	while (*text) {
 		size_t length = strcspn(text, " ");
@@ -50,7 +50,7 @@ static void write_flagged(const struct report *report, unsigned flag, int column
 		if (!(a->channels[i].flags & flag))
 			continue;
 		snprintf(name, sizeof(name), "%s%s", named++ ? "" : "(", report->record->channels[i].name);
-		column = fill(out, column, name, named == flagged ? ")" : ",");
+		column = text_fill(out, column, name, named == flagged ? ")" : ",");
 	}
 }
 
@@ -86,7 +86,7 @@ static void write_head(const struct report *report, FILE *out)
 	fprintf(out, "%s\n", verdict);
 	measured_text(r, tower, sizeof(tower));
 	if (tower[0] != '\0') {
-		(void)fill(out, fprintf(out, "tower:"), tower, "");
+		(void)text_fill(out, fprintf(out, "tower:"), tower, "");
 		fputc('\n', out);
 	}
 	write_flags(report, out);
@@ -122,14 +122,14 @@ static void write_channels(const struct report *report, const struct report_zero
 		char status[48];
 
 		fprintf(out, "%-*s", width, report->record->channels[i].name);
-		cell(out, 8, 1, report->record->channels[i].rate_hz);
-		cell(out, 9, 2, e->peak.value_g);
-		cell(out, 7, 2, e->peak.sigma_g);
-		cell(out, 9, 3, (e->peak.time_s - zero->time_s) * 1e3);
-		cell(out, 7, 1, e->peak.sigma_time_s * 1e6);
-		cell(out, 9, 3, e->pulse.duration_s * 1e3);
-		cell(out, 9, 3, e->pulse.velocity_change_m_s);
-		cell(out, 8, 2, e->baseline.noise_g);
+		text_cell(out, 8, 1, report->record->channels[i].rate_hz);
+		text_cell(out, 9, 2, e->peak.value_g);
+		text_cell(out, 7, 2, e->peak.sigma_g);
+		text_cell(out, 9, 3, (e->peak.time_s - zero->time_s) * 1e3);
+		text_cell(out, 7, 1, e->peak.sigma_time_s * 1e6);
+		text_cell(out, 9, 3, e->pulse.duration_s * 1e3);
+		text_cell(out, 9, 3, e->pulse.velocity_change_m_s);
+		text_cell(out, 8, 2, e->baseline.noise_g);
 		fprintf(out, "  %s\n", report_channel_status(e, status, sizeof(status)));
 	}
 	for (size_t i = 0; i < report->analysis->resultant_count; i++) {
@@ -138,10 +138,10 @@ static void write_channels(const struct report *report, const struct report_zero
 
 		snprintf(name, sizeof(name), "%s XY", r->sensor);
 		fprintf(out, "%-*s %8s", width, name, "");
-		cell(out, 9, 2, r->peak_g);
-		cell(out, 7, 2, r->sigma_g);
-		cell(out, 9, 3, (r->time_s - zero->time_s) * 1e3);
-		cell(out, 7, 1, r->sigma_time_s * 1e6);
+		text_cell(out, 9, 2, r->peak_g);
+		text_cell(out, 7, 2, r->sigma_g);
+		text_cell(out, 9, 3, (r->time_s - zero->time_s) * 1e3);
+		text_cell(out, 7, 1, r->sigma_time_s * 1e6);
 		fprintf(out, "  %s", estimate_status_name(r->how.status));
 		if (isfinite(r->axes_apart_s))
 			fprintf(out,
@@ -157,10 +157,10 @@ static void write_channels(const struct report *report, const struct report_zero
 /* " 1.9026 +- 0.0012" */
 static void with_sigma(FILE *out, int decimals, double value, double sigma)
 {
-	cell(out, 1, decimals, value);
+	text_cell(out, 1, decimals, value);
 	if (isfinite(sigma)) {
 		fprintf(out, " +-");
-		cell(out, 1, decimals, sigma);
+		text_cell(out, 1, decimals, sigma);
 	}
 }
 
@@ -178,7 +178,7 @@ static void write_quantity(const struct quantity *q, const void *object, FILE *o
 	fputs(behind + 1, out);
 }
 
-static void write_all(enum quantity_object which, const void *object, FILE *out)
+static void text_write_all(enum quantity_object which, const void *object, FILE *out)
 {
 	const struct quantity *q = NULL;
 
@@ -192,22 +192,22 @@ static void write_lag(const struct report *report, FILE *out)
 
 	fprintf(out, "S1 after S2:");
 	if (report_driven(report))
-		write_all(QUANTITY_DRIVEN, lag, out);
-	write_all(QUANTITY_LAG, lag, out);
+		text_write_all(QUANTITY_DRIVEN, lag, out);
+	text_write_all(QUANTITY_LAG, lag, out);
 	fprintf(out, "  %s\n", estimate_status_name(lag->status));
 }
 
 static void write_plate(const struct estimate_ringdown *plate, FILE *out)
 {
 	fprintf(out, "plate:");
-	write_all(QUANTITY_RINGDOWN, plate, out);
+	text_write_all(QUANTITY_RINGDOWN, plate, out);
 	fprintf(out, "  (%s) %s\n", plate->how.method, estimate_status_name(plate->how.status));
 }
 
 static void write_rebound(const struct estimate_rebound *rebound, FILE *out)
 {
 	fprintf(out, "rebound:");
-	write_all(QUANTITY_REBOUND, rebound, out);
+	text_write_all(QUANTITY_REBOUND, rebound, out);
 	fprintf(out, "  %s\n", estimate_status_name(rebound->status));
 }
 
@@ -238,15 +238,15 @@ static void write_notes(const struct report *report, FILE *out)
 
 		if (first)
 			column = fprintf(out, "note:");
-		column = fill(out, column, notes[i].of, last ? ":" : ",");
+		column = text_fill(out, column, notes[i].of, last ? ":" : ",");
 		if (!last)
 			continue;
-		fill(out, column, report_note_words(notes[i].flag), "");
+		text_fill(out, column, report_note_words(notes[i].flag), "");
 		fputc('\n', out);
 	}
 }
 
-static void write_model(const struct report *report, FILE *out)
+static void text_write_model(const struct report *report, FILE *out)
 {
 	struct report_row rows[REPORT_ROWS_MAX];
 	size_t count = report_compare(report, rows);
@@ -260,9 +260,9 @@ static void write_model(const struct report *report, FILE *out)
 	for (size_t i = 0; i < count; i++) {
 		compared |= isfinite(rows[i].measured);
 		fprintf(out, "%-17s %2s", rows[i].label, rows[i].unit);
-		cell(out, 10, rows[i].decimals, rows[i].predicted * rows[i].scale);
-		cell(out, 10, rows[i].decimals, rows[i].measured * rows[i].scale);
-		cell(out, 8, rows[i].decimals, rows[i].sigma * rows[i].scale);
+		text_cell(out, 10, rows[i].decimals, rows[i].predicted * rows[i].scale);
+		text_cell(out, 10, rows[i].decimals, rows[i].measured * rows[i].scale);
+		text_cell(out, 8, rows[i].decimals, rows[i].sigma * rows[i].scale);
 		if (isfinite(rows[i].difference_percent))
 			fprintf(out, " %+10.1f %%\n", rows[i].difference_percent);
 		else
@@ -273,11 +273,11 @@ static void write_model(const struct report *report, FILE *out)
 		      "recorded this.\n",
 		      out);
 	column = fprintf(out, "Model %s,", report->prediction->fidelity);
-	fill(out, column, report->prediction->reason, ".");
+	text_fill(out, column, report->prediction->reason, ".");
 	fputc('\n', out);
 }
 
-static void write_frames(const struct record *r, FILE *out)
+static void text_write_frames(const struct record *r, FILE *out)
 {
 	const struct record_counters *c = &r->counters;
 
@@ -309,8 +309,8 @@ int report_text(const struct report *report, FILE *out)
 	write_channels(report, &zero, out);
 	write_joint(report, out);
 	write_notes(report, out);
-	write_model(report, out);
+	text_write_model(report, out);
 	shock_write(report, zero.time_s, out);
-	write_frames(report->record, out);
+	text_write_frames(report->record, out);
 	return fflush(out) != 0 || ferror(out) ? DT_E_SYSTEM : 0;
 }

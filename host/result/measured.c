@@ -41,7 +41,7 @@ struct measured measured_of(const struct record *record)
 
 /* Behind what stands there, and only with a value. */
 static void __attribute__((format(printf, 4, 0)))
-add(char *text, size_t size, double value, const char *format, ...)
+measured_add(char *text, size_t size, double value, const char *format, ...)
 {
 	size_t length = strlen(text);
 	va_list arguments;
@@ -60,14 +60,14 @@ void measured_text(const struct record *record, char *text, size_t size)
 	struct measured m = measured_of(record);
 
 	text[0] = '\0';
-	add(text, size, m.dropout_s, "magnet drop-out %.2f ms (planned with %.2f ms%s)", m.dropout_s * 1e3,
-	    m.dropout_used_s * 1e3, m.calibrated ? ", calibrated" : "");
-	add(text, size, m.separation_m, "separated at %.1f mm", m.separation_m * 1e3);
-	add(text, size, m.separation_speed_m_s, "%.3f m/s", m.separation_speed_m_s);
-	add(text, size, m.acceleration_m_s2, "frame %.3f m/s2", m.acceleration_m_s2);
-	add(text, size, m.latch_delay_s, "latch %.1f ms", m.latch_delay_s * 1e3);
-	add(text, size, m.clock_ratio_ppm, "clock ratio %+.0f ppm", m.clock_ratio_ppm);
-	add(text, size, m.trigger_latency_s, "trigger after %.2f ms", m.trigger_latency_s * 1e3);
+	measured_add(text, size, m.dropout_s, "magnet drop-out %.2f ms (planned with %.2f ms%s)",
+	             m.dropout_s * 1e3, m.dropout_used_s * 1e3, m.calibrated ? ", calibrated" : "");
+	measured_add(text, size, m.separation_m, "separated at %.1f mm", m.separation_m * 1e3);
+	measured_add(text, size, m.separation_speed_m_s, "%.3f m/s", m.separation_speed_m_s);
+	measured_add(text, size, m.acceleration_m_s2, "frame %.3f m/s2", m.acceleration_m_s2);
+	measured_add(text, size, m.latch_delay_s, "latch %.1f ms", m.latch_delay_s * 1e3);
+	measured_add(text, size, m.clock_ratio_ppm, "clock ratio %+.0f ppm", m.clock_ratio_ppm);
+	measured_add(text, size, m.trigger_latency_s, "trigger after %.2f ms", m.trigger_latency_s * 1e3);
 	if (record->crc_known && record->seal_known)
-		add(text, size, 0.0, "parameters %08" PRIx32, record->parameters_crc32);
+		measured_add(text, size, 0.0, "parameters %08" PRIx32, record->parameters_crc32);
 }

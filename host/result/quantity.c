@@ -159,7 +159,7 @@ bool quantity_words(const struct quantity *quantity, const void *object, char te
 	return true;
 }
 
-static unsigned flags_of(const char *text)
+static unsigned quantity_flags_of(const char *text)
 {
 	unsigned flags = 0;
 
@@ -188,7 +188,7 @@ void quantity_set_text(const struct quantity *quantity, void *object, const char
 	void *at = (char *)object + quantity->offset;
 
 	if (quantity->kind == QUANTITY_FLAGS)
-		*(unsigned *)at = flags_of(text);
+		*(unsigned *)at = quantity_flags_of(text);
 	else if (quantity->kind == QUANTITY_STATUS)
 		*(enum estimate_status *)at = status_of(text);
 	else if (quantity->kind == QUANTITY_NAME)

@@ -15,7 +15,7 @@
 
 enum { LINE_MAX_BYTES = 512, WORD_MAX_BYTES = 64 };
 
-static bool find(char path[PATH_MAX])
+static bool journal_find(char path[PATH_MAX])
 {
 	const char *named = getenv("DROPTOWER_JOURNAL"), *state = getenv("XDG_STATE_HOME"),
 	           *home = getenv("HOME");
@@ -72,7 +72,7 @@ void journal_sender(const char *program, char *text, size_t size)
 }
 
 /* A name or a text of others must not make a line of its own, nor a column where it is to be one. */
-static void put(char *line, size_t size, const char *text, bool word)
+static void journal_put(char *line, size_t size, const char *text, bool word)
 {
 	size_t at = strlen(line);
 
@@ -86,7 +86,7 @@ static void put(char *line, size_t size, const char *text, bool word)
 	line[at] = '\0';
 }
 
-static void compose(const struct journal_line *entry, char *line, size_t size)
+static void journal_compose(const struct journal_line *entry, char *line, size_t size)
 {
 	char user[64];
 	struct timespec now;
@@ -98,12 +98,12 @@ static void compose(const struct journal_line *entry, char *line, size_t size)
 	snprintf(line, size, "%04d-%02d-%02dT%02d:%02d:%02d.%03ldZ %s[%d] ", utc.tm_year + 1900,
 	         utc.tm_mon + 1, utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec, now.tv_nsec / 1000000,
 	         entry->program, (int)getpid());
-	put(line, size, entry->who != NULL && entry->who[0] != '\0' ? entry->who : user, true);
+	journal_put(line, size, entry->who != NULL && entry->who[0] != '\0' ? entry->who : user, true);
 	snprintf(line + strlen(line), size - strlen(line), " session %08x ", entry->session);
-	put(line, size, entry->verb, true);
-	put(line, size, entry->refusal != NULL ? " refused: " : " taken", false);
+	journal_put(line, size, entry->verb, true);
+	journal_put(line, size, entry->refusal != NULL ? " refused: " : " taken", false);
 	if (entry->refusal != NULL)
-		put(line, size, entry->refusal, false);
+		journal_put(line, size, entry->refusal, false);
 }
 
 void journal_write(const struct journal_line *entry)
@@ -114,11 +114,11 @@ void journal_write(const struct journal_line *entry)
 	ssize_t written = -1;
 	size_t length;
 
-	compose(entry, line, sizeof(line) - 1);
+	journal_compose(entry, line, sizeof(line) - 1);
 	length = strlen(line);
 	line[length++] = '\n';
 	errno = ENOENT;
-	if (find(path))
+	if (journal_find(path))
 		fd = open_journal(path);
 	if (fd >= 0)
 		written = write(fd, line, length);

@@ -46,7 +46,7 @@ static bool is_bound(int fd, unsigned port)
 	       ntohs(address.sin_port) == port;
 }
 
-static int confine(int fd)
+static int session_loopback_confine(int fd)
 {
 	const uint32_t packet_type = (uint32_t)SKF_AD_OFF + SKF_AD_PKTTYPE,
 	               interface = (uint32_t)SKF_AD_OFF + SKF_AD_IFINDEX;
@@ -78,7 +78,7 @@ int loopback_confine(const char *url)
 
 		if (entry->d_name[0] == '.' || !is_bound(fd, port))
 			continue;
-		result = confine(fd);
+		result = session_loopback_confine(fd);
 		found = true;
 	}
 	closedir(fds);

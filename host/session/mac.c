@@ -16,8 +16,8 @@
 
 /* ---- the key ---- */
 
-__attribute__((format(printf, 2, 3))) static int refuse(char message[MAC_MESSAGE_MAX], const char *format,
-                                                        ...)
+__attribute__((format(printf, 2, 3))) static int mac_refuse(char message[MAC_MESSAGE_MAX], const char *format,
+                                                            ...)
 {
 	va_list arguments;
 
@@ -30,17 +30,18 @@ __attribute__((format(printf, 2, 3))) static int refuse(char message[MAC_MESSAGE
 static int check_key(const char *path, const struct stat *file, char message[MAC_MESSAGE_MAX])
 {
 	if (!S_ISREG(file->st_mode))
-		return refuse(message, "%.160s: not a regular file, expected a key file", path);
+		return mac_refuse(message, "%.160s: not a regular file, expected a key file", path);
 	if (file->st_uid != geteuid() && file->st_uid != 0)
-		return refuse(message,
-		              "%.120s: belongs to user %u, expected a key file of user %u or of root", path,
-		              (unsigned)file->st_uid, (unsigned)geteuid());
+		return mac_refuse(message,
+		                  "%.120s: belongs to user %u, expected a key file of user %u or of root",
+		                  path, (unsigned)file->st_uid, (unsigned)geteuid());
 	if ((file->st_mode & 077) != 0)
-		return refuse(message, "%.120s: mode %04o, expected 0600: a key that others may read is none",
-		              path, (unsigned)(file->st_mode & 07777));
+		return mac_refuse(message,
+		                  "%.120s: mode %04o, expected 0600: a key that others may read is none",
+		                  path, (unsigned)(file->st_mode & 07777));
 	if (file->st_size < MAC_KEY_MIN || file->st_size > MAC_KEY_MAX)
-		return refuse(message, "%.120s: %lld bytes, expected a key of %d to %d", path,
-		              (long long)file->st_size, MAC_KEY_MIN, MAC_KEY_MAX);
+		return mac_refuse(message, "%.120s: %lld bytes, expected a key of %d to %d", path,
+		                  (long long)file->st_size, MAC_KEY_MIN, MAC_KEY_MAX);
 	return 0;
 }
 
@@ -50,7 +51,7 @@ static int read_open_key(int fd, const char *path, struct mac_key *key, char mes
 	int result;
 
 	if (fstat(fd, &file) != 0)
-		return refuse(message, "%.160s: %s, expected a key file", path, strerror(errno));
+		return mac_refuse(message, "%.160s: %s, expected a key file", path, strerror(errno));
 	result = check_key(path, &file, message);
 	if (result != 0)
 		return result;
@@ -61,8 +62,8 @@ static int read_open_key(int fd, const char *path, struct mac_key *key, char mes
 		if (got < 0 && errno == EINTR)
 			continue;
 		if (got <= 0)
-			return refuse(message, "%.160s: %s, expected a key file", path,
-			              got < 0 ? strerror(errno) : "it became shorter");
+			return mac_refuse(message, "%.160s: %s, expected a key file", path,
+			                  got < 0 ? strerror(errno) : "it became shorter");
 		key->size += (size_t)got;
 	}
 	return 0;
@@ -74,7 +75,7 @@ int mac_read_key(const char *path, struct mac_key *key, char message[MAC_MESSAGE
 	int result;
 
 	if (fd < 0)
-		return refuse(message, "%.160s: %s, expected a key file", path, strerror(errno));
+		return mac_refuse(message, "%.160s: %s, expected a key file", path, strerror(errno));
 	result = read_open_key(fd, path, key, message);
 	close(fd);
 	return result;
@@ -127,8 +128,8 @@ const char *mac_text(enum mac_refusal refusal)
 	return (unsigned)refusal < MAC_REFUSALS ? texts[refusal] : "refused";
 }
 
-static enum mac_refusal judge(const struct mac_taker *taker, const void *bytes, size_t size, int64_t now_us,
-                              const droptower_command *command)
+static enum mac_refusal session_mac_judge(const struct mac_taker *taker, const void *bytes, size_t size,
+                                          int64_t now_us, const droptower_command *command)
 {
 	if (taker->key == NULL)
 		return MAC_CLOSED;
@@ -147,7 +148,7 @@ enum mac_refusal mac_judge(struct mac_taker *taker, const void *bytes, size_t si
 	enum mac_refusal refusal = MAC_FORM;
 
 	if (size <= INT32_MAX && droptower_command_decode(bytes, 0, (int)size, command) == (int)size)
-		refusal = judge(taker, bytes, size, now_us, command);
+		refusal = session_mac_judge(taker, bytes, size, now_us, command);
 	if (refusal == MAC_TAKEN)
 		taker->counter = command->counter;
 	taker->refused[refusal]++;

@@ -44,7 +44,7 @@ void publisher_close(struct publisher *publisher)
 }
 
 /* LCM opens its socket with the first subscription. What came before it was confined is thrown away. */
-static int confine(struct publisher *publisher)
+static int publish_confine(struct publisher *publisher)
 {
 	publisher->listening = true;
 	if (!loopback_only(publisher->url))
@@ -69,7 +69,7 @@ int publisher_listen(struct publisher *publisher, const char *channel, lcm_msg_h
 
 	if (!publisher->listening) {
 		subscription = lcm_subscribe(publisher->lcm, "DT_.*", ignore, NULL);
-		if (subscription == NULL || confine(publisher) != 0)
+		if (subscription == NULL || publish_confine(publisher) != 0)
 			return DT_E_LINK;
 		lcm_unsubscribe(publisher->lcm, subscription);
 	}
@@ -78,7 +78,7 @@ int publisher_listen(struct publisher *publisher, const char *channel, lcm_msg_h
 	                                                                                         : DT_E_LINK;
 }
 
-static int sent(int lcm_result)
+static int publish_sent(int lcm_result)
 {
 	return lcm_result == 0 ? 0 : DT_E_LINK;
 }
@@ -89,7 +89,7 @@ static int publish_signed(struct publisher *publisher, const char *channel, uint
 		return DT_E_MEMORY;
 	if (publisher->key != NULL)
 		mac_seal(publisher->key, channel, bytes, (size_t)size);
-	return sent(lcm_publish(publisher->lcm, channel, bytes, (unsigned)size));
+	return publish_sent(lcm_publish(publisher->lcm, channel, bytes, (unsigned)size));
 }
 
 int publisher_state(struct publisher *publisher)
@@ -126,7 +126,7 @@ static int publish_block(struct publisher *publisher, const struct frame *frame)
 	}
 	publisher->blocks++;
 	publisher->state.drop_id = block.drop_id;
-	return sent(droptower_block_publish(publisher->lcm, LCM_CODEC_BLOCK, &block));
+	return publish_sent(droptower_block_publish(publisher->lcm, LCM_CODEC_BLOCK, &block));
 }
 
 int publisher_frame(struct publisher *publisher, const struct frame *frame)
@@ -173,10 +173,10 @@ int publisher_result(struct publisher *publisher, unsigned drop_id, const char *
 	} text = {.given = json};
 	droptower_result result = {.utime = session_utime(), .drop_id = (int32_t)drop_id, .json = text.taken};
 
-	return sent(droptower_result_publish(publisher->lcm, PUBLISH_RESULT, &result));
+	return publish_sent(droptower_result_publish(publisher->lcm, PUBLISH_RESULT, &result));
 }
 
 int publisher_raw(struct publisher *publisher, const char *channel, const void *bytes, size_t size)
 {
-	return sent(lcm_publish(publisher->lcm, channel, bytes, (unsigned)size));
+	return publish_sent(lcm_publish(publisher->lcm, channel, bytes, (unsigned)size));
 }

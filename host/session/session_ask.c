@@ -28,7 +28,7 @@ int can_send_op(struct session *session, enum wire_op op, uint32_t argument)
 }
 
 /* Another host on the bus may ask for the same. */
-static bool is_answer(const struct wire_sdo *answer, const struct wire_sdo *request)
+static bool session_ask_is_answer(const struct wire_sdo *answer, const struct wire_sdo *request)
 {
 	unsigned wanted = request->specifier == SDO_READ ? SDO_VALUE : SDO_WRITTEN;
 
@@ -67,7 +67,7 @@ void can_hear_answer(struct session *session, const struct frame *frame)
 			way->reply_awaited = false;
 		}
 	} else if (frame->id == WIRE_ID_SDO_REPLY && wire_unpack_sdo(frame, &sdo) == 0) {
-		if (way->sdo_awaited && is_answer(&sdo, &way->sdo)) {
+		if (way->sdo_awaited && session_ask_is_answer(&sdo, &way->sdo)) {
 			way->sdo = sdo;
 			way->sdo_awaited = false;
 		}
@@ -167,7 +167,7 @@ static int ask_arm(struct session *session, uint32_t nonce)
 
 /* That an answer came too late, or after another's ARM, looks as if the parameters were not the tower's.
  * Whether they are says the next challenge, which is asked for with them. */
-static int arm(struct session *session)
+static int session_ask_arm(struct session *session)
 {
 	struct session_view *view = &session->view;
 	int result = view->parameters_known ? 0 : session_read_parameters(session);
@@ -187,7 +187,7 @@ static int arm(struct session *session)
 	return result;
 }
 
-static int release(struct session *session)
+static int session_ask_release(struct session *session)
 {
 	struct session_view *view = &session->view;
 	int result = DT_E_TOKEN;
@@ -205,9 +205,9 @@ int can_command(struct session *session, enum wire_op op)
 {
 	switch (op) {
 	case WIRE_OP_ARM:
-		return arm(session);
+		return session_ask_arm(session);
 	case WIRE_OP_RELEASE:
-		return release(session);
+		return session_ask_release(session);
 	case WIRE_OP_ABORT: /* before a state says so: nothing is released after it */
 		session->view.armed = false;
 		return ask_op(session, op, 0);

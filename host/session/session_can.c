@@ -25,7 +25,7 @@ int can_way_send(struct session *session, struct frame *frame)
 	return result;
 }
 
-static int send_heartbeat(struct session *session)
+static int session_can_send_heartbeat(struct session *session)
 {
 	struct can_way *way = session->way;
 	struct wire_host_heartbeat heartbeat = {
@@ -122,7 +122,7 @@ static const struct frame *put_together(struct can_way *way, const struct frame 
 	return whole;
 }
 
-static int take_frame(struct session *session, const struct frame *frame)
+static int session_can_take_frame(struct session *session, const struct frame *frame)
 {
 	struct can_way *way = session->way;
 	const struct frame *whole;
@@ -145,7 +145,7 @@ static int take_frame(struct session *session, const struct frame *frame)
 int can_poll(struct session *session, int timeout_ms)
 {
 	struct can_way *way = session->way;
-	int result = send_heartbeat(session);
+	int result = session_can_send_heartbeat(session);
 
 	if (result == 0)
 		result = can_drive_collection(session);
@@ -162,13 +162,13 @@ int can_poll(struct session *session, int timeout_ms)
 		}
 		if (result > 0) {
 			way->heard_ms = session_now_ms();
-			result = take_frame(session, &frame);
+			result = session_can_take_frame(session, &frame);
 		}
 	}
 	return result;
 }
 
-static void can_close(struct session *session)
+static void session_can_close(struct session *session)
 {
 	struct can_way *way = session->way;
 
@@ -177,7 +177,7 @@ static void can_close(struct session *session)
 	free(way);
 }
 
-static int can_open(struct session *session, const char *url, char message[SESSION_MESSAGE_MAX])
+static int session_can_open(struct session *session, const char *url, char message[SESSION_MESSAGE_MAX])
 {
 	struct can_way *way = calloc(1, sizeof(*way));
 
@@ -200,8 +200,8 @@ static int can_open(struct session *session, const char *url, char message[SESSI
 }
 
 const struct session_way session_can = {
-        .open = can_open,
-        .close = can_close,
+        .open = session_can_open,
+        .close = session_can_close,
         .poll = can_poll,
         .command = can_command,
         .set_parameter = can_set_parameter,

@@ -23,7 +23,7 @@ static int send_verdict(struct session *session)
 }
 
 /* After it the tower forgets: a host that is killed then must have the samples in its log. */
-static int judge(struct session *session, enum wire_op verdict)
+static int session_collect_judge(struct session *session, enum wire_op verdict)
 {
 	struct can_way *way = session->way;
 	int result = session->options.log != NULL ? link_flush(session->options.log) : 0;
@@ -127,13 +127,13 @@ static int ask_end(struct session *session)
 }
 
 /* What the drop has measured and its parameters follow the capture end; a drop is a drop without them. */
-static int finish(struct session *session)
+static int session_collect_finish(struct session *session)
 {
 	struct can_way *way = session->way;
 	int64_t now_ms = session_now_ms();
 
 	if (join_told(way->join) || way->told_rounds > TOLD_ROUNDS)
-		return judge(session, WIRE_OP_ACCEPT);
+		return session_collect_judge(session, WIRE_OP_ACCEPT);
 	if (now_ms < way->told_due_ms)
 		return 0;
 	way->told_due_ms = now_ms + CAN_RESEND_PATIENCE_MS;
@@ -149,13 +149,13 @@ int can_drive_collection(struct session *session)
 	if (!way->collecting || way->finished)
 		return 0;
 	if (join_complete(way->join))
-		return finish(session);
+		return session_collect_finish(session);
 	if (now_ms < way->ask_due_ms)
 		return 0;
 	way->rounds = way->progress ? 0 : way->rounds + 1;
 	way->progress = false;
 	if (way->rounds > RESEND_ROUNDS)
-		return judge(session, WIRE_OP_DISCARD);
+		return session_collect_judge(session, WIRE_OP_DISCARD);
 	way->ask_due_ms = now_ms + CAN_RESEND_PATIENCE_MS;
 	return ask_again(session);
 }

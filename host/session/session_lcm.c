@@ -53,7 +53,7 @@ static bool is_news(const struct lcm_way *way, const droptower_state *state)
 	       (state->utime > way->state.utime && age_us < MAC_AGE_US && age_us > -MAC_AGE_US);
 }
 
-static void follow(struct session *session, const droptower_state *state)
+static void session_lcm_follow(struct session *session, const droptower_state *state)
 {
 	struct session_view *view = &session->view;
 	struct lcm_way *way = session->way;
@@ -78,7 +78,7 @@ static void follow(struct session *session, const droptower_state *state)
 	view->armed_until_ms = now_ms + state->disarmed_in_ms;
 }
 
-static void on_state(const lcm_recv_buf_t *buffer, const char *channel, void *user)
+static void session_lcm_on_state(const lcm_recv_buf_t *buffer, const char *channel, void *user)
 {
 	struct session *session = user;
 	struct lcm_way *way = session->way;
@@ -91,7 +91,7 @@ static void on_state(const lcm_recv_buf_t *buffer, const char *channel, void *us
 	if (!is_believed(way, channel, buffer) || !is_news(way, &state))
 		return;
 	way->state = state;
-	follow(session, &state);
+	session_lcm_follow(session, &state);
 }
 
 static void on_block(const lcm_recv_buf_t *buffer, const char *channel, void *user)
@@ -113,7 +113,7 @@ static void on_block(const lcm_recv_buf_t *buffer, const char *channel, void *us
 		session->options.on_frame(session->options.user, &frame);
 }
 
-static void take_drop(struct lcm_way *way, const droptower_drop *drop)
+static void session_lcm_take_drop(struct lcm_way *way, const droptower_drop *drop)
 {
 	if (way->has_key && drop->utime <= way->drop_utime)
 		return;
@@ -140,7 +140,7 @@ static void on_drop(const lcm_recv_buf_t *buffer, const char *channel, void *use
 		way->drop_error = result;
 		return;
 	}
-	take_drop(way, &drop);
+	session_lcm_take_drop(way, &drop);
 	lcm_codec_free_drop(&drop);
 }
 
@@ -242,7 +242,7 @@ static int lcm_way_command(struct session *session, enum wire_op op)
 		result = await_answer(session, &command);
 	if (result == 0 && op == WIRE_OP_ARM) {
 		way->armed_here = true;
-		follow(session, &way->state);
+		session_lcm_follow(session, &way->state);
 	}
 	return result;
 }
@@ -263,7 +263,7 @@ static int lcm_way_get_parameter(struct session *session, enum wire_parameter_nu
 	return DT_E_UNKNOWN;
 }
 
-static int log_frame(void *user, const struct frame *frame)
+static int session_lcm_log_frame(void *user, const struct frame *frame)
 {
 	return link_send(user, frame);
 }
@@ -281,7 +281,8 @@ static int lcm_way_take_drop(struct session *session, struct record *record)
 	}
 	*record = way->drop;
 	way->has_drop = false;
-	if (session->options.log != NULL && write_frames(record, log_frame, session->options.log) != 0) {
+	if (session->options.log != NULL &&
+	    write_frames(record, session_lcm_log_frame, session->options.log) != 0) {
 		record_free(record);
 		return DT_E_SYSTEM;
 	}
@@ -302,7 +303,7 @@ static void lcm_way_close(struct session *session)
 static int listen(struct session *session)
 {
 	struct lcm_way *way = session->way;
-	int result = publisher_listen(way->publisher, PUBLISH_STATE, on_state, session);
+	int result = publisher_listen(way->publisher, PUBLISH_STATE, session_lcm_on_state, session);
 
 	if (result == 0)
 		result = publisher_listen(way->publisher, LCM_CODEC_BLOCK, on_block, session);

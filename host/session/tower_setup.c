@@ -16,7 +16,7 @@ static bool passing(unsigned state)
 	return state == WIRE_STATE_BOOT || state == WIRE_STATE_UPLOADED;
 }
 
-static int stopped(char message[SESSION_MESSAGE_MAX])
+static int tower_setup_stopped(char message[SESSION_MESSAGE_MAX])
 {
 	snprintf(message, SESSION_MESSAGE_MAX, "interrupted, nothing was released");
 	return DT_E_STATE;
@@ -31,7 +31,7 @@ int tower_setup_hear(struct session *session, char message[SESSION_MESSAGE_MAX])
 		int result = session_poll(session, 50);
 
 		if (interrupt_came())
-			return stopped(message);
+			return tower_setup_stopped(message);
 		if (result == 0 && session_now_ms() - start_ms > HEAR_MS)
 			result = DT_E_TIMEOUT;
 		if (result != 0) {
@@ -95,7 +95,7 @@ static int write_round(struct session *session, struct tower_setting *settings, 
 }
 
 /* In rounds, until all are written or a round has moved nothing. */
-static int write_all(struct session *session, struct tower_setting *settings, size_t count)
+static int tower_setup_write_all(struct session *session, struct tower_setting *settings, size_t count)
 {
 	size_t before = count + 1;
 	int result = 0;
@@ -107,7 +107,8 @@ static int write_all(struct session *session, struct tower_setting *settings, si
 	return result == 0 && count > 0 ? DT_E_RANGE : result;
 }
 
-static int refused(const struct tower_setting *setting, int result, char message[SESSION_MESSAGE_MAX])
+static int tower_setup_refused(const struct tower_setting *setting, int result,
+                               char message[SESSION_MESSAGE_MAX])
 {
 	const struct wire_parameter_info *parameter = &wire_parameters[setting->number];
 
@@ -134,7 +135,7 @@ static int read_back(struct session *session, const struct tower_setting *settin
 	int result = session_read_parameters(session);
 
 	if (result != 0 && interrupt_came())
-		return stopped(message);
+		return tower_setup_stopped(message);
 	if (result != 0) {
 		snprintf(message, SESSION_MESSAGE_MAX, "the tower's parameters cannot be read: %s",
 		         error_text(result));
@@ -163,14 +164,15 @@ int tower_setup_write(struct session *session, const struct scene *scene, char m
 	tower_setup_settings(scene, wanted);
 	beyond = out_of_range(wanted, count);
 	if (beyond != NULL)
-		return refused(beyond, DT_E_RANGE, message);
+		return tower_setup_refused(beyond, DT_E_RANGE, message);
 	memcpy(settings, wanted, sizeof(settings));
-	result = write_all(session, settings, count);
+	result = tower_setup_write_all(session, settings, count);
 	if (result == DT_E_UNKNOWN) /* over LCM: the bridge has set them */
 		return 0;
 	if (result == 0)
 		return read_back(session, wanted, count, message);
-	return interrupt_came() ? stopped(message) : refused(&settings[0], result, message);
+	return interrupt_came() ? tower_setup_stopped(message)
+	                        : tower_setup_refused(&settings[0], result, message);
 }
 
 bool tower_setup_difference(struct session *session, char message[SESSION_MESSAGE_MAX])

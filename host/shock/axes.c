@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static bool usable(const struct channel *channel)
+static bool axes_usable(const struct channel *channel)
 {
 	return channel->count > 0 && isfinite(channel->rate_hz) && channel->rate_hz > 0 &&
 	       isfinite(channel->start_s);
@@ -46,13 +46,13 @@ static void set_name(struct axes *axes)
 }
 
 /* Adds the axes of the sensor that channel first belongs to. */
-static void gather(const struct record *record, size_t first, struct axes *axes)
+static void axes_gather(const struct record *record, size_t first, struct axes *axes)
 {
 	*axes = (struct axes){.count = 1, .axis = {&record->channels[first]}};
 	for (size_t i = first + 1; i < record->channel_count && axes->count < AXES_MAX; i++) {
 		const struct channel *c = &record->channels[i];
 
-		if (!usable(c) || !same_sensor(axes->axis[0]->name, c->name))
+		if (!axes_usable(c) || !same_sensor(axes->axis[0]->name, c->name))
 			continue;
 		axes->axis[axes->count++] = c;
 		if (c->rate_hz > axes->axis[0]->rate_hz) {
@@ -63,7 +63,7 @@ static void gather(const struct record *record, size_t first, struct axes *axes)
 	set_name(axes);
 }
 
-static bool taken(const struct axes *axes, size_t count, const struct channel *channel)
+static bool axes_taken(const struct axes *axes, size_t count, const struct channel *channel)
 {
 	for (size_t i = 0; i < count; i++)
 		for (size_t a = 0; a < axes[i].count; a++)
@@ -77,8 +77,8 @@ size_t axes_find(const struct record *record, struct axes *axes)
 	size_t count = 0;
 
 	for (size_t i = 0; i < record->channel_count; i++)
-		if (usable(&record->channels[i]) && !taken(axes, count, &record->channels[i]))
-			gather(record, i, &axes[count++]);
+		if (axes_usable(&record->channels[i]) && !axes_taken(axes, count, &record->channels[i]))
+			axes_gather(record, i, &axes[count++]);
 	return count;
 }
 
@@ -88,7 +88,7 @@ double axes_time(const struct axes *axes, size_t k)
 }
 
 /* Straight between two samples; NAN beside one that is not there. */
-static double between(const struct channel *channel, double time_s)
+static double axes_between(const struct channel *channel, double time_s)
 {
 	double place = (time_s - channel->start_s) * channel->rate_hz, whole = floor(place + 1e-9);
 	double part = fmax(place - whole, 0);
@@ -108,7 +108,7 @@ bool axes_read(const struct axes *axes, size_t k, const double offset_g[AXES_MAX
 {
 	value_g[0] = axes->axis[0]->value_g[k] - offset_g[0];
 	for (size_t i = 1; i < axes->count; i++)
-		value_g[i] = between(axes->axis[i], axes_time(axes, k)) - offset_g[i];
+		value_g[i] = axes_between(axes->axis[i], axes_time(axes, k)) - offset_g[i];
 	for (size_t i = 0; i < axes->count; i++)
 		if (!isfinite(value_g[i]))
 			return false;

@@ -10,7 +10,7 @@
 #include "host/estimate/iepe.h"
 
 /* Of the channel with the largest peak, or the one asked for; channel_count if there is none. */
-static size_t choose(const struct record *record, const struct analysis *analysis, const char *name)
+static size_t band_choose(const struct record *record, const struct analysis *analysis, const char *name)
 {
 	size_t best = record->channel_count;
 	double most = 0;
@@ -29,8 +29,8 @@ static size_t choose(const struct record *record, const struct analysis *analysi
 }
 
 /* As the estimates have it, but for what they mark: a spike is outside the band. */
-static int prepare(struct trace *trace, const struct estimate_baseline *baseline,
-                   const struct estimate_options *estimate)
+static int band_prepare(struct trace *trace, const struct estimate_baseline *baseline,
+                        const struct estimate_options *estimate)
 {
 	int result = 0;
 
@@ -47,7 +47,7 @@ static int prepare(struct trace *trace, const struct estimate_baseline *baseline
 int band_check(const struct record *record, const struct analysis *analysis,
                const struct estimate_options *estimate, const struct band_options *options, struct band *band)
 {
-	size_t i = choose(record, analysis, options->channel);
+	size_t i = band_choose(record, analysis, options->channel);
 	struct band checked = {.at_peak = options->at_peak};
 	const struct estimate_channel *e;
 	struct trace trace;
@@ -62,7 +62,7 @@ int band_check(const struct record *record, const struct analysis *analysis,
 	result = trace_open(&trace, &record->channels[i], -INFINITY, INFINITY);
 	if (result != 0)
 		return result;
-	result = prepare(&trace, &e->baseline, estimate);
+	result = band_prepare(&trace, &e->baseline, estimate);
 	if (result == 0) {
 		memcpy(checked.channel, record->channels[i].name, sizeof(checked.channel));
 		checked.verdict = limit_pulse(options->curve, &trace, checked.zero_s);

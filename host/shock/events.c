@@ -30,7 +30,7 @@ struct shock {
 	double first_s, last_s; /* when it was outside the level */
 };
 
-static bool value_at(const struct source *source, size_t k, double *value_g)
+static bool events_value_at(const struct source *source, size_t k, double *value_g)
 {
 	double value[AXES_MAX];
 
@@ -60,13 +60,13 @@ static void rest_of(const struct channel *channel, double *rest_g, double *noise
 	*noise_g = MAD_TO_SIGMA * gsl_stats_mad0(work, 1, n, scratch);
 }
 
-static inline double larger(double a, double b)
+static inline double events_larger(double a, double b)
 {
 	return a > b ? a : b; /* a NAN in a is never larger */
 }
 
 /* The largest distance from rest between two instants, the samples beside them included. */
-static double reach(const struct channel *channel, double from_s, double until_s, double rest_g)
+static double events_reach(const struct channel *channel, double from_s, double until_s, double rest_g)
 {
 	double first = floor((from_s - channel->start_s) * channel->rate_hz);
 	double last = ceil((until_s - channel->start_s) * channel->rate_hz);
@@ -79,11 +79,11 @@ static double reach(const struct channel *channel, double from_s, double until_s
 		end = (size_t)last + 1;
 	for (; k + LANES <= end; k += LANES)
 		for (unsigned i = 0; i < LANES; i++)
-			most[i] = larger(fabs(channel->value_g[k + i] - rest_g), most[i]);
+			most[i] = events_larger(fabs(channel->value_g[k + i] - rest_g), most[i]);
 	for (; k < end; k++)
-		most[0] = larger(fabs(channel->value_g[k] - rest_g), most[0]);
+		most[0] = events_larger(fabs(channel->value_g[k] - rest_g), most[0]);
 	for (unsigned i = 1; i < LANES; i++)
-		most[0] = larger(most[i], most[0]);
+		most[0] = events_larger(most[i], most[0]);
 	return most[0];
 }
 
@@ -93,7 +93,7 @@ static double bound(const struct source *source, double from_s, double until_s)
 	double squares = 0;
 
 	for (size_t i = 0; i < source->axes.count; i++) {
-		double most = reach(source->axes.axis[i], from_s, until_s, source->rest_g[i]);
+		double most = events_reach(source->axes.axis[i], from_s, until_s, source->rest_g[i]);
 
 		squares += most * most;
 	}
@@ -121,7 +121,7 @@ static void set_level(struct source *source, const struct events_options *option
 /* From the peak outward to where the value falls below a tenth of it: the last sample inside, and the instant
  * of the crossing. No further than a hold-off beyond the shock: a sensor that was turned round rests
  * elsewhere than before. */
-static size_t edge(const struct source *source, const struct shock *shock, int step, double *time_s)
+static size_t events_edge(const struct source *source, const struct shock *shock, int step, double *time_s)
 {
 	double sign = shock->peak_g < 0 ? -1 : 1, inside = fabs(shock->peak_g), value;
 	double level = WIDTH_PART * inside;
@@ -132,7 +132,7 @@ static size_t edge(const struct source *source, const struct shock *shock, int s
 		if (axes_time(&source->axes, k) < shock->first_s - source->hold_off_s ||
 		    axes_time(&source->axes, k) > shock->last_s + source->hold_off_s)
 			break;
-		if (!value_at(source, k, &value))
+		if (!events_value_at(source, k, &value))
 			continue;
 		value *= sign;
 		if (value < level) {
@@ -149,7 +149,7 @@ static size_t edge(const struct source *source, const struct shock *shock, int s
 }
 
 /* Over the samples from first to last, of each axis; a hole counts as the mean of the others. */
-static double velocity(const struct source *source, size_t first, size_t last)
+static double events_velocity(const struct source *source, size_t first, size_t last)
 {
 	double sum[AXES_MAX] = {0}, value[AXES_MAX];
 	size_t n = 0;
@@ -167,15 +167,15 @@ static double velocity(const struct source *source, size_t first, size_t last)
 	return axes_value(&source->axes, sum);
 }
 
-static void refine(const struct source *source, const struct shock *shock, struct event *event)
+static void events_refine(const struct source *source, const struct shock *shock, struct event *event)
 {
 	size_t k = shock->peak;
 	double before, after, bend, shift;
 
 	event->peak_g = shock->peak_g;
 	event->time_s = axes_time(&source->axes, k);
-	if (k == 0 || k + 1 == source->axes.axis[0]->count || !value_at(source, k - 1, &before) ||
-	    !value_at(source, k + 1, &after))
+	if (k == 0 || k + 1 == source->axes.axis[0]->count || !events_value_at(source, k - 1, &before) ||
+	    !events_value_at(source, k + 1, &after))
 		return;
 	bend = before - 2 * shock->peak_g + after;
 	if (!(fabs(bend) > 0))
@@ -187,7 +187,7 @@ static void refine(const struct source *source, const struct shock *shock, struc
 	event->time_s += shift / source->axes.axis[0]->rate_hz;
 }
 
-static void keep(struct events *events, const struct event *event)
+static void events_keep(struct events *events, const struct event *event)
 {
 	size_t place = events->count;
 
@@ -203,7 +203,7 @@ static void keep(struct events *events, const struct event *event)
 	events->event[place] = *event;
 }
 
-static void finish(const struct source *source, struct shock *shock, struct events *events)
+static void events_finish(const struct source *source, struct shock *shock, struct events *events)
 {
 	struct event event = {.sensor = source->axes.count > 1};
 	double from, to;
@@ -213,12 +213,12 @@ static void finish(const struct source *source, struct shock *shock, struct even
 		return;
 	shock->open = false;
 	memcpy(event.name, source->axes.name, sizeof(event.name));
-	refine(source, shock, &event);
-	first = edge(source, shock, -1, &from);
-	last = edge(source, shock, +1, &to);
+	events_refine(source, shock, &event);
+	first = events_edge(source, shock, -1, &from);
+	last = events_edge(source, shock, +1, &to);
 	event.duration_s = to - from;
-	event.velocity_change_m_s = velocity(source, first, last);
-	keep(events, &event);
+	event.velocity_change_m_s = events_velocity(source, first, last);
+	events_keep(events, &event);
 }
 
 /* ---- all of them ---- */
@@ -230,10 +230,10 @@ static void scan_block(const struct source *source, size_t from, size_t until, s
 	for (size_t k = from; k < until; k++) {
 		double time_s = axes_time(&source->axes, k), value;
 
-		if (!value_at(source, k, &value) || fabs(value) <= source->level_g)
+		if (!events_value_at(source, k, &value) || fabs(value) <= source->level_g)
 			continue;
 		if (shock->open && time_s - shock->last_s > source->hold_off_s)
-			finish(source, shock, events);
+			events_finish(source, shock, events);
 		if (!shock->open || fabs(value) > fabs(shock->peak_g)) {
 			shock->peak = k;
 			shock->peak_g = value;
@@ -245,7 +245,7 @@ static void scan_block(const struct source *source, size_t from, size_t until, s
 	}
 }
 
-static void scan(const struct source *source, struct events *events)
+static void events_scan(const struct source *source, struct events *events)
 {
 	size_t count = source->axes.axis[0]->count;
 	struct shock shock = {0};
@@ -259,7 +259,7 @@ static void scan(const struct source *source, struct events *events)
 		    source->level_g)
 			scan_block(source, from, until, &shock, events);
 	}
-	finish(source, &shock, events);
+	events_finish(source, &shock, events);
 }
 
 int events_find(const struct record *record, const struct events_options *options, struct events *events)
@@ -275,7 +275,7 @@ int events_find(const struct record *record, const struct events_options *option
 		struct source source = {.axes = axes[i]};
 
 		set_level(&source, options);
-		scan(&source, events);
+		events_scan(&source, events);
 	}
 	free(axes);
 	return 0;

@@ -24,7 +24,7 @@
 
 enum { REST_SAMPLES = 256, REST_SAMPLES_MIN = 10 };
 
-static bool magnitude(const struct axes *axes, size_t k, double *value_g)
+static bool free_fall_magnitude(const struct axes *axes, size_t k, double *value_g)
 {
 	static const double no_offset[AXES_MAX] = {0};
 	double value[AXES_MAX];
@@ -37,12 +37,13 @@ static bool magnitude(const struct axes *axes, size_t k, double *value_g)
 
 /* From sample k outward: where the magnitude first reaches level_g, or the last sample before the ends and
  * holes of reach_s. False when it does not. */
-static bool reach(const struct axes *axes, size_t k, int step, double level_g, double reach_s, double *time_s)
+static bool free_fall_reach(const struct axes *axes, size_t k, int step, double level_g, double reach_s,
+                            double *time_s)
 {
 	double begin = axes_time(axes, k), last = begin, inside = 0, value;
 	size_t count = axes->axis[0]->count;
 
-	(void)magnitude(axes, k, &inside);
+	(void)free_fall_magnitude(axes, k, &inside);
 	while (step < 0 ? k > 0 : k + 1 < count) {
 		double now;
 
@@ -50,7 +51,7 @@ static bool reach(const struct axes *axes, size_t k, int step, double level_g, d
 		now = axes_time(axes, k);
 		if (fabs(now - begin) > reach_s)
 			return false;
-		if (!magnitude(axes, k, &value))
+		if (!free_fall_magnitude(axes, k, &value))
 			continue;
 		if (value >= level_g) {
 			*time_s = inside < level_g
@@ -77,7 +78,7 @@ static bool rests_before(const struct axes *axes, double start_s)
 	begin = (size_t)ceil((from - first) * rate);
 	step = (size_t)((until - from) * rate) / REST_SAMPLES + 1;
 	for (size_t k = begin; n < REST_SAMPLES && axes_time(axes, k) < until; k += step)
-		if (magnitude(axes, k, &value[n]))
+		if (free_fall_magnitude(axes, k, &value[n]))
 			n++;
 	if (n < REST_SAMPLES_MIN)
 		return false;
@@ -88,20 +89,21 @@ static bool rests_before(const struct axes *axes, double start_s)
 }
 
 /* The run of samples [first, last] as a fall; false when it is none. */
-static bool judge(const struct axes *axes, double gravity_m_s2, size_t first, size_t last,
-                  struct free_fall *fall)
+static bool free_fall_judge(const struct axes *axes, double gravity_m_s2, size_t first, size_t last,
+                            struct free_fall *fall)
 {
 	double dt = 1 / axes->axis[0]->rate_hz, left, met, impact, release, stop;
 
 	if (!(axes_time(axes, last) - axes_time(axes, first) >= FALL_MIN_S))
 		return false;
-	if (!reach(axes, first, -1, EDGE_G, REST_UNTIL_S, &fall->start_s) ||
-	    !reach(axes, last, +1, EDGE_G, IMPACT_S, &fall->end_s) ||
-	    !reach(axes, last, +1, IMPACT_G, IMPACT_S, &impact) || !rests_before(axes, fall->start_s))
+	if (!free_fall_reach(axes, first, -1, EDGE_G, REST_UNTIL_S, &fall->start_s) ||
+	    !free_fall_reach(axes, last, +1, EDGE_G, IMPACT_S, &fall->end_s) ||
+	    !free_fall_reach(axes, last, +1, IMPACT_G, IMPACT_S, &impact) ||
+	    !rests_before(axes, fall->start_s))
 		return false;
-	if (!reach(axes, first, -1, LEFT_G, REST_UNTIL_S, &left))
+	if (!free_fall_reach(axes, first, -1, LEFT_G, REST_UNTIL_S, &left))
 		left = fall->start_s - REST_UNTIL_S;
-	if (!reach(axes, last, +1, LEFT_G, IMPACT_S, &met))
+	if (!free_fall_reach(axes, last, +1, LEFT_G, IMPACT_S, &met))
 		met = impact;
 	release = hypot(axes_time(axes, first) - left, dt) / sqrt(12);
 	stop = hypot(met - axes_time(axes, last), dt) / sqrt(12);
@@ -114,7 +116,7 @@ static bool judge(const struct axes *axes, double gravity_m_s2, size_t first, si
 	return true;
 }
 
-static void keep(struct free_falls *falls, const struct free_fall *fall)
+static void free_fall_keep(struct free_falls *falls, const struct free_fall *fall)
 {
 	for (size_t i = 0; i < falls->count; i++)
 		if (fall->start_s < falls->fall[i].end_s && fall->end_s > falls->fall[i].start_s)
@@ -131,7 +133,7 @@ static size_t run_end(const struct axes *axes, size_t k, int step)
 
 	while (step < 0 ? k > 0 : k + 1 < axes->axis[0]->count) {
 		k = step < 0 ? k - 1 : k + 1;
-		if (!magnitude(axes, k, &value))
+		if (!free_fall_magnitude(axes, k, &value))
 			continue;
 		if (value >= FALL_G)
 			break;
@@ -141,7 +143,7 @@ static size_t run_end(const struct axes *axes, size_t k, int step)
 }
 
 /* Looks often enough to meet every fall, and closer where there may be one. */
-static void scan(const struct axes *axes, double gravity_m_s2, struct free_falls *falls)
+static void free_fall_scan(const struct axes *axes, double gravity_m_s2, struct free_falls *falls)
 {
 	size_t step = (size_t)(LOOK_S * axes->axis[0]->rate_hz) + 1, k = 0;
 
@@ -150,7 +152,7 @@ static void scan(const struct axes *axes, double gravity_m_s2, struct free_falls
 		double value;
 		size_t last;
 
-		if (!magnitude(axes, k, &value)) {
+		if (!free_fall_magnitude(axes, k, &value)) {
 			k++;
 			continue;
 		}
@@ -159,8 +161,8 @@ static void scan(const struct axes *axes, double gravity_m_s2, struct free_falls
 			continue;
 		}
 		last = run_end(axes, k, +1);
-		if (judge(axes, gravity_m_s2, run_end(axes, k, -1), last, &fall))
-			keep(falls, &fall);
+		if (free_fall_judge(axes, gravity_m_s2, run_end(axes, k, -1), last, &fall))
+			free_fall_keep(falls, &fall);
 		k = last + step;
 	}
 }
@@ -177,7 +179,7 @@ int free_fall_find(const struct record *record, double gravity_m_s2, struct free
 	for (size_t most = AXES_MAX; most > 0; most--)
 		for (size_t i = 0; i < count; i++)
 			if (axes[i].count == most)
-				scan(&axes[i], gravity_m_s2, falls);
+				free_fall_scan(&axes[i], gravity_m_s2, falls);
 	free(axes);
 	return 0;
 }

@@ -19,7 +19,7 @@ static bool is_separator(char c)
 }
 
 /* The numbers of a line: how many words there are, and whether each of the first NUMBERS_MAX is a number. */
-static size_t split(const struct source_line *line, double number[NUMBERS_MAX], bool *numbers)
+static size_t limit_split(const struct source_line *line, double number[NUMBERS_MAX], bool *numbers)
 {
 	size_t i = 0, words = 0;
 
@@ -40,7 +40,7 @@ static size_t split(const struct source_line *line, double number[NUMBERS_MAX], 
 	}
 }
 
-static int append(struct limit_curve *curve, size_t *room, struct limit_point point)
+static int limit_append(struct limit_curve *curve, size_t *room, struct limit_point point)
 {
 	if (curve->count == *room) {
 		size_t more = *room > 0 ? 2 * *room : POINTS_FIRST;
@@ -82,7 +82,7 @@ static int read_points(struct limit_curve *curve, const struct source *source, e
 		struct limit_point point;
 		const char *why;
 		bool numbers, header;
-		size_t words = split(&line, number, &numbers);
+		size_t words = limit_split(&line, number, &numbers);
 
 		if (words == 0 || line.text[0] == '#')
 			continue;
@@ -99,7 +99,7 @@ static int read_points(struct limit_curve *curve, const struct source *source, e
 		if (why)
 			return source_refuse(message, DT_E_FORMAT, source->file, line.number,
 			                     "%s, expected %s", why, names);
-		if (append(curve, &room, point) != 0)
+		if (limit_append(curve, &room, point) != 0)
 			return source_refuse(message, DT_E_MEMORY, source->file, line.number, "%s",
 			                     error_text(DT_E_MEMORY));
 	}
@@ -165,7 +165,7 @@ bool limit_at(const struct limit_curve *curve, enum limit_kind kind, double x, s
 	return true;
 }
 
-static void judge(struct limit_verdict *verdict, double margin, double x)
+static void limit_judge(struct limit_verdict *verdict, double margin, double x)
 {
 	verdict->checked++;
 	if (!(margin >= verdict->margin)) {
@@ -197,7 +197,7 @@ struct limit_verdict limit_spectrum(const struct limit_curve *curve, const doubl
 
 	for (size_t i = 0; i < count; i++)
 		if (limit_at(curve, LIMIT_SPECTRUM, frequency_hz[i], &at))
-			judge(&verdict, 20 * log10(at.upper / value[i]), frequency_hz[i]);
+			limit_judge(&verdict, 20 * log10(at.upper / value[i]), frequency_hz[i]);
 	return verdict_end(verdict);
 }
 
@@ -212,7 +212,7 @@ struct limit_verdict limit_pulse(const struct limit_curve *curve, const struct t
 		if (!limit_at(curve, LIMIT_BAND, x, &at))
 			continue;
 		if (trace_good(trace, k))
-			judge(&verdict, fmin(at.upper - value, value - at.lower), x);
+			limit_judge(&verdict, fmin(at.upper - value, value - at.lower), x);
 		else
 			verdict.missing++;
 	}

@@ -26,8 +26,8 @@ const char *signal_flag_name(unsigned flags)
 /* ---- holes ---- */
 
 /* One hole [from, until) between good samples; false when it is too long for where it is. */
-static bool bridge(const struct trace *trace, double *value, size_t from, size_t until, double quiet_g,
-                   double zero_g)
+static bool signal_bridge(const struct trace *trace, double *value, size_t from, size_t until, double quiet_g,
+                          double zero_g)
 {
 	if (until - from > BRIDGE_CUBIC && !(fabs(trace->value_g[from - 1] - zero_g) < quiet_g &&
 	                                     fabs(trace->value_g[until] - zero_g) < quiet_g))
@@ -38,7 +38,8 @@ static bool bridge(const struct trace *trace, double *value, size_t from, size_t
 }
 
 /* The samples from first to last, both good, and what stands in for those missing between them. */
-static int fill(struct signal *signal, const struct trace *trace, size_t first, size_t last, double zero_g)
+static int signal_fill(struct signal *signal, const struct trace *trace, size_t first, size_t last,
+                       double zero_g)
 {
 	double most = 0;
 
@@ -51,7 +52,8 @@ static int fill(struct signal *signal, const struct trace *trace, size_t first, 
 
 		while (!trace_good(trace, k))
 			k++;
-		if (k > from && !bridge(trace, signal->value_g - first, from, k, EVENT_LEVEL * most, zero_g))
+		if (k > from &&
+		    !signal_bridge(trace, signal->value_g - first, from, k, EVENT_LEVEL * most, zero_g))
 			return DT_E_INCOMPLETE;
 		signal->bridged += k - from;
 	}
@@ -60,7 +62,7 @@ static int fill(struct signal *signal, const struct trace *trace, size_t first, 
 	return (double)signal->bridged > MISSING_MAX * (double)(last - first + 1) ? DT_E_INCOMPLETE : 0;
 }
 
-static void look_at_end(struct signal *signal)
+static void signal_look_at_end(struct signal *signal)
 {
 	size_t n = (size_t)(END_PART * (double)signal->count) + 1;
 	double mean = 0, most = 0;
@@ -90,7 +92,7 @@ static void zero(struct signal *signal, struct trace *trace, bool keep_offset)
 	signal->data_flags = trace->flags;
 }
 
-static int take(struct signal *signal, struct trace *trace, bool keep_offset)
+static int signal_take(struct signal *signal, struct trace *trace, bool keep_offset)
 {
 	size_t first = 0, last = trace->count;
 
@@ -103,7 +105,7 @@ static int take(struct signal *signal, struct trace *trace, bool keep_offset)
 		return DT_E_EMPTY;
 	signal->count = last - first;
 	signal->start_s = trace_time(trace, first);
-	return fill(signal, trace, first, last - 1, keep_offset ? signal->offset_g : 0);
+	return signal_fill(signal, trace, first, last - 1, keep_offset ? signal->offset_g : 0);
 }
 
 int signal_open(struct signal *signal, const struct channel *channel, bool keep_offset)
@@ -115,13 +117,13 @@ int signal_open(struct signal *signal, const struct channel *channel, bool keep_
 	if (result != 0)
 		return result;
 	opened.value_g = malloc(2 * (trace.count + 1) * sizeof(*opened.value_g));
-	result = opened.value_g ? take(&opened, &trace, keep_offset) : DT_E_MEMORY;
+	result = opened.value_g ? signal_take(&opened, &trace, keep_offset) : DT_E_MEMORY;
 	trace_close(&trace);
 	if (result != 0) {
 		free(opened.value_g);
 		return result;
 	}
-	look_at_end(&opened);
+	signal_look_at_end(&opened);
 	*signal = opened;
 	return 0;
 }

@@ -34,7 +34,7 @@ static size_t grid(const struct record *record, const struct spectrum_options *o
 	return steps >= 0 && steps < SPECTRUM_FREQUENCIES_MAX ? (size_t)steps + 1 : 0;
 }
 
-static int allocate(struct spectrum *spectrum, const struct record *record, size_t count)
+static int spectrum_allocate(struct spectrum *spectrum, const struct record *record, size_t count)
 {
 	size_t curves = 1 + CURVES * record->channel_count;
 	double *next;
@@ -58,8 +58,8 @@ static int allocate(struct spectrum *spectrum, const struct record *record, size
 }
 
 /* From the oscillators' extremes to the curves; usable of the frequencies were computed. */
-static void draw(const struct srs_value *value, size_t usable, enum srs_part part,
-                 struct spectrum_channel *out)
+static void spectrum_draw(const struct srs_value *value, size_t usable, enum srs_part part,
+                          struct spectrum_channel *out)
 {
 	for (size_t i = 0; i < usable; i++) {
 		for (unsigned side = 0; side < SRS_SIDES; side++)
@@ -100,7 +100,7 @@ static int compute_channel(const struct spectrum *spectrum, const struct channel
 	signal_close(&signal);
 	if (result != 0)
 		return result;
-	draw(value, usable, options->part, out);
+	spectrum_draw(value, usable, options->part, out);
 	if (options->limit)
 		out->verdict = limit_spectrum(options->limit, spectrum->frequency_hz,
 		                              out->side[options->side], usable);
@@ -133,7 +133,7 @@ int spectrum_compute(const struct record *record, const struct spectrum_options 
 
 	if (count == 0)
 		return DT_E_ARGUMENT;
-	result = allocate(&computed, record, count);
+	result = spectrum_allocate(&computed, record, count);
 	if (result == 0) {
 		for (size_t i = 0; i < count; i++)
 			computed.frequency_hz[i] = from_hz * exp2((double)i / options->per_octave);

@@ -110,12 +110,12 @@ static inline double increment(const struct bank *b, unsigned i, const struct in
 	       (b->now[i] * in->change - b->before[i] * in->step);
 }
 
-static inline double larger(double a, double b)
+static inline double srs_larger(double a, double b)
 {
 	return a > b ? a : b;
 }
 
-static inline double smaller(double a, double b)
+static inline double srs_smaller(double a, double b)
 {
 	return a < b ? a : b;
 }
@@ -125,8 +125,8 @@ static void run_one(struct bank *restrict bank, const struct input *in)
 	for (unsigned i = 0; i < LANES; i++) {
 		bank->d[i] = increment(bank, i, in, bank->y[i], bank->d[i]);
 		bank->y[i] += bank->d[i];
-		bank->high[i] = larger(bank->high[i], bank->y[i]);
-		bank->low[i] = smaller(bank->low[i], bank->y[i]);
+		bank->high[i] = srs_larger(bank->high[i], bank->y[i]);
+		bank->low[i] = srs_smaller(bank->low[i], bank->y[i]);
 	}
 }
 
@@ -143,26 +143,26 @@ WIDE static void run_four(struct bank *restrict bank, const double *base)
 
 	for (unsigned i = 0; i < LANES; i++) {
 		double d = increment(bank, i, &in[0], bank->y[i], bank->d[i]), y = bank->y[i] + d;
-		double high = larger(bank->high[i], y), low = smaller(bank->low[i], y);
+		double high = srs_larger(bank->high[i], y), low = srs_smaller(bank->low[i], y);
 
 		d = increment(bank, i, &in[1], y, d);
 		y += d;
-		high = larger(high, y);
-		low = smaller(low, y);
+		high = srs_larger(high, y);
+		low = srs_smaller(low, y);
 		d = increment(bank, i, &in[2], y, d);
 		y += d;
-		high = larger(high, y);
-		low = smaller(low, y);
+		high = srs_larger(high, y);
+		low = srs_smaller(low, y);
 		d = increment(bank, i, &in[3], y, d);
 		y += d;
-		bank->high[i] = larger(high, y);
-		bank->low[i] = smaller(low, y);
+		bank->high[i] = srs_larger(high, y);
+		bank->low[i] = srs_smaller(low, y);
 		bank->d[i] = d;
 		bank->y[i] = y;
 	}
 }
 
-static void run(struct bank *bank, const double *base, size_t count)
+static void srs_run(struct bank *bank, const double *base, size_t count)
 {
 	size_t k = 0;
 
@@ -250,7 +250,7 @@ WIDE static void upsample(const struct upsampler *u, const double *in, size_t co
 static void run_all(struct bank *bank, size_t banks, const double *base, size_t count)
 {
 	for (size_t b = 0; b < banks; b++)
-		run(&bank[b], base, count);
+		srs_run(&bank[b], base, count);
 }
 
 /* The points of a straight line, its first left out. */
@@ -308,7 +308,7 @@ static void free_extremes(const struct oscillator *o, double y0, double d1, doub
 }
 
 /* From a gain of +1 at zero frequency to the quantity. */
-static double scale_of(enum srs_quantity quantity, double frequency_hz)
+static double srs_scale_of(enum srs_quantity quantity, double frequency_hz)
 {
 	double w = 2 * UNITS_PI * frequency_hz;
 
@@ -322,7 +322,7 @@ static double scale_of(enum srs_quantity quantity, double frequency_hz)
 	}
 }
 
-static void scale(double factor, double *high, double *low)
+static void srs_scale(double factor, double *high, double *low)
 {
 	double h = *high * factor, l = *low * factor;
 
@@ -338,12 +338,12 @@ static void read_lane(struct bank *bank, unsigned lane, const struct oscillator 
 
 	value->primary_high = bank->high[lane];
 	value->primary_low = bank->low[lane];
-	run(&next, (const double[1]){0}, 1);
+	srs_run(&next, (const double[1]){0}, 1);
 	d1 = next.decay[lane] * next.d[lane] - next.stiffness[lane] * next.y[lane] -
 	     next.before[lane] * next.step;
 	free_extremes(o, next.y[lane], d1, &value->residual_high, &value->residual_low);
-	scale(factor, &value->primary_high, &value->primary_low);
-	scale(factor, &value->residual_high, &value->residual_low);
+	srs_scale(factor, &value->primary_high, &value->primary_low);
+	srs_scale(factor, &value->residual_high, &value->residual_low);
 }
 
 /* ---- all of it ---- */
@@ -371,12 +371,12 @@ static void compute_set(const double *value_g, size_t count, double rate_hz, con
 		struct oscillator o = oscillator(frequency_hz[index[i]], rate, options->damping);
 
 		read_lane(&bank[i / LANES], i % LANES, &o,
-		          scale_of(options->quantity, frequency_hz[index[i]]), &value[index[i]]);
+		          srs_scale_of(options->quantity, frequency_hz[index[i]]), &value[index[i]]);
 	}
 }
 
-static int check(const double *value_g, size_t count, double rate_hz, const double *frequency_hz,
-                 size_t frequency_count, const struct srs_options *options)
+static int shock_srs_check(const double *value_g, size_t count, double rate_hz, const double *frequency_hz,
+                           size_t frequency_count, const struct srs_options *options)
 {
 	double most = rate_hz * (options->keep_rate ? FREQUENCY_MAX_KEPT : FREQUENCY_MAX);
 
@@ -398,7 +398,7 @@ static int check(const double *value_g, size_t count, double rate_hz, const doub
 int srs_compute(const double *value_g, size_t count, double rate_hz, const double *frequency_hz,
                 size_t frequency_count, const struct srs_options *options, struct srs_value *value)
 {
-	int result = check(value_g, count, rate_hz, frequency_hz, frequency_count, options);
+	int result = shock_srs_check(value_g, count, rate_hz, frequency_hz, frequency_count, options);
 	size_t *index, low = 0, high = 0;
 	double most = 0;
 	struct bank *bank;
