@@ -345,18 +345,19 @@ static int proof_read_row(struct proof *proof, int64_t drop)
 static int remember(struct proof *proof)
 {
 	struct archive *archive = proof->archive;
-	struct archive_mark *mark = archive->mark, *more;
+	struct archive_mark *mark, *more;
+	size_t at = 0;
 
-	while (mark < archive->mark + archive->marks && mark->drop != proof->drop)
-		mark++;
-	if (mark == archive->mark + archive->marks) {
+	while (at < archive->marks && archive->mark[at].drop != proof->drop)
+		at++;
+	if (at == archive->marks) {
 		more = realloc(archive->mark, (archive->marks + 1) * sizeof(*more));
 		if (more == NULL)
 			return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
 		archive->mark = more;
-		mark = &more[archive->marks++];
-		mark->fault[0] = '\0';
+		more[archive->marks++].fault[0] = '\0';
 	}
+	mark = &archive->mark[at];
 	archive->marked += strcmp(mark->fault, proof->fault) != 0;
 	*mark = (struct archive_mark){.drop = proof->drop, .missing = !proof->altered};
 	memcpy(mark->fault, proof->fault, sizeof(mark->fault));

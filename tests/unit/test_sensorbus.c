@@ -31,7 +31,16 @@ static void request_bytes(void **state)
 	assert_int_equal(sensorbus_put_request(out, &request), SENSORBUS_REQUEST_BYTES);
 	assert_memory_equal(out, bytes, sizeof(bytes));
 	assert_int_equal(sensorbus_get_request(bytes, &back), SENSORBUS_REQUEST_BYTES);
-	assert_memory_equal(&back, &request, sizeof(back));
+	assert_int_equal(back.tick_ms, request.tick_ms); /* by members: between them is padding */
+	assert_int_equal(back.group, request.group);
+	assert_int_equal(back.index, request.index);
+	assert_int_equal(back.outputs, request.outputs);
+	assert_int_equal(back.edges, request.edges);
+	assert_int_equal(back.frames, request.frames);
+	assert_int_equal(back.reset, request.reset);
+	assert_int_equal(back.ahead, request.ahead);
+	assert_int_equal(back.kept, request.kept);
+	assert_memory_equal(back.edge_us, request.edge_us, sizeof(back.edge_us));
 }
 
 static void answer_bytes(void **state)
