@@ -7,7 +7,7 @@
 
 enum {
 	HEARTBEAT_MS = 100,
-	SILENCE_MS = 2000,   /* a tower that spoke and is not heard for so long is gone */
+	SILENCE_MS = 5000,   /* a tower that spoke and is not heard for so long is gone */
 	FRAMES_AT_ONCE = 64, /* handled before anything else is done */
 };
 
