@@ -155,8 +155,8 @@ static int take_word(const struct option_table *table, const struct option_row *
 	return OPTIONS_READ;
 }
 
-static int base_option_take(const struct option_table *table, const struct option_row *row, const char *text,
-                            void *into)
+static int option_take_row(const struct option_table *table, const struct option_row *row, const char *text,
+                           void *into)
 {
 	void *field = (char *)into + row->at;
 
@@ -198,7 +198,7 @@ int option_read(const struct option_table *table, void *into, int argc, char **a
 		}
 		code = option < ROW_OPTION
 		               ? refuse_word(table, argv[optind - 1])
-		               : base_option_take(table, &table->rows[option - ROW_OPTION], optarg, into);
+		               : option_take_row(table, &table->rows[option - ROW_OPTION], optarg, into);
 	}
 	if (code == OPTIONS_READ && !table->words && optind != argc)
 		code = option_wrong(table, "'%s' is too much", argv[optind]);

@@ -139,7 +139,7 @@ static void rescue(const struct work *work, const struct tower_drop *drop, char 
 	         drop->recording.log[0] != '\0' ? drop->recording.log : "nothing");
 }
 
-static void work_keep_keep(struct job *way)
+static void work_keep_drop(struct job *way)
 {
 	struct tower_drop *drop = way->maker;
 	struct work *work = way->console->work;
@@ -205,7 +205,7 @@ static void send(struct work *work, struct tower_drop *drop, void (*run)(struct 
 
 void work_keep(struct work *work, struct tower_drop *drop)
 {
-	send(work, drop, work_keep_keep);
+	send(work, drop, work_keep_drop);
 }
 
 void work_discard(struct work *work, struct tower_drop *drop)

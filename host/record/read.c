@@ -51,8 +51,8 @@ static int read_dispatch(struct record *record, const struct source *source, con
 }
 
 /* The one recording of the log, which a pipe has left in memory. */
-static int read_read_one(struct record *record, const struct log_file *log, const char *columns,
-                         char *message)
+static int read_one_record(struct record *record, const struct log_file *log, const char *columns,
+                           char *message)
 {
 	struct source loaded = {0}, source = log->whole;
 	int error = 0;
@@ -148,7 +148,7 @@ int read_each(const char *file, const char *columns,
 	if (log_is(&log)) {
 		result = each_of_log(&of, message);
 	} else {
-		result = read_read_one(&record, &log, columns, message);
+		result = read_one_record(&record, &log, columns, message);
 		if (result == 0)
 			result = each(context, NULL, &record);
 	}
@@ -298,7 +298,7 @@ int read_nth(struct record *record, const char *file, const char *columns, unsig
 	else if (number > 1)
 		error = source_refuse(message, DT_E_ARGUMENT, file, 0, "no drop %u, 1 is there", number);
 	else
-		error = read_read_one(record, &log, columns, message);
+		error = read_one_record(record, &log, columns, message);
 	log_file_close(&log);
 	return error;
 }
@@ -314,7 +314,7 @@ static int list_one(const struct log_file *log, struct log_visitor *visitor, cha
 {
 	struct log_capture capture = {.number = 1, .alone = true, .to = log->size};
 	struct record record;
-	int error = read_read_one(&record, log, NULL, message);
+	int error = read_one_record(&record, log, NULL, message);
 
 	if (error)
 		return error;
