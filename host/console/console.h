@@ -4,16 +4,20 @@
 /*
  * The parts of a running console, as each finds the others.
  */
+#include <stdatomic.h>
+
 #include "host/console/job.h"
-#include "host/console/live.h"
-#include "host/console/tower.h"
-#include "host/console/work.h"
+
+struct live;
+struct tower;
+struct work;
 
 struct console {
 	struct live *live;
 	struct tower *tower;
 	struct work *work;
 	struct job_queue tower_queue, work_queue;
+	atomic_bool at_rest; /* nothing falls, is about to, or is being fetched; the tower's thread knows */
 };
 
 #endif

@@ -20,9 +20,26 @@
 
 struct console;
 
+/* What a job asks of the thread that takes it. */
+enum job_message {
+	JOB_RUN, /* what its run says */
+	/* The tower's thread asks the archive's. These two come back as JOB_RUN, or are answered when they
+	 * fail (404 without such a series), and then their luggage is freed. */
+	JOB_BEGIN, /* luggage: a drop with its series. Makes the next recording of it */
+	JOB_SCENE, /* luggage: a scene with its series. Adds scene and text */
+	/* These are never refused and go before all that waits; what comes with them is the receiver's. */
+	JOB_KEEP,     /* a drop that was collected: syncs, records, analyses it; JOB_SAVED when done */
+	JOB_DISCARD,  /* a drop of which nothing came, or nothing was collected (released) */
+	JOB_SELECTED, /* the scene whose series the tower drops in from now on */
+	/* The archive's thread tells the tower's. */
+	JOB_SAVED, /* what became of the drop that was to be kept */
+	JOB_MESSAGES,
+};
+
 struct job {
 	struct job *next;
 	struct console *console;
+	enum job_message message;
 	void (*run)(struct job *job);
 	void (*done)(struct job *job); /* called by job_done, on any thread */
 	void *maker;                   /* what done needs */

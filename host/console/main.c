@@ -326,7 +326,6 @@ static void main_stop(struct serve *serve)
 		tower_stop(console->tower);
 	if (console->work != NULL)
 		work_stop(console->work);
-	tower_free(console->tower);
 	if (console->live != NULL) {
 		live_destroy(console->live);
 		job_queue_destroy(&console->work_queue);

@@ -9,6 +9,8 @@
 #include "host/command/serve.h"
 #include "host/console/console.h"
 #include "host/console/http.h"
+#include "host/console/tower.h"
+#include "host/console/work.h"
 
 struct options {
 	struct tower_options tower;

@@ -11,6 +11,7 @@
 #include "common/plain.h"
 #include "host/console/http_private.h"
 #include "host/console/route.h"
+#include "host/session/session.h"
 
 enum {
 	BODY_MAX = 16 * 1024,

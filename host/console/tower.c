@@ -176,6 +176,9 @@ void tower_publish(struct tower *tower)
 	view->simulated_count = tower->simulated_count;
 	memcpy(view->simulated_name, tower->simulated_name, sizeof(view->simulated_name));
 	view->simulated_faults = tower->simulated_faults;
+	atomic_store(&tower->console->at_rest, view->phase == TOWER_IDLE &&
+	                                               !wire_state_moving(view->session.state) &&
+	                                               view->session.state != WIRE_STATE_ARMED);
 	pthread_mutex_unlock(&tower->lock);
 }
 
@@ -188,6 +191,14 @@ void tower_look(struct tower *tower, struct tower_view *view)
 
 /* ---- the thread ---- */
 
+static void tower_do(struct tower *tower, struct job *job)
+{
+	if (job->message == JOB_SAVED)
+		tower_drop_saved(tower, job->maker);
+	else
+		job->run(job);
+}
+
 static void run_jobs(struct tower *tower)
 {
 	struct job_queue *queue = &tower->console->tower_queue;
@@ -198,7 +209,7 @@ static void run_jobs(struct tower *tower)
 		job = job_take(queue, i == 0 ? TURN_MS : 0);
 		if (job == NULL)
 			return;
-		job->run(job);
+		tower_do(tower, job);
 	}
 }
 
@@ -227,6 +238,10 @@ static void *tower_run(void *user)
 		tower_turn(tower);
 	tower_drop_leave(tower);
 	while ((job = job_take(&tower->console->tower_queue, 0)) != NULL) {
+		if (job->message == JOB_SAVED) {
+			tower_do(tower, job);
+			continue;
+		}
 		job_refuse(job, 503, "the console is ending");
 		job_done(job);
 	}
@@ -295,10 +310,5 @@ void tower_stop(struct tower *tower)
 	atomic_store(&tower->stopping, true);
 	job_queue_close(&tower->console->tower_queue);
 	pthread_join(tower->thread, NULL);
-}
-
-void tower_free(struct tower *tower)
-{
-	if (tower != NULL)
-		console_tower_destroy(tower);
+	console_tower_destroy(tower);
 }

@@ -72,10 +72,8 @@ struct tower *tower_start(struct console *console, const struct tower_options *o
 
 /* Ends the thread and with it the simulated tower; to be called before work_stop. What is armed is aborted, a
  * drop in motion stays partial in the archive; a real tower holds it for the next start. Closes the tower's
- * queue; jobs in it are refused (503). */
+ * queue; jobs in it are refused (503). Nothing of it may be looked at any more. */
 void tower_stop(struct tower *tower);
-/* After tower_stop and work_stop: until then work may look at it. */
-void tower_free(struct tower *tower);
 
 /* A copy of what is known. */
 void tower_look(struct tower *tower, struct tower_view *view);
@@ -105,32 +103,5 @@ void tower_abort(struct job *job);
 /* Aborts what is armed, or about to be, and does not wait for it; on any thread. The console ends, and other
  * requests may take a while yet. */
 void tower_disarm(struct tower *tower);
-
-/* ---- for work ---- */
-
-/* A drop, from arm to archive: malloc, with the recording's lock -1 until work_begin has made one. */
-struct tower_drop {
-	struct archive_recording
-	        recording;    /* lock < 0: none was begun, the log is to be written from the record */
-	struct record record; /* initialised; the receiver frees it */
-	char series[ARCHIVE_NAME_MAX + 1];
-	char note[ARCHIVE_TEXT_MAX];
-	bool released;    /* work_discard leaves it partial: something may have fallen */
-	bool simulated;   /* nothing has */
-	unsigned aborted; /* the tower's own */
-	struct job way;   /* work's own */
-};
-
-/* What work did of it: the phase goes back to idle. drop: SERIES/NUMBER, "" when it could not be kept, then
- * trouble says why. */
-void tower_saved(struct tower *tower, const char *drop, const char *trouble);
-
-/* A series, as work hands it over: malloc, text too. */
-struct tower_scene {
-	char series[ARCHIVE_NAME_MAX + 1];
-	struct scene scene; /* at the angle and height of the series */
-	char *text;         /* its file, for a simulated tower, which gets the angle beside it */
-	unsigned aborted;   /* the tower's own */
-};
 
 #endif

@@ -62,7 +62,7 @@ void tower_bench_stop(struct tower *tower)
 	}
 }
 
-int tower_bench_scene(struct tower *tower, const struct tower_scene *scene)
+int tower_bench_scene(struct tower *tower, const struct handover_scene *scene)
 {
 	size_t length = strlen(scene->text);
 	int fd = memfd_create("scene", MFD_CLOEXEC);

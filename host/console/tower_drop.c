@@ -17,9 +17,9 @@ enum {
 	SETTLED = 2, /* statuses: of what was on its way while the state changed there is one at most */
 };
 
-struct tower_drop *tower_drop_new(const struct tower *tower, const char *series)
+struct handover_drop *tower_drop_new(const struct tower *tower, const char *series)
 {
-	struct tower_drop *drop = calloc(1, sizeof(*drop));
+	struct handover_drop *drop = calloc(1, sizeof(*drop));
 
 	if (drop == NULL)
 		return NULL;
@@ -28,6 +28,24 @@ struct tower_drop *tower_drop_new(const struct tower *tower, const char *series)
 	drop->simulated = tower->is_simulated;
 	snprintf(drop->series, sizeof(drop->series), "%s", series);
 	return drop;
+}
+
+/* To the archive, which has it from now on. */
+static void tower_drop_send(struct tower *tower, struct handover_drop *drop, enum job_message message)
+{
+	drop->way = (struct job){.console = tower->console, .message = message, .maker = drop};
+	if (job_put_first(&tower->console->work_queue, &drop->way) == 0)
+		return;
+	/* the program ends: what is on the disk shows up as interrupted */
+	if (drop->recording.lock >= 0)
+		archive_abandon(&drop->recording);
+	record_free(&drop->record);
+	free(drop);
+}
+
+void tower_drop_discard(struct tower *tower, struct handover_drop *drop)
+{
+	tower_drop_send(tower, drop, JOB_DISCARD);
 }
 
 /* ---- the log ---- */
@@ -77,7 +95,7 @@ static void tower_drop_enter(struct tower *tower, enum tower_phase phase)
 		tower->armed_until_ms = 0;
 }
 
-static void tower_drop_take(struct tower *tower, struct tower_drop *drop)
+static void tower_drop_take(struct tower *tower, struct handover_drop *drop)
 {
 	tower->drop = drop;
 	tower->fault = WIRE_FAULT_NONE;
@@ -89,7 +107,7 @@ static void tower_drop_take(struct tower *tower, struct tower_drop *drop)
 		         drop->recording.number);
 }
 
-bool tower_drop_begin(struct tower *tower, struct tower_drop *drop)
+bool tower_drop_begin(struct tower *tower, struct handover_drop *drop)
 {
 	tower_drop_take(tower, drop);
 	if (!tower_drop_open_log(tower)) {
@@ -116,13 +134,13 @@ void tower_drop_end(struct tower *tower)
 {
 	(void)close_log(tower);
 	if (tower->drop != NULL)
-		work_discard(tower->console->work, tower->drop);
+		tower_drop_discard(tower, tower->drop);
 	tower->drop = NULL;
 	tower->drop_name[0] = '\0';
 	tower_drop_enter(tower, TOWER_IDLE);
 }
 
-static void add_note(struct tower_drop *drop, const char *text)
+static void add_note(struct handover_drop *drop, const char *text)
 {
 	size_t length = strlen(drop->note);
 
@@ -160,9 +178,9 @@ tower_drop_give_up(struct tower *tower, const char *format, ...)
 /* ---- collecting ---- */
 
 /* A drop that we did not release. */
-static struct tower_drop *without_recording(const struct tower *tower)
+static struct handover_drop *without_recording(const struct tower *tower)
 {
-	struct tower_drop *drop = tower_drop_new(tower, tower->series);
+	struct handover_drop *drop = tower_drop_new(tower, tower->series);
 
 	if (drop == NULL)
 		return NULL;
@@ -172,9 +190,9 @@ static struct tower_drop *without_recording(const struct tower *tower)
 }
 
 /* The drop that the record belongs to, no longer the tower's; NULL without memory. */
-static struct tower_drop *tower_drop_hand_over(struct tower *tower)
+static struct handover_drop *tower_drop_hand_over(struct tower *tower)
 {
-	struct tower_drop *drop = tower->drop;
+	struct handover_drop *drop = tower->drop;
 
 	if (drop == NULL)
 		drop = without_recording(tower);
@@ -186,7 +204,7 @@ static struct tower_drop *tower_drop_hand_over(struct tower *tower)
 
 static void collected(struct tower *tower, struct record *record)
 {
-	struct tower_drop *drop = tower_drop_hand_over(tower);
+	struct handover_drop *drop = tower_drop_hand_over(tower);
 
 	if (drop == NULL) {
 		record_free(record);
@@ -199,31 +217,18 @@ static void collected(struct tower *tower, struct record *record)
 		add_note(drop, wire_fault_text(tower->fault));
 	drop->record = *record;
 	tower_drop_enter(tower, TOWER_SAVING);
-	work_keep(tower->console->work, drop);
+	tower_drop_send(tower, drop, JOB_KEEP);
 }
 
-void tower_saved(struct tower *tower, const char *drop, const char *trouble)
+void tower_drop_saved(struct tower *tower, struct handover_drop *drop)
 {
-	pthread_mutex_lock(&tower->lock);
-	tower->saved = true;
-	snprintf(tower->saved_trouble, sizeof(tower->saved_trouble), "%s", drop[0] != '\0' ? "" : trouble);
-	pthread_mutex_unlock(&tower->lock);
-}
-
-static void take_saved(struct tower *tower)
-{
-	bool saved;
-
-	pthread_mutex_lock(&tower->lock);
-	saved = tower->saved;
-	tower->saved = false;
-	if (saved)
-		snprintf(tower->drop_trouble, sizeof(tower->drop_trouble), "%s", tower->saved_trouble);
-	pthread_mutex_unlock(&tower->lock);
-	if (saved && tower->phase == TOWER_SAVING) {
-		tower->drop_name[0] = '\0';
-		tower_drop_enter(tower, TOWER_IDLE);
-	}
+	snprintf(tower->drop_trouble, sizeof(tower->drop_trouble), "%.*s",
+	         (int)sizeof(tower->drop_trouble) - 1, drop->trouble);
+	free(drop);
+	if (tower->phase != TOWER_SAVING)
+		return;
+	tower->drop_name[0] = '\0';
+	tower_drop_enter(tower, TOWER_IDLE);
 }
 
 /* ---- following ---- */
@@ -245,7 +250,7 @@ static bool settled(struct tower *tower, bool now)
 
 static void follow_idle(struct tower *tower, unsigned state)
 {
-	struct tower_drop *drop;
+	struct handover_drop *drop;
 
 	if (session_at_rest(state))
 		tower->origin = "was not released from the console";
@@ -319,7 +324,6 @@ void tower_drop_follow(struct tower *tower)
 	struct record record;
 	int taken = 0;
 
-	take_saved(tower);
 	if (tower->session != NULL && session_view(tower->session)->seen) {
 		if (tower->phase != TOWER_SAVING)
 			taken = session_take_drop(tower->session, &record);

@@ -14,6 +14,8 @@
 
 #include "host/session/simulated.h"
 #include "host/console/console.h"
+#include "host/console/handover.h"
+#include "host/console/live.h"
 #include "host/console/tower.h"
 
 struct tower {
@@ -32,8 +34,6 @@ struct tower {
 	atomic_uint aborts; /* asked for */
 	pthread_mutex_t lock;
 	struct tower_view view;
-	bool saved; /* tower_saved was called */
-	char saved_trouble[ARCHIVE_TEXT_MAX];
 
 	/* the link */
 	struct session *session; /* NULL: not open */
@@ -52,8 +52,8 @@ struct tower {
 
 	/* the drop under way */
 	enum tower_phase phase;
-	struct tower_drop *drop; /* NULL: none, or work has it */
-	const char *origin;      /* of a drop that comes without one */
+	struct handover_drop *drop; /* NULL: none, or work has it */
+	const char *origin;         /* of a drop that comes without one */
 	struct link *log;
 	char drop_name[ARCHIVE_NAME_MAX + 16];
 	int64_t phase_ms;       /* since when */
@@ -113,14 +113,20 @@ bool tower_check_select(struct job *job);
 /* ---- tower_drop.c ---- */
 
 /* NULL without memory. */
-struct tower_drop *tower_drop_new(const struct tower *tower, const char *series);
+struct handover_drop *tower_drop_new(const struct tower *tower, const char *series);
 
 /* Takes drop over and opens its log. False with drop_trouble. */
-bool tower_drop_begin(struct tower *tower, struct tower_drop *drop);
+bool tower_drop_begin(struct tower *tower, struct handover_drop *drop);
 
 /* The tower has taken ARM, RELEASE. */
 void tower_drop_armed(struct tower *tower);
 void tower_drop_released(struct tower *tower);
+
+/* Takes drop over: nothing came of it, or nothing that was collected (released). */
+void tower_drop_discard(struct tower *tower, struct handover_drop *drop);
+
+/* What became of the one that was to be kept. Takes it over. */
+void tower_drop_saved(struct tower *tower, struct handover_drop *drop);
 
 /* Nothing comes of it, or nothing more. */
 void tower_drop_end(struct tower *tower);
@@ -143,7 +149,7 @@ int tower_bench_start(struct tower *tower);
 void tower_bench_stop(struct tower *tower);
 
 /* From now on it is started with this scene. 0 or DT_E_SYSTEM. */
-int tower_bench_scene(struct tower *tower, const struct tower_scene *scene);
+int tower_bench_scene(struct tower *tower, const struct handover_scene *scene);
 
 /* The control socket of the bench is at path. 0, or -1 with link_trouble. */
 int tower_bench_control(struct tower *tower, const char *path);

@@ -55,7 +55,7 @@ static void answer_token(struct job *job, const struct session_view *view)
 	job_answer_json(job, tree);
 }
 
-static void tower_verbs_arm(struct job *job, struct tower_drop *drop)
+static void tower_verbs_arm(struct job *job, struct handover_drop *drop)
 {
 	struct tower *tower = job->console->tower;
 	const struct session_view *view = session_view(tower->session);
@@ -82,7 +82,7 @@ static void tower_verbs_arm(struct job *job, struct tower_drop *drop)
 static void send_arm(struct job *job)
 {
 	struct tower *tower = job->console->tower;
-	struct tower_drop *drop = job->luggage;
+	struct handover_drop *drop = job->luggage;
 	bool may = false;
 
 	tower->wanted = drop->aborted;
@@ -95,20 +95,15 @@ static void send_arm(struct job *job)
 	if (may)
 		tower_verbs_arm(job, drop);
 	else
-		work_discard(tower->console->work, drop);
+		tower_drop_discard(tower, drop);
 	tower_verbs_finish(job);
-}
-
-static void begin_arm(struct job *job)
-{
-	work_begin(job, send_arm);
 }
 
 void tower_arm(struct job *job)
 {
 	struct tower *tower = job->console->tower;
 	unsigned aborted = atomic_load(&tower->aborts);
-	struct tower_drop *drop;
+	struct handover_drop *drop;
 
 	if (!tower_check_arm(job)) {
 		job_done(job);
@@ -124,7 +119,8 @@ void tower_arm(struct job *job)
 	}
 	drop->aborted = aborted;
 	job->luggage = drop;
-	if (!hand_on(job, &job->console->work_queue, begin_arm))
+	job->message = JOB_BEGIN;
+	if (!hand_on(job, &job->console->work_queue, send_arm))
 		free(drop);
 }
 
@@ -268,7 +264,7 @@ void tower_disarm(struct tower *tower)
 /* ---- select ---- */
 
 /* A simulated tower of our own becomes one of that scene. */
-static bool change_bench(struct tower *tower, const struct tower_scene *scene)
+static bool change_bench(struct tower *tower, const struct handover_scene *scene)
 {
 	if (!tower->own)
 		return true;
@@ -280,13 +276,14 @@ static bool change_bench(struct tower *tower, const struct tower_scene *scene)
 	return true;
 }
 
-static void tower_verbs_select_series(struct job *job, const struct tower_scene *scene)
+/* Whether it is selected now; a job that was refused may have selected it. */
+static bool tower_verbs_select_series(struct job *job, const struct handover_scene *scene)
 {
 	struct tower *tower = job->console->tower;
 
 	if (!change_bench(tower, scene)) {
 		job_refuse(job, 500, "the scene: %s", error_text(DT_E_SYSTEM));
-		return;
+		return false;
 	}
 	snprintf(tower->series, sizeof(tower->series), "%s", scene->series);
 	tower->scene = scene->scene;
@@ -300,31 +297,30 @@ static void tower_verbs_select_series(struct job *job, const struct tower_scene 
 		answer_empty(job);
 	else
 		job_refuse(job, 409, "%s is selected, but %s", tower->series, tower->setup_trouble);
+	return true;
 }
 
 static void send_select(struct job *job)
 {
 	struct tower *tower = job->console->tower;
-	struct tower_scene *scene = job->luggage;
+	struct handover_scene *scene = job->luggage;
+	bool selected = false;
 
 	if (tower_is_void(tower, scene->aborted))
 		job_refuse(job, 409, "aborted");
 	else if (tower_check_select(job))
-		tower_verbs_select_series(job, scene);
+		selected = tower_verbs_select_series(job, scene);
 	free(scene->text);
-	free(scene);
+	scene->way = (struct job){.console = job->console, .message = JOB_SELECTED, .maker = scene};
+	if (!selected || job_put_first(&job->console->work_queue, &scene->way) != 0)
+		free(scene);
 	tower_verbs_finish(job);
-}
-
-static void begin_select(struct job *job)
-{
-	work_scene(job, send_select);
 }
 
 void tower_select(struct job *job)
 {
 	const char *series = job_text(job, "series", NULL);
-	struct tower_scene *scene = NULL;
+	struct handover_scene *scene = NULL;
 
 	if (series == NULL || !tower_check_select(job)) {
 		job_done(job);
@@ -340,7 +336,8 @@ void tower_select(struct job *job)
 	snprintf(scene->series, sizeof(scene->series), "%s", series);
 	scene->aborted = atomic_load(&job->console->tower->aborts);
 	job->luggage = scene;
-	if (!hand_on(job, &job->console->work_queue, begin_select))
+	job->message = JOB_SCENE;
+	if (!hand_on(job, &job->console->work_queue, send_select))
 		free(scene);
 }
 

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "host/console/work_private.h"
+#include "host/session/session.h"
 
 enum { LOOK_MS = 100, LOOK_AROUND_MS = 1000 };
 
@@ -85,19 +86,15 @@ static int show_series(void *context, const struct archive_series *series)
 	return 0;
 }
 
-/* The tower knows which series is selected. */
 static void look_at_series(struct work *work)
 {
 	struct archive_filter filter = archive_filter_none();
-	struct tower_view tower;
 	const char *shown = work->view.series.name;
 
-	if (!work->tower_there)
+	if (work->selected[0] == '\0' ||
+	    (!work->changed && shown != NULL && strcmp(shown, work->selected) == 0))
 		return;
-	tower_look(work->console->tower, &tower);
-	if (tower.series[0] == '\0' || (!work->changed && shown != NULL && strcmp(shown, tower.series) == 0))
-		return;
-	filter.series = tower.series;
+	filter.series = work->selected;
 	work->changed = false;
 	if (archive_each_series(work->archive, &filter, show_series, work) != 0)
 		work_trouble(work, archive_message(work->archive));
@@ -148,6 +145,26 @@ void work_look(struct work *work, struct work_view *view)
 
 /* ---- the thread ---- */
 
+static void work_select(struct job *way)
+{
+	struct handover_scene *scene = way->maker;
+	struct work *work = way->console->work;
+
+	snprintf(work->selected, sizeof(work->selected), "%s", scene->series);
+	free(scene);
+}
+
+static void work_do(struct job *job)
+{
+	static void (*const act[JOB_MESSAGES])(struct job * job) = {[JOB_BEGIN] = work_keep_begin,
+	                                                            [JOB_SCENE] = work_setup_scene,
+	                                                            [JOB_KEEP] = work_keep_drop,
+	                                                            [JOB_DISCARD] = work_keep_discard,
+	                                                            [JOB_SELECTED] = work_select};
+
+	(act[job->message] != NULL ? act[job->message] : job->run)(job);
+}
+
 static void *work_run(void *context)
 {
 	struct work *work = context;
@@ -158,7 +175,7 @@ static void *work_run(void *context)
 		struct job *job = job_take(&work->console->work_queue, LOOK_MS);
 
 		if (job != NULL)
-			job->run(job);
+			work_do(job);
 		else
 			ended = atomic_load(&work->ending);
 		work_report_look(work, false);

@@ -7,7 +7,6 @@
  */
 #include "host/archive/archive.h"
 #include "host/console/job.h"
-#include "host/console/tower.h"
 
 struct work;
 
@@ -32,22 +31,6 @@ struct work *work_start(struct console *console, const struct work_options *opti
                         char message[ARCHIVE_MESSAGE_MAX]);
 void work_stop(struct work *work); /* after what is queued is done */
 void work_look(struct work *work, struct work_view *view);
-
-/* ---- the tower's ---- */
-
-/* Both run on the work thread, are given the job by the tower's verbs, and hand it on to the tower's queue
- * with run = then. When they fail they answer it, and luggage is freed. work_begin  job of an arm. Its
- * luggage is a struct tower_drop with the series: makes the next drop of it, puts it into recording.
- *   work_scene  job of a select. Its luggage is a struct tower_scene with the series: adds scene and text.
- * 404 without such a series. */
-void work_begin(struct job *job, void (*then)(struct job *job));
-void work_scene(struct job *job, void (*then)(struct job *job));
-
-/* Takes drop over (malloc): syncs, records, analyses; tower_saved when done. Never refused, and goes before
- * everything else that waits. */
-void work_keep(struct work *work, struct tower_drop *drop);
-/* Takes drop over: nothing came of it, or nothing that was collected (released). */
-void work_discard(struct work *work, struct tower_drop *drop);
 
 /* ---- the page's, as run of a job; the routes stand in README.md ---- */
 

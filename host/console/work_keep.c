@@ -19,13 +19,12 @@
 
 /* ---- before ---- */
 
-void work_begin(struct job *job, void (*then)(struct job *job))
+void work_keep_begin(struct job *job)
 {
 	struct work *work = job->console->work;
-	struct tower_drop *drop = job->luggage;
+	struct handover_drop *drop = job->luggage;
 	int result = 0;
 
-	work->tower_there = true;
 	if (work->view.disk_free_bytes < ROOM_RESERVE_BYTES) {
 		job_refuse(job, 507, "%.0f MB left on the disk, expected %.0f MB for a drop",
 		           work->view.disk_free_bytes / 1e6, ROOM_RESERVE_BYTES / 1e6);
@@ -35,7 +34,7 @@ void work_begin(struct job *job, void (*then)(struct job *job))
 		if (result != 0)
 			job_refuse(job, work_status(result), "%s", archive_message(work->archive));
 	}
-	job->run = then;
+	job->message = JOB_RUN;
 	if (drop->recording.lock >= 0 && job_put(&job->console->tower_queue, job) == 0) {
 		work_changed(work);
 		return;
@@ -57,7 +56,7 @@ static int work_keep_send_frame(void *context, const struct frame *frame)
 }
 
 /* Writes the record's frames into the log, instead of what is there. */
-static int write_log(struct tower_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
+static int write_log(struct handover_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
 {
 	char url[ARCHIVE_PATH_MAX + 8];
 	struct link *log;
@@ -80,7 +79,7 @@ static int write_log(struct tower_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
 }
 
 /* A disk that was full for a moment leaves a log with holes, and no error afterwards. */
-static bool log_is_whole(const struct tower_drop *drop)
+static bool log_is_whole(const struct handover_drop *drop)
 {
 	char message[READ_MESSAGE_MAX];
 	struct record read;
@@ -94,7 +93,7 @@ static bool log_is_whole(const struct tower_drop *drop)
 	return whole;
 }
 
-static int record_drop(struct work *work, struct tower_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
+static int record_drop(struct work *work, struct handover_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
 {
 	int result = 0;
 
@@ -113,7 +112,8 @@ static int record_drop(struct work *work, struct tower_drop *drop, char message[
 }
 
 /* The frames to where there is room; message is what the archive said, and then also where they are. */
-static void rescue(const struct work *work, const struct tower_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
+static void rescue(const struct work *work, const struct handover_drop *drop,
+                   char message[ARCHIVE_MESSAGE_MAX])
 {
 	/* a service's own /tmp goes with it; what stays is its folder in memory */
 	const char *folder[] = {archive_folder(work->archive), getenv("RUNTIME_DIRECTORY"), "/var/tmp",
@@ -139,15 +139,14 @@ static void rescue(const struct work *work, const struct tower_drop *drop, char 
 	         drop->recording.log[0] != '\0' ? drop->recording.log : "nothing");
 }
 
-static void work_keep_drop(struct job *way)
+void work_keep_drop(struct job *way)
 {
-	struct tower_drop *drop = way->maker;
+	struct handover_drop *drop = way->maker;
 	struct work *work = way->console->work;
 	const struct archive_recording *r = &drop->recording;
 	char name[ARCHIVE_NAME_MAX + 16] = "", message[ARCHIVE_MESSAGE_MAX] = "", fault[ARCHIVE_MESSAGE_MAX];
 	bool analysed = false;
 
-	work->tower_there = true;
 	if (record_drop(work, drop, message) != 0) {
 		rescue(work, drop, message);
 	} else {
@@ -160,13 +159,15 @@ static void work_keep_drop(struct job *way)
 		strcpy(work->view.result, name);
 	snprintf(work->view.trouble, sizeof(work->view.trouble), "%s", analysed ? "" : message);
 	pthread_mutex_unlock(&work->lock);
-	tower_saved(work->console->tower, name, analysed ? "" : message);
 	record_free(&drop->record);
-	free(drop);
+	snprintf(drop->trouble, sizeof(drop->trouble), "%s", name[0] != '\0' ? "" : message);
+	way->message = JOB_SAVED;
+	if (job_put_first(&work->console->tower_queue, way) != 0)
+		free(drop);
 }
 
 /* What there is of it stays, partial, with a word why. */
-static void leave(struct work *work, struct tower_drop *drop)
+static void leave(struct work *work, struct handover_drop *drop)
 {
 	char name[ARCHIVE_NAME_MAX + 16];
 
@@ -177,9 +178,9 @@ static void leave(struct work *work, struct tower_drop *drop)
 		work_trouble(work, archive_message(work->archive));
 }
 
-static void discard(struct job *way)
+void work_keep_discard(struct job *way)
 {
-	struct tower_drop *drop = way->maker;
+	struct handover_drop *drop = way->maker;
 	struct work *work = way->console->work;
 
 	if (drop->recording.lock >= 0 && drop->released)
@@ -189,26 +190,4 @@ static void discard(struct job *way)
 	work_changed(work);
 	record_free(&drop->record);
 	free(drop);
-}
-
-static void send(struct work *work, struct tower_drop *drop, void (*run)(struct job *job))
-{
-	drop->way = (struct job){.console = work->console, .run = run, .maker = drop};
-	if (job_put_first(&work->console->work_queue, &drop->way) == 0)
-		return;
-	/* the program ends: what is on the disk shows up as interrupted */
-	if (drop->recording.lock >= 0)
-		archive_abandon(&drop->recording);
-	record_free(&drop->record);
-	free(drop);
-}
-
-void work_keep(struct work *work, struct tower_drop *drop)
-{
-	send(work, drop, work_keep_drop);
-}
-
-void work_discard(struct work *work, struct tower_drop *drop)
-{
-	send(work, drop, discard);
 }

@@ -10,6 +10,7 @@
 
 #include "common/link/temporary.h"
 #include "host/console/console.h"
+#include "host/console/handover.h"
 #include "host/console/work.h"
 
 struct work_scene_file {
@@ -35,8 +36,8 @@ struct work {
 	struct work_report report;
 	pthread_t thread;
 	atomic_bool ending;
-	bool tower_there; /* the tower has sent a job: console->tower may be asked */
-	bool changed;     /* the view's series is to be read again */
+	char selected[ARCHIVE_NAME_MAX + 1]; /* series; "" */
+	bool changed;                        /* the view's series is to be read again */
 	int64_t looked_ms, changes;
 
 	pthread_mutex_t lock;
@@ -57,6 +58,12 @@ void work_trouble(struct work *work, const char *text);
 
 /* Reads the scenes' files. 0 or DT_E_* with one line in message. */
 DT_MUST_USE int work_open_scenes(struct work *work, char message[ARCHIVE_MESSAGE_MAX]);
+
+/* The tower's messages. */
+void work_keep_begin(struct job *job);
+void work_keep_drop(struct job *way);
+void work_keep_discard(struct job *way);
+void work_setup_scene(struct job *job);
 
 /* Notes interrupted drops as recorded whose logs are whole. */
 void work_recover(struct work *work);

@@ -14,22 +14,11 @@
 #include <unistd.h>
 
 #include "common/base/process.h"
-#include "common/wire_table.h"
 #include "host/base/beside.h"
 #include "host/base/durable.h"
 #include "host/console/work_private.h"
 
 enum { NICE = 10 };
-
-/* Nothing falls, is about to, or is being fetched. */
-static bool at_rest(const struct work *work)
-{
-	struct tower_view view;
-
-	tower_look(work->console->tower, &view);
-	return view.phase == TOWER_IDLE && !wire_state_moving(view.session.state) &&
-	       view.session.state != WIRE_STATE_ARMED;
-}
 
 static int run_program(struct work_report *r, const char *folder, const char *series)
 {
@@ -100,7 +89,7 @@ void work_report(struct job *job)
 		work_refuse(job, result);
 		return;
 	}
-	if (work->report.job == NULL && at_rest(work)) {
+	if (work->report.job == NULL && atomic_load(&work->console->at_rest)) {
 		work_report_start(work, job);
 		return;
 	}

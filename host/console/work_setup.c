@@ -220,19 +220,18 @@ static int copy_text(void *context, const struct archive_series *series)
 	return *text != NULL ? 0 : DT_E_MEMORY;
 }
 
-void work_scene(struct job *job, void (*then)(struct job *job))
+void work_setup_scene(struct job *job)
 {
 	struct work *work = job->console->work;
 	struct archive_filter filter = archive_filter_none();
-	struct tower_scene *wanted = job->luggage;
+	struct handover_scene *wanted = job->luggage;
 	int result = archive_scene(work->archive, wanted->series, &wanted->scene);
 
-	work->tower_there = true;
 	wanted->text = NULL;
 	filter.series = wanted->series;
 	if (result == 0)
 		result = archive_each_series(work->archive, &filter, copy_text, &wanted->text);
-	job->run = then;
+	job->message = JOB_RUN;
 	if (result == 0 && job_put(&job->console->tower_queue, job) == 0)
 		return;
 	free(wanted->text);

@@ -23,6 +23,8 @@
 #include "common/wire_table.h"
 #include "firmware/parameter.h"
 #include "host/console/console.h"
+#include "host/console/tower.h"
+#include "host/console/work.h"
 #include "tests/unit/drop_by_hand.h"
 
 enum {
@@ -357,7 +359,6 @@ static void console_stop(void)
 {
 	tower_stop(console.tower);
 	work_stop(console.work);
-	tower_free(console.tower);
 	live_destroy(console.live);
 	job_queue_destroy(&console.work_queue);
 	job_queue_destroy(&console.tower_queue);
@@ -632,6 +633,7 @@ static void begin_to_fall(void)
 	behave(0, 0, false);
 	release(arm());
 	wait_view(is_moving);
+	assert_false(console.at_rest);
 }
 
 static void wait_recorded(const char *drop)
@@ -753,6 +755,7 @@ static void a_wrong_token_leaves_it_armed(void **state)
 	assert_int_equal(say(tower_release, body, text), 409);
 	assert_non_null(strstr(text, error_text(DT_E_TOKEN)));
 	assert_int_equal(wait_view(is_armed).phase, TOWER_ARMED);
+	assert_false(console.at_rest);
 	assert_int_equal(say(tower_arm, "{}", text), 409); /* one at a time */
 	assert_int_equal(say(tower_select, "{\"series\":\"box\"}", text), 409);
 	release(token);
@@ -772,6 +775,7 @@ static void disarmed_without_a_release_leaves_no_drop(void **state)
 	pthread_mutex_unlock(&fake.lock);
 	idle = wait_view(is_idle);
 	assert_true(idle.armed_until_ms == 0);
+	assert_true(console.at_rest);
 	assert_string_equal(idle.trouble, "");
 	(void)arm();
 	must(tower_abort, "{}");

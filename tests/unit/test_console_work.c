@@ -18,6 +18,8 @@
 #include "common/wire.h"
 #include "host/archive/print.h"
 #include "host/console/console.h"
+#include "host/console/handover.h"
+#include "host/console/work.h"
 #include "host/model/model.h"
 #include "host/record/read.h"
 #include "tests/unit/archive_stock.h"
@@ -27,41 +29,19 @@
 #define SCENE "common/scenes/geometry-2A.ini"
 #define BARE "common/scenes/geometry-1.ini"
 
-/* ---- a tower that only remembers ---- */
-
-static struct tower_view seen_tower;
-static char saved_drop[128], saved_trouble[ARCHIVE_MESSAGE_MAX];
-static sem_t saved;
-static unsigned counted, counted_when_saved;
-
-void tower_look(struct tower *tower, struct tower_view *view)
-{
-	(void)tower;
-	*view = seen_tower;
-}
-
-void tower_saved(struct tower *tower, const char *drop, const char *trouble)
-{
-	(void)tower;
-	snprintf(saved_drop, sizeof(saved_drop), "%s", drop);
-	snprintf(saved_trouble, sizeof(saved_trouble), "%s", trouble);
-	counted_when_saved = counted;
-	sem_post(&saved);
-}
-
 /* ---- a console without the rest ---- */
 
 static char folder[64], message[ARCHIVE_MESSAGE_MAX];
 static struct console console;
 static sem_t answered;
+static char saved_trouble[ARCHIVE_MESSAGE_MAX];
 
 static int make_folder(void **state)
 {
 	(void)state;
 	strcpy(folder, "/tmp/droptower-work-XXXXXX");
 	memset(&console, 0, sizeof(console));
-	memset(&seen_tower, 0, sizeof(seen_tower));
-	sem_init(&saved, 0, 0);
+	console.at_rest = true;
 	sem_init(&answered, 0, 0);
 	job_queue_init(&console.work_queue);
 	job_queue_init(&console.tower_queue);
@@ -76,7 +56,6 @@ static int remove_folder(void **state)
 	work_stop(console.work);
 	job_queue_destroy(&console.work_queue);
 	job_queue_destroy(&console.tower_queue);
-	sem_destroy(&saved);
 	sem_destroy(&answered);
 	snprintf(command, sizeof(command), "rm -rf %s", folder);
 	return system(command);
@@ -745,9 +724,9 @@ static void test_decisions_and_notes(void **state)
 
 /* ---- the tower's ---- */
 
-static struct tower_drop *new_drop(const char *series)
+static struct handover_drop *new_drop(const char *series)
 {
-	struct tower_drop *drop = calloc(1, sizeof(*drop));
+	struct handover_drop *drop = calloc(1, sizeof(*drop));
 
 	assert_non_null(drop);
 	record_init(&drop->record);
@@ -763,16 +742,6 @@ static void and_then(struct job *job)
 	job_done(job);
 }
 
-static void begin_run(struct job *job)
-{
-	work_begin(job, and_then);
-}
-
-static void scene_run(struct job *job)
-{
-	work_scene(job, and_then);
-}
-
 /* The job as it comes to the tower; NULL when it was answered with that status instead. */
 static struct job *hand_over(struct job *job, int status)
 {
@@ -783,7 +752,7 @@ static struct job *hand_over(struct job *job, int status)
 		struct job *come = job_take(&console.tower_queue, 5000);
 
 		assert_ptr_equal(come, job);
-		assert_ptr_equal(come->run, and_then);
+		assert_int_equal(come->message, JOB_RUN);
 		return come;
 	}
 	while (sem_wait(&answered) != 0)
@@ -793,9 +762,9 @@ static struct job *hand_over(struct job *job, int status)
 	return NULL;
 }
 
-static struct tower_drop *begin(const char *series)
+static struct handover_drop *begin(const char *series)
 {
-	struct job job = {.run = begin_run, .luggage = new_drop(series)};
+	struct job job = {.run = and_then, .message = JOB_BEGIN, .luggage = new_drop(series)};
 
 	return hand_over(&job, 0)->luggage;
 }
@@ -810,11 +779,37 @@ static void read_hand(struct record *record, int lost_tick)
 	assert_int_equal(unlink(path), 0);
 }
 
+/* What the tower's thread sends of a drop. */
+static void give(struct handover_drop *drop, enum job_message sent)
+{
+	drop->way = (struct job){.console = &console, .message = sent, .maker = drop};
+	assert_int_equal(job_put_first(&console.work_queue, &drop->way), 0);
+}
+
+static void select_series(const char *series)
+{
+	struct handover_scene *scene = calloc(1, sizeof(*scene));
+
+	assert_non_null(scene);
+	strcpy(scene->series, series);
+	scene->way = (struct job){.console = &console, .message = JOB_SELECTED, .maker = scene};
+	assert_int_equal(job_put_first(&console.work_queue, &scene->way), 0);
+}
+
 static void wait_saved(const char *drop)
 {
-	while (sem_wait(&saved) != 0)
-		continue;
-	assert_string_equal(saved_drop, drop);
+	struct job *come = job_take(&console.tower_queue, 5000);
+	struct handover_drop *saved;
+	char name[128] = "";
+
+	assert_non_null(come);
+	assert_int_equal(come->message, JOB_SAVED);
+	saved = come->maker;
+	strcpy(saved_trouble, saved->trouble);
+	if (saved->trouble[0] == '\0')
+		snprintf(name, sizeof(name), "%s/%u", saved->recording.series, saved->recording.number);
+	free(saved);
+	assert_string_equal(name, drop);
 }
 
 static bool is_simulated(const char *series, int number)
@@ -834,19 +829,19 @@ static bool is_simulated(const char *series, int number)
 
 static void test_a_drop_is_kept_and_analysed(void **state)
 {
-	struct tower_drop *drop;
+	struct handover_drop *drop;
 	struct work_view view;
 	cJSON *tree;
 
 	(void)state;
 	start_with_drops();
-	strcpy(seen_tower.series, "one");
+	select_series("one");
 	drop = begin("one");
 	assert_int_equal(drop->recording.number, 4);
 	write_hand(drop->recording.log, -1);
 	read_hand(&drop->record, -1);
 	strcpy(drop->note, "a note");
-	work_keep(console.work, drop);
+	give(drop, JOB_KEEP);
 	wait_saved("one/4");
 	assert_string_equal(saved_trouble, "");
 	tree = ask_json(work_result, "one/4", NULL, NULL);
@@ -875,9 +870,16 @@ static void wait_for_all(struct job *job)
 	job_done(job);
 }
 
+static unsigned counted;
+static bool saved_first; /* before the first that was counted */
+
 static void count(struct job *job)
 {
-	counted++;
+	if (counted++ == 0) {
+		pthread_mutex_lock(&console.tower_queue.lock);
+		saved_first = console.tower_queue.count == 1;
+		pthread_mutex_unlock(&console.tower_queue.lock);
+	}
 	job_done(job);
 }
 
@@ -885,7 +887,7 @@ static void count(struct job *job)
 static void test_a_drop_goes_first(void **state)
 {
 	static struct job waiting[1000];
-	struct tower_drop *drop = new_drop("one");
+	struct handover_drop *drop = new_drop("one");
 	sem_t all;
 	struct job first = {.console = &console, .run = wait_for_all, .done = on_done, .maker = &all};
 	unsigned put = 0;
@@ -900,13 +902,13 @@ static void test_a_drop_goes_first(void **state)
 	while (job_put(&console.work_queue, &waiting[put]) == 0 && ++put < 1000);
 	assert_in_range(put, 10, 999);
 	read_hand(&drop->record, -1);
-	work_keep(console.work, drop);
+	give(drop, JOB_KEEP);
 	sem_post(&all);
 	for (unsigned i = 0; i <= put; i++)
 		while (sem_wait(&answered) != 0)
 			continue;
 	wait_saved("one/4");
-	assert_int_equal(counted_when_saved, 0);
+	assert_true(saved_first);
 	assert_int_equal(counted, put);
 	sem_destroy(&all);
 }
@@ -928,14 +930,14 @@ static unsigned frames_in(const char *log)
 static void test_a_log_that_lacks_frames_is_written_again(void **state)
 {
 	char log[ARCHIVE_PATH_MAX];
-	struct tower_drop *drop;
+	struct handover_drop *drop;
 	struct curves c;
 
 	(void)state;
 	start_with_drops();
 	drop = new_drop("one");
 	read_hand(&drop->record, -1);
-	work_keep(console.work, drop);
+	give(drop, JOB_KEEP);
 	wait_saved("one/4");
 	assert_true(is_simulated("one", 4));
 	drop = begin("one");
@@ -943,13 +945,13 @@ static void test_a_log_that_lacks_frames_is_written_again(void **state)
 	write_hand(log, 150);
 	assert_int_equal(frames_in(log), 2 * TICKS);
 	read_hand(&drop->record, -1);
-	work_keep(console.work, drop);
+	give(drop, JOB_KEEP);
 	wait_saved("one/5");
 	assert_int_equal(frames_in(log), 2 * TICKS + 1); /* nothing is left of what was there */
 	drop = begin("one");
 	write_hand(drop->recording.log, 150);
 	read_hand(&drop->record, 150);
-	work_keep(console.work, drop);
+	give(drop, JOB_KEEP);
 	wait_saved("one/6");
 	for (int i = 4; i <= 6; i++) {
 		char name[16];
@@ -963,7 +965,7 @@ static void test_a_log_that_lacks_frames_is_written_again(void **state)
 
 static void test_what_the_archive_does_not_take_is_not_lost(void **state)
 {
-	struct tower_drop *drop;
+	struct handover_drop *drop;
 	struct work_view view;
 	struct record record, expected;
 	char path[200] = "", *at;
@@ -973,7 +975,7 @@ static void test_what_the_archive_does_not_take_is_not_lost(void **state)
 	drop = new_drop("nowhere");
 	read_hand(&drop->record, -1);
 	read_hand(&expected, -1);
-	work_keep(console.work, drop);
+	give(drop, JOB_KEEP);
 	wait_saved("");
 	work_look(console.work, &view);
 	assert_string_equal(view.trouble, saved_trouble);
@@ -988,7 +990,7 @@ static void test_what_the_archive_does_not_take_is_not_lost(void **state)
 	record_free(&expected);
 	drop = begin("one");
 	read_hand(&drop->record, -1);
-	work_keep(console.work, drop);
+	give(drop, JOB_KEEP);
 	wait_saved("one/4");
 	work_look(console.work, &view);
 	assert_string_equal(view.trouble, "");
@@ -996,19 +998,19 @@ static void test_what_the_archive_does_not_take_is_not_lost(void **state)
 
 static void test_a_drop_that_did_not_come(void **state)
 {
-	struct job refused = {.run = begin_run};
-	struct tower_drop *drop;
+	struct job refused = {.run = and_then, .message = JOB_BEGIN};
+	struct handover_drop *drop;
 	cJSON *tree, *drops;
 
 	(void)state;
 	start_with_drops();
-	work_discard(console.work, begin("one"));
+	give(begin("one"), JOB_DISCARD);
 	drop = begin("one");
 	assert_int_equal(drop->recording.number, 4);
 	drop->released = true;
 	strcpy(drop->note, "nothing was heard of it");
-	work_discard(console.work, drop);
-	work_discard(console.work, new_drop("one"));
+	give(drop, JOB_DISCARD);
+	give(new_drop("one"), JOB_DISCARD);
 	tree = ask_json(work_drops, NULL, "series=one", NULL);
 	drops = cJSON_GetObjectItem(tree, "drops");
 	assert_int_equal(cJSON_GetArraySize(drops), 4);
@@ -1021,8 +1023,8 @@ static void test_a_drop_that_did_not_come(void **state)
 
 static void test_the_scene_for_the_tower(void **state)
 {
-	struct tower_scene *wanted = calloc(1, sizeof(*wanted));
-	struct job job = {.run = scene_run, .luggage = wanted};
+	struct handover_scene *wanted = calloc(1, sizeof(*wanted));
+	struct job job = {.run = and_then, .message = JOB_SCENE, .luggage = wanted};
 
 	(void)state;
 	start_with_drops();
@@ -1034,7 +1036,7 @@ static void test_the_scene_for_the_tower(void **state)
 	assert_non_null(strstr(wanted->text, "height_m = 0.894"));
 	free(wanted->text);
 	strcpy(wanted->series, "two");
-	job.run = scene_run;
+	job.message = JOB_SCENE;
 	assert_null(hand_over(&job, 404));
 }
 
@@ -1043,12 +1045,9 @@ static void test_no_report_while_a_drop_is_under_way(void **state)
 	(void)state;
 	start_with_drops();
 	expect(404, work_report, "two", NULL, NULL);
-	seen_tower.phase = TOWER_ARMED;
+	console.at_rest = false;
 	expect(409, work_report, "one", NULL, NULL);
-	seen_tower.phase = TOWER_IDLE;
-	seen_tower.session.state = WIRE_STATE_SEPARATED;
-	expect(409, work_report, "one", NULL, NULL);
-	seen_tower.session.state = WIRE_STATE_READY;
+	console.at_rest = true;
 	expect(500, work_report, "one", NULL, NULL); /* there is no droptower beside the test */
 }
 
