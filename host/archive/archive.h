@@ -151,7 +151,6 @@ enum archive_value {
 	ARCHIVE_VALUE_COUNT
 };
 const char *archive_value_name(enum archive_value value); /* "s1_x" */
-const char *archive_value_unit(enum archive_value value); /* "g" */
 
 struct archive_drop {
 	struct archive_series series; /* without the counts */

@@ -16,11 +16,6 @@ const char *archive_value_name(enum archive_value value)
 	return quantity_columns[value].name;
 }
 
-const char *archive_value_unit(enum archive_value value)
-{
-	return quantity_columns[value].unit;
-}
-
 /* ---- columns ---- */
 
 struct numbers {

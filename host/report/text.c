@@ -197,20 +197,6 @@ static void write_lag(const struct report *report, FILE *out)
 	fprintf(out, "  %s\n", estimate_status_name(lag->status));
 }
 
-static void write_plate(const struct estimate_ringdown *plate, FILE *out)
-{
-	fprintf(out, "plate:");
-	text_write_all(QUANTITY_RINGDOWN, plate, out);
-	fprintf(out, "  (%s) %s\n", plate->how.method, estimate_status_name(plate->how.status));
-}
-
-static void write_rebound(const struct estimate_rebound *rebound, FILE *out)
-{
-	fprintf(out, "rebound:");
-	text_write_all(QUANTITY_REBOUND, rebound, out);
-	fprintf(out, "  %s\n", estimate_status_name(rebound->status));
-}
-
 static void write_joint(const struct report *report, FILE *out)
 {
 	const struct analysis *a = report->analysis;
@@ -219,10 +205,16 @@ static void write_joint(const struct report *report, FILE *out)
 		fputc('\n', out);
 	if (a->has_lag)
 		write_lag(report, out);
-	if (a->has_plate)
-		write_plate(&a->plate, out);
-	if (a->has_rebound)
-		write_rebound(&a->rebound, out);
+	if (a->has_plate) {
+		fprintf(out, "plate:");
+		text_write_all(QUANTITY_RINGDOWN, &a->plate, out);
+		fprintf(out, "  (%s) %s\n", a->plate.how.method, estimate_status_name(a->plate.how.status));
+	}
+	if (a->has_rebound) {
+		fprintf(out, "rebound:");
+		text_write_all(QUANTITY_REBOUND, &a->rebound, out);
+		fprintf(out, "  %s\n", estimate_status_name(a->rebound.status));
+	}
 }
 
 /* "note: S1X peak, S2X peak: clipped; ..." for each flag. */
