@@ -17,6 +17,8 @@ static const struct {
         {"run", command_run, "arm, drop, capture, analyse and report; without --link on a simulated tower"},
         {"analyze", command_analyze, "logged drops and foreign recordings to results"},
         {"model", command_model, "what a drop should look like: prediction, sweeps, Monte Carlo"},
+        {"fit", command_fit, "a product's parameters from its drops, with uncertainty; the next drop to do"},
+        {"scene", command_scene, "a first scene of a product from its masses and sizes"},
         {"srs", command_srs, "shock response spectra, against a limit curve"},
         {"replay", command_replay, "a logged drop onto CAN or LCM, in its own time"},
         {"convert", command_convert, "candump, LCM, CSV, UFF58 and HDF5 into each other; the wire as DBC"},

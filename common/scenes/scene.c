@@ -4,8 +4,10 @@
 #include "common/plain.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -32,6 +34,10 @@ static const struct key keys[] = {
 #undef SCENE_KEY
 };
 enum { KEYS = sizeof(keys) / sizeof(keys[0]) };
+
+const char *const scene_fitted[SCENE_FITTED] = {"stiffness_n_m15",  "restitution",   "balance_angle_deg",
+                                                "tangential_ratio", "stiffness_n_m", "softening",
+                                                "softening_strain", "damping_n_s_m", "s1_yaw_deg"};
 
 static double *scene_value_of(struct scene *scene, const struct key *key)
 {
@@ -90,6 +96,36 @@ static int scene_read_number(struct reading *reading, size_t index, const char *
 	return 1;
 }
 
+/* "u r1 r2 ..." */
+static int scene_read_fitted(struct reading *reading, const char *name, const char *text)
+{
+	size_t row = 0, n = 0;
+	double value[SCENE_FITTED];
+	char *end;
+
+	while (row < SCENE_FITTED && strcmp(name, scene_fitted[row]) != 0)
+		row++;
+	if (row == SCENE_FITTED)
+		return settings_fail(&reading->settings, DT_E_FORMAT, "unknown key '%.60s' in [fit]", name);
+	for (const char *at = text; n <= row; n++, at = end) {
+		value[n] = strtod(at, &end);
+		if (end == at || !(n == 0 ? value[n] >= 0.0 && value[n] < 1e6 : fabs(value[n]) <= 1.0))
+			break;
+		if (n == row && end[strspn(end, " \t")] != '\0')
+			break;
+	}
+	if (n != row + 1)
+		return settings_fail(&reading->settings, DT_E_FORMAT,
+		                     "%.60s is '%.60s', expected an uncertainty and %zu correlations", name,
+		                     text, row);
+	reading->scene.fitted_u[row] = value[0];
+	for (size_t i = 0; i < row; i++)
+		reading->scene.fitted_correlation[row][i] = reading->scene.fitted_correlation[i][row] =
+		        value[i + 1];
+	reading->scene.fitted_correlation[row][row] = 1.0;
+	return 1;
+}
+
 static int scene_read_entry(struct settings *settings, const char *section, const char *name,
                             const char *value)
 {
@@ -98,6 +134,8 @@ static int scene_read_entry(struct settings *settings, const char *section, cons
 
 	if (section[0] == '\0')
 		return scene_read_text(reading, name, value);
+	if (strcmp(section, "fit") == 0)
+		return scene_read_fitted(reading, name, value);
 	for (size_t i = 0; i < KEYS; i++) {
 		if (strcmp(section, keys[i].section) != 0)
 			continue;
@@ -157,6 +195,47 @@ int scene_read(struct scene *scene, const char *file, char message[SCENE_MESSAGE
 	if (result == 0)
 		*scene = reading.scene;
 	return result;
+}
+
+static void scene_write_fitted(const struct scene *scene, FILE *out)
+{
+	fputs("\n[fit]\n", out);
+	for (size_t i = 0; i < SCENE_FITTED; i++) {
+		if (!(scene->fitted_u[i] > 0.0))
+			continue;
+		fprintf(out, "%s = %.6g", scene_fitted[i], scene->fitted_u[i]);
+		for (size_t j = 0; j < i; j++)
+			fprintf(out, " %.6f", scene->fitted_correlation[i][j]);
+		fputc('\n', out);
+	}
+}
+
+void scene_write(const struct scene *scene, FILE *out)
+{
+	struct scene placed = *scene;
+	const char *section = "";
+	bool fitted = false;
+
+	placed.tower_separation_m = placed.tower_dampers_m = 0.0;
+	placed.tower_gate_lower_m = placed.tower_gate_upper_m = 0.0;
+	place_tower(&placed);
+	fprintf(out, "; SPDX-License-Identifier: GPL-3.0-or-later\nname = %s\ntitle = %s\n", scene->name,
+	        scene->title);
+	for (size_t i = 0; i < KEYS; i++) {
+		double value = value_in(scene, &keys[i]);
+		bool by_height = keys[i].initial == 0.0 && strcmp(keys[i].section, "tower") == 0;
+
+		if (value == keys[i].initial || (by_height && value == value_in(&placed, &keys[i])))
+			continue;
+		if (strcmp(section, keys[i].section) != 0)
+			fprintf(out, "\n[%s]\n", keys[i].section);
+		section = keys[i].section;
+		fprintf(out, "%s = %.10g\n", keys[i].name, value);
+	}
+	for (size_t i = 0; i < SCENE_FITTED; i++)
+		fitted = fitted || scene->fitted_u[i] > 0.0;
+	if (fitted)
+		scene_write_fitted(scene, out);
 }
 
 void scene_limits(const char *section, const char *key, double *min, double *max)

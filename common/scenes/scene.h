@@ -6,10 +6,17 @@
  * and bench). The keys stand in scene.def. A scene is data: no formula lives here, so that the bench's
  * plant and the host's model share none.
  */
+#include <stdio.h>
+
 #include "common/error.h"
 #include "common/scenes/settings.h"
 
-enum { SCENE_MESSAGE_MAX = SETTINGS_MESSAGE_MAX };
+enum { SCENE_MESSAGE_MAX = SETTINGS_MESSAGE_MAX, SCENE_FITTED = 9 };
+
+/* What a fit finds of a product, in the order of the keys of section [fit]. There, `KEY = u r1 r2 ...` is its
+ * standard uncertainty and its correlations with the keys before it. u is relative, but in deg of angles, of
+ * softening absolute, of restitution e that of ln(e/(1 - e)). */
+extern const char *const scene_fitted[SCENE_FITTED];
 
 struct scene {
 	char name[64];   /* key `name` before any section, e.g. "geometry-2A" */
@@ -17,6 +24,8 @@ struct scene {
 #define SCENE_KEY(section, key, min, max, initial, doc) double section##_##key;
 #include "common/scenes/scene.def"
 #undef SCENE_KEY
+	double fitted_u[SCENE_FITTED]; /* 0: not known */
+	double fitted_correlation[SCENE_FITTED][SCENE_FITTED];
 };
 
 /* Reads and checks file. 0, or DT_E_* with "FILE:LINE: what is wrong, what was expected" in message and
@@ -28,6 +37,9 @@ DT_MUST_USE int scene_read(struct scene *scene, const char *file, char message[S
 /* The same for values changed after reading, e.g. an angle from the command line; where names it in the
  * message. */
 DT_MUST_USE int scene_check(const struct scene *scene, const char *where, char message[SCENE_MESSAGE_MAX]);
+
+/* Writes all that differs from what a key is without being given, and [fit] where u is known. */
+void scene_write(const struct scene *scene, FILE *out);
 
 /* What section.key of scene.def may be; NAN when there is no such key. */
 void scene_limits(const char *section, const char *key, double *min, double *max);

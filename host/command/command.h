@@ -27,6 +27,8 @@ int command_ctl(int argc, char **argv);
 int command_bridge(int argc, char **argv);
 int command_chart(int argc, char **argv);
 int command_model(int argc, char **argv);
+int command_fit(int argc, char **argv);
+int command_scene(int argc, char **argv);
 int command_series(int argc, char **argv);
 int command_report(int argc, char **argv);
 int command_verify(int argc, char **argv);

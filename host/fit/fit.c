@@ -1,0 +1,439 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/fit/fit.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/fit/judge.h"
+#include "host/fit/prepare.h"
+
+const char *const fit_axis_names[MOTION_AXES] = {"S1X", "S1Y", "S2X", "S2Y"};
+const char *const fit_derived_names[MOTION_DERIVED] = {"contact_time_s", "restitution_of_centre",
+                                                       "spin_rad_s",     "lag_s",
+                                                       "s1_resultant_g", "s2_resultant_g",
+                                                       "s1x_peak_g",     "s1y_peak_g",
+                                                       "s2x_peak_g",     "s2y_peak_g"};
+
+/* Weak: they decide only what the data leave open. */
+static const double prior_sds[MOTION_SHARED] = {1.2, 1.0, 6.0, 1.2, 1.2, 0.35, 0.8, 1.2, 6.0};
+#define BEYOND_SDS 3.0
+#define BEYOND_YAW_DEG 15.0
+
+/* Where a start does not follow from a scan. */
+#define START_SOFTENING 0.2
+#define START_STRAIN 0.8
+#define START_DAMPING_S 2.76e-4 /* over the mount's stiffness */
+
+/* Mounts and their softening: stages of the weights, shares of the envelope. */
+static const double stages[] = {0.15, 0.02, 0.0};
+
+/* Tangential stiffness has a false minimum where a corner slips otherwise: so many starts. */
+static const struct {
+	double grip, gamma_deg;
+} starts[] = {{1.8, 0.0}, {3.2, 0.0}, {0.6, 0.0}, {1.1, 0.0}, {4.5, 0.0}, {1.8, 1.2}, {3.2, -1.2}};
+_Static_assert((int)SCENE_FITTED == (int)MOTION_SHARED, "[fit] has them all, in this order");
+enum { STARTS = sizeof(starts) / sizeof(starts[0]), STARTS_OF_MANY = 2 };
+
+/* Angles that differ by this rule the false minimum out. */
+#define MANY_SPAN_DEG 8.0
+enum { MANY_DROPS = 3 };
+
+enum { SCAN_POINTS = 15, SCAN_NODES = MOTION_FINE_NODES + 140, ITERATIONS = 30 };
+#define SCAN_REACH 1.75
+
+/* A corner that does not slide tells nothing of the tangential stiffness. */
+#define SLIDES_DEG 3.0
+
+/* ---- start ---- */
+
+struct fit_options fit_options_usual(const struct scene *scene)
+{
+	bool plate = scene->mount_plate_mass_kg > 0.0;
+
+	return (struct fit_options){.angle_sd_deg = 1.0,
+	                            .speed_sd = 0.003,
+	                            .gain_sd = {plate ? 0.02 : 0.01, 0.01},
+	                            .common_gain_sd = 0.003};
+}
+
+static void start_common(const struct scene *scene, const struct fit_options *o, struct solve *s)
+{
+	double p[MOTION_PARAMETERS];
+	bool plate = scene->mount_plate_mass_kg > 0.0;
+
+	motion_of_scene(scene, p);
+	if (!(scene->contact_tangential_ratio > 0.0))
+		p[MOTION_LN_GRIP] = log(starts[0].grip);
+	if (!(scene->mount_softening > 0.0)) {
+		p[MOTION_SOFTENING] = START_SOFTENING;
+		p[MOTION_LN_STRAIN] = log(START_STRAIN);
+	}
+	if (!(scene->mount_damping_n_s_m > 0.0))
+		p[MOTION_LN_MOUNT_C] = p[MOTION_LN_MOUNT_K] + log(START_DAMPING_S);
+	for (size_t i = 0; i < MOTION_SHARED; i++)
+		if (plate || i < MOTION_LN_MOUNT_K) {
+			s->centre[i] = p[i];
+			s->prior_sd[i] = prior_sds[i];
+		}
+	for (size_t i = FIT_GAIN; i < FIT_COMMON; i++)
+		s->prior_sd[i] = o->common_gain_sd;
+	memcpy(s->common, s->centre, sizeof(s->common));
+}
+
+/* Onset of the model that reaches a quarter of its peak of S2X when the record does. */
+static void align(struct solve *s, struct solve_drop *d)
+{
+	double p[MOTION_PARAMETERS], most = 0.0;
+	size_t n = 0;
+
+	solve_parameters(s, d, p);
+	d->own[FIT_ONSET_MS] = 0.0;
+	if (motion_solve(s->scene, p, MOTION_FINE_NODES / 2, s->motion, NULL) != 0)
+		return;
+	for (size_t i = 0; i < s->motion->nodes; i++)
+		most = fmax(most, s->motion->axis[i][MOTION_S2X]);
+	while (n < s->motion->nodes && s->motion->axis[n][MOTION_S2X] < 0.25 * most)
+		n++;
+	d->own[FIT_ONSET_MS] = 1e3 * (d->quarter_s[MOTION_S2X] - d->touch_s - motion_node_s(n));
+}
+
+/* Stiffness of contact and mounts where the histories fit best, the rest as a start has it. */
+static void scan(struct solve *s)
+{
+	int points = s->prior_sd[MOTION_LN_MOUNT_K] > 0.0 ? SCAN_POINTS : 1;
+	unsigned drops = s->drops;
+	double best = (double)INFINITY, found[FIT_COMMON],
+	       from[2] = {s->centre[MOTION_LN_STIFFNESS], s->centre[MOTION_LN_MOUNT_K]};
+
+	s->drops = 1;
+	s->nodes = SCAN_NODES;
+	s->share = stages[0];
+	memcpy(found, s->common, sizeof(found));
+	for (int i = 0; i < SCAN_POINTS; i++) {
+		s->common[MOTION_LN_STIFFNESS] = from[0] + SCAN_REACH * (2.0 * i / (SCAN_POINTS - 1) - 1.0);
+		align(s, s->drop);
+		for (int j = 0; j < points; j++) {
+			double now;
+
+			if (points > 1) {
+				s->common[MOTION_LN_MOUNT_K] =
+				        from[1] + SCAN_REACH * (2.0 * j / (SCAN_POINTS - 1) - 1.0);
+				s->common[MOTION_LN_MOUNT_C] =
+				        s->common[MOTION_LN_MOUNT_K] + log(START_DAMPING_S);
+			}
+			now = solve_squares(s);
+			if (now < best) {
+				best = now;
+				memcpy(found, s->common, sizeof(found));
+			}
+		}
+	}
+	memcpy(s->common, found, sizeof(found));
+	s->drops = drops;
+	s->nodes = MOTION_NODES;
+}
+
+/* ---- starts ---- */
+
+struct minimum {
+	double squares, common[FIT_COMMON], own[FIT_DROPS_MAX][FIT_OWN];
+};
+
+static void minimum_keep(struct minimum *m, struct solve *s)
+{
+	m->squares = s->squares;
+	memcpy(m->common, s->common, sizeof(m->common));
+	for (unsigned k = 0; k < s->drops; k++)
+		memcpy(m->own[k], s->drop[k].own, sizeof(m->own[k]));
+}
+
+static void minimum_take(const struct minimum *m, struct solve *s)
+{
+	memcpy(s->common, m->common, sizeof(m->common));
+	for (unsigned k = 0; k < s->drops; k++)
+		memcpy(s->drop[k].own, m->own[k], sizeof(m->own[k]));
+}
+
+static unsigned starts_of(const struct solve *s)
+{
+	double least = (double)INFINITY, most = 0.0;
+
+	for (unsigned k = 0; k < s->drops; k++) {
+		least = fmin(least, s->drop[k].centre[FIT_GAMMA_DEG]);
+		most = fmax(most, s->drop[k].centre[FIT_GAMMA_DEG]);
+	}
+	return s->drops >= MANY_DROPS && most - least >= MANY_SPAN_DEG ? STARTS_OF_MANY : STARTS;
+}
+
+static void start_drops(struct solve *s, const double zero[][MOTION_AXES], double gamma_deg)
+{
+	for (unsigned k = 0; k < s->drops; k++) {
+		struct solve_drop *d = &s->drop[k];
+
+		memset(d->own, 0, sizeof(d->own));
+		d->own[FIT_GAMMA_DEG] = d->centre[FIT_GAMMA_DEG] + gamma_deg;
+		d->own[FIT_LN_SPEED] = d->centre[FIT_LN_SPEED];
+		memcpy(d->own + FIT_ZERO, zero[k], sizeof(zero[k]));
+		align(s, d);
+	}
+}
+
+/* All starts through the first two stages; the lowest through the last. */
+static bool search(struct solve *s, struct fit *fit, struct minimum *best)
+{
+	double from[FIT_COMMON], zero[FIT_DROPS_MAX][MOTION_AXES], reached[STARTS];
+	unsigned count = starts_of(s), n = 0;
+
+	for (unsigned k = 0; k < s->drops; k++)
+		memcpy(zero[k], s->drop[k].centre + FIT_ZERO, sizeof(zero[k]));
+	s->common[MOTION_LOGIT_RESTITUTION] = 0.0;
+	s->common[MOTION_LN_GRIP] = log(starts[0].grip);
+	s->nodes = MOTION_NODES;
+	start_drops(s, (const double(*)[MOTION_AXES])zero, 0.0);
+	scan(s);
+	memcpy(from, s->common, sizeof(from));
+	best->squares = (double)INFINITY;
+	for (unsigned i = 0; i < count; i++) {
+		memcpy(s->common, from, sizeof(from));
+		s->common[MOTION_LN_GRIP] = log(starts[i].grip);
+		start_drops(s, (const double(*)[MOTION_AXES])zero, starts[i].gamma_deg);
+		s->share = stages[0];
+		if (!solve_run(s, ITERATIONS, 0.1))
+			continue;
+		s->share = stages[1];
+		if (!solve_run(s, ITERATIONS, 0.05))
+			continue;
+		reached[n++] = s->squares;
+		if (s->squares < best->squares)
+			minimum_keep(best, s);
+	}
+	fit->starts = count;
+	fit->agreed = 0;
+	for (unsigned i = 0; i < n; i++)
+		fit->agreed += reached[i] < best->squares + 0.5;
+	if (n == 0)
+		return false;
+	minimum_take(best, s);
+	s->share = stages[2];
+	return solve_run(s, ITERATIONS, 0.01) && solve_covariance(s);
+}
+
+/* ---- results ---- */
+
+static double covariance_of(const struct solve *s, const struct solve_drop *d, size_t i, size_t j)
+{
+	static const size_t own[] = {FIT_GAMMA_DEG, FIT_LN_SPEED};
+
+	if (i < MOTION_SHARED && j < MOTION_SHARED)
+		return s->held || s->prior_sd[i] == 0.0 || s->prior_sd[j] == 0.0 ? 0.0 : s->covariance[i][j];
+	if (i < MOTION_SHARED)
+		return s->held || s->prior_sd[i] == 0.0 ? 0.0 : d->cross[i][own[j - MOTION_SHARED]];
+	return j < MOTION_SHARED ? covariance_of(s, d, j, i)
+	                         : d->covariance[own[i - MOTION_SHARED]][own[j - MOTION_SHARED]];
+}
+
+static void derive(struct solve *s, const struct solve_drop *d, struct fit_drop_result *r)
+{
+	double p[MOTION_PARAMETERS], slope[MOTION_PARAMETERS][MOTION_DERIVED], moved[MOTION_DERIVED];
+
+	solve_parameters(s, d, p);
+	if (motion_solve(s->scene, p, s->nodes, s->motion, r->derived) != 0)
+		return;
+	for (size_t i = 0; i < MOTION_PARAMETERS; i++) {
+		double was = p[i];
+
+		p[i] += solve_step_of(i);
+		if ((s->held && i < MOTION_SHARED) ||
+		    motion_solve(s->scene, p, s->nodes, s->motion, moved) != 0)
+			memcpy(moved, r->derived, sizeof(moved));
+		for (size_t q = 0; q < MOTION_DERIVED; q++)
+			slope[i][q] = (moved[q] - r->derived[q]) / solve_step_of(i);
+		p[i] = was;
+	}
+	for (size_t q = 0; q < MOTION_DERIVED; q++) {
+		double variance = 0.0;
+
+		for (size_t i = 0; i < MOTION_PARAMETERS; i++)
+			for (size_t j = 0; j < MOTION_PARAMETERS; j++)
+				variance += slope[i][q] * slope[j][q] * covariance_of(s, d, i, j);
+		r->derived_sd[q] = sqrt(variance);
+	}
+}
+
+static void conclude_drop(struct solve *s, const struct solve_drop *d, struct fit_drop_result *r)
+{
+	memcpy(r->own, d->own, sizeof(r->own));
+	r->pull = 0.0;
+	for (size_t i = 0; i < FIT_OWN; i++) {
+		r->sd[i] = sqrt(d->covariance[i][i]);
+		if (i >= FIT_GAMMA_DEG && i < FIT_ZERO)
+			r->pull += pow((d->own[i] - d->centre[i]) / d->prior_sd[i], 2);
+	}
+	derive(s, d, r);
+}
+
+static enum fit_status status_of(const struct solve *s, size_t i)
+{
+	double most = 0.0;
+
+	if (s->prior_sd[i] == 0.0)
+		return FIT_ABSENT;
+	if (fabs(s->common[i] - s->centre[i]) > BEYOND_SDS * s->prior_sd[i] ||
+	    (i == MOTION_YAW_DEG && fabs(s->common[i]) > BEYOND_YAW_DEG))
+		return FIT_BEYOND;
+	for (unsigned k = 0; k < s->drops; k++)
+		most = fmax(most, fabs(s->drop[k].own[FIT_GAMMA_DEG] - s->common[MOTION_BALANCE_DEG]));
+	if (i == MOTION_LN_GRIP && most < SLIDES_DEG)
+		return FIT_NOT_IDENTIFIED;
+	return sqrt(s->covariance[i][i]) < s->prior_sd[i] / 3.0 ? FIT_IDENTIFIED : FIT_NOT_IDENTIFIED;
+}
+
+static void conclude_common(const struct solve *s, struct fit *fit)
+{
+	memcpy(fit->common, s->common, sizeof(fit->common));
+	memcpy(fit->prior_sd, s->prior_sd, sizeof(fit->prior_sd));
+	for (size_t i = 0; i < FIT_COMMON; i++)
+		fit->sd[i] = s->prior_sd[i] > 0.0 ? sqrt(s->covariance[i][i]) : 0.0;
+	for (size_t i = 0; i < MOTION_SHARED; i++) {
+		fit->status[i] = status_of(s, i);
+		for (size_t j = 0; j < MOTION_SHARED; j++)
+			fit->covariance[i][j] =
+			        s->prior_sd[i] > 0.0 && s->prior_sd[j] > 0.0 ? s->covariance[i][j] : 0.0;
+	}
+	/* where no drop slides, the local bar is wrong */
+	if (fit->status[MOTION_LN_GRIP] == FIT_NOT_IDENTIFIED) {
+		fit->covariance[MOTION_LN_GRIP][MOTION_LN_GRIP] += pow(prior_sds[MOTION_LN_GRIP], 2);
+		fit->sd[MOTION_LN_GRIP] = sqrt(fit->covariance[MOTION_LN_GRIP][MOTION_LN_GRIP]);
+	}
+}
+
+/* The scene's bars: relative and in deg as the coordinates are, of logit e, too. */
+static void conclude_bars(struct fit *fit)
+{
+	struct scene *to = &fit->scene;
+
+	for (size_t i = 0; i < MOTION_SHARED; i++) {
+		to->fitted_u[i] = sqrt(fit->covariance[i][i]);
+		for (size_t j = 0; j < MOTION_SHARED; j++) {
+			double both = sqrt(fit->covariance[i][i] * fit->covariance[j][j]);
+
+			to->fitted_correlation[i][j] = both > 0.0 ? fit->covariance[i][j] / both : 0.0;
+		}
+	}
+}
+
+static void conclude_scene(const struct solve *s, const struct scene *start, struct fit *fit)
+{
+	const double *p = s->common;
+	struct scene *to = &fit->scene;
+
+	*to = *start;
+	to->contact_stiffness_n_m15 = exp(p[MOTION_LN_STIFFNESS]);
+	to->contact_restitution = 1.0 / (1.0 + exp(-p[MOTION_LOGIT_RESTITUTION]));
+	to->product_balance_angle_deg = p[MOTION_BALANCE_DEG];
+	to->contact_tangential_ratio = exp(p[MOTION_LN_GRIP]);
+	if (isfinite(fit->drop[0].derived[MOTION_CONTACT_S])) {
+		to->contact_duration_s = fit->drop[0].derived[MOTION_CONTACT_S];
+		to->contact_mass_kg = start->product_case_mass_kg;
+	}
+	conclude_bars(fit);
+	if (!(start->mount_plate_mass_kg > 0.0))
+		return;
+	to->mount_stiffness_n_m = exp(p[MOTION_LN_MOUNT_K]);
+	to->mount_softening = p[MOTION_SOFTENING];
+	to->mount_softening_strain = exp(p[MOTION_LN_STRAIN]);
+	to->mount_damping_n_s_m = exp(p[MOTION_LN_MOUNT_C]);
+	to->mount_damping_ratio =
+	        to->mount_damping_n_s_m / (2.0 * sqrt(to->mount_stiffness_n_m * start->mount_plate_mass_kg));
+	to->sensor_s1_yaw_deg = p[MOTION_YAW_DEG];
+}
+
+static int fit_prepared(const struct scene *start, const struct fit_options *options, struct solve *s,
+                        struct fit *fit, char message[FIT_MESSAGE_MAX])
+{
+	struct minimum *best = malloc(sizeof(*best));
+	bool found;
+
+	if (!best || !s->motion) {
+		free(best);
+		snprintf(message, FIT_MESSAGE_MAX, "no memory");
+		return DT_E_MEMORY;
+	}
+	start_common(start, options, s);
+	found = search(s, fit, best);
+	free(best);
+	if (!found) {
+		snprintf(message, FIT_MESSAGE_MAX, "no parameters explain these drops: nothing converged");
+		return DT_E_NUMERIC;
+	}
+	conclude_common(s, fit);
+	for (unsigned k = 0; k < s->drops; k++)
+		conclude_drop(s, &s->drop[k], &fit->drop[k]);
+	conclude_scene(s, start, fit);
+	if (judge(s, fit) != 0) {
+		snprintf(message, FIT_MESSAGE_MAX, "no memory");
+		return DT_E_MEMORY;
+	}
+	judge_next(s, fit);
+	return 0;
+}
+
+int fit_drops(const struct scene *start, const struct fit_drop *drops, unsigned count,
+              const struct fit_options *options, struct fit *fit, char message[FIT_MESSAGE_MAX])
+{
+	struct solve_drop *prepared = calloc(count + 1, sizeof(*prepared));
+	struct solve s = {.scene = start, .drop = prepared, .drops = count, .nodes = MOTION_NODES};
+	int error = prepared ? 0 : DT_E_MEMORY;
+
+	s.motion = calloc(1 + MOTION_PARAMETERS, sizeof(*s.motion));
+	*fit = (struct fit){.drops = count};
+	for (unsigned k = 0; k < count && !error; k++) {
+		char why[FIT_MESSAGE_MAX];
+
+		error = prepare_drop(start, &drops[k], options, &prepared[k], why);
+		if (error)
+			snprintf(message, FIT_MESSAGE_MAX, "drop %u: %.480s", k + 1, why);
+	}
+	if (!error)
+		error = fit_prepared(start, options, &s, fit, message);
+	for (unsigned k = 0; prepared && k < count; k++)
+		prepare_free(&prepared[k]);
+	free(prepared);
+	free(s.motion);
+	return error;
+}
+
+/* ---- a later drop ---- */
+
+enum { LATER_ITERATIONS = 4 };
+
+int fit_later_drop(const struct scene *scene, const struct fit_drop *drop, const struct fit_options *options,
+                   struct fit_drop_result *result, double *chi2, size_t *samples,
+                   char message[FIT_MESSAGE_MAX])
+{
+	struct solve_drop d;
+	struct solve s = {.scene = scene, .drop = &d, .drops = 1, .held = true, .nodes = MOTION_NODES};
+	int error = prepare_drop(scene, drop, options, &d, message);
+
+	if (error)
+		return error;
+	s.motion = malloc((1 + MOTION_PARAMETERS) * sizeof(*s.motion));
+	start_common(scene, options, &s);
+	error = s.motion ? 0 : DT_E_MEMORY;
+	if (!error) {
+		align(&s, &d);
+		if (solve_run(&s, LATER_ITERATIONS, 0.1) && solve_covariance(&s)) {
+			conclude_drop(&s, &d, result);
+			*chi2 = s.squares;
+			*samples = d.count;
+		} else {
+			error = DT_E_NUMERIC;
+			snprintf(message, FIT_MESSAGE_MAX, "the scene's product cannot have made this drop");
+		}
+	}
+	free(s.motion);
+	prepare_free(&d);
+	return error;
+}

@@ -1,0 +1,282 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/fit/judge.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/units.h"
+#include "host/fit/prepare.h"
+
+const char *const fit_window_names[FIT_WINDOWS] = {"before the touch", "0 to 1 ms",   "1 ms to the release",
+                                                   "release to 10 ms", "10 to 20 ms", "beyond 20 ms"};
+
+/* Alarms: above all that drops of a product which the model describes showed. */
+#define ALARM_WINDOW_Z 5.0
+#define ALARM_PERIODOGRAM 14.0
+#define ALARM_PULL 30.0
+#define ALARM_GROUP 20.0
+
+#define PERIODOGRAM_FROM_HZ 50.0
+#define PERIODOGRAM_STEP_HZ 25.0
+#define PERIODOGRAM_TO_HZ 3450.0
+
+struct sums {
+	double squares[MOTION_AXES][FIT_WINDOWS];
+	size_t count[MOTION_AXES][FIT_WINDOWS];
+};
+
+static enum fit_window judge_window(double t, double release)
+{
+	if (t < 0.0)
+		return FIT_BEFORE;
+	if (t < 1e-3)
+		return FIT_FIRST_MS;
+	if (t < release)
+		return FIT_CONTACT;
+	return t < 10e-3 ? FIT_TO_10_MS : t < 20e-3 ? FIT_TO_20_MS : FIT_RING;
+}
+
+/* Sums over frequencies by rotation; of one channel of one drop. */
+static void judge_periodogram(const struct solve_drop *d, const double *residual, unsigned axis,
+                              struct fit_doubt *doubt)
+{
+	for (double hz = PERIODOGRAM_FROM_HZ; hz <= PERIODOGRAM_TO_HZ; hz += PERIODOGRAM_STEP_HZ) {
+		double sum[2] = {0.0, 0.0}, turn[2] = {1.0, 0.0}, by[2] = {1.0, 0.0}, step = 0.0, last = 0.0;
+		size_t n = 0;
+
+		for (size_t i = 0; i < d->count; i++) {
+			const struct solve_sample *sample = &d->sample[i];
+			double was = turn[0], now = sample->t_s - last;
+
+			if (sample->axis != axis || isnan(residual[i]))
+				continue;
+			if (fabs(now - step) > 1e-9) {
+				step = now;
+				by[0] = cos(2.0 * UNITS_PI * hz * step);
+				by[1] = sin(2.0 * UNITS_PI * hz * step);
+			}
+			turn[0] = was * by[0] - turn[1] * by[1];
+			turn[1] = was * by[1] + turn[1] * by[0];
+			last = sample->t_s;
+			sum[0] += residual[i] * turn[0];
+			sum[1] += residual[i] * turn[1];
+			n++;
+		}
+		if (n > 0 && (sum[0] * sum[0] + sum[1] * sum[1]) / ((double)n * d->colour[axis]) >
+		                     doubt->periodogram) {
+			doubt->periodogram =
+			        (sum[0] * sum[0] + sum[1] * sum[1]) / ((double)n * d->colour[axis]);
+			doubt->periodogram_hz = hz;
+			doubt->periodogram_axis = (int)axis;
+		}
+	}
+}
+
+static int judge_drop(struct solve *s, struct solve_drop *d, double release, struct sums *sums,
+                      struct fit *fit)
+{
+	double *residual = malloc((d->count + 1) * sizeof(*residual));
+
+	if (!residual)
+		return DT_E_MEMORY;
+	if (solve_residuals(s, d, residual)) {
+		for (size_t i = 0; i < d->count; i++) {
+			double t = d->sample[i].t_s - d->own[FIT_ONSET_MS] * 1e-3;
+			enum fit_window w = judge_window(t, release);
+
+			if (isnan(residual[i]))
+				continue;
+			sums->squares[d->sample[i].axis][w] += residual[i] * residual[i];
+			sums->count[d->sample[i].axis][w]++;
+		}
+		for (unsigned a = 0; a < MOTION_AXES; a++)
+			judge_periodogram(d, residual, a, &fit->doubt);
+	}
+	free(residual);
+	return 0;
+}
+
+/* Gains that are the same in all drops. */
+static double judge_group(const struct solve *s)
+{
+	double sum = 0.0;
+
+	for (size_t i = 0; i < 8; i++) {
+		size_t axis = i / 4 * 2 + i % 4 / 2;
+		double sd = s->drop[0].prior_sd[FIT_MIX + i], mean = 0.0, variance = sd * sd / s->drops;
+
+		for (unsigned k = 0; k < s->drops; k++)
+			mean += s->drop[k].own[FIT_MIX + i] / s->drops;
+		if (i % 4 == 0 || i % 4 == 3) {
+			mean += s->common[FIT_GAIN + axis];
+			variance += s->prior_sd[FIT_GAIN + axis] * s->prior_sd[FIT_GAIN + axis];
+		}
+		sum += mean * mean / variance;
+	}
+	return s->drops > 1 ? sum : 0.0;
+}
+
+static void judge_say(struct fit_doubt *d, unsigned axis, unsigned window, double z, unsigned drops)
+{
+	double level = ALARM_PERIODOGRAM + log((double)drops);
+
+	if (z > ALARM_WINDOW_Z && d->periodogram > level)
+		snprintf(d->words, sizeof(d->words),
+		         "%s is not explained %s (%.3g standard deviations; most at %.0f Hz)",
+		         fit_axis_names[axis], fit_window_names[window], z, d->periodogram_hz);
+	else if (z > ALARM_WINDOW_Z)
+		snprintf(d->words, sizeof(d->words), "%s is not explained %s (%.3g standard deviations)",
+		         fit_axis_names[axis], fit_window_names[window], z);
+	else if (d->periodogram > level)
+		snprintf(d->words, sizeof(d->words),
+		         "%s holds an oscillation of %.0f Hz that is not explained",
+		         fit_axis_names[d->periodogram_axis], d->periodogram_hz);
+	else if (d->pull > ALARM_PULL)
+		snprintf(d->words, sizeof(d->words),
+		         "angle, speed or gains of a drop are further from what was set than their spread "
+		         "(%.3g for 10)",
+		         d->pull);
+	else if (d->group > ALARM_GROUP)
+		snprintf(d->words, sizeof(d->words),
+		         "the gains of all drops are off together (%.3g for 8): a sensitivity or the "
+		         "cross-axis is wrong",
+		         d->group);
+}
+
+int judge(struct solve *s, struct fit *fit)
+{
+	struct sums sums = {.count = {{0}}};
+	unsigned worst[2] = {0, 0};
+	double most = -(double)INFINITY;
+
+	for (unsigned k = 0; k < s->drops; k++) {
+		double release = fit->drop[k].derived[MOTION_CONTACT_S];
+
+		if (judge_drop(s, &s->drop[k], isfinite(release) ? release : 10e-3, &sums, fit) != 0)
+			return DT_E_MEMORY;
+		fit->doubt.pull = fmax(fit->doubt.pull, fit->drop[k].pull);
+	}
+	for (unsigned a = 0; a < MOTION_AXES; a++)
+		for (unsigned w = 0; w < FIT_WINDOWS; w++) {
+			double n = (double)sums.count[a][w],
+			       z = n > 0 ? (sums.squares[a][w] - n) / sqrt(2.0 * n * s->drop[0].colour[a])
+			                 : 0.0;
+
+			fit->doubt.window_z[a][w] = z;
+			fit->chi2 += sums.squares[a][w];
+			fit->samples += sums.count[a][w];
+			if (z > most) {
+				most = z;
+				worst[0] = a;
+				worst[1] = w;
+			}
+		}
+	fit->doubt.group = judge_group(s);
+	judge_say(&fit->doubt, worst[0], worst[1], most, s->drops);
+	return 0;
+}
+
+/* ---- the next drop ---- */
+
+enum { NEXT_FROM_DEG = 10, NEXT_TO_DEG = 60, NEXT_STEP_DEG = 5 };
+
+/* As much as the first drop, at another angle and height; what would clip tells nothing. */
+static void next_samples(struct solve *s, struct solve_drop *d)
+{
+	double p[MOTION_PARAMETERS];
+
+	solve_parameters(s, d, p);
+	if (motion_solve(s->scene, p, s->nodes, s->motion, NULL) != 0)
+		return;
+	for (size_t i = 0; i < d->count; i++) {
+		struct solve_sample *sample = &d->sample[i];
+		double t = sample->t_s;
+		size_t n = t <= 0.0 ? 0
+		           : t < MOTION_FINE_NODES * MOTION_FINE_S
+		                   ? (size_t)(t / MOTION_FINE_S)
+		                   : MOTION_FINE_NODES + (size_t)((t - MOTION_FINE_NODES * MOTION_FINE_S) /
+		                                                  MOTION_COARSE_S);
+
+		sample->envelope_g = n < s->motion->nodes && fabs(s->motion->axis[n][sample->axis]) >
+		                                                     s->scene->sensor_range_g
+		                             ? 1e9
+		                             : 0.0;
+	}
+}
+
+/* Log of the determinant of what the product's parameters are known to, in terms of their priors, and the
+ * largest bar in those terms. */
+static double next_weigh(const struct solve *s, double information[FIT_COMMON][FIT_COMMON], int *largest,
+                         double *sd)
+{
+	double a[FIT_COMMON][FIT_COMMON], log_det = 0.0, most = 0.0;
+
+	memcpy(a, information, sizeof(a));
+	if (!solve_factor(FIT_COMMON, FIT_COMMON, &a[0][0]))
+		return (double)NAN;
+	for (size_t i = 0; i < FIT_COMMON; i++)
+		log_det += 2.0 * log(a[i][i]);
+	for (size_t i = 0; i < MOTION_SHARED; i++) {
+		double x[FIT_COMMON] = {0.0}, bar;
+
+		if (s->prior_sd[i] == 0.0)
+			continue;
+		x[i] = 1.0;
+		solve_back(FIT_COMMON, FIT_COMMON, &a[0][0], x);
+		bar = sqrt(x[i]);
+		if (bar / s->prior_sd[i] > most) {
+			most = bar / s->prior_sd[i];
+			*largest = (int)i;
+			*sd = bar;
+		}
+	}
+	return log_det;
+}
+
+static void next_start(struct solve *s, double information[FIT_COMMON][FIT_COMMON])
+{
+	memset(information, 0, FIT_COMMON * sizeof(*information));
+	for (size_t i = 0; i < FIT_COMMON; i++)
+		information[i][i] = s->prior_sd[i] > 0.0 ? 1.0 / (s->prior_sd[i] * s->prior_sd[i]) : 1.0;
+	for (unsigned k = 0; k < s->drops; k++)
+		(void)solve_information(s, &s->drop[k], information);
+}
+
+void judge_next(struct solve *s, struct fit *fit)
+{
+	double information[FIT_COMMON][FIT_COMMON], now, best = -1.0;
+	struct solve_drop d = s->drop[0];
+	int largest = -1;
+	double sd = 0.0;
+
+	d.sample = malloc((d.count + 1) * sizeof(*d.sample));
+	if (!d.sample)
+		return;
+	memcpy(d.sample, s->drop[0].sample, d.count * sizeof(*d.sample));
+	memset(d.own, 0, sizeof(d.own));
+	next_start(s, information);
+	now = next_weigh(s, information, &largest, &sd);
+	for (unsigned half = 0; half < 2; half++)
+		for (int angle = NEXT_FROM_DEG; angle <= NEXT_TO_DEG; angle += NEXT_STEP_DEG) {
+			double more[FIT_COMMON][FIT_COMMON], gain;
+
+			memcpy(more, information, sizeof(more));
+			d.own[FIT_GAMMA_DEG] = angle;
+			d.own[FIT_LN_SPEED] = s->drop[0].centre[FIT_LN_SPEED] - (half ? 0.5 * log(2.0) : 0.0);
+			s->share = 0.0;
+			next_samples(s, &d);
+			s->share = 1.0; /* what would clip has an envelope without end */
+			if (!solve_information(s, &d, more))
+				continue;
+			gain = next_weigh(s, more, &largest, &sd) - now;
+			if (!(gain > best))
+				continue;
+			best = gain;
+			fit->next = (struct fit_next){
+			        angle, exp(2.0 * d.own[FIT_LN_SPEED]) / (2.0 * s->scene->drop_gravity_m_s2),
+			        gain, largest, sd};
+		}
+	free(d.sample);
+}

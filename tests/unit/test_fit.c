@@ -1,0 +1,215 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* host/fit against drops of the bench's product, which shares no formula with it. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <math.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "tests/unit/fit_by_hand.h"
+
+enum { SEED = 5, DROPS = 3 };
+
+static struct fit fit;
+static struct by_hand_drop made[DROPS];
+static struct fit_drop given[DROPS];
+
+static struct by_hand product(void)
+{
+	struct by_hand h = {.gain_sd = {.02, .01}, .noise_g = 1};
+	char message[SCENE_MESSAGE_MAX];
+
+	assert_int_equal(scene_read(&h.truth, "common/scenes/geometry-2A.ini", message), 0);
+	return h;
+}
+
+static void make(struct by_hand *h, unsigned count, const double *angle_deg)
+{
+	gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
+
+	gsl_rng_set(random, SEED);
+	for (unsigned k = 0; k < count; k++) {
+		h->truth.drop_angle_deg = angle_deg[k];
+		by_hand_drop(h, random, &made[k]);
+		given[k] = made[k].drop;
+	}
+	gsl_rng_free(random);
+}
+
+/* Three times off, and what a user can guess of the rest. */
+static struct scene wrong_start(const struct scene *truth)
+{
+	struct scene start = *truth;
+
+	start.contact_stiffness_n_m15 *= 3;
+	start.mount_stiffness_n_m /= 3;
+	start.mount_damping_n_s_m /= 3;
+	start.contact_tangential_ratio /= 3;
+	start.product_balance_angle_deg += 5;
+	start.contact_restitution = .65;
+	return start;
+}
+
+static int try_fit(const struct scene *start, unsigned count, char message[FIT_MESSAGE_MAX])
+{
+	const struct fit_options options = fit_options_usual(start);
+
+	return fit_drops(start, given, count, &options, &fit, message);
+}
+
+static void test_product_is_found_from_a_start_three_times_off(void **state)
+{
+	const double angles[] = {15, 25, 35};
+	struct by_hand h = product();
+	struct scene start = wrong_start(&h.truth);
+	double truth[MOTION_PARAMETERS];
+	char message[FIT_MESSAGE_MAX];
+
+	(void)state;
+	make(&h, DROPS, angles);
+	assert_int_equal(try_fit(&start, DROPS, message), 0);
+	assert_string_equal(fit.doubt.words, "");
+	motion_of_scene(&h.truth, truth);
+	for (int i = 0; i < MOTION_SHARED; i++) {
+		assert_int_equal(fit.status[i], FIT_IDENTIFIED);
+		assert_true(fabs(fit.common[i] - truth[i]) < 3.5 * fit.sd[i]);
+	}
+	/* no bar that says nothing */
+	assert_true(fit.sd[MOTION_LN_STIFFNESS] < .02 && fit.sd[MOTION_LN_GRIP] < .02);
+	assert_true(fit.sd[MOTION_BALANCE_DEG] < .2 && fit.sd[MOTION_LN_MOUNT_K] < .005);
+	assert_true(fabs(fit.scene.contact_tangential_ratio - 2.5) < .1);
+}
+
+static void test_derived_are_the_true_motion_s(void **state)
+{
+	const double angle = 35;
+	struct by_hand h = product();
+	struct scene start = wrong_start(&h.truth);
+	struct by_hand_truth truth;
+	char message[FIT_MESSAGE_MAX];
+
+	(void)state;
+	make(&h, 1, &angle);
+	assert_int_equal(try_fit(&start, 1, message), 0);
+	truth = by_hand_truth(&h, &made[0]);
+	assert_true(fabs(fit.drop[0].derived[MOTION_CONTACT_S] - truth.contact_s) < 30e-6);
+	assert_true(fabs(fit.drop[0].derived[MOTION_RESTITUTION] - truth.restitution) < 6e-3);
+	assert_true(fabs(fit.drop[0].derived[MOTION_LAG_S] - truth.lag_s) < 4e-6);
+	assert_true(fit.drop[0].derived_sd[MOTION_CONTACT_S] < 20e-6);
+}
+
+static void test_tangential_stiffness_is_not_told_where_nothing_slides(void **state)
+{
+	const double angle = 25;
+	struct by_hand h = product();
+	struct scene start = wrong_start(&h.truth);
+	char message[FIT_MESSAGE_MAX];
+
+	(void)state;
+	make(&h, 1, &angle);
+	assert_int_equal(try_fit(&start, 1, message), 0);
+	assert_int_equal(fit.status[MOTION_LN_GRIP], FIT_NOT_IDENTIFIED);
+	assert_true(fit.sd[MOTION_LN_GRIP] > 1);
+	assert_true(fabs(fit.next.angle_deg - 25) > 5);
+}
+
+static void test_a_ringing_case_is_named(void **state)
+{
+	const double angles[] = {15, 35};
+	struct by_hand h = product();
+	struct scene start = h.truth;
+	char message[FIT_MESSAGE_MAX];
+
+	(void)state;
+	h.mode_hz = 900;
+	h.mode_share = .1;
+	make(&h, 2, angles);
+	assert_int_equal(try_fit(&start, 2, message), 0);
+	assert_string_not_equal(fit.doubt.words, "");
+	assert_true(fabs(fit.doubt.periodogram_hz - 900) < 60);
+	assert_int_equal(fit.doubt.periodogram_axis, MOTION_S2Y);
+}
+
+static void test_clipped_samples_are_left_out(void **state)
+{
+	const double angles[] = {15, 35};
+	struct by_hand h = product();
+	struct scene start = h.truth;
+	char message[FIT_MESSAGE_MAX];
+
+	(void)state;
+	h.clip_g = 350;
+	make(&h, 2, angles);
+	assert_int_equal(try_fit(&start, 2, message), 0);
+	assert_string_equal(fit.doubt.words, "");
+	for (unsigned k = 0; k < 2; k++)
+		memset(made[k].sample, 0, sizeof(made[k].sample)); /* the same, unmarked */
+	assert_int_equal(try_fit(&start, 2, message), 0);
+	assert_string_not_equal(fit.doubt.words, "");
+}
+
+static void test_wrong_wiring_is_refused(void **state)
+{
+	const double angle = 25;
+	struct by_hand h = product();
+	struct scene start = h.truth;
+	char message[FIT_MESSAGE_MAX];
+	struct fit_channel was;
+
+	(void)state;
+	make(&h, 1, &angle);
+	for (int i = 0; i < BY_HAND_Y; i++)
+		made[0].value[MOTION_S1Y][i] *= -1;
+	assert_int_equal(try_fit(&start, 1, message), DT_E_ARGUMENT);
+	assert_non_null(strstr(message, "S1Y"));
+	make(&h, 1, &angle);
+	for (int a = 0; a < 2; a++) {
+		was = given[0].axis[a];
+		given[0].axis[a] = given[0].axis[a + 2];
+		given[0].axis[a + 2] = was;
+	}
+	assert_int_equal(try_fit(&start, 1, message), DT_E_ARGUMENT);
+	assert_non_null(strstr(message, "swapped"));
+	make(&h, 1, &angle);
+	memset(made[0].value[MOTION_S2X], 0, sizeof(made[0].value[MOTION_S2X]));
+	assert_int_equal(try_fit(&start, 1, message), DT_E_ARGUMENT);
+	assert_non_null(strstr(message, "no impact"));
+}
+
+static void test_a_later_drop_of_a_known_product(void **state)
+{
+	const double angle = 30;
+	struct by_hand h = product();
+	struct scene scene = h.truth;
+	struct fit_drop_result r;
+	struct fit_options options;
+	double chi2;
+	size_t samples;
+	char message[FIT_MESSAGE_MAX];
+
+	(void)state;
+	make(&h, 1, &angle);
+	options = fit_options_usual(&scene);
+	assert_int_equal(fit_later_drop(&scene, given, &options, &r, &chi2, &samples, message), 0);
+	assert_true(fabs(r.own[FIT_GAMMA_DEG] - made[0].angle_deg) < 4 * r.sd[FIT_GAMMA_DEG]);
+	assert_true(r.sd[FIT_GAMMA_DEG] < .5);
+	assert_true(chi2 / (double)samples > .85 && chi2 / (double)samples < 1.15);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(test_product_is_found_from_a_start_three_times_off),
+	        cmocka_unit_test(test_derived_are_the_true_motion_s),
+	        cmocka_unit_test(test_tangential_stiffness_is_not_told_where_nothing_slides),
+	        cmocka_unit_test(test_a_ringing_case_is_named),
+	        cmocka_unit_test(test_clipped_samples_are_left_out),
+	        cmocka_unit_test(test_wrong_wiring_is_refused),
+	        cmocka_unit_test(test_a_later_drop_of_a_known_product),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
