@@ -133,6 +133,14 @@ struct link *link_open(const char *url, enum link_mode mode, char *message, unsi
 	return link;
 }
 
+struct link *link_open_log(const char *path, enum link_mode mode, char *message, unsigned size)
+{
+	char url[PATH_MAX + 512];
+
+	(void)snprintf(url, sizeof(url), "log:%s", path);
+	return link_open(url, mode, message, size);
+}
+
 int link_send(struct link *link, const struct frame *frame)
 {
 	int error;

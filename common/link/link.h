@@ -42,6 +42,8 @@ struct link_counters {
 /* Opens url. On error returns NULL and writes one line of explanation (no newline) into message, which
  * has room for size bytes: "unix:/tmp/bus: no such directory, ..." */
 struct link *link_open(const char *url, enum link_mode mode, char *message, unsigned size);
+/* The log at path. */
+struct link *link_open_log(const char *path, enum link_mode mode, char *message, unsigned size);
 
 /* 0, DT_E_FULL (the queue stayed full for 10 ms, or a SocketCAN interface is down; a later frame may go),
  * DT_E_CLOSED, DT_E_LINK, DT_E_SYSTEM (a log that cannot be written), DT_E_STATE (opened for reading), or

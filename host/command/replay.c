@@ -171,14 +171,13 @@ static int replay_frames(struct replay *replay, struct link *from, struct link *
 
 static int replay_candump(struct replay *replay)
 {
-	char url[4200], message[512];
+	char message[512];
 	bool to_lcm = publisher_wants(replay->to);
 	struct publisher *publisher = NULL;
 	struct link *from, *to = NULL;
 	int code;
 
-	snprintf(url, sizeof(url), "log:%.4000s", replay->file);
-	from = link_open(url, LINK_READ, message, sizeof(message));
+	from = link_open_log(replay->file, LINK_READ, message, sizeof(message));
 	if (from == NULL) {
 		command_error("%s", message);
 		return COMMAND_INPUT;

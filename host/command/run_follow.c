@@ -219,11 +219,10 @@ int run_follow(struct run *run, const char *url, struct record *record)
 	        .key = run->key,
 	        .program = run->link != NULL ? "run" : NULL, /* a simulated tower is nobody's business */
 	        .operator_name = run->operator_name};
-	char log[ARCHIVE_PATH_MAX + 8], message[SESSION_MESSAGE_MAX];
+	char message[SESSION_MESSAGE_MAX];
 	int code = COMMAND_LINK;
 
-	snprintf(log, sizeof(log), "log:%s", run->log);
-	options.log = link_open(log, LINK_WRITE, message, sizeof(message));
+	options.log = link_open_log(run->log, LINK_WRITE, message, sizeof(message));
 	if (options.log == NULL) {
 		command_error("%s", message);
 		return COMMAND_INPUT;

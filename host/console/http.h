@@ -10,7 +10,7 @@
  * too long to ask, the oldest are closed. So neither half-open nor slow ones keep anybody out, and those with
  * the token stay.
  */
-#include "host/console/console.h"
+#include "host/console/job.h"
 #include "host/console/page_parts.h"
 
 enum { HTTP_MESSAGE_MAX = 256, HTTP_CONNECTIONS = 256 };

@@ -12,6 +12,7 @@
  */
 #include <cjson/cJSON.h>
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -63,6 +64,19 @@ struct job_queue {
 	struct job *first, *last;
 	unsigned count;
 	bool closed;
+};
+
+struct live;
+struct tower;
+struct work;
+
+/* The parts of a running console, as each finds the others. */
+struct console {
+	struct live *live;
+	struct tower *tower;
+	struct work *work;
+	struct job_queue tower_queue, work_queue;
+	atomic_bool at_rest; /* nothing falls, is about to, or is being fetched; the tower's thread knows */
 };
 
 void job_queue_init(struct job_queue *queue);

@@ -7,7 +7,7 @@
 #include <glob.h>
 
 #include "host/command/serve.h"
-#include "host/console/console.h"
+#include "host/console/job.h"
 #include "host/console/http.h"
 #include "host/console/tower.h"
 #include "host/console/work.h"

@@ -10,7 +10,7 @@
  */
 #include <microhttpd.h>
 
-#include "host/console/console.h"
+#include "host/console/job.h"
 #include "host/console/hold.h"
 
 enum { STREAM_MAX = 16 };

@@ -52,10 +52,9 @@ void tower_drop_discard(struct tower *tower, struct handover_drop *drop)
 
 static bool tower_drop_open_log(struct tower *tower)
 {
-	char url[ARCHIVE_PATH_MAX + 8], message[SESSION_MESSAGE_MAX];
+	char message[SESSION_MESSAGE_MAX];
 
-	snprintf(url, sizeof(url), "log:%s", tower->drop->recording.log);
-	tower->log = link_open(url, LINK_WRITE, message, sizeof(message));
+	tower->log = link_open_log(tower->drop->recording.log, LINK_WRITE, message, sizeof(message));
 	if (tower->log == NULL)
 		snprintf(tower->drop_trouble, sizeof(tower->drop_trouble), "%s", message);
 	session_log(tower->session, tower->log);

@@ -13,7 +13,7 @@
 #include <sys/un.h>
 
 #include "host/session/simulated.h"
-#include "host/console/console.h"
+#include "host/console/job.h"
 #include "host/console/handover.h"
 #include "host/console/live.h"
 #include "host/console/tower.h"

@@ -170,7 +170,7 @@ static void *work_run(void *context)
 	struct work *work = context;
 	bool ended = false;
 
-	work_recover(work);
+	work_keep_recover(work);
 	while (!ended) {
 		struct job *job = job_take(&work->console->work_queue, LOOK_MS);
 

@@ -17,6 +17,8 @@
 #include "host/console/work_private.h"
 #include "host/record/write.h"
 
+enum { RECOVER_MAX = 64 }; /* at one start */
+
 /* ---- before ---- */
 
 void work_keep_begin(struct job *job)
@@ -58,7 +60,6 @@ static int work_keep_send_frame(void *context, const struct frame *frame)
 /* Writes the record's frames into the log, instead of what is there. */
 static int write_log(struct handover_drop *drop, char message[ARCHIVE_MESSAGE_MAX])
 {
-	char url[ARCHIVE_PATH_MAX + 8];
 	struct link *log;
 	int result;
 
@@ -66,8 +67,7 @@ static int write_log(struct handover_drop *drop, char message[ARCHIVE_MESSAGE_MA
 		snprintf(message, ARCHIVE_MESSAGE_MAX, "%.500s: %s", drop->recording.log, strerror(errno));
 		return DT_E_SYSTEM;
 	}
-	snprintf(url, sizeof(url), "log:%s", drop->recording.log);
-	log = link_open(url, LINK_WRITE, message, ARCHIVE_MESSAGE_MAX);
+	log = link_open_log(drop->recording.log, LINK_WRITE, message, ARCHIVE_MESSAGE_MAX);
 	if (log == NULL)
 		return DT_E_SYSTEM;
 	result = write_frames(&drop->record, work_keep_send_frame, log);
@@ -78,17 +78,20 @@ static int write_log(struct handover_drop *drop, char message[ARCHIVE_MESSAGE_MA
 	return result;
 }
 
-/* A disk that was full for a moment leaves a log with holes, and no error afterwards. */
-static bool log_is_whole(const struct handover_drop *drop)
+/* A disk that was full for a moment leaves a log with holes, and no error afterwards. expected: what came;
+ * NULL: every sample. */
+static bool work_keep_is_whole(const char *log, const struct record *expected)
 {
 	char message[READ_MESSAGE_MAX];
 	struct record read;
 	bool whole;
 
-	if (read_record(&read, drop->recording.log, NULL, message) != 0)
+	if (read_record(&read, log, NULL, message) != 0)
 		return false;
-	whole = read.drop_id == drop->record.drop_id && read.lost_samples <= drop->record.lost_samples &&
-	        read.crc_agrees >= drop->record.crc_agrees;
+	whole = expected == NULL
+	                ? read.lost_samples == 0 && read.crc_agrees
+	                : read.drop_id == expected->drop_id && read.lost_samples <= expected->lost_samples &&
+	                          read.crc_agrees >= expected->crc_agrees;
 	record_free(&read);
 	return whole;
 }
@@ -100,7 +103,8 @@ static int record_drop(struct work *work, struct handover_drop *drop, char messa
 	if (drop->recording.lock < 0)
 		result = archive_begin(work->archive, drop->series, work->options.operator_name, ".log",
 		                       drop->simulated, &drop->recording);
-	if (result == 0 && !log_is_whole(drop) && write_log(drop, message) != 0) {
+	if (result == 0 && !work_keep_is_whole(drop->recording.log, &drop->record) &&
+	    write_log(drop, message) != 0) {
 		archive_abandon(&drop->recording);
 		return DT_E_SYSTEM;
 	}
@@ -190,4 +194,74 @@ void work_keep_discard(struct job *way)
 	work_changed(work);
 	record_free(&drop->record);
 	free(drop);
+}
+
+/* ---- at the start ---- */
+
+/* Drops that a console before us had collected and could not note any more. The tower has forgotten such a
+ * drop, since it was told that it is kept; its log has it. */
+struct interrupted {
+	char drop[RECOVER_MAX][ARCHIVE_NAME_MAX + 16];
+	size_t count;
+};
+
+static int note_interrupted(void *context, const struct archive_drop *drop)
+{
+	struct interrupted *found = context;
+
+	if (strcmp(drop->state, "interrupted") != 0 || found->count == RECOVER_MAX)
+		return 0;
+	snprintf(found->drop[found->count++], sizeof(found->drop[0]), "%s/%u", drop->series.name,
+	         drop->number);
+	return 0;
+}
+
+/* Whether we told the tower that we have the drop. One without that is still in the tower, which hands it
+ * over. */
+static bool was_accepted(const char *log)
+{
+	char message[READ_MESSAGE_MAX];
+	struct link *link;
+	struct frame frame;
+	bool accepted = false;
+
+	link = link_open_log(log, LINK_READ, message, sizeof(message));
+	if (link == NULL)
+		return false;
+	while (link_receive(link, &frame, 0) == 1)
+		accepted |=
+		        frame.id == WIRE_ID_COMMAND && frame.length > 0 && frame.data[0] == WIRE_OP_ACCEPT;
+	(void)link_close(link);
+	return accepted;
+}
+
+static void recover(struct work *work, const char *drop)
+{
+	char message[ARCHIVE_MESSAGE_MAX], fault[ARCHIVE_MESSAGE_MAX];
+	struct archive_recording r;
+
+	if (archive_resume(work->archive, drop, &r) != 0)
+		return;
+	if (!was_accepted(r.log) || !work_keep_is_whole(r.log, NULL)) {
+		archive_abandon(&r);
+		return;
+	}
+	if (archive_finish(work->archive, &r, 0,
+	                   "the console ended before it was noted; the log is complete") != 0)
+		work_trouble(work, archive_message(work->archive));
+	else if (archived_result(work->archive, r.series, r.number, fault, message) != 0)
+		work_trouble(work, message);
+	work_changed(work);
+}
+
+void work_keep_recover(struct work *work)
+{
+	struct archive_filter filter = archive_filter_none();
+	static struct interrupted found; /* the work thread's */
+
+	found.count = 0;
+	if (archive_each_drop(work->archive, &filter, note_interrupted, &found) != 0)
+		return;
+	for (size_t i = 0; i < found.count; i++)
+		recover(work, found.drop[i]);
 }

@@ -9,7 +9,7 @@
 #include <sys/types.h>
 
 #include "common/link/temporary.h"
-#include "host/console/console.h"
+#include "host/console/job.h"
 #include "host/console/handover.h"
 #include "host/console/work.h"
 
@@ -66,7 +66,7 @@ void work_keep_discard(struct job *way);
 void work_setup_scene(struct job *job);
 
 /* Notes interrupted drops as recorded whose logs are whole. */
-void work_recover(struct work *work);
+void work_keep_recover(struct work *work);
 
 /* Answers a report once its process has ended; now: ends it. */
 void work_report_look(struct work *work, bool now);

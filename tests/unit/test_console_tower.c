@@ -22,7 +22,7 @@
 
 #include "common/wire_table.h"
 #include "firmware/parameter.h"
-#include "host/console/console.h"
+#include "host/console/job.h"
 #include "host/console/tower.h"
 #include "host/console/work.h"
 #include "tests/unit/drop_by_hand.h"

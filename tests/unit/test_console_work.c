@@ -17,7 +17,7 @@
 #include "common/units.h"
 #include "common/wire.h"
 #include "host/archive/print.h"
-#include "host/console/console.h"
+#include "host/console/job.h"
 #include "host/console/handover.h"
 #include "host/console/work.h"
 #include "host/model/model.h"
