@@ -187,13 +187,6 @@ static int scenario_read_entry(struct settings *settings, const char *section, c
 	return scenario_read_number(reading, section, name, value);
 }
 
-static void scenario_begin(struct scenario *scenario)
-{
-	for (unsigned i = 0; i < NUMBERS; i++)
-		*number_in(scenario, &numbers[i]) = numbers[i].initial;
-	scenario_expect_nominal(scenario);
-}
-
 static int scenario_complete(const struct scenario_reading *reading)
 {
 	const struct scenario *scenario = &reading->scenario;
@@ -221,7 +214,9 @@ int scenario_read(struct scenario *scenario, const char *file, char message[SCEN
 	        .settings = {.file = file, .message = message, .entry = scenario_read_entry}};
 	int result;
 
-	scenario_begin(&reading.scenario);
+	for (unsigned i = 0; i < NUMBERS; i++)
+		*number_in(&reading.scenario, &numbers[i]) = numbers[i].initial;
+	scenario_expect_nominal(&reading.scenario);
 	result = settings_read(&reading.settings);
 	if (result == 0)
 		result = scenario_complete(&reading);

@@ -73,17 +73,12 @@ static void put_path(FILE *out, const struct quantity_home *home, const struct q
 
 /* ---- tables ---- */
 
-static int has_column(struct archive *archive, const char *table, const char *column, int64_t *has)
-{
-	return sql_number(archive, has, "SELECT COUNT(*) FROM pragma_table_info(?) WHERE name = ?", "ss",
-	                  table, column);
-}
-
 static int need_column(struct archive *archive, const char *table, const char *column)
 {
 	char text[200];
 	int64_t has = 0;
-	int result = has_column(archive, table, column, &has);
+	int result = sql_number(archive, &has, "SELECT COUNT(*) FROM pragma_table_info(?) WHERE name = ?",
+	                        "ss", table, column);
 
 	if (result != 0 || has)
 		return result;

@@ -57,14 +57,6 @@ struct run {
 	double *peak; /* [2] */
 };
 
-static void read_states(const struct motion *m, double (*y)[MOTION_STATES_MAX], struct readings *r)
-{
-	for (size_t i = 0; i < INSTANTS; i++) {
-		r->box[i] = motion_box(m, y[i]);
-		r->plate[i] = motion_plate(m, y[i]);
-	}
-}
-
 static int theirs(const struct problem *p, enum way way, double setting, struct readings *r)
 {
 	double y[INSTANTS][MOTION_STATES_MAX];
@@ -77,7 +69,10 @@ static int theirs(const struct problem *p, enum way way, double setting, struct 
 		if (status)
 			return status;
 	}
-	read_states(&p->motion, y, r);
+	for (size_t i = 0; i < INSTANTS; i++) {
+		r->box[i] = motion_box(&p->motion, y[i]);
+		r->plate[i] = motion_plate(&p->motion, y[i]);
+	}
 	return 0;
 }
 

@@ -191,13 +191,6 @@ int run_keep_report(struct run *run, struct record *record)
 	return run->archive != NULL ? report_archived(run, record) : report_files(run, record);
 }
 
-/* A run that released nothing, and fetched nothing, leaves no file. */
-static void forget_log(const struct run *run)
-{
-	if (run->log[0] != '\0' && !run->released && !run->earlier)
-		unlink(run->log);
-}
-
 /* Nothing released: no drop. Else what there is of it stays, partial. */
 static void leave_recording(struct run *run)
 {
@@ -212,7 +205,9 @@ static void leave_recording(struct run *run)
 void run_keep_end(struct run *run)
 {
 	if (run->series == NULL) {
-		forget_log(run);
+		/* a run that released nothing, and fetched nothing, leaves no file */
+		if (run->log[0] != '\0' && !run->released && !run->earlier)
+			unlink(run->log);
 		return;
 	}
 	leave_recording(run);

@@ -119,14 +119,6 @@ static void read_sidecar_beside(struct adding *adding)
 	free(name);
 }
 
-static void read_beside(struct adding *adding)
-{
-	adding->angle_deg = adding->height_m = NAN;
-	read_json_beside(adding);
-	if (isnan(adding->angle_deg))
-		read_sidecar_beside(adding);
-}
-
 static bool one_agrees(struct adding *adding, const char *name, const char *what, double found, double wanted,
                        double tolerance, const char *unit, const char *source)
 {
@@ -377,7 +369,10 @@ static void add_log(struct adding *adding, const char *file)
 	}
 	if (series_add_is_there(adding, file, NULL) != 0)
 		return;
-	read_beside(adding);
+	adding->angle_deg = adding->height_m = NAN;
+	read_json_beside(adding);
+	if (isnan(adding->angle_deg))
+		read_sidecar_beside(adding);
 	if (read_each(file, NULL, series_add_drop, adding, message) < 0) {
 		command_error("%s", message);
 		series_add_refuse(adding);

@@ -88,14 +88,6 @@ static unsigned mask_of(const struct channel *channel, size_t k)
 	return isfinite(channel->value_g[k]) || mask & SAMPLE_LOST ? mask : mask | SAMPLE_BAD;
 }
 
-static void put_mask(FILE *out, const struct channel *channel)
-{
-	for (size_t k = 0; k < channel->count; k++)
-		fprintf(out, "%13.5E%s", (double)mask_of(channel, k),
-		        k % 6 == 5 || k + 1 == channel->count ? "\n" : "");
-	fputs("    -1\n", out);
-}
-
 /* As many of the drop's numbers as fit into one line, from *next on; "NONE" if none is left. */
 static void fill_line(const struct record *record, size_t *next, char line[UFF58_ID_CHARS + 1])
 {
@@ -156,7 +148,10 @@ static void write_uff58_put_channel(const struct record *record, size_t i, size_
 	dataset.precision = UFF58_SINGLE;
 	dataset.ordinate = (struct axis){UFF58_UNKNOWN, "Mask", "NONE"};
 	write_uff58_put_head(out, &dataset);
-	put_mask(out, channel);
+	for (size_t k = 0; k < channel->count; k++)
+		fprintf(out, "%13.5E%s", (double)mask_of(channel, k),
+		        k % 6 == 5 || k + 1 == channel->count ? "\n" : "");
+	fputs("    -1\n", out);
 }
 
 int write_uff58(const struct record *record, FILE *out)

@@ -92,14 +92,6 @@ static void write_head(const struct report *report, FILE *out)
 	write_flags(report, out);
 }
 
-static void write_processing(const struct report *report, FILE *out)
-{
-	char line[160];
-
-	if (report_processing(report, line, sizeof(line)))
-		fprintf(out, "processing: %s\n", line);
-}
-
 static int name_width(const struct record *record)
 {
 	size_t width = 7;
@@ -295,9 +287,11 @@ static void text_write_frames(const struct record *r, FILE *out)
 int report_text(const struct report *report, FILE *out)
 {
 	struct report_zero zero = report_zero(report);
+	char processing[160];
 
 	write_head(report, out);
-	write_processing(report, out);
+	if (report_processing(report, processing, sizeof(processing)))
+		fprintf(out, "processing: %s\n", processing);
 	write_channels(report, &zero, out);
 	write_joint(report, out);
 	write_notes(report, out);

@@ -72,12 +72,6 @@ static void follow_block(struct session_view *view, const struct frame *frame)
 	follow_state(view, block.status & WIRE_STATUS_STATE); /* two thousand times a second */
 }
 
-static void follow_measured(struct session_view *view, const struct frame *frame)
-{
-	if (wire_check_measured(frame) == 0 && wire_unpack_measured(frame, &view->measured) == 0)
-		view->measured_known = true;
-}
-
 static void follow_tower(struct session *session, const struct frame *frame)
 {
 	struct session_view *view = &session->view;
@@ -105,7 +99,8 @@ static void follow_tower(struct session *session, const struct frame *frame)
 	} else if (frame->id == WIRE_ID_BLOCK_S1 || frame->id == WIRE_ID_BLOCK_S2) {
 		follow_block(view, frame);
 	} else if (frame->id == WIRE_ID_MEASURED) {
-		follow_measured(view, frame);
+		if (wire_check_measured(frame) == 0 && wire_unpack_measured(frame, &view->measured) == 0)
+			view->measured_known = true;
 	}
 }
 
