@@ -113,6 +113,7 @@ static int print_drops_put_drop(void *context, const struct archive_drop *drop)
 	if (archive_counts(drop, p->undecided))
 		archive_cell_add(&p->total, drop);
 	p->faulty += archive_is_faulty(drop);
+	p->faulty_accepted |= archive_is_faulty(drop) && strcmp(drop->decision, "accepted") == 0;
 	if (drop->sha256[0] == '\0' || archive_is_faulty(drop))
 		row.state = drop->state;
 	snprintf(row.name, sizeof(row.name), "%s/%u", drop->series.name, drop->number);
@@ -226,7 +227,9 @@ static int end_text(const struct print *p, bool of_series)
 	else if (of_series && p->total.drops > 0)
 		total_text(p);
 	else if (of_series)
-		fputs("\nnone accepted yet: no mean\n", out);
+		fputs(p->faulty_accepted > 0 ? "\nnone of the accepted is as it was recorded: no mean\n"
+		                             : "\nnone accepted yet: no mean\n",
+		      out);
 	if (p->faulty > 0)
 		fprintf(out, "%u altered or missing, and in no mean\n", p->faulty);
 	if (p->marked)

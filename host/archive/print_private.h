@@ -13,6 +13,7 @@ struct print {
 	bool undecided, with_events, has_series;
 	bool marked;               /* a value has a star */
 	unsigned faulty;           /* drops whose files are altered or missing */
+	bool faulty_accepted;      /* one of them was accepted */
 	struct archive_cell total; /* of the drops that count */
 };
 

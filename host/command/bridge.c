@@ -288,6 +288,8 @@ static int hand_on_drop(struct bridge *bridge)
 	if (taken <= 0)
 		return taken;
 	result = publisher_drop(bridge->publisher, &record);
+	if (result == 0)
+		result = session_accept(bridge->session);
 	json = evaluate_json(&e, &record, bridge->scene_file != NULL ? &bridge->scene : NULL);
 	if (json == NULL)
 		command_error("drop %u: no result, it cannot be analysed", record.drop_id);

@@ -71,16 +71,17 @@ static void tell_fault(const struct run *run, unsigned fault, unsigned *told)
 	*told = fault;
 }
 
-/* A log that can take no more: the drop is fetched without it, and stays in the tower for the next run. */
-static int poll_and_keep(struct run *run)
+/* 1 with the drop, 0 while it is not there. A log that can take no more: the drop is fetched without it. */
+static int poll_and_take(struct run *run, struct record *record)
 {
 	int result = session_poll(run->session, 50);
 
+	if (result == 0)
+		result = session_take_drop(run->session, record);
 	if (result != DT_E_SYSTEM || run->log_failed)
 		return result;
 	run->log_failed = true;
 	session_log(run->session, NULL);
-	session_keep(run->session);
 	run_progress(run, "log       cannot be written: %s", run->log);
 	return 0;
 }
@@ -110,15 +111,14 @@ static int follow_to_end(struct run *run, struct record *record)
 	struct patience patience = {.since_ms = session_now_ms()};
 
 	for (;;) {
-		int result = poll_and_keep(run);
-		int taken = result == 0 ? session_take_drop(run->session, record) : result;
+		int result = poll_and_take(run, record);
 
-		if (result == 0)
+		if (result >= 0)
 			tell_fault(run, view->fault, &told_fault);
-		if (taken == 1)
+		if (result == 1)
 			return COMMAND_DONE;
-		if (taken < 0)
-			return command_link_failed("following the drop", taken);
+		if (result < 0)
+			return command_link_failed("following the drop", result);
 		tell_state(run, view->state, &told);
 		if (run->aborted && session_at_rest(view->state))
 			return command_stopped();
@@ -232,7 +232,10 @@ int run_follow(struct run *run, const char *url, struct record *record)
 		code = drop(run, record);
 	else
 		command_error("%s", message);
+	run->kept = run->session != NULL && session_view(run->session)->kept;
 	session_close(run->session);
 	run->log_failed |= link_close(options.log) != 0;
+	if (run->log_failed && code != COMMAND_DONE)
+		command_error("%s: could not be written", run->log);
 	return code;
 }

@@ -94,8 +94,9 @@ int run_keep_room(const struct run *run)
 /* The drop is in memory, and shown; what could not be kept of it is told. */
 static int run_keep_tell_lost(const struct run *run)
 {
-	command_error("%s: could not be written; the tower holds the drop, the next run fetches it",
-	              run->log);
+	command_error("%s: could not be written; %s", run->log,
+	              run->kept ? "the tower holds the drop, the next run fetches it"
+	                        : "the tower has let go of the drop");
 	return COMMAND_INPUT;
 }
 

@@ -31,7 +31,8 @@ struct run {
 	int64_t start_ms;
 	bool aborted;    /* by the operator, after the release */
 	bool earlier;    /* the drop is one that the tower still held */
-	bool log_failed; /* the disk took no more of it; the drop stays in the tower */
+	bool log_failed; /* the disk took no more of it */
+	bool kept;       /* the drop is still in the tower */
 	bool released;   /* what comes now is, or may be, a drop, whatever becomes of it */
 	char scene_path[PATH_MAX];
 	char stem[4096]; /* OUT/drop-NNNN */

@@ -21,7 +21,8 @@ struct handover_drop {
 	bool released;                     /* something may have fallen: discarded it stays, partial */
 	bool simulated;                    /* nothing has */
 	unsigned aborted;                  /* the tower's own */
-	char trouble[ARCHIVE_MESSAGE_MAX]; /* with JOB_SAVED: why it could not be kept; "" */
+	char trouble[ARCHIVE_MESSAGE_MAX]; /* with JOB_SAVED: why the archive did not take it; "" */
+	bool on_disk;                      /* with JOB_SAVED: it is, there or elsewhere */
 	struct job way;                    /* of JOB_KEEP, JOB_DISCARD, JOB_SAVED; its maker is the drop */
 };
 

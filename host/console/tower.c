@@ -131,6 +131,9 @@ static const char *find_trouble(const struct tower *tower)
 		return "two towers on this bus: their clocks disagree, expected one";
 	if (view->state == WIRE_STATE_CAPTURED && tower->series[0] == '\0')
 		return "the tower holds a drop: select the series that it belongs to";
+	if (view->state == WIRE_STATE_CAPTURED && view->kept && tower->phase == TOWER_IDLE)
+		return "the tower holds a drop that is not on the disk: make room, and select its series "
+		       "again";
 	if (tower->setup_due)
 		return tower->setup_trouble[0] != '\0' ? tower->setup_trouble
 		                                       : "the tower's parameters are being set";

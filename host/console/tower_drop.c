@@ -223,6 +223,9 @@ void tower_drop_saved(struct tower *tower, struct handover_drop *drop)
 {
 	snprintf(tower->drop_trouble, sizeof(tower->drop_trouble), "%.*s",
 	         (int)sizeof(tower->drop_trouble) - 1, drop->trouble);
+	/* a link that fails here is told by its next poll; the tower then still has the drop */
+	if (drop->on_disk && tower->session != NULL)
+		(void)!session_accept(tower->session);
 	free(drop);
 	if (tower->phase != TOWER_SAVING)
 		return;

@@ -287,6 +287,8 @@ static bool tower_verbs_select_series(struct job *job, const struct handover_sce
 	}
 	snprintf(tower->series, sizeof(tower->series), "%s", scene->series);
 	tower->scene = scene->scene;
+	if (tower->session != NULL && session_view(tower->session)->kept)
+		tower_link_close(tower, 0); /* what could not be kept is collected again */
 	if (tower->session != NULL)
 		session_hold(tower->session, false);
 	tower->drop_trouble[0] = '\0';

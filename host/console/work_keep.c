@@ -116,7 +116,7 @@ static int record_drop(struct work *work, struct handover_drop *drop, char messa
 }
 
 /* The frames to where there is room; message is what the archive said, and then also where they are. */
-static void rescue(const struct work *work, const struct handover_drop *drop,
+static bool rescue(const struct work *work, const struct handover_drop *drop,
                    char message[ARCHIVE_MESSAGE_MAX])
 {
 	/* a service's own /tmp goes with it; what stays is its folder in memory */
@@ -135,12 +135,13 @@ static void rescue(const struct work *work, const struct handover_drop *drop,
 		length = strnlen(message, ARCHIVE_MESSAGE_MAX / 2);
 		snprintf(message + length, ARCHIVE_MESSAGE_MAX - length,
 		         "; the drop is in %s, 'droptower series add' takes it in", path);
-		return;
+		return true;
 	}
 	length = strnlen(message, ARCHIVE_MESSAGE_MAX / 2);
 	snprintf(message + length, ARCHIVE_MESSAGE_MAX - length,
 	         "; no place was found for the drop's frames, %s has what came",
 	         drop->recording.log[0] != '\0' ? drop->recording.log : "nothing");
+	return false;
 }
 
 void work_keep_drop(struct job *way)
@@ -151,8 +152,9 @@ void work_keep_drop(struct job *way)
 	char name[ARCHIVE_NAME_MAX + 16] = "", message[ARCHIVE_MESSAGE_MAX] = "", fault[ARCHIVE_MESSAGE_MAX];
 	bool analysed = false;
 
+	drop->on_disk = true;
 	if (record_drop(work, drop, message) != 0) {
-		rescue(work, drop, message);
+		drop->on_disk = rescue(work, drop, message);
 	} else {
 		snprintf(name, sizeof(name), "%s/%u", r->series, r->number);
 		analysed = archived_result(work->archive, r->series, r->number, fault, message) == 0;

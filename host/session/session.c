@@ -58,6 +58,13 @@ void session_close(struct session *session)
 void session_log(struct session *session, struct link *log)
 {
 	session->options.log = log;
+	session->log_failed = false;
+}
+
+void session_log_frame(struct session *session, const struct frame *frame)
+{
+	if (session->options.log != NULL && link_send(session->options.log, frame) != 0)
+		session->log_failed = true;
 }
 
 void session_hold(struct session *session, bool hold)
@@ -65,14 +72,16 @@ void session_hold(struct session *session, bool hold)
 	session->hold = hold;
 }
 
-void session_keep(struct session *session)
+int session_accept(struct session *session)
 {
-	session->keep = true;
+	return session->how->accept(session);
 }
 
 int session_poll(struct session *session, int timeout_ms)
 {
-	return session->how->poll(session, timeout_ms);
+	int result = session->how->poll(session, timeout_ms);
+
+	return result == 0 && session->log_failed ? DT_E_SYSTEM : result;
 }
 
 const struct session_view *session_view(const struct session *session)

@@ -45,6 +45,7 @@ struct session_view {
 	int64_t armed_until_ms;  /* at which the tower disarms by itself */
 
 	bool collected; /* what the tower captured last is held, or was given up */
+	bool kept;      /* and was not accepted: the tower waits for session_accept */
 
 	bool parameters_known;                /* the set that ARM names; CAN only */
 	uint32_t parameters[WIRE_PARAMETERS]; /* as read, or written since */
@@ -81,18 +82,19 @@ struct session *session_open(const char *url, const struct session_options *opti
 void session_close(struct session *session);
 
 /* Every frame sent or received from now on is appended to log, over LCM the drop's own; NULL: none. It stays
- * the caller's. */
+ * the caller's. A drop that is in the log is accepted, and the tower forgets it. Without a log, or with one
+ * that could not be written, the tower keeps the drop until session_accept. */
 void session_log(struct session *session, struct link *log);
 
-/* A drop that is collected from now on stays in the tower, too: it is neither accepted nor discarded. */
-void session_keep(struct session *session);
+/* The drop that was taken is safe: the tower may forget it. 0 too when it has; DT_E_LINK, DT_E_CLOSED. */
+DT_MUST_USE int session_accept(struct session *session);
 
 /* With hold the tower keeps what it captures and is asked for nothing; without, it is collected. Over LCM the
  * bridge collects in any case. */
 void session_hold(struct session *session, bool hold);
 
 /* Handles what arrives within timeout_ms (returns earlier after handling what was there). 0; DT_E_CLOSED when
- * the tower was heard and then nothing came for 2 s, or the link's other end is gone; DT_E_LINK; DT_E_SYSTEM
+ * the tower was heard and then nothing came for 5 s, or the link's other end is gone; DT_E_LINK; DT_E_SYSTEM
  * when the log cannot be written. */
 DT_MUST_USE int session_poll(struct session *session, int timeout_ms);
 

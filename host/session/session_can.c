@@ -20,8 +20,8 @@ int can_way_send(struct session *session, struct frame *frame)
 	result = link_send(way->link, frame);
 	if (result == DT_E_FULL)
 		return 0; /* as one lost on the bus: the link counts it, what matters is sent again */
-	if (result == 0 && session->options.log != NULL)
-		result = link_send(session->options.log, frame);
+	if (result == 0)
+		session_log_frame(session, frame);
 	return result;
 }
 
@@ -121,17 +121,15 @@ static int session_can_take_frame(struct session *session, const struct frame *f
 {
 	struct can_way *way = session->way;
 	const struct frame *whole;
-	int result = 0;
+	int result;
 
-	if (session->options.log != NULL)
-		result = link_send(session->options.log, frame);
+	session_log_frame(session, frame);
 	whole = put_together(way, frame);
 	if (whole == NULL)
-		return result;
+		return 0;
 	follow_tower(session, whole);
 	can_hear_answer(session, whole);
-	if (result == 0)
-		result = can_collect(session, whole);
+	result = can_collect(session, whole);
 	if (session->options.on_frame != NULL)
 		session->options.on_frame(session->options.user, whole);
 	return result;
@@ -202,4 +200,5 @@ const struct session_way session_can = {
         .set_parameter = can_set_parameter,
         .get_parameter = can_get_parameter,
         .take_drop = can_take_drop,
+        .accept = can_accept,
 };

@@ -65,6 +65,7 @@ DT_MUST_USE int can_collect(struct session *session, const struct frame *frame);
 /* Moves the collection on: ask, wait, ask again, until complete or hopeless. */
 DT_MUST_USE int can_drive_collection(struct session *session);
 DT_MUST_USE int can_take_drop(struct session *session, struct record *record);
+DT_MUST_USE int can_accept(struct session *session);
 
 enum { CAN_RESEND_PATIENCE_MS = 60 }; /* without a resent block: ask again */
 

@@ -26,16 +26,24 @@ static int send_verdict(struct session *session)
 static int session_collect_judge(struct session *session, enum wire_op verdict)
 {
 	struct can_way *way = session->way;
-	int result = session->options.log != NULL ? link_flush(session->options.log) : 0;
+	struct link *log = session->options.log;
 
-	if (result != 0)
-		return result;
+	session->log_failed |= log != NULL && link_flush(log) != 0;
 	way->finished = true;
-	session->view.collected = true;
-	if (session->keep)
-		return 0;
-	way->sequence++;
 	way->verdict = verdict;
+	session->view.collected = true;
+	session->view.kept = true;
+	return log != NULL && !session->log_failed ? can_accept(session) : 0;
+}
+
+int can_accept(struct session *session)
+{
+	struct can_way *way = session->way;
+
+	if (!session->view.kept)
+		return 0;
+	session->view.kept = false;
+	way->sequence++;
 	way->judged = true;
 	return send_verdict(session);
 }
@@ -69,11 +77,12 @@ int can_collect(struct session *session, const struct frame *frame)
 		session->view.drop_id = end.drop_id;
 		if (way->judged && same_capture(&end, &way->end))
 			return send_verdict(session); /* it was lost on its way */
-		if (session->hold || (session->keep && way->finished))
+		if (session->hold || (session->view.kept && same_capture(&end, &way->end)))
 			return 0; /* it comes again */
 		if (!way->collecting) {
 			begin_collecting(way, &end);
 			session->view.collected = false;
+			session->view.kept = false;
 		}
 	}
 	if (way->finished)

@@ -265,7 +265,8 @@ static int lcm_way_get_parameter(struct session *session, enum wire_parameter_nu
 
 static int session_lcm_log_frame(void *user, const struct frame *frame)
 {
-	return link_send(user, frame);
+	session_log_frame(user, frame);
+	return 0;
 }
 
 /* The log gets the drop's own frames: what else came over the bus is in the bridge's. */
@@ -281,13 +282,17 @@ static int lcm_way_take_drop(struct session *session, struct record *record)
 	}
 	*record = way->drop;
 	way->has_drop = false;
-	if (session->options.log != NULL &&
-	    write_frames(record, session_lcm_log_frame, session->options.log) != 0) {
-		record_free(record);
-		return DT_E_SYSTEM;
-	}
+	if (session->options.log != NULL && write_frames(record, session_lcm_log_frame, session) != 0)
+		session->log_failed = true;
 	snprintf(record->format, sizeof(record->format), "live");
 	return 1;
+}
+
+/* The bridge has. */
+static int lcm_way_accept(struct session *session)
+{
+	(void)session;
+	return 0;
 }
 
 static void lcm_way_close(struct session *session)
@@ -356,4 +361,5 @@ const struct session_way session_lcm = {
         .set_parameter = lcm_way_set_parameter,
         .get_parameter = lcm_way_get_parameter,
         .take_drop = lcm_way_take_drop,
+        .accept = lcm_way_accept,
 };

@@ -17,6 +17,7 @@ struct session_way {
 	int (*set_parameter)(struct session *session, enum wire_parameter_number number, uint32_t value);
 	int (*get_parameter)(struct session *session, enum wire_parameter_number number, uint32_t *value);
 	int (*take_drop)(struct session *session, struct record *record);
+	int (*accept)(struct session *session);
 };
 
 struct session {
@@ -24,11 +25,15 @@ struct session {
 	void *way;
 	struct session_options options;
 	struct session_view view;
-	bool hold, keep;
+	bool hold, log_failed;
 };
 
 /* Nobody wants what is under way any longer: Ctrl-C or an ABORT came. ABORT itself is always wanted. */
 bool session_cancelled(struct session *session);
+
+/* Appends frame to the log, if there is one. What comes of it is no matter of a command that is under way:
+ * session_poll tells. */
+void session_log_frame(struct session *session, const struct frame *frame);
 
 extern const struct session_way session_can, session_lcm;
 

@@ -13,10 +13,12 @@
 #include <math.h>
 #include <pthread.h>
 #include <semaphore.h>
+#include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -1051,6 +1053,53 @@ static void what_no_tower_can_have_is_refused_with_its_range(void **state)
 	wait_view(is_blocked); /* green, and yet the page must not call it ready */
 }
 
+/* No file of this process can become longer than bytes; 0: any can. */
+static void limit_files(rlim_t bytes)
+{
+	struct rlimit limit;
+
+	signal(SIGXFSZ, SIG_IGN);
+	assert_int_equal(getrlimit(RLIMIT_FSIZE, &limit), 0);
+	limit.rlim_cur = bytes > 0 ? bytes : limit.rlim_max;
+	assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
+}
+
+static bool is_kept_by_the_tower(const struct tower_view *view)
+{
+	return is_idle(view) && view->session.state == WIRE_STATE_CAPTURED && view->blocked &&
+	       strstr(view->trouble, "not on the disk") != NULL;
+}
+
+/* Neither in its log nor in the archive nor anywhere: the tower must not forget it. */
+static void what_no_disk_took_is_not_accepted(void **state)
+{
+	unsigned token, ends, accepted;
+	struct found found;
+	char text[512];
+	int status;
+
+	(void)state;
+	select_box();
+	token = arm();
+	limit_files(50000); /* a third of the drop */
+	release(token);
+	wait_view(is_kept_by_the_tower);
+	ends = atomic_load(&fake.ends);
+	while (atomic_load(&fake.ends) < ends + 5) /* nor when the tower asks for it */
+		nap();
+	accepted = heard(WIRE_OP_ACCEPT);
+	assert_int_equal(say(tower_arm, "{}", text), 409);
+	limit_files(0);
+	status = say(tower_select, "{\"series\":\"box\"}", text);
+	assert_int_equal(accepted, 0);
+	assert_int_equal(status, 200);
+	wait_heard(WIRE_OP_ACCEPT, 1);
+	wait_view(is_ready);
+	found = archived();
+	assert_int_equal(found.count, 2);
+	assert_string_equal(found.state, "recorded");
+}
+
 static void the_end_aborts_what_is_armed(void **state)
 {
 	(void)state;
@@ -1083,6 +1132,7 @@ int main(void)
 	        TEST(a_tower_that_starts_again_is_set_up_again),
 	        TEST(a_tower_is_set_up_from_any_height_for_any_other),
 	        TEST(what_no_tower_can_have_is_refused_with_its_range),
+	        TEST(what_no_disk_took_is_not_accepted),
 	        TEST(the_end_aborts_what_is_armed),
 	};
 

@@ -35,6 +35,7 @@ static char folder[64], message[ARCHIVE_MESSAGE_MAX];
 static struct console console;
 static sem_t answered;
 static char saved_trouble[ARCHIVE_MESSAGE_MAX];
+static bool saved_on_disk;
 
 static int make_folder(void **state)
 {
@@ -806,6 +807,7 @@ static void wait_saved(const char *drop)
 	assert_int_equal(come->message, JOB_SAVED);
 	saved = come->maker;
 	strcpy(saved_trouble, saved->trouble);
+	saved_on_disk = saved->on_disk;
 	if (saved->trouble[0] == '\0')
 		snprintf(name, sizeof(name), "%s/%u", saved->recording.series, saved->recording.number);
 	free(saved);
@@ -980,6 +982,7 @@ static void test_what_the_archive_does_not_take_is_not_lost(void **state)
 	work_look(console.work, &view);
 	assert_string_equal(view.trouble, saved_trouble);
 	assert_non_null(strstr(saved_trouble, "no series 'nowhere'"));
+	assert_true(saved_on_disk);
 	at = strstr(saved_trouble, "the drop is in ");
 	assert_non_null(at);
 	snprintf(path, sizeof(path), "%.*s", (int)strcspn(at + 15, ","), at + 15);
