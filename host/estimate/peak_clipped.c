@@ -8,6 +8,11 @@
 /* What readings beyond the range are trusted: this part of what they add is taken as their uncertainty. */
 #define BEYOND_RANGE 0.1
 
+/* Flanks tell of no more than this many times their limit, and of no cut that lasts this many times the
+ * shorter one: that is a channel that hangs at its limit. */
+#define FLANKS_TELL 3.0
+#define FLANKS_LAST 20.0
+
 /* The clipped samples under the pulse. */
 struct clipped {
 	size_t first, last, n;
@@ -110,15 +115,30 @@ static void peak_clipped_take_choice(const struct trace *trace, enum shape_verdi
 		*sigma_g = sigma_of_all(trace, peak);
 }
 
+/* Whether the flanks are too little of the pulse to say how high it went. */
+static bool flanks_silent(const struct clipped *clipped, const struct peak *peak)
+{
+	double before = peak->clipped_from_s - peak->span.from_s;
+	double after = peak->span.until_s - peak->clipped_until_s;
+
+	return peak->shape.family == ESTIMATE_FAMILY_AUTO ||
+	       !(fabs(peak->shape.peak_g) <= FLANKS_TELL * clipped->high) ||
+	       peak->clipped_until_s - peak->clipped_from_s > FLANKS_LAST * fmin(before, after);
+}
+
 /* From the flanks alone. */
 static void extrapolate(const struct trace *trace, const struct estimate_options *options,
                         const struct clipped *clipped, struct peak *peak)
 {
 	enum shape_verdict verdict = fit_flanks(trace, options->family, peak);
 
-	if (peak->shape.family == ESTIMATE_FAMILY_AUTO) {
-		peak_take_samples(trace, peak);
+	if (flanks_silent(clipped, peak)) {
+		peak->shape.family = ESTIMATE_FAMILY_AUTO;
+		peak_tried(&peak->result.how, "sample");
+		peak->result.how.method = "sample";
+		peak->result.value_g = trace->value_g[peak->at];
 		peak->result.sigma_g = NAN;
+		peak->result.time_s = (peak->clipped_from_s + peak->clipped_until_s) / 2;
 		peak->result.sigma_time_s = (peak->clipped_until_s - peak->clipped_from_s) / 2;
 		return;
 	}

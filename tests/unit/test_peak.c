@@ -737,6 +737,32 @@ static void degenerate(void **state)
 	synth_free(&channel);
 }
 
+/* A channel that hangs at its limit from before the summit on, for a while or to the record's end, tells the
+ * limit and nothing beyond. */
+static void hangs(void **state)
+{
+	struct synth_random random = {17};
+
+	(void)state;
+	for (int i = 0; i < 200; i++) {
+		struct channel channel =
+		        pulse_channel(SYNTH_HALF_SINE, synth_uniform(&random) / RATE_HZ, 1, &random);
+		size_t from = 144, until = i % 2 ? 300 : channel.count;
+		struct estimate_peak peak;
+
+		while (channel.value_g[from] < 0.3 * HEIGHT_G)
+			from++;
+		for (size_t k = from; k < until; k++)
+			channel.value_g[k] = 1.04 * HEIGHT_G;
+		peak = find(&channel, 1);
+		assert_int_equal(peak.how.status, ESTIMATE_CLIPPED);
+		assert_near(peak.value_g, 1.04 * HEIGHT_G, 1e-9);
+		assert_true(isnan(peak.sigma_g));
+		assert_int_equal(peak.how.flags & ESTIMATE_FLAG_EXTRAPOLATED, 0);
+		synth_free(&channel);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -754,6 +780,7 @@ int main(void)
 	        cmocka_unit_test(clipped),
 	        cmocka_unit_test(clipped_rivals),
 	        cmocka_unit_test(clipped_once),
+	        cmocka_unit_test(hangs),
 	        cmocka_unit_test(marked),
 	        cmocka_unit_test(weak_axis),
 	        cmocka_unit_test(ripple),
