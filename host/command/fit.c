@@ -360,7 +360,8 @@ static void fit_json(const struct fitting *f)
 			       : a == 2 ? ",\"S2X\":["
 			                : ",\"S2Y\":[",
 			       fit->doubt.window_z[a][w], w < FIT_WINDOWS - 1 ? "" : "]");
-	printf("},\"periodogram\":%.6g,\"periodogram_hz\":%.6g,\"pull\":%.6g,\"group\":%.6g",
+	printf("},\"widened\":%.4g", fit->widened);
+	printf(",\"periodogram\":%.6g,\"periodogram_hz\":%.6g,\"pull\":%.6g,\"group\":%.6g",
 	       fit->doubt.periodogram, fit->doubt.periodogram_hz, fit->doubt.pull, fit->doubt.group);
 	printf(",\"next\":{\"angle_deg\":%.4g,\"height_m\":%.6g,\"gain\":%.4g,\"largest\":\"%s\",\"u\":%.4g}}"
 	       "\n",
@@ -380,6 +381,9 @@ static void fit_text(const struct fitting *f)
 	       "drops pull %.1f, gains together %.1f\n",
 	       fit->chi2 / (double)fit->samples, fit->samples, fit->doubt.periodogram,
 	       fit->doubt.periodogram_hz, fit->doubt.pull, fit->doubt.group);
+	if (fit->widened > 1.0)
+		printf("gains scatter more than --gain-sd says: all variances are taken %.1f times\n",
+		       fit->widened);
 	printf("starts: %u of %u came to the same\n", fit->agreed, fit->starts);
 	if (fit->next.largest >= 0 && fit_holds(fit))
 		printf("next drop: %.0f deg from %.3f m tells most (%.1f in the log of the information); the "

@@ -36,12 +36,20 @@ static const struct {
 _Static_assert((int)SCENE_FITTED == (int)MOTION_SHARED, "[fit] has them all, in this order");
 enum { STARTS = sizeof(starts) / sizeof(starts[0]), STARTS_OF_MANY = 2 };
 
+/* Of another minimum, and how much higher it may seem before the last stage. */
+#define ANOTHER_GRIP 0.05
+#define ANOTHER_SQUARES 30.0
+
 /* Angles that differ by this rule the false minimum out. */
 #define MANY_SPAN_DEG 8.0
 enum { MANY_DROPS = 3 };
 
 enum { SCAN_POINTS = 15, SCAN_NODES = MOTION_FINE_NODES + 140, ITERATIONS = 30 };
 #define SCAN_REACH 1.75
+
+/* Squares of the eight gains and cross-axis where the priors are right: what the product takes up is missing.
+ */
+#define SCATTER_USUAL 5.0
 
 /* A corner that does not slide tells nothing of the tangential stiffness. */
 #define SLIDES_DEG 3.0
@@ -180,10 +188,50 @@ static void start_drops(struct solve *s, const double zero[][MOTION_AXES], doubl
 	}
 }
 
-/* All starts through the first two stages; the lowest through the last. */
-static bool search(struct solve *s, struct fit *fit, struct minimum *best)
+/* Through the last stage; out and s->squares are what it comes to. */
+static bool finish(struct solve *s, const struct minimum *from, struct minimum *out)
 {
-	double from[FIT_COMMON], zero[FIT_DROPS_MAX][MOTION_AXES], reached[STARTS];
+	minimum_take(from, s);
+	s->share = stages[2];
+	if (!solve_run(s, ITERATIONS, 0.01))
+		return false;
+	minimum_keep(out, s);
+	return true;
+}
+
+/* The lowest of those that are not the one given. NULL: there is none. */
+static const struct minimum *lowest(const struct minimum *reached, unsigned count, const struct minimum *but)
+{
+	const struct minimum *best = NULL;
+
+	for (unsigned i = 0; i < count; i++)
+		if ((!but ||
+		     fabs(reached[i].common[MOTION_LN_GRIP] - but->common[MOTION_LN_GRIP]) > ANOTHER_GRIP) &&
+		    (!best || reached[i].squares < best->squares))
+			best = &reached[i];
+	return best;
+}
+
+/* The lowest two go through the last stage: loose weights may rank them wrongly. */
+static bool choose(struct solve *s, const struct minimum *reached, unsigned count)
+{
+	const struct minimum *first = lowest(reached, count, NULL), *second;
+	struct minimum end[2];
+
+	if (!first || !finish(s, first, &end[0]))
+		return false;
+	second = lowest(reached, count, first);
+	if (second && second->squares < first->squares + ANOTHER_SQUARES && finish(s, second, &end[1]) &&
+	    end[1].squares < end[0].squares)
+		return solve_covariance(s);
+	minimum_take(&end[0], s);
+	return solve_covariance(s);
+}
+
+/* All starts through the first two stages. */
+static bool search(struct solve *s, struct fit *fit, struct minimum reached[STARTS])
+{
+	double from[FIT_COMMON], zero[FIT_DROPS_MAX][MOTION_AXES];
 	unsigned count = starts_of(s), n = 0;
 
 	for (unsigned k = 0; k < s->drops; k++)
@@ -194,7 +242,6 @@ static bool search(struct solve *s, struct fit *fit, struct minimum *best)
 	start_drops(s, (const double(*)[MOTION_AXES])zero, 0.0);
 	scan(s);
 	memcpy(from, s->common, sizeof(from));
-	best->squares = (double)INFINITY;
 	for (unsigned i = 0; i < count; i++) {
 		memcpy(s->common, from, sizeof(from));
 		s->common[MOTION_LN_GRIP] = log(starts[i].grip);
@@ -203,21 +250,14 @@ static bool search(struct solve *s, struct fit *fit, struct minimum *best)
 		if (!solve_run(s, ITERATIONS, 0.1))
 			continue;
 		s->share = stages[1];
-		if (!solve_run(s, ITERATIONS, 0.05))
-			continue;
-		reached[n++] = s->squares;
-		if (s->squares < best->squares)
-			minimum_keep(best, s);
+		if (solve_run(s, ITERATIONS, 0.05))
+			minimum_keep(&reached[n++], s);
 	}
 	fit->starts = count;
 	fit->agreed = 0;
 	for (unsigned i = 0; i < n; i++)
-		fit->agreed += reached[i] < best->squares + 0.5;
-	if (n == 0)
-		return false;
-	minimum_take(best, s);
-	s->share = stages[2];
-	return solve_run(s, ITERATIONS, 0.01) && solve_covariance(s);
+		fit->agreed += reached[i].squares < lowest(reached, n, NULL)->squares + 0.5;
+	return choose(s, reached, n);
 }
 
 /* ---- results ---- */
@@ -262,15 +302,57 @@ static void derive(struct solve *s, const struct solve_drop *d, struct fit_drop_
 	}
 }
 
+static double pull_of(const struct solve_drop *d)
+{
+	double sum = 0.0;
+
+	for (size_t i = FIT_GAMMA_DEG; i < FIT_ZERO; i++)
+		sum += pow((d->own[i] - d->centre[i]) / d->prior_sd[i], 2);
+	return sum;
+}
+
+/* Squares of gains and cross-axis about their means over the drops, of one drop. */
+static double scatter_of(const struct solve *s)
+{
+	double sum = 0.0;
+
+	for (size_t i = FIT_MIX; i < FIT_ZERO; i++) {
+		double mean = 0.0;
+
+		for (unsigned k = 0; k < s->drops; k++)
+			mean += s->drop[k].own[i] / s->drops;
+		for (unsigned k = 0; k < s->drops; k++)
+			sum += pow((s->drop[k].own[i] - mean) / s->drop[k].prior_sd[i], 2) / (s->drops - 1);
+	}
+	return sum;
+}
+
+/* Gains that scatter more from drop to drop than their priors allow: the priors are too narrow, and so are
+ * all bars. What is off in all drops together is a fault and widens nothing. */
+static void widen(struct solve *s, struct fit *fit)
+{
+	double by = s->drops < MANY_DROPS ? 1.0 : scatter_of(s) / SCATTER_USUAL;
+
+	fit->widened = 1.0;
+	if (by < 1.0 + 2.0 * sqrt(2.0 / (SCATTER_USUAL * s->drops)))
+		return;
+	fit->widened = by;
+	for (size_t i = 0; i < FIT_COMMON * FIT_COMMON; i++)
+		(&s->covariance[0][0])[i] *= by;
+	for (unsigned k = 0; k < s->drops; k++) {
+		for (size_t i = 0; i < FIT_OWN * FIT_OWN; i++)
+			(&s->drop[k].covariance[0][0])[i] *= by;
+		for (size_t i = 0; i < FIT_COMMON * FIT_OWN; i++)
+			(&s->drop[k].cross[0][0])[i] *= by;
+	}
+}
+
 static void conclude_drop(struct solve *s, const struct solve_drop *d, struct fit_drop_result *r)
 {
 	memcpy(r->own, d->own, sizeof(r->own));
-	r->pull = 0.0;
-	for (size_t i = 0; i < FIT_OWN; i++) {
+	r->pull = pull_of(d);
+	for (size_t i = 0; i < FIT_OWN; i++)
 		r->sd[i] = sqrt(d->covariance[i][i]);
-		if (i >= FIT_GAMMA_DEG && i < FIT_ZERO)
-			r->pull += pow((d->own[i] - d->centre[i]) / d->prior_sd[i], 2);
-	}
 	derive(s, d, r);
 }
 
@@ -353,21 +435,22 @@ static void conclude_scene(const struct solve *s, const struct scene *start, str
 static int fit_prepared(const struct scene *start, const struct fit_options *options, struct solve *s,
                         struct fit *fit, char message[FIT_MESSAGE_MAX])
 {
-	struct minimum *best = malloc(sizeof(*best));
+	struct minimum *reached = malloc(STARTS * sizeof(*reached));
 	bool found;
 
-	if (!best || !s->motion) {
-		free(best);
+	if (!reached || !s->motion) {
+		free(reached);
 		snprintf(message, FIT_MESSAGE_MAX, "no memory");
 		return DT_E_MEMORY;
 	}
 	start_common(start, options, s);
-	found = search(s, fit, best);
-	free(best);
+	found = search(s, fit, reached);
+	free(reached);
 	if (!found) {
 		snprintf(message, FIT_MESSAGE_MAX, "no parameters explain these drops: nothing converged");
 		return DT_E_NUMERIC;
 	}
+	widen(s, fit);
 	conclude_common(s, fit);
 	for (unsigned k = 0; k < s->drops; k++)
 		conclude_drop(s, &s->drop[k], &fit->drop[k]);
@@ -407,14 +490,16 @@ int fit_drops(const struct scene *start, const struct fit_drop *drops, unsigned 
 
 /* ---- a later drop ---- */
 
-enum { LATER_ITERATIONS = 4 };
+/* To 15 ms: what the plate does later tells nothing of onset, angle and speed. */
+enum { LATER_ITERATIONS = 4, LATER_NODES = SCAN_NODES };
+#define LATER_ENOUGH 0.5
 
 int fit_later_drop(const struct scene *scene, const struct fit_drop *drop, const struct fit_options *options,
                    struct fit_drop_result *result, double *chi2, size_t *samples,
                    char message[FIT_MESSAGE_MAX])
 {
 	struct solve_drop d;
-	struct solve s = {.scene = scene, .drop = &d, .drops = 1, .held = true, .nodes = MOTION_NODES};
+	struct solve s = {.scene = scene, .drop = &d, .drops = 1, .held = true, .nodes = LATER_NODES};
 	int error = prepare_drop(scene, drop, options, &d, message);
 
 	if (error)
@@ -424,10 +509,10 @@ int fit_later_drop(const struct scene *scene, const struct fit_drop *drop, const
 	error = s.motion ? 0 : DT_E_MEMORY;
 	if (!error) {
 		align(&s, &d);
-		if (solve_run(&s, LATER_ITERATIONS, 0.1) && solve_covariance(&s)) {
+		if (solve_run(&s, LATER_ITERATIONS, LATER_ENOUGH) && solve_covariance_there(&s)) {
 			conclude_drop(&s, &d, result);
 			*chi2 = s.squares;
-			*samples = d.count;
+			*samples = s.used;
 		} else {
 			error = DT_E_NUMERIC;
 			snprintf(message, FIT_MESSAGE_MAX, "the scene's product cannot have made this drop");

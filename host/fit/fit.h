@@ -91,6 +91,7 @@ struct fit {
 	enum fit_status status[MOTION_SHARED];
 	double covariance[MOTION_SHARED][MOTION_SHARED]; /* in motion.h's coordinates; absent ones 0 */
 	struct fit_drop_result drop[FIT_DROPS_MAX];
+	double widened; /* all variances by so much, since gains scatter more than was said; 1: as they are */
 	double chi2;
 	size_t samples;
 	unsigned starts, agreed; /* starts that came within 0.1 of the lowest sum */

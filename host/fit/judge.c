@@ -99,13 +99,14 @@ static int judge_drop(struct solve *s, struct solve_drop *d, double release, str
 }
 
 /* Gains that are the same in all drops. */
-static double judge_group(const struct solve *s)
+static double judge_group(const struct solve *s, double widened)
 {
 	double sum = 0.0;
 
 	for (size_t i = 0; i < 8; i++) {
 		size_t axis = i / 4 * 2 + i % 4 / 2;
-		double sd = s->drop[0].prior_sd[FIT_MIX + i], mean = 0.0, variance = sd * sd / s->drops;
+		double sd = s->drop[0].prior_sd[FIT_MIX + i], mean = 0.0,
+		       variance = widened * sd * sd / s->drops;
 
 		for (unsigned k = 0; k < s->drops; k++)
 			mean += s->drop[k].own[FIT_MIX + i] / s->drops;
@@ -156,7 +157,7 @@ int judge(struct solve *s, struct fit *fit)
 
 		if (judge_drop(s, &s->drop[k], isfinite(release) ? release : 10e-3, &sums, fit) != 0)
 			return DT_E_MEMORY;
-		fit->doubt.pull = fmax(fit->doubt.pull, fit->drop[k].pull);
+		fit->doubt.pull = fmax(fit->doubt.pull, fit->drop[k].pull / fit->widened);
 	}
 	for (unsigned a = 0; a < MOTION_AXES; a++)
 		for (unsigned w = 0; w < FIT_WINDOWS; w++) {
@@ -173,7 +174,7 @@ int judge(struct solve *s, struct fit *fit)
 				worst[1] = w;
 			}
 		}
-	fit->doubt.group = judge_group(s);
+	fit->doubt.group = judge_group(s, fit->widened);
 	judge_say(&fit->doubt, worst[0], worst[1], most, s->drops);
 	return 0;
 }

@@ -111,7 +111,6 @@ static bool solve_histories(struct solve *s, const struct solve_drop *d, bool sl
 	double p[MOTION_PARAMETERS];
 
 	solve_parameters(s, d, p);
-	s->histories++;
 	if (motion_solve(s->scene, p, s->nodes, s->motion, NULL) != 0)
 		return false;
 	for (size_t i = 0; slopes && i < MOTION_PARAMETERS; i++) {
@@ -120,7 +119,6 @@ static bool solve_histories(struct solve *s, const struct solve_drop *d, bool sl
 		if (!solve_moves(s, i))
 			continue;
 		p[i] += steps[i];
-		s->histories++;
 		if (motion_solve(s->scene, p, s->nodes, s->motion + 1 + i, NULL) != 0)
 			return false;
 		p[i] = was;
@@ -241,6 +239,7 @@ static bool solve_sum(struct solve *s, struct solve_drop *d, bool slopes)
 		if (!solve_row(s, d, sample, slopes, &row))
 			continue;
 		residual = sample->value_g - row.model;
+		s->used++;
 		s->squares += weight * residual * residual;
 		if (slopes)
 			solve_gather(&row, weight, residual, s, d);
@@ -267,6 +266,7 @@ static bool solve_normal(struct solve *s, bool slopes)
 	memset(s->a, 0, sizeof(s->a));
 	memset(s->right, 0, sizeof(s->right));
 	s->squares = 0.0;
+	s->used = 0;
 	for (unsigned k = 0; k < s->drops; k++) {
 		if (slopes)
 			solve_clear_drop(&s->drop[k]);
@@ -379,7 +379,7 @@ static void solve_keep(struct solve *s, struct kept *kept, bool back)
 
 bool solve_run(struct solve *s, unsigned iterations, double enough)
 {
-	double damping = DAMPING, now, tried;
+	double damping = DAMPING, first, now, tried;
 	struct kept kept;
 
 	for (unsigned i = 0; i < iterations; i++) {
@@ -387,6 +387,7 @@ bool solve_run(struct solve *s, unsigned iterations, double enough)
 			return false;
 		now = s->squares;
 		solve_keep(s, &kept, false);
+		first = damping;
 		for (tried = (double)INFINITY; damping < DAMPING_MOST; damping *= 8.0) {
 			struct solve *at = s;
 			double a[FIT_COMMON][FIT_COMMON], right[FIT_COMMON];
@@ -404,7 +405,8 @@ bool solve_run(struct solve *s, unsigned iterations, double enough)
 			s->squares = now;
 			return true;
 		}
-		if (now - tried < enough)
+		/* a step that had to be shortened says nothing of how far the minimum is */
+		if (now - tried < enough && !(damping > first))
 			return true;
 		damping = fmax(damping / 10.0, 1e-9);
 	}
@@ -454,11 +456,14 @@ static bool solve_covariance_of(struct solve *s, struct solve_drop *d)
 
 bool solve_covariance(struct solve *s)
 {
+	return solve_normal(s, true) && solve_covariance_there(s);
+}
+
+bool solve_covariance_there(struct solve *s)
+{
 	double factor[FIT_OWN][FIT_OWN];
 	struct eliminated e = {.right = {0.0}};
 
-	if (!solve_normal(s, true))
-		return false;
 	memcpy(e.a, s->a, sizeof(e.a));
 	for (unsigned k = 0; k < s->drops && !s->held; k++)
 		if (!solve_eliminate(&s->drop[k], 0.0, factor, &e))

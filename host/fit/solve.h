@@ -35,8 +35,8 @@ struct solve {
 	double a[FIT_COMMON][FIT_COMMON], right[FIT_COMMON];
 	double covariance[FIT_COMMON][FIT_COMMON];
 	double squares;        /* with priors */
+	size_t used;           /* samples in it */
 	struct motion *motion; /* [1 + MOTION_PARAMETERS] */
-	unsigned histories;
 };
 
 /* Minimises from what common and own are, which it leaves at the minimum. False: nowhere to go. */
@@ -47,6 +47,9 @@ double solve_squares(struct solve *s);
 
 /* Covariances, for noise as the weights have it. False: the data leave something open. */
 bool solve_covariance(struct solve *s);
+
+/* The same where the last iteration began, which costs no histories. */
+bool solve_covariance_there(struct solve *s);
 
 /* Adds the information on the common ones of one drop, its own eliminated. */
 bool solve_information(struct solve *s, struct solve_drop *d, double information[FIT_COMMON][FIT_COMMON]);

@@ -15,13 +15,15 @@
 #include "tests/unit/fit_by_hand.h"
 
 struct tally {
-	double squares;
+	double squares, sum, bars;
 	unsigned count, within;
 };
 
 static void tally_add(struct tally *t, double error, double sd)
 {
 	t->squares += error * error;
+	t->sum += error;
+	t->bars += sd * sd;
 	t->count++;
 	t->within += fabs(error) <= 2 * sd;
 }
@@ -29,8 +31,9 @@ static void tally_add(struct tally *t, double error, double sd)
 static void tally_print(const char *name, const struct tally *t, double scale)
 {
 	if (t->count)
-		printf("%-22s rms %9.5g  within 2 bars %3.0f %%  n %u\n", name,
-		       scale * sqrt(t->squares / t->count), 100.0 * t->within / t->count, t->count);
+		printf("%-22s mean %9.4g rms %9.5g bar %9.5g  within 2 bars %3.0f %%  n %u\n", name,
+		       scale * t->sum / t->count, scale * sqrt(t->squares / t->count),
+		       scale * sqrt(t->bars / t->count), 100.0 * t->within / t->count, t->count);
 }
 
 static bool is(const char *kind, const char *name)
@@ -72,7 +75,8 @@ int main(int argc, char **argv)
 	static struct fit_drop given[16];
 	static struct fit fit;
 	char message[FIT_MESSAGE_MAX];
-	struct tally shared[MOTION_SHARED] = {{0}}, e = {0}, contact = {0}, lag = {0}, gamma = {0}, all = {0};
+	struct tally shared[MOTION_SHARED] = {{0}}, widened = {0}, e = {0}, contact = {0}, lag = {0},
+	             gamma = {0}, all = {0};
 	unsigned groups, refused = 0, wrong = 0, failed = 0, count = (unsigned)argc - 5, same = 0;
 	double truth_p[MOTION_PARAMETERS], chi2 = 0;
 	gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
@@ -118,6 +122,10 @@ int main(int argc, char **argv)
 		if (fit.doubt.words[0]) {
 			refused++;
 			printf("doubt: %s\n", fit.doubt.words);
+			for (size_t i = 0; getenv("V") && i < MOTION_SHARED; i++)
+				printf("  %s %g (%g) true %g gamma %g true %g agreed %u\n", scene_fitted[i],
+				       fit.common[i], fit.sd[i], truth_p[i], fit.drop[0].own[1],
+				       drops[0].angle_deg, fit.agreed);
 			continue;
 		}
 		for (size_t i = 0; i < MOTION_SHARED; i++)
@@ -129,6 +137,7 @@ int main(int argc, char **argv)
 		wrong += fit.status[MOTION_LN_GRIP] == FIT_IDENTIFIED &&
 		         fabs(fit.common[MOTION_LN_GRIP] - truth_p[MOTION_LN_GRIP]) >
 		                 5 * fit.sd[MOTION_LN_GRIP];
+		tally_add(&widened, fit.widened, 1);
 		for (unsigned k = 0; k < count; k++) {
 			struct by_hand_truth t = by_hand_truth(&h, &drops[k]);
 			const struct fit_drop_result *r = &fit.drop[k];
@@ -155,6 +164,7 @@ int main(int argc, char **argv)
 	tally_print("contact time, us", &contact, 1e6);
 	tally_print("lag, us", &lag, 1e6);
 	tally_print("angle, deg", &gamma, 1);
+	tally_print("widened", &widened, 1);
 	tally_print("all, in bars", &all, 1);
 	printf("%s: %u groups of %u, failed %u, doubted %u, false minima %u, chi2/n %.3f, starts agreed "
 	       "%.1f, CPU %.3f s each\n",

@@ -110,13 +110,30 @@ void by_hand_drop(const struct by_hand *h, gsl_rng *random, struct by_hand_drop 
 	d->drop.height_m = h->truth.drop_height_m;
 }
 
+struct peak {
+	double at_s, most, before, last;
+};
+
+/* The top of the parabola through three readings 1 us apart. */
+static void peak_follow(struct peak *k, double t, double now)
+{
+	double bend = k->before - 2 * k->last + now;
+
+	if (k->last > k->most && k->last >= k->before && k->last >= now && bend < 0) {
+		k->most = k->last;
+		k->at_s = t - 1e-6 - .5 * (now - k->before) / bend * 1e-6;
+	}
+	k->before = k->last;
+	k->last = now;
+}
+
 struct by_hand_truth by_hand_truth(const struct by_hand *h, const struct by_hand_drop *d)
 {
 	struct by_hand_truth truth = {0};
 	struct product p;
 	struct product_reading r;
-	double most[2] = {0}, at[2] = {0},
-	       mass = h->truth.mount_plate_mass_kg + h->truth.product_case_mass_kg;
+	struct peak peak[2] = {{0}};
+	double mass = h->truth.mount_plate_mass_kg + h->truth.product_case_mass_kg;
 	double low = 0, depth = 0, up = 0;
 
 	product_init(&p, &h->truth, UNITS_RAD(d->angle_deg));
@@ -126,14 +143,8 @@ struct by_hand_truth by_hand_truth(const struct by_hand *h, const struct by_hand
 
 		product_step(&p, 1e-6);
 		product_read(&p, &r);
-		if (hypot(r.s1_x, r.s1_y) > most[0]) {
-			most[0] = hypot(r.s1_x, r.s1_y);
-			at[0] = t;
-		}
-		if (hypot(r.s2_x, r.s2_y) > most[1]) {
-			most[1] = hypot(r.s2_x, r.s2_y);
-			at[1] = t;
-		}
+		peak_follow(&peak[0], t, hypot(r.s1_x, r.s1_y));
+		peak_follow(&peak[1], t, hypot(r.s2_x, r.s2_y));
 		c = cos(p.state[PRODUCT_ANGLE]);
 		s = sin(p.state[PRODUCT_ANGLE]);
 		now = -(p.state[PRODUCT_Y] - p.lever_x_m * c - p.lever_y_m * s);
@@ -148,6 +159,6 @@ struct by_hand_truth by_hand_truth(const struct by_hand *h, const struct by_hand
 		depth = now;
 		up = now_up;
 	}
-	truth.lag_s = at[0] - at[1];
+	truth.lag_s = peak[0].at_s - peak[1].at_s;
 	return truth;
 }

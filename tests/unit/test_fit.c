@@ -151,6 +151,27 @@ static void test_clipped_samples_are_left_out(void **state)
 	assert_string_not_equal(fit.doubt.words, "");
 }
 
+static void test_gains_that_scatter_more_than_was_said_widen_the_bars(void **state)
+{
+	const double angles[] = {15, 25, 35};
+	struct by_hand h = product();
+	struct scene start = h.truth;
+	char message[FIT_MESSAGE_MAX];
+	double narrow;
+
+	(void)state;
+	make(&h, DROPS, angles);
+	assert_int_equal(try_fit(&start, DROPS, message), 0);
+	assert_true(fit.widened == 1);
+	narrow = fit.sd[MOTION_BALANCE_DEG];
+	for (int s = 0; s < 2; s++)
+		h.gain_sd[s] *= 2.5;
+	make(&h, DROPS, angles);
+	assert_int_equal(try_fit(&start, DROPS, message), 0);
+	assert_true(fit.widened > 2);
+	assert_true(fit.sd[MOTION_BALANCE_DEG] > 1.4 * narrow);
+}
+
 static void test_wrong_wiring_is_refused(void **state)
 {
 	const double angle = 25;
@@ -207,6 +228,7 @@ int main(void)
 	        cmocka_unit_test(test_tangential_stiffness_is_not_told_where_nothing_slides),
 	        cmocka_unit_test(test_a_ringing_case_is_named),
 	        cmocka_unit_test(test_clipped_samples_are_left_out),
+	        cmocka_unit_test(test_gains_that_scatter_more_than_was_said_widen_the_bars),
 	        cmocka_unit_test(test_wrong_wiring_is_refused),
 	        cmocka_unit_test(test_a_later_drop_of_a_known_product),
 	};
