@@ -153,8 +153,12 @@ static int look_start(struct archive *archive, const struct query *q, sqlite3_st
 {
 	int result = sql_query(archive, s, q->text, "");
 
+	if (result != 0)
+		return result;
 	for (int i = 0; result == 0 && i < q->count; i++)
-		sqlite3_bind_text(*s, i + 1, q->value[i], -1, SQLITE_TRANSIENT);
+		result = sql_bind_text(archive, *s, i + 1, q->value[i]);
+	if (result != 0)
+		sqlite3_finalize(*s);
 	return result;
 }
 

@@ -38,6 +38,9 @@ __attribute__((format(printf, 3, 4))) int archive_refuse(struct archive *archive
 DT_MUST_USE int sql_query(struct archive *archive, sqlite3_stmt **statement, const char *text,
                           const char *types, ...);
 
+/* Binds a text to a column of a statement that sql_query has prepared; the statement stays the caller's. */
+DT_MUST_USE int sql_bind_text(struct archive *archive, sqlite3_stmt *statement, int column, const char *text);
+
 /* 1 with a row, 0 after the last, DT_E_*. */
 DT_MUST_USE int sql_step(struct archive *archive, sqlite3_stmt *statement);
 

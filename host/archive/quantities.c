@@ -148,19 +148,20 @@ static int insert_object(struct archive *archive, int64_t row, const struct quan
 	if (result != 0)
 		return result;
 	sqlite3_bind_int64(s, 1, row);
-	sqlite3_bind_text(s, 2, subject, -1, SQLITE_TRANSIENT);
-	while ((q = quantity_next(home->object, q))) {
+	result = sql_bind_text(archive, s, 2, subject);
+	while (result == 0 && (q = quantity_next(home->object, q))) {
 		char value[QUANTITY_TEXT_MAX];
 
 		if (!is_kept(q))
 			continue;
 		if (quantity_words(q, object, value))
-			sqlite3_bind_text(s, at, value, -1, SQLITE_TRANSIENT);
+			result = sql_bind_text(archive, s, at, value);
 		else if (isfinite(quantity_number(q, object)))
 			sqlite3_bind_double(s, at, quantity_number(q, object));
 		at++;
 	}
-	result = sql_step(archive, s);
+	if (result == 0)
+		result = sql_step(archive, s);
 	sqlite3_finalize(s);
 	return result;
 }

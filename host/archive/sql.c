@@ -77,10 +77,20 @@ int sql_query(struct archive *archive, sqlite3_stmt **statement, const char *tex
 	return result;
 }
 
+int sql_bind_text(struct archive *archive, sqlite3_stmt *statement, int column, const char *text)
+{
+	return sqlite3_bind_text(statement, column, text, -1, SQLITE_TRANSIENT) == SQLITE_OK
+	               ? 0
+	               : sql_refuse(archive);
+}
+
 int sql_step(struct archive *archive, sqlite3_stmt *statement)
 {
-	int result = sqlite3_step(statement);
+	int result;
 
+	if (sqlite3_errcode(archive->index) == SQLITE_NOMEM) /* a text of the row before had no memory */
+		return sql_refuse(archive);
+	result = sqlite3_step(statement);
 	if (result == SQLITE_ROW)
 		return 1;
 	return result == SQLITE_DONE ? 0 : sql_refuse(archive);

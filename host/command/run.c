@@ -87,7 +87,7 @@ static int choose_scene(struct run *run)
 		        "--link sets a tower up for what is dropped, expected --scene FILE or --series NAME");
 	name = beside_scene_file(name, run->scene_path);
 	if (run->scene_file == NULL && access(name, F_OK) != 0) {
-		command_error("no scenes came along; --scene FILE names one");
+		command_error("no scene given and none installed; use --scene FILE");
 		return COMMAND_INPUT;
 	}
 	run->scene_file = name;

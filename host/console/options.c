@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/console/options.h"
 
+#include <dirent.h>
+#include <errno.h>
+#include <limits.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "host/command/archived.h"
@@ -32,20 +36,42 @@ static int options_check(const struct options *options)
 	return COMMAND_DONE;
 }
 
+static int is_scene(const struct dirent *entry)
+{
+	const char *ending = strrchr(entry->d_name, '.');
+
+	return ending != NULL && ending != entry->d_name && strcmp(ending, ".ini") == 0;
+}
+
+/* scandir, as glibc's glob frees twice when it finds no memory. */
 static int find_scenes(struct options *options)
 {
 	struct option_words *scenes = &options->given.scenes;
-	char pattern[PATH_MAX];
+	char path[PATH_MAX];
+	struct dirent **entry = NULL;
+	int count;
 
 	if (scenes->count > 0)
 		return COMMAND_DONE;
-	if (beside_scene("*.ini", pattern) != 0 || glob(pattern, 0, NULL, &options->found) != 0) {
-		command_error("no scenes came along; --scene FILE names them");
-		return COMMAND_INPUT;
+	count = beside_scene("", path) == 0 ? scandir(path, &entry, is_scene, alphasort) : 0;
+	for (int i = 0; i < count && i < SERVE_SCENES_MAX; i++) {
+		options->found[i] = beside_scene(entry[i]->d_name, path) == 0 ? strdup(path) : NULL;
+		if (options->found[i] != NULL)
+			scenes->word[scenes->count++] = options->found[i];
 	}
-	for (size_t i = 0; i < options->found.gl_pathc && scenes->count < SERVE_SCENES_MAX; i++)
-		scenes->word[scenes->count++] = options->found.gl_pathv[i];
-	return COMMAND_DONE;
+	for (int i = 0; i < count; i++)
+		free(entry[i]);
+	free(entry);
+	if (scenes->count > 0 && (int)scenes->count == count)
+		return COMMAND_DONE;
+	if (count < 0)
+		command_error("%.300s: %s", path, strerror(errno));
+	else if (count == 0)
+		command_error("no scene given and none installed; use --scene FILE");
+	else
+		command_error("%.300s: %d scenes, expected memory for them and at most %d", path, count,
+		              SERVE_SCENES_MAX);
+	return COMMAND_INPUT;
 }
 
 int options_read(struct options *options, int argc, char **argv)
@@ -77,5 +103,6 @@ int options_read(struct options *options, int argc, char **argv)
 
 void options_free(struct options *options)
 {
-	globfree(&options->found);
+	for (int i = 0; i < SERVE_SCENES_MAX; i++)
+		free(options->found[i]);
 }

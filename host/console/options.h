@@ -4,8 +4,6 @@
 /*
  * What the console is started with. host/command/serve.h has the options.
  */
-#include <glob.h>
-
 #include "host/command/serve.h"
 #include "host/console/job.h"
 #include "host/console/http.h"
@@ -15,9 +13,9 @@
 struct options {
 	struct tower_options tower;
 	struct work_options work;
-	struct http_options http;     /* address and port */
-	struct serve_arguments given; /* what the others point into */
-	glob_t found;
+	struct http_options http;      /* address and port */
+	struct serve_arguments given;  /* what the others point into */
+	char *found[SERVE_SCENES_MAX]; /* scenes that come along; ours */
 };
 
 /* Fills options, which stay where they are and point into argv. OPTIONS_READ, or the exit code; what is wrong

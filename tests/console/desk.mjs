@@ -117,6 +117,12 @@ export class Desk {
 		return this.page.keyboard.press(name);
 	}
 
+	/* A key that stands on a button, once the button may be pressed. */
+	async command(name, button) {
+		await this.page.locator(`#${button}:enabled:visible`).waitFor();
+		await this.key(name);
+	}
+
 	/* The focus goes there by the Tab key alone. */
 	async tabTo(id) {
 		const reached = [];
@@ -163,7 +169,7 @@ export class Desk {
 	 * tower holds a fault, as it must. */
 	async ready() {
 		const asked = this.page.locator("#acknowledge:enabled:visible, #clear:enabled:visible");
-		const armable = this.page.locator('html[data-step="arm"][data-state="READY"]');
+		const armable = this.page.locator('html[data-step="arm"][data-state="READY"] :is(#arm, #arm-confirm):enabled:visible');
 		for (let asks = 0; asks < 10; asks++) {
 			await asked.or(armable).waitFor();
 			if (await armable.count())

@@ -93,7 +93,7 @@ async function acknowledgeByKey() {
 	await desk.states();
 	await look(desk, "2-acknowledge");
 	assert.ok(!(await desk.states()).includes("READY"), "ready without being acknowledged");
-	await desk.key("Shift+C");
+	await desk.command("Shift+C", "acknowledge");
 	await desk.page.waitForSelector(check("ACKNOWLEDGE", "yes"));
 	await desk.until({ step: "arm", state: "READY" });
 }
@@ -128,10 +128,31 @@ async function warningByKey() {
 	assert.ok(!asked.some((url) => url.endsWith("/api/release")), "nothing was asked of the tower");
 }
 
+/* A page that does not know yet whether a drop is undecided lets nobody arm. */
+async function unknownDrops() {
+	let answered = false;
+	await desk.page.route(/\/api\/drops\?/, async (route) => {
+		await new Promise((resolve) => setTimeout(resolve, 1500));
+		answered = true;
+		await route.continue();
+	});
+	await desk.page.reload();
+	await desk.until({ connected: "yes" });
+	for (const key of ["Shift+A", "Shift+C", "Shift+K"])
+		await desk.key(key);
+	const enabled = await desk.page.locator("#now [data-command]:enabled:visible").evaluateAll((found) => found.map(({ id }) => id));
+	assert.ok(!answered, "the archive answered before the page was there");
+	assert.deepEqual(enabled, [], "commands before the archive has answered");
+	assert.ok(!await desk.page.locator("#arm-dialog").isVisible(), "ARM's key before the archive has answered");
+	await desk.until({ step: "decide" });
+	await desk.page.unroute(/\/api\/drops\?/);
+	await desk.page.waitForSelector("#accept:enabled");
+}
+
 async function dropByKey() {
 	await desk.until({ step: "arm", state: "READY" });
 	await look(desk, "3-arm");
-	await desk.key("Shift+A");
+	await desk.command("Shift+A", "arm");
 	await look(desk, "4-confirm");
 	await warningByKey();
 	await look(desk, "5-release");
@@ -149,7 +170,8 @@ async function dropByKey() {
 	for (const state of ["FALLING", "BRAKED", "UPLOADED"])
 		assert.ok(path.includes(state), `${state} was not shown: ${path}`);
 	await look(desk, "7-decide");
-	await desk.key("Shift+K");
+	await unknownDrops();
+	await desk.command("Shift+K", "accept");
 	await desk.page.waitForSelector(`#series-table tr[data-drop="${SERIES}/1"][data-decision="accepted"]`);
 }
 
@@ -503,7 +525,7 @@ async function abortOnce(first) {
 	assert.match(await desk.text("#fault-text"), /abort/i);
 	if (first)
 		await look(desk, "13-aborted");
-	await desk.key("Shift+C");
+	await desk.command("Shift+C", "clear");
 	await desk.until({ phase: "idle", state: ["SAFE", "READY"] });
 	return kept("aborted");
 }

@@ -63,6 +63,12 @@ const isEscape = (event) => event.key === "Escape" || event.code === "Escape";
 export function listen() {
 	let pressed = false;
 
+	/* what was aborted is over: its outcome does not stand above the next one */
+	document.addEventListener("armed", () => {
+		round++;
+		tell("", "good");
+	});
+
 	byId("abort").addEventListener("click", abort);
 	addEventListener(
 		"keydown",

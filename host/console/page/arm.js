@@ -2,13 +2,15 @@
 /* Arming, the countdown, releasing. Arming is asked for twice, at two places; the token that releases lives in this
  * page only, is used once, and is gone when the page is loaded again. */
 import { post } from "./api.js";
-import { attempt, byId, setData, setText, show } from "./dom.js";
+import { attempt, byId, message, setData, setText, show } from "./dom.js";
 import { holding } from "./hold.js";
 import { degrees, number } from "./words.js";
+import { atRest } from "./workflow.js";
 
 const EARLY = 425;
 let token = null; /* of our own arming, while it can be used */
 let wasArmed = false;
+let aborted = false; /* since it was armed */
 let until = 0; /* performance.now() at which the tower disarms by itself */
 let whole = 10;
 let warned = 0; /* performance.now() at which horn and lamp have warned for long enough */
@@ -39,6 +41,8 @@ async function arm() {
 	ask(false);
 	await attempt(async () => {
 		const answer = await holding(() => post("/api/arm"));
+		aborted = false;
+		document.dispatchEvent(new Event("armed"));
 		token = answer.token;
 		wasArmed = false;
 		whole = answer.expires_s;
@@ -90,6 +94,12 @@ export function follow(state) {
 		wasArmed = true;
 	} else if (wasArmed) {
 		wasArmed = false;
+		if (token !== null && !aborted && atRest(state.tower) && state.tower.state !== "FAULT_HELD")
+			message(
+				performance.now() > until - 500
+					? `ARM ran out after ${whole} s. Nothing was released.`
+					: "The tower is no longer armed. Nothing was released.",
+			);
 		token = null;
 	}
 	show(byId("release"), armed && token !== null && state.hold.mine);
@@ -131,7 +141,10 @@ export function listen() {
 	});
 	byId("arm-confirm").addEventListener("click", arm);
 	/* An ABORT takes the question back as well. */
-	document.addEventListener("aborted", forget);
+	document.addEventListener("aborted", () => {
+		aborted = true;
+		forget();
+	});
 	byId("release").addEventListener("click", release);
 	setInterval(tick, 100);
 }

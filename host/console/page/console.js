@@ -22,7 +22,9 @@ import { clock } from "./words.js";
 import { MOVING } from "./workflow.js";
 
 const root = document.documentElement;
-const model = { state: null, connected: false, pending: "", setupOpen: false };
+/* known: the archive has told the drops of the series, so that it is known whether one is undecided */
+const model = { state: null, connected: false, known: false, pending: "", setupOpen: false };
+const AGAIN_MS = 1000; /* until an archive that did not answer is asked again */
 const deferred = new Set(); /* drops to be decided later */
 const seen = { revision: -1, series: "", result: "", captureEnd: NaN, step: "" };
 let live = null;
@@ -109,8 +111,12 @@ function findPending() {
 }
 
 async function reload() {
+	const asked = model.state?.series?.name;
 	const loaded = await series.load().catch((error) => message(error.message));
-	if (loaded) drops = loaded;
+	if (loaded) {
+		drops = loaded;
+		model.known = true;
+	} else if (asked && !model.known) setTimeout(reload, AGAIN_MS);
 	if (!byId("history").hidden) history.load();
 	findPending();
 	if (!model.state || !model.connected) return;
@@ -136,6 +142,8 @@ function followArchive(state) {
 	const { revision, result } = state.archive;
 	const name = state.series?.name ?? "";
 	const changed = revision !== seen.revision || name !== seen.series;
+	if (!name) model.known = true;
+	else if (name !== seen.series) model.known = false;
 	if (name !== seen.series) {
 		drops = [];
 		if (!(root.dataset.result ?? "").startsWith(`${name}/`)) hideResult();
@@ -180,6 +188,7 @@ function onConnected(is, why) {
 	show(byId("connection"), !is);
 	if (is) {
 		seen.revision = -1; /* what came meanwhile is read again */
+		model.known = false;
 		seen.step = "";
 		return;
 	}

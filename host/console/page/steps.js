@@ -8,7 +8,11 @@ import { atRest, placeOf, stepOf } from "./workflow.js";
 
 const PANELS = ["setup", "checks", "fault", "arm", "release", "moving", "wait", "decide"];
 
+const DEAD_MS = 500; /* what takes another control's place is not pressed by the press that was meant for that one */
+
 let current = "";
+let changed = -Infinity; /* performance.now() at which the step began */
+let shown = null; /* the model drawn last */
 let watched = false; /* another console held the arm, and ours has not taken it since */
 
 function mark(step) {
@@ -40,6 +44,8 @@ function change(step) {
 	const hadFocus = panel.contains(document.activeElement) || document.activeElement === document.body;
 	for (const name of PANELS) show(byId(`step-${name}`), name === step);
 	current = step;
+	changed = performance.now();
+	setTimeout(() => shown.connected && enable(shown), DEAD_MS);
 	setData(document.documentElement, "step", step);
 	mark(step);
 	arm.forget();
@@ -114,7 +120,8 @@ function setDisabled(button, disabled) {
 
 function enable(model) {
 	const { hold, tower } = model.state;
-	const may = model.connected && !(hold.taken && !hold.mine);
+	const may =
+		model.connected && model.known && performance.now() >= changed + DEAD_MS && !(hold.taken && !hold.mine);
 	for (const button of document.querySelectorAll("[data-command]"))
 		setDisabled(button, !may || (button.id === "release" && arm.warns()));
 	byId("hold-give").disabled = !model.connected;
@@ -128,9 +135,10 @@ export function disableAll() {
 		button.disabled = true;
 }
 
-/* model: {state, connected, pending, setupOpen}. Returns the step. */
+/* model: {state, connected, known, pending, setupOpen}. Returns the step. */
 export function render(model) {
 	const { state } = model;
+	shown = model;
 	const step = stepOf({
 		tower: state.tower,
 		series: state.series,
