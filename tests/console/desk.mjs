@@ -228,7 +228,10 @@ export class Desk {
 		const done = new Promise((settle, fail) => {
 			this.page.route("**/api/release", async (route) => {
 				const response = await route.fetch();
-				await action().then(settle, fail);
+				if (response.ok())
+					await action().then(settle, fail);
+				else
+					fail(new Error(`RELEASE was refused with ${response.status()}`));
 				await route.fulfill({ response });
 			}, { times: 1 });
 		});
