@@ -3,7 +3,8 @@
 # has them too, for a short run in `make test`; there only the targets are instrumented, so that they hardly learn from what
 # they do. `make fuzz` builds all of it so that they do.
 
-FUZZ_C = $(wildcard tests/fuzz/fuzz_*.c)
+# That of HDF5 is there when its library is.
+FUZZ_C = $(filter-out $(if $(HDF5),,%/fuzz_hdf5.c),$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_O = $(call obj,$(FUZZ_C) tests/fuzz/fuzz.c)
 FUZZERS = $(FUZZ_C:tests/fuzz/%.c=$(BUILD)/fuzz/%)
 ALL_O += $(FUZZ_O)
@@ -13,6 +14,8 @@ CFLAGS += -fsanitize=fuzzer-no-link
 endif
 $(FUZZ_O): CPPFLAGS += $(LINUX)
 $(FUZZ_O): | $(LCM_H)
+$(BUILD)/obj/tests/fuzz/fuzz_hdf5.o: CPPFLAGS += $(patsubst -I%,-isystem %,$(filter -I%,$(HDF5)))
+$(BUILD)/fuzz/fuzz_hdf5: LIBRARIES += $(filter-out -I%,$(HDF5))
 ifneq ($(and $(SANITIZE),$(findstring clang,$(CC))),)
 $(FUZZ_O): CFLAGS += -fsanitize=fuzzer-no-link
 endif
