@@ -105,28 +105,24 @@ struct fit_file {
 	struct fitting *f;
 	const char *name;
 	double angle_deg;
-	unsigned number;
 	int code;
 };
 
 static int fit_each(void *context, const struct log_capture *capture, struct record *record)
 {
 	struct fit_file *file = context;
-	char name[128], message[READ_MESSAGE_MAX];
-	struct record own;
+	char name[128];
 
 	(void)capture;
 	if (record == NULL)
 		return 0;
-	if (file->f->count == FIT_DROPS_MAX)
+	if (file->f->count == FIT_DROPS_MAX) {
+		record_free(record);
 		return file->code = fit_full(file->name);
-	if (read_nth(&own, file->name, NULL, ++file->number, message) != 0) {
-		command_error("%s", message);
-		return file->code = COMMAND_INPUT;
 	}
-	snprintf(name, sizeof(name), own.log_number ? "%.100s, drop %u" : "%.100s", file->name,
-	         own.log_number);
-	file->code = fit_add(file->f, &own, name, file->angle_deg, file->f->scene.drop_height_m);
+	snprintf(name, sizeof(name), record->log_number ? "%.100s, drop %u" : "%.100s", file->name,
+	         record->log_number);
+	file->code = fit_add(file->f, record, name, file->angle_deg, file->f->scene.drop_height_m);
 	return file->code;
 }
 
@@ -290,7 +286,10 @@ static void fit_parameters(const struct fit *fit, enum table_format format)
 	table_begin(&table, parameter_columns, TABLE_COUNT(parameter_columns));
 	for (size_t i = 0; i < MOTION_SHARED; i++) {
 		double value = fit_value(fit, i), slope = value;
-		struct parameter_row row = {scene_fitted[i], status[fit->status[i]], {value, 0, false}};
+		struct parameter_row row = {
+		        scene_fitted[i],
+		        fit_holds(fit) || fit->status[i] == FIT_BEYOND ? status[fit->status[i]] : "doubtful",
+		        {value, 0, false}};
 
 		if (i == MOTION_LOGIT_RESTITUTION)
 			slope = value * (1.0 - value);
@@ -330,6 +329,62 @@ static void fit_drops_table(const struct fitting *f, enum table_format format)
 	(void)table_end(&table);
 }
 
+struct prediction_row {
+	double angle_deg;
+	struct table_value contact, restitution, lag, s1, s2;
+};
+
+static const struct table_column prediction_columns[] = {
+        TABLE_COLUMN(NUMBER, struct prediction_row, angle_deg, .key = "angle_deg", .title = "predicted",
+                     .unit = "deg", .width = 13),
+        TABLE_COLUMN(VALUE, struct prediction_row, contact, .key = "contact_time_s",
+                     .sigma = "sigma_contact_time_s", .title = "contact", .unit = "ms", .width = 8,
+                     .digits = 3, .scale = 1e3),
+        TABLE_COLUMN(NUMBER, struct prediction_row, contact.sigma, .title = "+-", .width = 7, .digits = 3,
+                     .scale = 1e3),
+        TABLE_COLUMN(VALUE, struct prediction_row, restitution, .key = "restitution_of_centre",
+                     .sigma = "sigma_restitution_of_centre", .title = "e of c.o.g.", .width = 8, .digits = 4),
+        TABLE_COLUMN(NUMBER, struct prediction_row, restitution.sigma, .title = "+-", .width = 7,
+                     .digits = 4),
+        TABLE_COLUMN(VALUE, struct prediction_row, lag, .key = "lag_s", .sigma = "sigma_lag_s",
+                     .title = "lag", .unit = "ms", .width = 8, .digits = 4, .scale = 1e3),
+        TABLE_COLUMN(NUMBER, struct prediction_row, lag.sigma, .title = "+-", .width = 7, .digits = 4,
+                     .scale = 1e3),
+        TABLE_COLUMN(VALUE, struct prediction_row, s1, .key = "s1_resultant_g",
+                     .sigma = "sigma_s1_resultant_g", .title = "S1", .unit = "g", .width = 8, .digits = 1),
+        TABLE_COLUMN(NUMBER, struct prediction_row, s1.sigma, .title = "+-", .width = 7, .digits = 2),
+        TABLE_COLUMN(VALUE, struct prediction_row, s2, .key = "s2_resultant_g",
+                     .sigma = "sigma_s2_resultant_g", .title = "S2", .unit = "g", .width = 8, .digits = 1),
+        TABLE_COLUMN(NUMBER, struct prediction_row, s2.sigma, .title = "+-", .width = 7, .digits = 2),
+};
+
+enum { PREDICT_FROM_DEG = 15, PREDICT_TO_DEG = 45, PREDICT_STEP_DEG = 5 };
+
+static void fit_predictions(const struct fit *fit, enum table_format format)
+{
+	struct table table = {.out = stdout, .format = format};
+	struct scene at = fit->scene;
+
+	table_begin(&table, prediction_columns, TABLE_COUNT(prediction_columns));
+	for (int angle = PREDICT_FROM_DEG; angle <= PREDICT_TO_DEG && fit_holds(fit);
+	     angle += PREDICT_STEP_DEG) {
+		double value[MOTION_DERIVED], sd[MOTION_DERIVED];
+		struct prediction_row row;
+
+		at.drop_angle_deg = angle;
+		if (fit_predict(&at, value, sd) != 0)
+			continue;
+		row = (struct prediction_row){angle,
+		                              {value[MOTION_CONTACT_S], sd[MOTION_CONTACT_S], false},
+		                              {value[MOTION_RESTITUTION], sd[MOTION_RESTITUTION], false},
+		                              {value[MOTION_LAG_S], sd[MOTION_LAG_S], false},
+		                              {value[MOTION_S1R_G], sd[MOTION_S1R_G], false},
+		                              {value[MOTION_S2R_G], sd[MOTION_S2R_G], false}};
+		table_row(&table, &row);
+	}
+	(void)table_end(&table);
+}
+
 static void fit_json(const struct fitting *f)
 {
 	const struct fit *fit = &f->fit;
@@ -338,6 +393,8 @@ static void fit_json(const struct fitting *f)
 	fit_parameters(fit, TABLE_JSON);
 	printf(",\"drops\":");
 	fit_drops_table(f, TABLE_JSON);
+	printf(",\"predicted\":");
+	fit_predictions(fit, TABLE_JSON);
 	printf(",\"covariance\":");
 	for (size_t i = 0; i < MOTION_SHARED; i++)
 		for (size_t j = 0; j < MOTION_SHARED; j++)
@@ -376,6 +433,8 @@ static void fit_text(const struct fitting *f)
 	fit_parameters(fit, TABLE_TEXT);
 	printf("\n");
 	fit_drops_table(f, TABLE_TEXT);
+	printf("\n");
+	fit_predictions(fit, TABLE_TEXT);
 	printf("\nresiduals: %.3f of the noise's squares over %zu samples; largest oscillation left %.1f at "
 	       "%.0f Hz; "
 	       "drops pull %.1f, gains together %.1f\n",

@@ -488,6 +488,42 @@ int fit_drops(const struct scene *start, const struct fit_drop *drops, unsigned 
 	return error;
 }
 
+/* ---- predictions ---- */
+
+int fit_predict(const struct scene *scene, double derived[MOTION_DERIVED], double sd[MOTION_DERIVED])
+{
+	struct motion *motion = malloc(sizeof(*motion));
+	double p[MOTION_PARAMETERS], slope[MOTION_SHARED][MOTION_DERIVED], variance[MOTION_DERIVED] = {0.0};
+	int error = motion ? 0 : DT_E_MEMORY;
+
+	motion_of_scene(scene, p);
+	if (!error && !(scene->fitted_u[MOTION_LN_STIFFNESS] > 0.0))
+		error = DT_E_ARGUMENT;
+	if (!error)
+		error = motion_solve(scene, p, MOTION_NODES, motion, derived);
+	for (size_t i = 0; i < MOTION_SHARED && !error; i++) {
+		double was = p[i], moved[MOTION_DERIVED];
+
+		p[i] += solve_step_of(i);
+		error = scene->fitted_u[i] > 0.0 ? motion_solve(scene, p, MOTION_NODES, motion, moved) : 0;
+		for (size_t q = 0; q < MOTION_DERIVED; q++)
+			slope[i][q] =
+			        scene->fitted_u[i] > 0.0
+			                ? scene->fitted_u[i] * (moved[q] - derived[q]) / solve_step_of(i)
+			                : 0.0;
+		p[i] = was;
+	}
+	free(motion);
+	for (size_t q = 0; q < MOTION_DERIVED && !error; q++) {
+		for (size_t i = 0; i < MOTION_SHARED; i++)
+			for (size_t j = 0; j < MOTION_SHARED; j++)
+				variance[q] += (i == j ? 1.0 : scene->fitted_correlation[i][j]) *
+				               slope[i][q] * slope[j][q];
+		sd[q] = sqrt(fmax(variance[q], 0.0));
+	}
+	return error;
+}
+
 /* ---- a later drop ---- */
 
 /* To 15 ms: what the plate does later tells nothing of onset, angle and speed. */

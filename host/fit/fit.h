@@ -105,6 +105,11 @@ struct fit {
 DT_MUST_USE int fit_drops(const struct scene *start, const struct fit_drop *drops, unsigned count,
                           const struct fit_options *options, struct fit *fit, char message[FIT_MESSAGE_MAX]);
 
+/* The drop of a scene with [fit], at its angle and height, and what the uncertainty of the parameters alone
+ * makes of it. DT_E_ARGUMENT: the scene has no [fit]; DT_E_NUMERIC: it makes no drop. */
+DT_MUST_USE int fit_predict(const struct scene *scene, double derived[MOTION_DERIVED],
+                            double sd[MOTION_DERIVED]);
+
 /* A later drop of a product whose scene is known: onset, angle and speed, gains and zeros, the product's
  * parameters held. Fills result, and *chi2 over *samples. */
 DT_MUST_USE int fit_later_drop(const struct scene *scene, const struct fit_drop *drop,
