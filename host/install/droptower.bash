@@ -11,7 +11,7 @@ _droptower_words() {
 }
 
 _droptower_options() {
-	"$@" --help 2>/dev/null | grep -oE -- '(^|[[ ])--[a-z][a-z-]*' | tr -d '[ ' | sort -u
+	"$@" --help 2>/dev/null | grep -oE -- '(^|[[ ])--[a-z][a-z0-9-]*' | tr -d '[ ' | sort -u
 	echo --help
 }
 

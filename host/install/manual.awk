@@ -15,7 +15,7 @@ function split_row(line) {
 	if (match(line, /^ *[^ ]+( [^ ]+)*  +/)) {
 		word = substr(line, 1, RLENGTH)
 		rest = substr(line, RLENGTH + 1)
-	} else if (match(line, /^  --[a-z-]+ [A-Z]+ /) || match(line, /^  [a-z]+ \[[^]]*\] /)) {
+	} else if (match(line, /^  --[a-z0-9-]+ [A-Z]+ /) || match(line, /^  [a-z]+ \[[^]]*\] /)) {
 		word = substr(line, 1, RLENGTH)
 		rest = substr(line, RLENGTH + 1)
 	} else {
