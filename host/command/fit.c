@@ -246,22 +246,6 @@ static const struct table_column drop_columns[] = {
         TABLE_COLUMN(NUMBER, struct drop_row, pull, .key = "pull"),
 };
 
-static double fit_value(const struct fit *fit, size_t i)
-{
-	const double *p = fit->common;
-
-	switch (i) {
-	case MOTION_LOGIT_RESTITUTION:
-		return 1.0 / (1.0 + exp(-p[i]));
-	case MOTION_BALANCE_DEG:
-	case MOTION_SOFTENING:
-	case MOTION_YAW_DEG:
-		return p[i];
-	default:
-		return exp(p[i]);
-	}
-}
-
 static bool fit_holds(const struct fit *fit)
 {
 	bool holds = fit->doubt.words[0] == '\0';
@@ -285,16 +269,12 @@ static void fit_parameters(const struct fit *fit, enum table_format format)
 
 	table_begin(&table, parameter_columns, TABLE_COUNT(parameter_columns));
 	for (size_t i = 0; i < MOTION_SHARED; i++) {
-		double value = fit_value(fit, i), slope = value;
+		double slope, value = motion_value((enum motion_shared)i, fit->common[i], &slope);
 		struct parameter_row row = {
 		        scene_fitted[i],
 		        fit_holds(fit) || fit->status[i] == FIT_BEYOND ? status[fit->status[i]] : "doubtful",
 		        {value, 0, false}};
 
-		if (i == MOTION_LOGIT_RESTITUTION)
-			slope = value * (1.0 - value);
-		if (i == MOTION_BALANCE_DEG || i == MOTION_SOFTENING || i == MOTION_YAW_DEG)
-			slope = 1.0;
 		row.value.sigma = fit_bar(fit, slope * fit->sd[i]);
 		if (fit->status[i] != FIT_ABSENT)
 			table_row(&table, &row);
@@ -398,25 +378,16 @@ static void fit_json(const struct fitting *f)
 	printf(",\"covariance\":");
 	for (size_t i = 0; i < MOTION_SHARED; i++)
 		for (size_t j = 0; j < MOTION_SHARED; j++)
-			printf("%s%.9g%s",
-			       j   ? ","
-			       : i ? ",["
-			           : "[[",
-			       fit->covariance[i][j],
-			       j < MOTION_SHARED - 1   ? ""
-			       : i < MOTION_SHARED - 1 ? "]"
-			                               : "]]");
+			printf("%s%.9g", j > 0 ? "," : i > 0 ? "],[" : "[[", fit->covariance[i][j]);
+	printf("]]");
 	printf(",\"chi2\":%.9g,\"samples\":%zu,\"starts\":%u,\"agreed\":%u,\"windows\":{", fit->chi2,
 	       fit->samples, fit->starts, fit->agreed);
-	for (size_t a = 0; a < MOTION_AXES; a++)
+	for (size_t a = 0; a < MOTION_AXES; a++) {
+		printf("%s\"%s\":", a > 0 ? "," : "", fit_axis_names[a]);
 		for (size_t w = 0; w < FIT_WINDOWS; w++)
-			printf("%s%.4g%s",
-			       w        ? ","
-			       : a == 0 ? "\"S1X\":["
-			       : a == 1 ? ",\"S1Y\":["
-			       : a == 2 ? ",\"S2X\":["
-			                : ",\"S2Y\":[",
-			       fit->doubt.window_z[a][w], w < FIT_WINDOWS - 1 ? "" : "]");
+			printf("%s%.4g", w > 0 ? "," : "[", fit->doubt.window_z[a][w]);
+		printf("]");
+	}
 	printf("},\"widened\":%.4g", fit->widened);
 	printf(",\"periodogram\":%.6g,\"periodogram_hz\":%.6g,\"pull\":%.6g,\"group\":%.6g",
 	       fit->doubt.periodogram, fit->doubt.periodogram_hz, fit->doubt.pull, fit->doubt.group);
@@ -482,7 +453,8 @@ static int fit_told(const struct fitting *f)
 		if (fit->status[i] == FIT_BEYOND) {
 			command_error("%s came out as %g, beyond what --scene allows: a wrong scene, or "
 			              "another product",
-			              scene_fitted[i], fit_value(fit, i));
+			              scene_fitted[i],
+			              motion_value((enum motion_shared)i, fit->common[i], NULL));
 			return COMMAND_INPUT;
 		}
 	return f->a->output ? fit_write(f) : COMMAND_DONE;

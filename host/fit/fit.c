@@ -408,14 +408,16 @@ static void conclude_bars(struct fit *fit)
 
 static void conclude_scene(const struct solve *s, const struct scene *start, struct fit *fit)
 {
-	const double *p = s->common;
+	double value[MOTION_SHARED];
 	struct scene *to = &fit->scene;
 
+	for (size_t i = 0; i < MOTION_SHARED; i++)
+		value[i] = motion_value((enum motion_shared)i, s->common[i], NULL);
 	*to = *start;
-	to->contact_stiffness_n_m15 = exp(p[MOTION_LN_STIFFNESS]);
-	to->contact_restitution = 1.0 / (1.0 + exp(-p[MOTION_LOGIT_RESTITUTION]));
-	to->product_balance_angle_deg = p[MOTION_BALANCE_DEG];
-	to->contact_tangential_ratio = exp(p[MOTION_LN_GRIP]);
+	to->contact_stiffness_n_m15 = value[MOTION_LN_STIFFNESS];
+	to->contact_restitution = value[MOTION_LOGIT_RESTITUTION];
+	to->product_balance_angle_deg = value[MOTION_BALANCE_DEG];
+	to->contact_tangential_ratio = value[MOTION_LN_GRIP];
 	if (isfinite(fit->drop[0].derived[MOTION_CONTACT_S])) {
 		to->contact_duration_s = fit->drop[0].derived[MOTION_CONTACT_S];
 		to->contact_mass_kg = start->product_case_mass_kg;
@@ -423,13 +425,13 @@ static void conclude_scene(const struct solve *s, const struct scene *start, str
 	conclude_bars(fit);
 	if (!(start->mount_plate_mass_kg > 0.0))
 		return;
-	to->mount_stiffness_n_m = exp(p[MOTION_LN_MOUNT_K]);
-	to->mount_softening = p[MOTION_SOFTENING];
-	to->mount_softening_strain = exp(p[MOTION_LN_STRAIN]);
-	to->mount_damping_n_s_m = exp(p[MOTION_LN_MOUNT_C]);
+	to->mount_stiffness_n_m = value[MOTION_LN_MOUNT_K];
+	to->mount_softening = value[MOTION_SOFTENING];
+	to->mount_softening_strain = value[MOTION_LN_STRAIN];
+	to->mount_damping_n_s_m = value[MOTION_LN_MOUNT_C];
 	to->mount_damping_ratio =
 	        to->mount_damping_n_s_m / (2.0 * sqrt(to->mount_stiffness_n_m * start->mount_plate_mass_kg));
-	to->sensor_s1_yaw_deg = p[MOTION_YAW_DEG];
+	to->sensor_s1_yaw_deg = value[MOTION_YAW_DEG];
 }
 
 static int fit_prepared(const struct scene *start, const struct fit_options *options, struct solve *s,

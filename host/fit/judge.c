@@ -43,7 +43,8 @@ static void judge_periodogram(const struct solve_drop *d, const double *residual
                               struct fit_doubt *doubt)
 {
 	for (double hz = PERIODOGRAM_FROM_HZ; hz <= PERIODOGRAM_TO_HZ; hz += PERIODOGRAM_STEP_HZ) {
-		double sum[2] = {0.0, 0.0}, turn[2] = {1.0, 0.0}, by[2] = {1.0, 0.0}, step = 0.0, last = 0.0;
+		double sum[2] = {0.0, 0.0}, turn[2] = {1.0, 0.0}, by[2] = {1.0, 0.0}, step = 0.0, last = 0.0,
+		       power;
 		size_t n = 0;
 
 		for (size_t i = 0; i < d->count; i++) {
@@ -64,10 +65,11 @@ static void judge_periodogram(const struct solve_drop *d, const double *residual
 			sum[1] += residual[i] * turn[1];
 			n++;
 		}
-		if (n > 0 && (sum[0] * sum[0] + sum[1] * sum[1]) / ((double)n * d->colour[axis]) >
-		                     doubt->periodogram) {
-			doubt->periodogram =
-			        (sum[0] * sum[0] + sum[1] * sum[1]) / ((double)n * d->colour[axis]);
+		if (n == 0)
+			continue;
+		power = (sum[0] * sum[0] + sum[1] * sum[1]) / ((double)n * d->colour[axis]);
+		if (power > doubt->periodogram) {
+			doubt->periodogram = power;
 			doubt->periodogram_hz = hz;
 			doubt->periodogram_axis = (int)axis;
 		}

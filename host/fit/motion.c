@@ -49,6 +49,22 @@ void motion_of_scene(const struct scene *s, double p[MOTION_PARAMETERS])
 	p[MOTION_LN_SPEED] = 0.5 * log(2.0 * s->drop_gravity_m_s2 * s->drop_height_m);
 }
 
+double motion_value(enum motion_shared parameter, double p, double *slope)
+{
+	double value = p, by = 1.0;
+
+	if (parameter == MOTION_LOGIT_RESTITUTION) {
+		value = 1.0 / (1.0 + exp(-p));
+		by = value * (1.0 - value);
+	} else if (parameter != MOTION_BALANCE_DEG && parameter != MOTION_SOFTENING &&
+	           parameter != MOTION_YAW_DEG) {
+		value = by = exp(p);
+	}
+	if (slope)
+		*slope = by;
+	return value;
+}
+
 static void motion_mounts(const struct scene *s, const double p[], struct body *b)
 {
 	double far = exp(p[MOTION_LN_STRAIN]) * s->mount_cube_m;

@@ -63,6 +63,10 @@ double motion_node_s(size_t node);
  * and damping_n_s_m above 0 (fit.h sees to that). */
 void motion_of_scene(const struct scene *scene, double p[MOTION_PARAMETERS]);
 
+/* A shared parameter as a scene has it, from the fit's coordinate p; slope, which may be NULL: its
+ * derivative. */
+double motion_value(enum motion_shared parameter, double p, double *slope);
+
 /* Nodes up to most. derived may be NULL. 0, or DT_E_NUMERIC where these are no parameters of a product. */
 DT_MUST_USE int motion_solve(const struct scene *scene, const double p[MOTION_PARAMETERS], size_t most,
                              struct motion *motion, double derived[MOTION_DERIVED]);

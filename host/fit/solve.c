@@ -261,10 +261,13 @@ static void solve_clear_drop(struct solve_drop *d)
 	memset(d->right, 0, sizeof(d->right));
 }
 
+/* Without slopes the equations stay as they are. */
 static bool solve_normal(struct solve *s, bool slopes)
 {
-	memset(s->a, 0, sizeof(s->a));
-	memset(s->right, 0, sizeof(s->right));
+	if (slopes) {
+		memset(s->a, 0, sizeof(s->a));
+		memset(s->right, 0, sizeof(s->right));
+	}
 	s->squares = 0.0;
 	s->used = 0;
 	for (unsigned k = 0; k < s->drops; k++) {
@@ -277,6 +280,8 @@ static bool solve_normal(struct solve *s, bool slopes)
 		double sd = s->prior_sd[i];
 
 		s->squares += solve_prior(s->common[i], s->centre[i], sd);
+		if (!slopes)
+			continue;
 		s->a[i][i] += sd > 0.0 ? 1.0 / (sd * sd) : 1.0;
 		s->right[i] += sd > 0.0 ? (s->centre[i] - s->common[i]) / (sd * sd) : 0.0;
 	}
@@ -389,14 +394,7 @@ bool solve_run(struct solve *s, unsigned iterations, double enough)
 		solve_keep(s, &kept, false);
 		first = damping;
 		for (tried = (double)INFINITY; damping < DAMPING_MOST; damping *= 8.0) {
-			struct solve *at = s;
-			double a[FIT_COMMON][FIT_COMMON], right[FIT_COMMON];
-
-			memcpy(a, s->a, sizeof(a));
-			memcpy(right, s->right, sizeof(right));
-			tried = solve_step(at, damping) ? solve_squares(at) : (double)INFINITY;
-			memcpy(s->a, a, sizeof(a));
-			memcpy(s->right, right, sizeof(right));
+			tried = solve_step(s, damping) ? solve_squares(s) : (double)INFINITY;
 			if (tried <= now)
 				break;
 			solve_keep(s, &kept, true);
