@@ -83,6 +83,8 @@ static struct model_prediction blank(const struct drop *drop)
 	        .spin_rad_s = none,
 	        .box = {none, none},
 	        .direction_deg = {none, none},
+	        .second_touch_s = none,
+	        .until_s = none,
 	        .lag_s = none,
 	        .difference = none,
 	        .next_change = none,

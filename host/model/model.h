@@ -95,8 +95,10 @@ struct model_peak {
 };
 
 enum model_note {
-	MODEL_NOTE_DEEP = 1 << 0,  /* the dent is deeper than 0.3 of the mat: its floor begins to be felt */
-	MODEL_NOTE_STUCK = 1 << 1, /* the box does not leave the mat: no contact time, no restitution */
+	MODEL_NOTE_DEEP = 1 << 0,   /* the dent is deeper than 0.3 of the mat: its floor begins to be felt */
+	MODEL_NOTE_STUCK = 1 << 1,  /* the box does not leave the mat: no contact time, no restitution */
+	MODEL_NOTE_STRUCK = 1 << 2, /* a corner strikes, or strikes again, before all peaks are over: they
+	                             * take it in */
 };
 
 struct model_prediction {
@@ -121,6 +123,10 @@ struct model_prediction {
 	struct model_peak resultant[2]; /* S1, S2 */
 	struct model_peak box;          /* resultant at the box's centre of gravity */
 	double direction_deg[2];        /* S1, S2: from X towards Y when the resultant peaks */
+	double second_touch_s;          /* MODEL_NOTE_STRUCK: when */
+	int second_corner;              /* and which: 0 the one that struck first, 1 that beyond X, 3 that
+	                                 * beyond Y, 2 the opposite one */
+	double until_s;                 /* what the peaks are of ends here; NAN: nothing can come later */
 	double lag_s;                   /* S1's resultant peak after S2's */
 	unsigned evaluations;           /* of the equations of motion: its cost; 0 where the form is closed */
 	/* of auto only, else NAN and none: */

@@ -146,6 +146,11 @@ void ode_cut(struct ode *ode, double t)
 {
 	ode_at(ode, t, ode->y);
 	ode->t = ode->last.end = t;
+	ode_renew(ode);
+}
+
+void ode_renew(struct ode *ode)
+{
 	ode->rates(ode->context, ode->y, ode->rate[0]);
 	ode->evaluations++;
 }

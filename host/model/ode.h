@@ -13,7 +13,7 @@
 
 #include "common/error.h"
 
-enum { ODE_STATES_MAX = 10, ODE_STAGES = 7 };
+enum { ODE_STATES_MAX = 13, ODE_STAGES = 7 };
 
 /* One step: what y was in between. */
 struct ode_piece {
@@ -52,5 +52,8 @@ void ode_at(const struct ode *ode, double t, double y[]);
 
 /* Takes the last step back to an instant within it: goes on from there. */
 void ode_cut(struct ode *ode, double t);
+
+/* y or its rates were changed at the present instant: goes on from there. */
+void ode_renew(struct ode *ode);
 
 #endif

@@ -12,7 +12,7 @@
  *            grip = 0: frictionless
  *   mounts   k (1 + softening/(1 + (|u|/u_s)^2)) u + c u', u the plate's place as seen from the turning box
  *
- * Only the first touch of this corner; nothing of later ones. Time 0 is that touch. Readings are as an
+ * Any corner may touch, and touch again: body.h. Time 0 is the first touch. Readings are as an
  * accelerometer gives them (0 in free fall), along the body's axes, which turn. SI units, angles from the
  * vertical to X in rad; pure functions, any thread.
  */
@@ -20,6 +20,7 @@
 #include <stddef.h>
 
 #include "common/error.h"
+#include "host/model/body.h"
 #include "host/model/contact.h"
 #include "host/model/watch.h"
 
@@ -28,7 +29,8 @@ struct planar {
 	double inertia_kg_m2;               /* of the box */
 	double angle_rad, gravity_m_s2, speed_m_s;
 	double lever_x_m, lever_y_m;
-	double stiffness_n_m15;
+	double stiffness_n_m15; /* with wedge: at BODY_WEDGE_RAD */
+	bool wedge;
 	struct contact_law law;
 	double grip, friction;
 	double mount_n_m, mount_damping_n_s_m;
@@ -64,11 +66,14 @@ struct planar_result {
 	double velocity_change_m_s;   /* of box and plate together, upwards, by the contact force */
 	double spin_rad_s;            /* at the release; positive turns X away from the vertical */
 	double ring_hz, ring_damping; /* mean over three oscillations after the release; NAN if not asked */
-	bool cut_short; /* all asked for had passed before the release: what comes of the release is NAN */
+	bool cut_short;    /* all asked for had passed before the release: what comes of the release is NAN */
+	double second_s;   /* the second touch of any corner, within what the peaks are of; NAN: none */
+	int second_corner; /* whose; 0 is the one that struck first */
+	double until_s;    /* what the peaks are of ends here */
 	unsigned evaluations;
 };
 
-/* 0, or DT_E_NUMERIC. Peaks are those of the contact and of the half oscillation after it. */
+/* 0, or DT_E_NUMERIC. Peaks are those up to until_s: 0.6 plate periods after the release. */
 DT_MUST_USE int planar_solve(const struct planar *planar, struct planar_result *result);
 
 struct planar_sample {

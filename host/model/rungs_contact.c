@@ -17,10 +17,6 @@
 /* From this tolerance of peaks on a parabola is as good as the steps are. */
 #define ROUGH_TOLERANCE 2e-3
 
-/* The angle at which stiffness_n_m15 was identified, and how far from flat a wedge's imprint still is one. */
-#define WEDGE_IDENTIFIED_DEG 25.0
-#define WEDGE_ANGLE_MIN_DEG 10.0
-
 static double step_tolerance(const struct model_options *options)
 {
 	return STEP_SHARE * (options->tolerance > 0.0 ? options->tolerance : MODEL_TOLERANCE);
@@ -75,14 +71,6 @@ static unsigned refinements_of(const struct model_options *options, unsigned kno
 	return options->refinements & MODEL_OF_RUNG ? own : options->refinements & known;
 }
 
-/* A right-angled edge leaves an imprint as wide as the tangents of both its flanks add up to. */
-static double rungs_contact_wedge(const struct scene *s)
-{
-	double angle = fmin(fmax(s->drop_angle_deg, WEDGE_ANGLE_MIN_DEG), 90.0 - WEDGE_ANGLE_MIN_DEG);
-
-	return sin(2.0 * UNITS_RAD(WEDGE_IDENTIFIED_DEG)) / sin(2.0 * UNITS_RAD(angle));
-}
-
 /* The contact's law and its stiffness. */
 static int contact_of(const struct drop *drop, unsigned refinements, struct contact_law *law,
                       double *stiffness_n_m15, char *message)
@@ -100,8 +88,6 @@ static int contact_of(const struct drop *drop, unsigned refinements, struct cont
 			                   given);
 		*stiffness_n_m15 = given;
 	}
-	if (refinements & MODEL_WEDGE)
-		*stiffness_n_m15 *= rungs_contact_wedge(drop->scene);
 	return 0;
 }
 
@@ -113,6 +99,8 @@ static int coupled_of(const struct drop *drop, const struct model_options *optio
                       char *message)
 {
 	const struct scene *s = drop->scene;
+	unsigned refinements = refinements_of(options, COUPLED_KNOWS, 0);
+	int error;
 
 	static const unsigned wanted_by[COUPLED_SIGNALS] = {
 	        [COUPLED_BOX] = MODEL_ASK_BOX | MODEL_ASK_S2,
@@ -136,8 +124,10 @@ static int coupled_of(const struct drop *drop, const struct model_options *optio
 	        .skipped = skipped_of(options, wanted_by, COUPLED_SIGNALS),
 	        .rough = rough(options),
 	};
-	return contact_of(drop, refinements_of(options, COUPLED_KNOWS, 0), &c->law, &c->stiffness_n_m15,
-	                  message);
+	error = contact_of(drop, refinements, &c->law, &c->stiffness_n_m15, message);
+	if (refinements & MODEL_WEDGE)
+		c->stiffness_n_m15 *= body_wedge(drop->angle);
+	return error;
 }
 
 /* Two masses on a linear mount, both free: their damping ratio against each other. */
@@ -300,6 +290,7 @@ static int planar_of(const struct drop *drop, const struct model_options *option
 	error = contact_of(drop, refinements, &p->law, &p->stiffness_n_m15, message);
 	if (error)
 		return error;
+	p->wedge = refinements & MODEL_WEDGE;
 	rungs_contact_refine(drop, refinements, p);
 	p->count_ring = options->ring && p->softening > 0.0;
 	return 0;
@@ -321,9 +312,13 @@ static int planar_predict(const struct drop *drop, const struct model_options *o
 	p->velocity_change_m_s = r.velocity_change_m_s;
 	p->contact_time_s = r.contact_time_s;
 	p->restitution = r.restitution;
-	p->stiffness_n_m15 = planar.stiffness_n_m15;
+	p->stiffness_n_m15 = planar.stiffness_n_m15 * (planar.wedge ? body_wedge(drop->angle) : 1.0);
 	p->dent_m = r.peak[PLANAR_DEPTH].value;
 	p->notes = isnan(r.contact_time_s) && !r.cut_short ? MODEL_NOTE_STUCK : 0u;
+	p->notes |= isnan(r.second_s) ? 0u : MODEL_NOTE_STRUCK;
+	p->second_touch_s = r.second_s;
+	p->second_corner = r.second_corner;
+	p->until_s = r.until_s;
 	p->spin_rad_s = r.spin_rad_s;
 	for (int i = 0; i < MODEL_AXES; i++)
 		p->peak[i] = peak_of(r.peak[PLANAR_S1X + i]);

@@ -41,6 +41,16 @@ void watch_start(struct watch *w, const struct ode *ode)
 		record(w, i, ode->t, w->value[2]);
 }
 
+void watch_resume(struct watch *w, const struct ode *ode)
+{
+	w->seen = 0;
+	w->resumed = true;
+	watch_sample(w, ode, ode->t);
+	for (size_t i = 0; i < w->count; i++)
+		if (!(w->skipped >> i & 1u) && fabs(w->value[2][i]) > fabs(w->peak[i].value))
+			record(w, i, ode->t, w->value[2]);
+}
+
 static double watch_magnitude(const struct watch *w, const struct ode *ode, size_t signal, double t)
 {
 	double y[ODE_STATES_MAX], value[WATCH_SIGNALS_MAX];
@@ -147,8 +157,21 @@ static void watch_refine(struct watch *w, const struct ode *ode, size_t signal, 
 /* How far above the largest sample a peak between samples may lie. */
 #define HIDDEN_SHARE 1.1
 
-/* How near the end of all its slope is looked at. */
+/* How near the end, or the new start, of all its slope is looked at. */
 #define END_SHARE 1e-3
+
+/* Between the first two samples after watch_resume, where no earlier one tells of a peak. */
+static void watch_look_at_start(struct watch *w, const struct ode *ode, size_t signal)
+{
+	double from = w->time_s[0], to = w->time_s[1], edge[3] = {from, from + END_SHARE * (to - from), to};
+	double f[3] = {fabs(w->value[0][signal]), 0.0, fabs(w->value[1][signal])};
+
+	if (f[0] < f[2])
+		return;
+	f[1] = watch_magnitude(w, ode, signal, edge[1]);
+	if (f[1] > f[0])
+		watch_refine(w, ode, signal, edge, f);
+}
 
 static void watch_look(struct watch *w, const struct ode *ode, double t)
 {
@@ -158,10 +181,14 @@ static void watch_look(struct watch *w, const struct ode *ode, double t)
 	for (size_t i = 0; i < w->count; i++) {
 		double f[3] = {fabs(w->value[0][i]), fabs(w->value[1][i]), fabs(w->value[2][i])};
 
-		if (!(w->skipped >> i & 1u) && f[1] >= f[0] && f[1] > f[2] &&
-		    f[1] * HIDDEN_SHARE > fabs(w->peak[i].value))
+		if (w->skipped >> i & 1u)
+			continue;
+		if (f[1] >= f[0] && f[1] > f[2] && f[1] * HIDDEN_SHARE > fabs(w->peak[i].value))
 			watch_refine(w, ode, i, w->time_s, f);
+		if (w->resumed && f[0] * HIDDEN_SHARE > fabs(w->peak[i].value))
+			watch_look_at_start(w, ode, i);
 	}
+	w->resumed = false;
 }
 
 void watch_step(struct watch *w, const struct ode *ode)

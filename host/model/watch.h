@@ -34,6 +34,7 @@ struct watch {
 	double with[WATCH_SIGNALS_MAX][WATCH_SIGNALS_MAX]; /* all signals at each one's peak */
 	double time_s[3], value[3][WATCH_SIGNALS_MAX];     /* the last samples, the newest last */
 	int seen;
+	bool resumed; /* and none since that told of what came right after */
 };
 
 /* After ode_start. */
@@ -47,6 +48,9 @@ bool watch_passed(const struct watch *watch, size_t signal, double share);
 
 /* At the end, or where the equations change: peaks between the last two samples, or at the very last. */
 void watch_end(struct watch *watch, const struct ode *ode);
+
+/* Goes on after watch_end. */
+void watch_resume(struct watch *watch, const struct ode *ode);
 
 /* Where the state, which has different signs at the ends of the last step, crosses zero. */
 double watch_crossing(const struct ode *ode, size_t state);

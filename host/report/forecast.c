@@ -72,6 +72,10 @@ int forecast_text(const struct forecast *f, FILE *out)
 		        100.0 * p->dent_share);
 	if (p->notes & MODEL_NOTE_STUCK)
 		fprintf(out, "\nnote: the box does not leave the mat\n");
+	if (p->notes & MODEL_NOTE_STRUCK)
+		fprintf(out, "\nnote: %s after %.3g ms: the peaks take it in\n",
+		        p->second_corner == 0 ? "the corner strikes again" : "another corner strikes",
+		        1e3 * p->second_touch_s);
 	return written(out);
 }
 

@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ *
+ * The planar rung against the bench's plant, which was written apart from it and integrates by fixed steps,
+ * over random products and drops: second touches of the corner that struck first and of the others included.
+ * An argument is the number of drops, for a longer run.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "common/units.h"
+#include "hil/product.h"
+#include "host/model/model.h"
+
+/* Steps of the plant in a contact time. */
+enum { STEPS = 4000, DROPS = 60 };
+#define PEAK_SHARE 1e-4
+#define TIME_SHARE 1e-3
+
+static int drops = DROPS;
+static uint64_t seed = 7;
+
+static double uniform(double low, double high)
+{
+	seed = seed * 6364136223846793005u + 1442695040888963407u;
+	return low + (high - low) * (double)(seed >> 11) / 9007199254740992.0;
+}
+
+static double spread(double low, double high)
+{
+	return low * pow(high / low, uniform(0.0, 1.0));
+}
+
+/* Cubes to crates; the mat is thicker than any dent. */
+static struct scene random_scene(void)
+{
+	double side = spread(0.03, 2.0), contact_s = spread(0.5e-3, 15e-3), mass = spread(0.05, 50.0);
+	struct scene s = {
+	        .drop_height_m = spread(0.05, 2.4),
+	        .drop_gravity_m_s2 = UNITS_G_M_S2,
+	        .drop_angle_deg = uniform(8.0, 60.0),
+	        .product_case_mass_kg = mass,
+	        .product_length_m = side,
+	        .product_width_m = side * uniform(0.3, 1.0),
+	        .product_balance_angle_deg = uniform(15.0, 45.0),
+	        .product_inertia_ratio = uniform(0.7, 1.6),
+	        .contact_duration_s = contact_s,
+	        .contact_restitution = uniform(0.01, 0.99),
+	        .contact_mass_kg = mass,
+	        .contact_mat_thickness_m = 10.0,
+	        .contact_tangential_ratio = uniform(0.0, 3.0),
+	        .contact_friction = 100.0, /* no slip, whose onset the rung spreads */
+	        .sensor_s2_offset_m = side * uniform(0.0, 0.4),
+	        .mount_plate_mass_kg = mass * spread(0.001, 2.0),
+	        .mount_cube_m = 0.003,
+	        .mount_softening = uniform(0.0, 1.0),
+	        .mount_softening_strain = 0.8,
+	        .mount_damping_ratio = 0.1,
+	};
+	double plate = s.mount_plate_mass_kg, omega = 2.0 * UNITS_PI * spread(0.08, 6.0) / contact_s;
+
+	s.mount_stiffness_n_m = omega * omega / (1.0 / plate + 1.0 / mass);
+	s.mount_damping_n_s_m = 2.0 * uniform(0.01, 0.5) * s.mount_stiffness_n_m / omega;
+	s.contact_stiffness_n_m15 =
+	        mass * pow(3.3 / contact_s, 2.5) / pow(2.0 * UNITS_G_M_S2 * s.drop_height_m, 0.25);
+	return s;
+}
+
+enum { S1, S2, BOX, PEAKS };
+
+static void plant_peaks(const struct scene *s, double step_s, double until_s, double peak[PEAKS],
+                        double when[PEAKS])
+{
+	struct product p;
+	struct product_reading r;
+	size_t steps = (size_t)(until_s / step_s);
+
+	product_init(&p, s, UNITS_RAD(s->drop_angle_deg));
+	product_strike(&p, sqrt(2.0 * UNITS_G_M_S2 * s->drop_height_m));
+	for (int i = 0; i < PEAKS; i++)
+		peak[i] = 0.0;
+	for (size_t k = 0; k <= steps; k++) {
+		double value[PEAKS];
+
+		product_read(&p, &r);
+		value[S1] = hypot(r.s1_x, r.s1_y);
+		value[S2] = hypot(r.s2_x, r.s2_y);
+		value[BOX] = hypot(p.rate[PRODUCT_VX], p.rate[PRODUCT_VY] + p.gravity_m_s2);
+		for (int i = 0; i < PEAKS; i++)
+			if (value[i] > peak[i]) {
+				peak[i] = value[i];
+				when[i] = (double)k * step_s;
+			}
+		product_step(&p, step_s);
+	}
+}
+
+static void touches_like_the_plant(void **state)
+{
+	double worst = 0.0, worst_s = 0.0;
+	int struck = 0, others = 0, refused = 0;
+
+	(void)state;
+	for (int drop = 0; drop < drops; drop++) {
+		struct scene s = random_scene();
+		double step_s = s.contact_duration_s / STEPS, peak[PEAKS], when[PEAKS];
+		struct model_prediction p;
+		char message[MODEL_MESSAGE_MAX];
+
+		if (model_solve(&s, MODEL_PLANAR, NULL, &p, message) != 0) {
+			print_message("%d refused: %s\n", drop, message);
+			refused++;
+			continue;
+		}
+		plant_peaks(&s, step_s, p.until_s, peak, when);
+		struck += (p.notes & MODEL_NOTE_STRUCK) != 0;
+		others += (p.notes & MODEL_NOTE_STRUCK) && p.second_corner != 0;
+		for (int i = 0; i < PEAKS; i++) {
+			struct model_peak mine = i == BOX ? p.box : p.resultant[i];
+			double off = fabs(mine.value_g * UNITS_G_M_S2 / peak[i] - 1.0);
+			double late = fabs(mine.time_s - when[i]) / s.contact_duration_s;
+
+			if (off > PEAK_SHARE || late > TIME_SHARE)
+				print_message(
+				        "%d: peak %d is %g g at %g s, the plant's %g g at %g s; notes %x "
+				        "second %g until %g\n",
+				        drop, i, mine.value_g, mine.time_s, peak[i] / UNITS_G_M_S2, when[i],
+				        p.notes, p.second_touch_s, p.until_s);
+			worst = fmax(worst, off);
+			worst_s = fmax(worst_s, late);
+		}
+	}
+	print_message(
+	        "%d drops: worst peak off by %.2g, worst time by %.2g of the contact; second touches %d, of "
+	        "them %d of another corner\n",
+	        drops, worst, worst_s, struck, others);
+	assert_int_equal(refused, 0);
+	assert_true(struck >= drops / 20);
+	assert_true(others > 0);
+	assert_true(worst <= PEAK_SHARE);
+	assert_true(worst_s <= TIME_SHARE);
+}
+
+int main(int argc, char **argv)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(touches_like_the_plant)};
+
+	if (argc > 1)
+		drops = atoi(argv[1]);
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
