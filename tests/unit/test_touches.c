@@ -2,7 +2,7 @@
  *
  * The planar rung against the bench's plant, which was written apart from it and integrates by fixed steps,
  * over random products and drops: second touches of the corner that struck first and of the others included.
- * An argument is the number of drops, for a longer run.
+ * A third argument, after the two builds, is the number of drops, for a longer run.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -151,7 +151,7 @@ int main(int argc, char **argv)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(touches_like_the_plant)};
 
-	if (argc > 1)
-		drops = atoi(argv[1]);
+	if (argc > 3) /* after the builds */
+		drops = atoi(argv[3]);
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
