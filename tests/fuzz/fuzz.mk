@@ -33,8 +33,8 @@ tests: fuzzers
 endif
 
 T = 60
-fuzz: setup-test all ## run each fuzz target for T seconds (T=60), in build/fuzz, with a corpus that stays there
+fuzz: setup-test all ## run each fuzz target (TARGETS="read http": those) for T seconds (T=60), with a corpus that stays in build/fuzzed
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD)/fuzzed CC=clang SANITIZE=1 FUZZ=1 fuzzers
-	@tests/fuzz/run $(BUILD) $(BUILD)/fuzzed/fuzz $(BUILD)/fuzzed/corpus -max_total_time=$(T)
+	@TARGETS="$(TARGETS)" tests/fuzz/run $(BUILD) $(BUILD)/fuzzed/fuzz $(BUILD)/fuzzed/corpus -max_total_time=$(T)
 
 -include $(FUZZ_C:%.c=$(BUILD)/obj/%.d)
