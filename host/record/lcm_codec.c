@@ -100,7 +100,7 @@ static void fill_message(const struct record *record, droptower_drop *drop)
 	drop->first_tick_ms = record->first_tick_ms;
 	drop->last_tick_ms = record->last_tick_ms;
 	drop->trigger_us = isnan(record->trigger_s) ? record->trigger_us : llround(record->trigger_s * 1e6);
-	if (!record->crc_known && isnan(record->trigger_s))
+	if (isnan(record->trigger_s) && !(record->crc_known && (record->marks & WIRE_MARK_NO_IMPACT)))
 		drop->trigger_us = -1;
 	drop->crc32 = record->crc32;
 	drop->crc_known = record->crc_known;
