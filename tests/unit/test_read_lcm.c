@@ -179,7 +179,8 @@ static void test_a_drop_there_and_back(void **state)
 		lcm_codec_free_drop(&message);
 		free(bytes);
 		record_free(&again);
-		record.trigger_s = NAN; /* not told, though a capture end was there: as a text that lost the line */
+		record.trigger_s =
+		        NAN; /* not told, though a capture end was there: as a text that lost the line */
 		record.marks = 0;
 		assert_int_equal(lcm_codec_drop(&record, 1234, &message), 0);
 		assert_int_equal(message.trigger_us, -1);
