@@ -187,18 +187,6 @@ uint32_t wire_answer(uint32_t nonce, uint32_t subject, uint32_t parameters_crc32
 	return crc_u32(crc_u32(crc_u32(CRC32_INIT, nonce), subject), parameters_crc32);
 }
 
-uint8_t wire_fd_length(size_t count)
-{
-	static const uint8_t lengths[] = {12, 16, 20, 24, 32, 48, 64};
-
-	if (count <= 8)
-		return (uint8_t)count;
-	for (size_t i = 0; i < sizeof(lengths); i++)
-		if (count <= lengths[i])
-			return lengths[i];
-	return 0;
-}
-
 uint32_t wire_hash(void)
 {
 	static const char text[] =

@@ -160,7 +160,4 @@ uint32_t wire_answer(uint32_t nonce, uint32_t subject, uint32_t parameters_crc32
 /* CRC-32 over wire.def without its texts: equal on both ends or they do not speak the same wire. */
 uint32_t wire_hash(void);
 
-/* The smallest length CAN FD has that holds count bytes; 0 for count > 64. */
-uint8_t wire_fd_length(size_t count);
-
 #endif

@@ -35,12 +35,6 @@
 	                                                   COUNT(fields_##layout), WIRE_LENGTH_##layout};
 #include "common/wire.def"
 
-const struct wire_layout *const wire_layouts[] = {
-#define WIRE_LAYOUT(layout, doc) &layout_##layout,
-#include "common/wire.def"
-};
-const size_t wire_layout_count = COUNT(wire_layouts);
-
 const struct wire_message wire_messages[] = {
 #define WIRE_ID(NAME, id, layout, sender, doc) {#NAME, doc, #sender, &layout_##layout, id},
 #include "common/wire.def"
@@ -87,18 +81,6 @@ const struct wire_message *wire_message_of(uint32_t id)
 		if (wire_messages[i].id == id)
 			return &wire_messages[i];
 	return NULL;
-}
-
-int64_t wire_field_value(const struct wire_field *field, const uint8_t *data, unsigned i)
-{
-	const uint8_t *p = data + field->offset + (size_t)i * field->size;
-	int64_t value = 0;
-
-	for (unsigned byte = 0; byte < field->size; byte++)
-		value |= (int64_t)p[byte] << (8u * byte);
-	if (field->is_signed && (p[field->size - 1u] & 0x80u) != 0)
-		value -= (int64_t)1 << (8u * field->size);
-	return value;
 }
 
 const char *wire_state_name(unsigned state)

@@ -44,17 +44,12 @@ struct wire_parameter_info {
 	uint32_t min, max, initial;
 };
 
-extern const struct wire_layout *const wire_layouts[];
-extern const size_t wire_layout_count;
 extern const struct wire_message wire_messages[];
 extern const size_t wire_message_count;
 extern const struct wire_parameter_info wire_parameters[]; /* WIRE_PARAMETERS of them */
 
 /* NULL for an identifier that wire.def does not have. */
 const struct wire_message *wire_message_of(uint32_t id);
-
-/* The raw value of element i of a field in packed data. */
-int64_t wire_field_value(const struct wire_field *field, const uint8_t *data, unsigned i);
 
 /* Names and texts; "?" for a number that wire.def does not have. */
 const char *wire_state_name(unsigned state);

@@ -154,7 +154,7 @@ static int step(struct sequence *sequence, enum sequence_event event)
 	uint8_t next;
 
 	DT_ASSERT(sequence->state < WIRE_STATES && event < SEQUENCE_EVENTS);
-	next = table[sequence->state][event];
+	next = sequence_next(sequence->state, event);
 	if (next == NO)
 		return DT_E_STATE;
 	if (next != STAY)
@@ -186,7 +186,7 @@ void sequence_fault(struct sequence *sequence, enum wire_fault fault)
 
 void sequence_abort(struct sequence *sequence)
 {
-	if (table[sequence->state][SEQUENCE_ABORT] == FAULT_MOVING)
+	if (sequence_next(sequence->state, SEQUENCE_ABORT) == FAULT_MOVING)
 		latch(sequence, WIRE_FAULT_ABORTED);
 	happen(sequence, SEQUENCE_ABORT);
 }

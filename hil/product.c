@@ -218,16 +218,3 @@ void product_read(const struct product *p, struct product_reading *reading)
 	reading->s2_x = box_x * sn + box_y * cs - spin * spin * p->s2_offset_m;
 	reading->s2_y = -box_x * cs + box_y * sn - p->rate[PRODUCT_SPIN] * p->s2_offset_m;
 }
-
-void product_simulate(const struct scene *scene, double angle_rad, double speed_m_s, double step_s,
-                      struct product_reading *reading, size_t count)
-{
-	struct product p;
-
-	product_init(&p, scene, angle_rad);
-	product_strike(&p, speed_m_s);
-	for (size_t i = 0; i < count; i++) {
-		product_read(&p, &reading[i]);
-		product_step(&p, step_s);
-	}
-}

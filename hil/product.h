@@ -80,8 +80,4 @@ void product_step(struct product *p, double step_s);
 
 void product_read(const struct product *p, struct product_reading *reading);
 
-/* A touch-down at time 0 by itself: fills reading[i] for the time i * step_s, i < count. */
-void product_simulate(const struct scene *scene, double angle_rad, double speed_m_s, double step_s,
-                      struct product_reading *reading, size_t count);
-
 #endif

@@ -171,16 +171,6 @@ int link_receive(struct link *link, struct frame *frame, int timeout_ms)
 	return result;
 }
 
-int link_descriptor(const struct link *link)
-{
-	return link->ops->descriptor(link);
-}
-
-uint64_t link_line(const struct link *link)
-{
-	return link->line;
-}
-
 const struct link_counters *link_counters(const struct link *link)
 {
 	return &link->counters;

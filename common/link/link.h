@@ -55,15 +55,9 @@ DT_MUST_USE int link_send(struct link *link, const struct frame *frame);
  * DT_E_CLOSED at the end of a log or when a bus cannot be joined again, DT_E_LINK, DT_E_SYSTEM, DT_E_STATE
  * (opened for writing). A SocketCAN interface that is down is waited for and
  * counted, it is not an error. Error reports arrive as frames with FRAME_ERROR. A log line that is not
- * a frame is skipped and counted; link_line tells where the last frame stood. time_us is never 0 on
+ * a frame is skipped and counted. time_us is never 0 on
  * return: kernel time for can:, else the time it was read, or the log's. */
 DT_MUST_USE int link_receive(struct link *link, struct frame *frame, int timeout_ms);
-
-/* A descriptor that polls readable when link_receive may have something, or -1 (log:). */
-int link_descriptor(const struct link *link);
-
-/* Line number of the last frame of a log: link, else 0. */
-uint64_t link_line(const struct link *link);
 
 const struct link_counters *link_counters(const struct link *link);
 const char *link_url(const struct link *link);

@@ -23,7 +23,6 @@ struct log {
 	FILE *output;   /* NULL when reading */
 	int descriptor; /* -1 when writing */
 	bool ended, skipping;
-	uint64_t lines;     /* seen so far */
 	size_t start, stop; /* the unread part of buffer */
 	char buffer[BUFFER_BYTES];
 };
@@ -165,7 +164,6 @@ static bool log_take_line(struct log *log, size_t length, struct frame *frame)
 	unsigned column;
 
 	log->start += length;
-	log->lines++;
 	log->skipping = false;
 	if (whole && is_remark(line, length))
 		return false;
@@ -175,7 +173,6 @@ static bool log_take_line(struct log *log, size_t length, struct frame *frame)
 	}
 	if (frame->time_us == 0) /* which would mean unknown */
 		frame->time_us = 1;
-	log->link.line = log->lines;
 	return true;
 }
 
@@ -204,11 +201,4 @@ static int log_receive(struct link *link, struct frame *frame, int64_t deadline_
 	}
 }
 
-static int log_descriptor(const struct link *link)
-{
-	(void)link;
-	return -1;
-}
-
-const struct link_ops link_log = {"log",          log_open,  log_send, log_receive,
-                                  log_descriptor, log_close, log_flush};
+const struct link_ops link_log = {"log", log_open, log_send, log_receive, log_close, log_flush};

@@ -8,8 +8,6 @@
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/epoll.h>
-#include <sys/eventfd.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -22,7 +20,6 @@
 struct slcan {
 	struct link link;
 	int descriptor;
-	int poller, event; /* what link_descriptor gives: the line, or input read but not yet delivered */
 	struct slcan_decoder decoder;
 	size_t input_at, input_end;
 	size_t output_at, output_end; /* the rest of a line the device has not taken */
@@ -114,10 +111,6 @@ static int slcan_close(struct link *link)
 		kept = flush(slcan, deadline_us) == 1 && slcan_put(slcan, "C\r", 2, deadline_us) == 1;
 		(void)close(slcan->descriptor);
 	}
-	if (slcan->poller >= 0)
-		(void)close(slcan->poller);
-	if (slcan->event >= 0)
-		(void)close(slcan->event);
 	free(slcan);
 	return kept ? 0 : DT_E_SYSTEM;
 }
@@ -125,30 +118,20 @@ static int slcan_close(struct link *link)
 static struct slcan *slcan_new(void)
 {
 	struct slcan *slcan = calloc(1, sizeof(*slcan));
-	struct epoll_event input = {.events = EPOLLIN};
 
-	if (slcan == NULL)
-		return NULL;
-	slcan->descriptor = -1;
-	slcan->poller = epoll_create1(EPOLL_CLOEXEC);
-	slcan->event = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-	if (slcan->poller >= 0 && slcan->event >= 0 &&
-	    epoll_ctl(slcan->poller, EPOLL_CTL_ADD, slcan->event, &input) == 0)
-		return slcan;
-	(void)slcan_close(&slcan->link);
-	return NULL;
+	if (slcan != NULL)
+		slcan->descriptor = -1;
+	return slcan;
 }
 
 static const char *slcan_start(struct slcan *slcan, const char *device, speed_t speed)
 {
 	static const char commands[] = "C\rS8\rY5\rO\r";
-	struct epoll_event input = {.events = EPOLLIN};
 	int descriptor = open(device, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
 
 	if (descriptor < 0)
 		return strerror(errno);
-	if (!set_line(descriptor, speed) ||
-	    epoll_ctl(slcan->poller, EPOLL_CTL_ADD, descriptor, &input) != 0) {
+	if (!set_line(descriptor, speed)) {
 		(void)close(descriptor);
 		return "not a serial line";
 	}
@@ -162,7 +145,7 @@ static struct link *slcan_open(const char *rest, enum link_mode mode, struct lin
 {
 	struct slcan *slcan = slcan_new();
 	char *device = strdup(rest);
-	const char *reason = "out of memory or descriptors";
+	const char *reason = "out of memory";
 	speed_t speed;
 
 	(void)mode;
@@ -204,13 +187,9 @@ static int slcan_send(struct link *link, const struct frame *frame)
 /* Looks for a frame in what was read. */
 static bool slcan_take_frame(struct slcan *slcan, struct frame *frame)
 {
-	eventfd_t ignored;
-
 	while (slcan->input_at < slcan->input_end) {
 		int result = slcan_decode(&slcan->decoder, slcan->input[slcan->input_at++], frame);
 
-		if (slcan->input_at == slcan->input_end)
-			(void)eventfd_read(slcan->event, &ignored);
 		if (result == 1) {
 			frame->time_us = link_clock_us();
 			return true;
@@ -241,7 +220,6 @@ static int read_input(struct slcan *slcan, int64_t deadline_us)
 		return DT_E_LINK;
 	slcan->input_at = 0;
 	slcan->input_end = (size_t)n;
-	(void)eventfd_write(slcan->event, 1);
 	return 1;
 }
 
@@ -262,10 +240,4 @@ static int slcan_receive(struct link *link, struct frame *frame, int64_t deadlin
 	} while (true);
 }
 
-static int slcan_descriptor(const struct link *link)
-{
-	return ((const struct slcan *)link)->poller;
-}
-
-const struct link_ops link_slcan = {"slcan",          slcan_open,  slcan_send, slcan_receive,
-                                    slcan_descriptor, slcan_close, NULL};
+const struct link_ops link_slcan = {"slcan", slcan_open, slcan_send, slcan_receive, slcan_close, NULL};

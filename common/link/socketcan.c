@@ -359,15 +359,5 @@ static int socketcan_can_receive(struct link *link, struct frame *frame, int64_t
 	}
 }
 
-static int can_descriptor(const struct link *link)
-{
-	return ((const struct socketcan *)link)->socket;
-}
-
-const struct link_ops link_can = {"can",
-                                  socketcan_can_open,
-                                  socketcan_can_send,
-                                  socketcan_can_receive,
-                                  can_descriptor,
-                                  socketcan_can_close,
-                                  NULL};
+const struct link_ops link_can = {
+        "can", socketcan_can_open, socketcan_can_send, socketcan_can_receive, socketcan_can_close, NULL};

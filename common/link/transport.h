@@ -29,7 +29,6 @@ struct link_ops {
 	int (*send)(struct link *link, const struct frame *frame);
 	/* deadline in us of link_now_us, LINK_FOREVER for none */
 	int (*receive)(struct link *link, struct frame *frame, int64_t deadline_us);
-	int (*descriptor)(const struct link *link);
 	int (*close)(struct link *link);
 	int (*flush)(struct link *link); /* NULL: nothing is held back */
 };
@@ -38,7 +37,6 @@ struct link {
 	const struct link_ops *ops;
 	char *url;
 	enum link_mode mode;
-	uint64_t line;
 	struct link_counters counters;
 };
 

@@ -14,7 +14,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/epoll.h>
-#include <sys/eventfd.h>
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -235,8 +234,6 @@ static int bus_close(struct link *link)
 	}
 	if (bus->poller >= 0)
 		(void)close(bus->poller);
-	if (bus->event >= 0)
-		(void)close(bus->event);
 	free(bus->inbound.frames);
 	free(bus);
 	return flushed ? 0 : DT_E_SYSTEM;
@@ -254,9 +251,7 @@ static struct bus *bus_new(const char *path, enum link_mode mode)
 	for (unsigned i = 0; i < UNIX_PEERS_MAX; i++)
 		bus->peers[i].socket = -1;
 	bus->poller = epoll_create1(EPOLL_CLOEXEC);
-	bus->event = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-	if (bus->poller >= 0 && bus->event >= 0 && unix_queue_allocate(&bus->inbound) &&
-	    unix_watch(bus, EPOLL_CTL_ADD, bus->event, UNIX_INBOUND, EPOLLIN) == 0)
+	if (bus->poller >= 0 && unix_queue_allocate(&bus->inbound))
 		return bus;
 	(void)bus_close(&bus->link);
 	return NULL;
@@ -305,14 +300,10 @@ static int bus_send(struct link *link, const struct frame *frame)
 
 static bool bus_take(struct bus *bus, struct frame *frame)
 {
-	eventfd_t ignored;
-
 	if (bus->inbound.count == 0)
 		return false;
 	*frame = bus->inbound.frames[bus->inbound.first];
 	unix_queue_drop_first(&bus->inbound);
-	if (bus->inbound.count == 0)
-		(void)eventfd_read(bus->event, &ignored);
 	return true;
 }
 
@@ -334,9 +325,4 @@ static int bus_receive(struct link *link, struct frame *frame, int64_t deadline_
 	}
 }
 
-static int bus_descriptor(const struct link *link)
-{
-	return ((const struct bus *)link)->poller;
-}
-
-const struct link_ops link_unix = {"unix", bus_open, bus_send, bus_receive, bus_descriptor, bus_close, NULL};
+const struct link_ops link_unix = {"unix", bus_open, bus_send, bus_receive, bus_close, NULL};

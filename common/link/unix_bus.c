@@ -8,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/epoll.h>
-#include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
@@ -205,8 +204,6 @@ static void bus_deliver(struct bus *bus, const struct frame *frame)
 		return;
 	if (!queue_push(&bus->inbound, frame))
 		bus->link.counters.receive_lost++;
-	else if (bus->inbound.count == 1)
-		(void)eventfd_write(bus->event, 1);
 }
 
 static void peer_read(struct bus *bus, struct peer *peer)

@@ -12,8 +12,8 @@
 
 #define UNIX_PEERS_MAX 32u
 
-/* Who an epoll event is about: a peer's number or one of these. */
-enum { UNIX_LISTENER = UNIX_PEERS_MAX, UNIX_INBOUND };
+/* Who an epoll event is about: a peer's number or this. */
+enum { UNIX_LISTENER = UNIX_PEERS_MAX };
 
 struct queue {
 	struct frame *frames;
@@ -32,9 +32,9 @@ struct peer {
 struct bus {
 	struct link link;
 	char path[sizeof(((struct sockaddr_un *)0)->sun_path)];
-	int poller, event; /* event: readable while inbound holds something */
-	int listener;      /* -1: a client, whose server is peers[0] */
-	dev_t device;      /* of the socket file we made */
+	int poller;
+	int listener; /* -1: a client, whose server is peers[0] */
+	dev_t device; /* of the socket file we made */
 	ino_t inode;
 	struct peer peers[UNIX_PEERS_MAX];
 	struct queue inbound;

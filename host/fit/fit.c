@@ -10,11 +10,6 @@
 #include "host/fit/prepare.h"
 
 const char *const fit_axis_names[MOTION_AXES] = {"S1X", "S1Y", "S2X", "S2Y"};
-const char *const fit_derived_names[MOTION_DERIVED] = {"contact_time_s", "restitution_of_centre",
-                                                       "spin_rad_s",     "lag_s",
-                                                       "s1_resultant_g", "s2_resultant_g",
-                                                       "s1x_peak_g",     "s1y_peak_g",
-                                                       "s2x_peak_g",     "s2y_peak_g"};
 
 /* Weak: they decide only what the data leave open. */
 static const double prior_sds[MOTION_SHARED] = {1.2, 1.0, 6.0, 1.2, 1.2, 0.35, 0.8, 1.2, 6.0};

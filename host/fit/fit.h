@@ -53,7 +53,6 @@ struct fit_options fit_options_usual(const struct scene *scene);
 enum fit_window { FIT_BEFORE, FIT_FIRST_MS, FIT_CONTACT, FIT_TO_10_MS, FIT_TO_20_MS, FIT_RING, FIT_WINDOWS };
 extern const char *const fit_window_names[FIT_WINDOWS];
 extern const char *const fit_axis_names[MOTION_AXES];
-extern const char *const fit_derived_names[MOTION_DERIVED];
 
 enum fit_status {
 	FIT_IDENTIFIED,

@@ -66,23 +66,6 @@ static void messages_by_identifier(void **state)
 	assert_null(wire_message_of(0x480));
 }
 
-static void raw_values(void **state)
-{
-	static const uint8_t data[] = {0xFF, 0x34, 0x12, 0xFE, 0xFF, 0x78, 0x56, 0x34, 0xF2};
-	static const struct wire_field one = {.offset = 0, .size = 1}, word = {.offset = 1, .size = 2},
-	                               list = {.offset = 1, .size = 2, .count = 2, .is_signed = 1},
-	                               large = {.offset = 5, .size = 4},
-	                               byte = {.offset = 0, .size = 1, .is_signed = 1};
-
-	(void)state;
-	assert_int_equal(wire_field_value(&one, data, 0), 255);
-	assert_int_equal(wire_field_value(&byte, data, 0), -1);
-	assert_int_equal(wire_field_value(&word, data, 0), 0x1234);
-	assert_int_equal(wire_field_value(&list, data, 0), 0x1234);
-	assert_int_equal(wire_field_value(&list, data, 1), -2);
-	assert_true(wire_field_value(&large, data, 0) == 0xF2345678);
-}
-
 static void errors_have_texts(void **state)
 {
 	(void)state;
@@ -101,8 +84,9 @@ static void errors_have_texts(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(names_of_numbers),       cmocka_unit_test(names_of_the_design),
-	        cmocka_unit_test(messages_by_identifier), cmocka_unit_test(raw_values),
+	        cmocka_unit_test(names_of_numbers),
+	        cmocka_unit_test(names_of_the_design),
+	        cmocka_unit_test(messages_by_identifier),
 	        cmocka_unit_test(errors_have_texts),
 	};
 

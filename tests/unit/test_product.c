@@ -84,10 +84,16 @@ static void peaks_of(const struct scene *scene, double angle_deg, double step_s,
 	const size_t count = (size_t)(0.012 / step_s);
 	struct product_reading *r = calloc(count, sizeof(*r));
 	double *v = calloc(count, sizeof(*v));
+	struct product p;
 
 	assert_non_null(r);
 	assert_non_null(v);
-	product_simulate(scene, UNITS_RAD(angle_deg), IMPACT_M_S, step_s, r, count);
+	product_init(&p, scene, UNITS_RAD(angle_deg));
+	product_strike(&p, IMPACT_M_S);
+	for (size_t i = 0; i < count; i++) {
+		product_read(&p, &r[i]);
+		product_step(&p, step_s);
+	}
 	for (int which = 0; which < PEAKS; which++) {
 		for (size_t i = 0; i < count; i++)
 			v[i] = part_of(&r[i], which);

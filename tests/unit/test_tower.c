@@ -200,6 +200,7 @@ static void codes_are_the_products_readings(void **state)
 	static int16_t codes[TRACE][6];
 	static double time_s[TRACE];
 	static struct product_reading r[STEPS];
+	struct product p;
 	const struct scene scene = test_scene();
 	struct tower *tower = falling();
 	const struct tower_truth *truth = tower_truth(tower);
@@ -208,7 +209,12 @@ static void codes_are_the_products_readings(void **state)
 	(void)state;
 	tower_output(tower, MAGNET, false, fall_time(0.78) - 0.008);
 	trace(tower, 0.53, codes, time_s);
-	product_simulate(&scene, UNITS_RAD(25), truth->impact_speed_m_s, 1e-6, r, STEPS);
+	product_init(&p, &scene, UNITS_RAD(25));
+	product_strike(&p, truth->impact_speed_m_s);
+	for (int i = 0; i < STEPS; i++) {
+		product_read(&p, &r[i]);
+		product_step(&p, 1e-6);
+	}
 	for (int i = 0; i < TRACE; i++) {
 		const double place = (time_s[i] - truth->impact_s) * 1e6;
 

@@ -72,21 +72,6 @@ static void what_is_no_data_frame_is_refused(void **state)
 	}
 }
 
-static void every_length_of_can_fd(void **state)
-{
-	static const uint8_t has[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
-	size_t next = 0;
-
-	(void)state;
-	for (size_t count = 0; count <= 64; count++) {
-		if (count > has[next])
-			next++;
-		assert_int_equal(wire_fd_length(count), has[next]);
-	}
-	for (size_t count = 65; count < 400; count++)
-		assert_int_equal(wire_fd_length(count), 0);
-}
-
 /* The text that the hash is over, from wire.def once more, and its CRC-32 with nothing before or behind. */
 static void the_hash_is_of_the_whole_text(void **state)
 {
@@ -117,7 +102,6 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(every_field_of_every_layout),
 	        cmocka_unit_test(what_is_no_data_frame_is_refused),
-	        cmocka_unit_test(every_length_of_can_fd),
 	        cmocka_unit_test(the_hash_is_of_the_whole_text),
 	};
 
