@@ -240,14 +240,8 @@ static void *tower_run(void *user)
 	while (!tower->failed && !atomic_load(&tower->stopping))
 		tower_turn(tower);
 	tower_drop_leave(tower);
-	while ((job = job_take(&tower->console->tower_queue, 0)) != NULL) {
-		if (job->message == JOB_SAVED) {
-			tower_do(tower, job);
-			continue;
-		}
-		job_refuse(job, 503, "the console is ending");
-		job_done(job);
-	}
+	while ((job = job_take(&tower->console->tower_queue, 0)) != NULL)
+		tower_do(tower, job); /* each is refused, and lets go of what it carries */
 	tower_link_close(tower, 0);
 	tower_bench_stop(tower);
 	return NULL;

@@ -103,6 +103,9 @@ void tower_obey_abort(struct tower *tower);
 /* An ABORT came after the first so many. Any thread. */
 bool tower_is_void(struct tower *tower, unsigned aborted);
 
+/* That, or the thread ends: job is refused. */
+bool tower_refuse_void(struct job *job, unsigned aborted);
+
 /* A command failed with result. */
 void tower_refuse_result(struct job *job, int result);
 

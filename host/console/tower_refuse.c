@@ -36,6 +36,19 @@ bool tower_is_void(struct tower *tower, unsigned aborted)
 	return atomic_load(&tower->aborts) != aborted;
 }
 
+bool tower_refuse_void(struct job *job, unsigned aborted)
+{
+	struct tower *tower = job->console->tower;
+
+	if (atomic_load(&tower->stopping))
+		job_refuse(job, 503, "the console is ending");
+	else if (tower_is_void(tower, aborted))
+		job_refuse(job, 409, "aborted");
+	else
+		return false;
+	return true;
+}
+
 /* Another has written them since; they are set again, and ARM is asked for again by a person. */
 static void refuse_parameters(struct job *job)
 {

@@ -86,8 +86,8 @@ static void send_arm(struct job *job)
 	bool may = false;
 
 	tower->wanted = drop->aborted;
-	if (tower_is_void(tower, drop->aborted))
-		job_refuse(job, 409, "aborted");
+	if (tower_refuse_void(job, drop->aborted))
+		may = false;
 	else if (strcmp(drop->series, tower->series) != 0)
 		job_refuse(job, 409, "another series was selected");
 	else
@@ -138,12 +138,11 @@ static bool check_sending(struct job *job)
 	struct tower *tower = job->console->tower;
 
 	tower->wanted = (unsigned)(uintptr_t)job->luggage;
-	if (tower_is_void(tower, tower->wanted))
-		job_refuse(job, 409, "aborted");
-	else if (tower->session == NULL)
-		job_refuse(job, 503, "no tower is heard");
-	else
+	if (tower_refuse_void(job, tower->wanted))
+		return false;
+	if (tower->session != NULL)
 		return true;
+	job_refuse(job, 503, "no tower is heard");
 	return false;
 }
 
@@ -304,13 +303,10 @@ static bool tower_verbs_select_series(struct job *job, const struct handover_sce
 
 static void send_select(struct job *job)
 {
-	struct tower *tower = job->console->tower;
 	struct handover_scene *scene = job->luggage;
 	bool selected = false;
 
-	if (tower_is_void(tower, scene->aborted))
-		job_refuse(job, 409, "aborted");
-	else if (tower_check_select(job))
+	if (!tower_refuse_void(job, scene->aborted) && tower_check_select(job))
 		selected = tower_verbs_select_series(job, scene);
 	free(scene->text);
 	scene->way = (struct job){.console = job->console, .message = JOB_SELECTED, .maker = scene};
@@ -347,7 +343,12 @@ void tower_select(struct job *job)
 
 static void tower_verbs_send_line(struct job *job)
 {
-	tower_bench_say(job->console->tower, job, job_text(job, "line", NULL));
+	struct tower *tower = job->console->tower;
+
+	if (tower_refuse_void(job, atomic_load(&tower->aborts)))
+		job_done(job);
+	else
+		tower_bench_say(tower, job, job_text(job, "line", NULL));
 }
 
 /* What breaks the tower; not what commands it, which only who holds the arm may. */

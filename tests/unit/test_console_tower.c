@@ -1109,6 +1109,47 @@ static void the_end_aborts_what_is_armed(void **state)
 	assert_int_equal(heard(WIRE_OP_ABORT), 1);
 }
 
+static bool waits_for_tower(const struct job *job)
+{
+	const struct job *waiting;
+
+	pthread_mutex_lock(&console.tower_queue.lock);
+	waiting = console.tower_queue.first;
+	while (waiting != NULL && waiting != job)
+		waiting = waiting->next;
+	pthread_mutex_unlock(&console.tower_queue.lock);
+	return waiting != NULL;
+}
+
+/* Verbs that wait behind others when the thread ends; what they carry is given back. */
+static void the_end_refuses_what_waits(void **state)
+{
+	enum { MANY = 20 }; /* not answered, each holds the tower's thread for a while */
+	struct asked cleared[MANY], armed, selected;
+	int64_t until_ms = session_now_ms() + WAIT_MS;
+	char text[512];
+
+	(void)state;
+	select_box();
+	behave(1u << WIRE_OP_CLEAR, 0, true);
+	for (unsigned i = 0; i < MANY; i++)
+		ask(&cleared[i], tower_clear, "{}");
+	ask(&armed, tower_arm, "{}");
+	ask(&selected, tower_select, "{\"series\":\"box\"}");
+	while (!waits_for_tower(&selected.job) && session_now_ms() < until_ms)
+		nap();
+	assert_true(waits_for_tower(&armed.job));
+	assert_int_equal(archived().count, 0);
+	for (unsigned i = 0; i < MANY + 2; i++)
+		wait_answer();
+	assert_int_equal(take_answer(&armed, text), 503);
+	assert_string_equal(text, "{\"error\":\"the console is ending\"}");
+	assert_int_equal(take_answer(&selected, text), 503);
+	for (unsigned i = 0; i < MANY; i++)
+		(void)take_answer(&cleared[i], text);
+	assert_int_equal(heard(WIRE_OP_ARM), 0);
+}
+
 int main(void)
 {
 #define TEST(f) cmocka_unit_test_setup_teardown(f, set_up, tear_down)
@@ -1134,6 +1175,7 @@ int main(void)
 	        TEST(what_no_tower_can_have_is_refused_with_its_range),
 	        TEST(what_no_disk_took_is_not_accepted),
 	        TEST(the_end_aborts_what_is_armed),
+	        TEST(the_end_refuses_what_waits),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
