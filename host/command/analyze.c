@@ -6,13 +6,16 @@
 #include "common/base/number.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
+#include "host/command/files.h"
 #include "host/command/list.h"
 #include "host/estimate/cfc.h"
 #include "host/record/log_capture.h"
+#include "host/record/profile.h"
 #include "host/record/read.h"
 
 struct arguments {
-	const char *columns, *scene_file, *band_file;
+	const char *columns, *profile, *save_profile, *scene_file, *band_file;
+	char profile_as_columns[4096];
 	double angle_deg;
 	unsigned drop; /* of the log; 0: all */
 	bool list;
@@ -44,10 +47,17 @@ static const struct option_row rows[] = {
                     "FILE.index"),
         OPTION_UNSIGNED("drop", "N", struct arguments, drop, 1, 1e9,
                         "only the N-th drop of the log, counted from 1 (one FILE only)"),
-        OPTION_TEXT("columns", "SPEC", struct arguments, columns,
-                    "for foreign text: one name:unit per column, '-' before the unit flips the sign, a lone "
-                    "'-' skips, e.g. \"time:ms,fixture:g,board:-g,-\"; units s ms us, g m/s2; without a time "
-                    "column say name:unit@RATE_HZ"),
+        OPTION_TEXT(
+                "columns", "SPEC", struct arguments, columns,
+                "what the columns of foreign text are, where it does not tell or tells wrong: one name:unit "
+                "per column, '-' before the unit flips the sign, a lone '-' skips, e.g. "
+                "\"time:ms,fixture:g,board:-g,-\"; units s ms us ns clock, g m/s2 ft/s2 kg (kilo-g), "
+                "g*FACTOR, mV/(10.2mV/g); without a time column say name:unit@RATE_HZ"),
+        OPTION_TEXT(
+                "profile", "NAME", struct arguments, profile,
+                "read foreign files as this profile says; without it, as import.ini in their folder says"),
+        OPTION_TEXT("save-profile", "NAME", struct arguments, save_profile,
+                    "keep how the first FILE was read as a profile, which may be edited"),
         OPTION_TEXT("scene", "FILE", struct arguments, scene_file,
                     "compare with the model's prediction for this scene"),
         OPTION_TAKEN("angle", "DEG", struct arguments, angle_deg, command_angle,
@@ -85,13 +95,16 @@ static const struct option_row rows[] = {
 static const struct option_table known_options = {
         .program = "droptower",
         .command = "analyze",
-        .head = "usage: droptower analyze FILE... [OPTIONS]\n"
+        .head = "usage: droptower analyze FILE|FOLDER|PATTERN... [OPTIONS]\n"
                 "\n"
                 "Analyses logged drops (candump text, LCM event log, our CSV), UFF58, HDF5 and LabVIEW .lvm "
                 "files,\n"
-                "and any delimited text. The format is found from the content. A log of several drops gives "
-                "one\n"
-                "result for each.\n"
+                "and any delimited text, compressed or not. The format is found from the content, and so are "
+                "columns,\n"
+                "units and rate of text; what can be read in two ways is refused. A log of several drops "
+                "gives one "
+                "result\n"
+                "for each.\n"
                 "\n",
         OPTION_ROWS(rows),
         .words = true,
@@ -165,6 +178,8 @@ static int analyze_check(const struct arguments *arguments, int argc, char **arg
 		return command_usage("analyze", "--html takes one FILE, %d are given", argc - optind);
 	if (arguments->drop != 0 && optind + 1 != argc)
 		return command_usage("analyze", "--drop takes one FILE, %d are given", argc - optind);
+	if (arguments->profile != NULL && (arguments->columns != NULL || arguments->save_profile != NULL))
+		return command_usage("analyze", "--profile goes without --columns and --save-profile");
 	if (arguments->list && (arguments->drop != 0 || arguments->evaluate.html != NULL))
 		return command_usage("analyze", "--list goes without --drop and --html");
 	if (!isnan(arguments->angle_deg) && arguments->scene_file == NULL)
@@ -187,16 +202,40 @@ static int read_band(struct limit_curve *curve, const char *file)
 	return COMMAND_INPUT;
 }
 
-static int analyze_files(char **files, int count, const struct arguments *arguments)
+static int analyze_files(const struct files *files, const struct arguments *arguments)
 {
 	int code = COMMAND_DONE;
+	size_t failed = 0;
 
-	for (int i = 0; i < count; i++) {
-		int one = analyze_file(files[i], arguments);
+	for (size_t i = 0; i < files->count; i++) {
+		int one = analyze_file(files->file[i], arguments);
 
 		if (one != COMMAND_DONE)
 			code = one; /* the other files are still analysed */
+		failed += one != COMMAND_DONE;
 	}
+	if (files->count > (size_t)files->named)
+		fprintf(stderr, "droptower: %zu files, %zu without a result or with a failure\n",
+		        files->count, failed);
+	return code;
+}
+
+static int analyze_words(char **words, int count, const struct arguments *arguments)
+{
+	char message[READ_MESSAGE_MAX];
+	struct files files;
+	int code = files_expand(&files, words, count);
+
+	if (code != COMMAND_DONE)
+		return code;
+	code = analyze_files(&files, arguments);
+	if (arguments->save_profile != NULL &&
+	    profile_save(arguments->save_profile, files.file[0],
+	                 arguments->profile == NULL ? arguments->columns : NULL, message) != 0) {
+		command_error("%s", message);
+		code = COMMAND_INPUT;
+	}
+	files_free(&files);
 	return code;
 }
 
@@ -210,6 +249,11 @@ int command_analyze(int argc, char **argv)
 	if (code != OPTIONS_READ)
 		return code;
 	code = analyze_check(&arguments, argc, argv);
+	if (arguments.profile != NULL) {
+		snprintf(arguments.profile_as_columns, sizeof(arguments.profile_as_columns), "@%s",
+		         arguments.profile);
+		arguments.columns = arguments.profile_as_columns;
+	}
 	if (code == COMMAND_DONE && arguments.scene_file != NULL) {
 		code = evaluate_read_scene(&scene, arguments.scene_file, arguments.angle_deg);
 		arguments.evaluate.scene = &scene;
@@ -219,7 +263,7 @@ int command_analyze(int argc, char **argv)
 		arguments.evaluate.band.curve = &band;
 	}
 	if (code == COMMAND_DONE)
-		code = analyze_files(argv + optind, argc - optind, &arguments);
+		code = analyze_words(argv + optind, argc - optind, &arguments);
 	limit_free(&band);
 	return code;
 }

@@ -43,8 +43,9 @@ static size_t cell_end(char separator, char decimal, const char *text, size_t le
 	for (; at < length; at++) {
 		char c = text[at];
 
-		if (separator ? c == separator
-		              : cells_is_blank(c) || c == ';' || (c == ',' && decimal != ','))
+		if (separator == ' ' ? cells_is_blank(c)
+		    : separator      ? c == separator
+		                     : cells_is_blank(c) || c == ';' || (c == ',' && decimal != ','))
 			break;
 	}
 	return at;
@@ -261,7 +262,7 @@ static bool gives(struct cells *cells, size_t count)
 
 bool cells_names(struct cells_style style, const char *text, size_t length, size_t count, struct cells *cells)
 {
-	static const char separators[] = {'\t', ';', ','};
+	static const char separators[] = {'\t', ';', ',', '|'};
 
 	if (style.separator) {
 		cells_split(style, text, length, cells);

@@ -22,7 +22,7 @@ struct piece {
 };
 
 struct cells_style {
-	char separator; /* 0 = any */
+	char separator; /* 0 = any; ' ' = runs of blanks and tabs */
 	char decimal;   /* 0 = as the line looks */
 };
 

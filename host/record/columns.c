@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/columns.h"
 
+#include <stdio.h>
 #include <string.h>
 
+#include "common/units.h"
 #include "host/record/cells.h"
 #include "common/base/number.h"
 #include "host/record/source.h"
@@ -46,14 +48,58 @@ static struct piece columns_trim(struct piece piece)
 	return piece;
 }
 
-/* A kg is a mass, unless it stands in a file of accelerations. */
-static const struct unit *unit_of(enum column_kind kind, struct piece text)
+static struct piece columns_unbracket(struct piece piece)
 {
-	const struct unit *unit = unit_find(text.text, text.length);
+	if (piece.length >= 2 && piece.text[0] == '(' && piece.text[piece.length - 1] == ')')
+		return columns_trim((struct piece){piece.text + 1, piece.length - 2});
+	return piece;
+}
 
-	if (!unit || unit->kind != (kind == COLUMN_TIME ? UNIT_TIME : UNIT_ACCELERATION) || unit->divisor < 1)
-		return NULL;
-	return unit;
+/* A sensitivity as "10.2mV/g": volts or coulombs for a g. */
+static bool columns_sensitivity(struct piece text, const struct unit *electric, double *divisor)
+{
+	struct piece per = columns_unbracket(text), number = columns_cut(&per, '/');
+	const struct unit *of, *acceleration = unit_find(per.text, per.length);
+	size_t digits = number.length;
+	double value;
+
+	while (digits > 0 && number.text[digits - 1] != '.' &&
+	       !(number.text[digits - 1] >= '0' && number.text[digits - 1] <= '9'))
+		digits--;
+	of = unit_find(number.text + digits, number.length - digits);
+	if (of == NULL || acceleration == NULL || acceleration->kind != UNIT_ACCELERATION ||
+	    !(electric->scale > 0) || !(of->scale > 0) ||
+	    (electric->name[1] == 'C') != (of->name[1] == 'C') ||
+	    !number_parse(number.text, digits, '.', &value) || !(value > 0))
+		return false;
+	*divisor = value * of->scale / electric->scale * acceleration->divisor;
+	return true;
+}
+
+/* "m/s2", "kg*1.02", "mV/(10.2mV/g)". */
+static bool columns_take_unit(struct column *column, struct piece text)
+{
+	struct piece factor = text, unit = columns_trim(columns_cut(&factor, '*')), rest = unit, plain;
+	double value = 1;
+
+	if (factor.text != NULL) {
+		factor = columns_trim(factor);
+		if (!number_parse(factor.text, factor.length, '.', &value) || !(value > 0))
+			return false;
+	}
+	column->unit = unit_find(unit.text, unit.length);
+	plain = columns_trim(columns_cut(&rest, '/'));
+	if (column->unit == NULL && rest.text != NULL && column->kind == COLUMN_CHANNEL) {
+		column->unit = unit_find(plain.text, plain.length);
+		return column->unit != NULL && factor.text == NULL &&
+		       columns_sensitivity(rest, column->unit, &column->divisor);
+	}
+	if (column->unit == NULL || (column->kind == COLUMN_TIME && column->unit->divisor < 1) ||
+	    column->unit->kind != (column->kind == COLUMN_TIME ? UNIT_TIME : UNIT_ACCELERATION))
+		return false;
+	column->is_clock = strcmp(column->unit->name, "clock") == 0;
+	column->divisor = column->unit->divisor / value;
+	return true;
 }
 
 static bool columns_can_name(struct piece name)
@@ -106,12 +152,13 @@ static int parse_entry(struct columns *columns, struct piece entry, char *messag
 		sign = -1;
 		unit = columns_trim((struct piece){unit.text + 1, unit.length - 1});
 	}
-	column->unit = unit_of(column->kind, unit);
-	if (!column->unit)
+	if (!columns_take_unit(column, unit))
 		return columns_refuse(message, entry,
-		                      column->kind == COLUMN_TIME ? "unit s, ms or us"
-		                                                  : "unit g, m/s2, -g or -m/s2");
-	column->divisor = sign * column->unit->divisor;
+		                      column->kind == COLUMN_TIME
+		                              ? "unit s, ms, us, ns or clock"
+		                              : "unit g, m/s2, -g or -m/s2, kg for kilo-g, g*FACTOR, "
+		                                "mV/(10.2mV/g)");
+	column->divisor *= sign;
 	if (columns_has_name(columns, column->name))
 		return columns_refuse(message, entry, "every name once");
 	columns->has_time |= column->kind == COLUMN_TIME;
@@ -141,4 +188,26 @@ int columns_parse(struct columns *columns, const char *text, char message[READ_M
 		return columns_refuse(message, all, "a time column or a rate, not both");
 	*columns = parsed;
 	return 0;
+}
+
+void columns_text(const struct columns *columns, char *text, size_t size)
+{
+	size_t used = 0;
+
+	text[0] = '\0';
+	for (size_t i = 0; i < columns->count && used + 1 < size; i++) {
+		const struct column *column = &columns->column[i];
+		const char *unit = column->unit == NULL ? "?" : column->unit->name;
+		const char *comma = i > 0 ? "," : "";
+		int put = column->kind == COLUMN_SKIP
+		                  ? snprintf(text + used, size - used, "%s-", comma)
+		                  : snprintf(text + used, size - used, "%s%s:%s%s", comma, column->name,
+		                             column->divisor < 0 ? "-" : "", unit);
+
+		used += put > 0 ? (size_t)put : 0;
+		if (used < size && columns->rate_hz > 0 && column->kind == COLUMN_CHANNEL) {
+			put = snprintf(text + used, size - used, "@%.9g", columns->rate_hz);
+			used += put > 0 ? (size_t)put : 0;
+		}
+	}
 }

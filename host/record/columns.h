@@ -21,6 +21,7 @@ struct column {
 	char name[32];
 	const struct unit *unit;
 	double divisor; /* number in the file / divisor = s or g, with the sign asked for */
+	bool is_clock;  /* h:m:s, with a date or without; divisor 1 */
 };
 
 struct columns {
@@ -33,5 +34,8 @@ struct columns {
 
 /* 0 or DT_E_ARGUMENT with a line in message. */
 DT_MUST_USE int columns_parse(struct columns *columns, const char *text, char message[READ_MESSAGE_MAX]);
+
+/* The same as text, as much as fits. */
+void columns_text(const struct columns *columns, char *text, size_t size);
 
 #endif

@@ -8,6 +8,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "host/record/unpack.h"
+
 enum { WINDOW_BYTES = 1 << 20 };
 
 static int log_file_refuse(const struct log_file *log, int code, const char *why, char *message)
@@ -42,6 +44,27 @@ static void log_file_skip_mark(struct log_file *log)
 		log->begin = 3;
 }
 
+static bool log_file_is_packed(struct log_file *log)
+{
+	size_t held;
+	const char *head = log_file_get(log, 0, 8, &held);
+
+	return unpack_program(head, held) != NULL;
+}
+
+/* What is no regular file, or compressed, is held whole. */
+static int open_whole(struct log_file *log, char *message)
+{
+	int error;
+
+	log_file_close(log);
+	error = source_load(&log->whole, log->file, log->expected, message);
+	if (!error)
+		error = unpack(&log->whole, message);
+	log->size = log->whole.size;
+	return error;
+}
+
 int log_file_open(struct log_file *log, const char *file, const char *expected,
                   char message[READ_MESSAGE_MAX])
 {
@@ -52,10 +75,10 @@ int log_file_open(struct log_file *log, const char *file, const char *expected,
 	if (stat(file, &status) == 0 && S_ISREG(status.st_mode))
 		error = open_regular(&opened, message);
 	else
-		error = source_load(&opened.whole, file, expected, message);
-	if (opened.whole.bytes != NULL)
-		opened.size = opened.whole.size;
-	else if (!error)
+		error = open_whole(&opened, message);
+	if (!error && opened.whole.bytes == NULL && log_file_is_packed(&opened))
+		error = open_whole(&opened, message);
+	if (!error && opened.whole.bytes == NULL)
 		log_file_skip_mark(&opened);
 	if (error)
 		log_file_close(&opened);

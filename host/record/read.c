@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "host/record/hdf5.h"
+#include "host/record/kind.h"
 #include "host/record/lcm_codec.h"
 #include "host/record/log_index.h"
 #include "host/record/seal.h"
@@ -25,7 +26,7 @@ static int refuse_columns(const char *file, char *message)
 	                     "this format names its channels itself, expected no --columns");
 }
 
-static int read_dispatch(struct record *record, const struct source *source, const char *columns,
+static int read_dispatch(struct record *record, struct source *source, const char *columns,
                          char message[READ_MESSAGE_MAX])
 {
 	int (*reader)(struct record *, const struct source *, char *) = NULL;
@@ -37,6 +38,9 @@ static int read_dispatch(struct record *record, const struct source *source, con
 		reader = read_csv;
 	else if (uff58_is(source))
 		reader = read_uff58;
+	sealed = reader == NULL ? kind_refuse(source, message) : 0;
+	if (sealed < 0)
+		return sealed;
 	if (!reader)
 		return read_delimited(record, source, columns, message);
 	if (columns)
@@ -51,21 +55,19 @@ static int read_dispatch(struct record *record, const struct source *source, con
 }
 
 /* The one recording of the log, which a pipe has left in memory. */
-static int read_one_record(struct record *record, const struct log_file *log, const char *columns,
-                           char *message)
+static int read_one_record(struct record *record, struct log_file *log, const char *columns, char *message)
 {
-	struct source loaded = {0}, source = log->whole;
+	struct source source = log->whole;
 	int error = 0;
 
-	if (source.bytes == NULL) {
-		error = source_load(&loaded, log->file, log->expected, message);
-		source = loaded;
-	}
+	log->whole = (struct source){0};
+	if (source.bytes == NULL)
+		error = source_load(&source, log->file, log->expected, message);
 	if (!error)
 		error = read_dispatch(record, &source, columns, message);
 	if (!error)
 		strcpy(record->file, log->file);
-	source_free(&loaded);
+	source_free(&source);
 	return error;
 }
 
@@ -310,7 +312,7 @@ int read_record(struct record *record, const char *file, const char *columns, ch
 
 /* ---- all of them, without samples ---- */
 
-static int list_one(const struct log_file *log, struct log_visitor *visitor, char *message)
+static int list_one(struct log_file *log, struct log_visitor *visitor, char *message)
 {
 	struct log_capture capture = {.number = 1, .alone = true, .to = log->size};
 	struct record record;

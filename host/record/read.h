@@ -7,10 +7,13 @@
  * content, not from the file's name.
  *
  * columns, as on the command line: "time:ms,fixture:g,board:-g,-" names one entry per column: name:unit;
- * '-' in front of the unit flips the sign; a lone '-' skips. Units: s ms us ns for time; g mg m/s2 and
- * others for channels (unit.h). Blanks around names, units and entries are left out. The
- * first column named "time" is the time; without one, give "name:unit@RATE_HZ". Needed for foreign text,
- * refused for our own formats. NULL otherwise.
+ * '-' in front of the unit flips the sign; a lone '-' skips. Units: s ms us ns for time, clock for h:m:s and
+ * dates with it; g kg (kilo-g) mg m/s2 ft/s2 and others for channels (unit.h), g*FACTOR, mV/(10.2mV/g) by a
+ * sensitivity. Blanks around names, units and entries are left out. The first column named "time" is the
+ * time; without one, give "name:unit@RATE_HZ". "@PATH" is a profile (profile.h). NULL: foreign text tells its
+ * columns itself (sniff.h) or is refused; our own formats do, and refuse others.
+ *
+ * Whatever the format, the file may be compressed by gzip, zstd, xz, lz4 or bzip2 (unpack.h).
  *
  * 0, or DT_E_* with a one-line explanation in message: "T04.txt:17: 5 columns, expected 6". *record is
  * initialised by the call and must be freed only after success.

@@ -4,21 +4,34 @@
  */
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/units.h"
+#include "host/record/clock.h"
+#include "host/record/encoding.h"
 #include "host/record/header.h"
 #include "host/record/lvm.h"
+#include "host/record/profile.h"
+#include "host/record/sniff.h"
 #include "host/record/timebase.h"
 
 enum { HEADER_LINES_MAX = 1000 };
 
 struct reading {
 	const struct source *source;
+	struct source rows_only; /* without a footer */
 	struct source_line line;
 	char *message;
 	struct columns columns;
 	struct record *record;
+
+	const char *encoding;
+	struct profile *profile; /* NULL: none */
+	struct sniff *sniff;     /* NULL: the user names the columns */
+	const char *assumed;     /* unit of time; NULL: it is told */
+	int64_t clock_ns;        /* of the first row */
 
 	bool is_lvm;
 	struct lvm lvm;
@@ -95,7 +108,11 @@ static bool next_row(struct reading *reading)
 static bool is_numeric(const struct reading *reading, size_t i)
 {
 	double value;
+	int64_t ns;
+	int digits;
 
+	if (reading->columns.column[i].is_clock)
+		return clock_parse(reading->row.cell[i], &ns, &digits);
 	return cells_number(&reading->row, i, &value) || cells_oddity(&reading->row, i) != CELLS_PLAIN;
 }
 
@@ -111,7 +128,7 @@ static bool is_data(const struct reading *reading)
 		if (kind == COLUMN_TIME || (kind == COLUMN_CHANNEL && !reading->columns.has_time))
 			return is_numeric(reading, i);
 	}
-	for (size_t i = 0; i < row->count && i < CELLS_MAX; i++) {
+	for (size_t i = 0; i < row->count && i < COLUMNS_MAX; i++) {
 		if (is_numeric(reading, i))
 			any = true;
 		else if (row->cell[i].length > 0)
@@ -193,7 +210,8 @@ static void note_number(struct reading *reading, size_t i)
 	struct piece cell = reading->row.cell[i];
 
 	reading->tail[i] = cells_tail(&reading->row, i);
-	if (reading->style.decimal || reading->row.decimal != ',' || cell.length == 0)
+	if ((reading->style.decimal && reading->sniff == NULL) || reading->is_lvm ||
+	    reading->row.decimal != ',' || cell.length == 0)
 		return;
 	if (cells_could_be_thousands(cell))
 		reading->comma_doubt = reading->comma_doubt ? reading->comma_doubt : reading->line.number;
@@ -212,11 +230,28 @@ static bool read_delimited_is_cut(const struct reading *reading, size_t i)
 	        (reading->rows > 0 && cells_tail(&reading->row, i) < reading->tail[i]));
 }
 
+static int take_clock(struct reading *reading, size_t i)
+{
+	int64_t ns;
+	int digits;
+
+	if (i >= reading->row.count || !clock_parse(reading->row.cell[i], &ns, &digits))
+		return REFUSE(reading, DT_E_FORMAT, "no time of day in column %zu, expected h:m:s", i + 1);
+	if (reading->rows == 0)
+		reading->clock_ns = ns;
+	reading->digit = fmax(reading->rows == 0 ? 0 : reading->digit, pow(10, -digits));
+	reading->time_s[reading->rows] = (double)(ns - reading->clock_ns) * 1e-9;
+	reading->row_line[reading->rows] = reading->line.number;
+	return 0;
+}
+
 static int read_delimited_take_time(struct reading *reading, size_t i)
 {
 	double value, digit;
 	int digits;
 
+	if (reading->columns.column[i].is_clock)
+		return take_clock(reading, i);
 	if (!cells_number(&reading->row, i, &value)) {
 		int error = check_oddity(reading, i);
 
@@ -316,6 +351,79 @@ static double digit_s(const struct reading *reading, double divisor)
 	return fmax(digit, reading->largest * DBL_EPSILON) / divisor;
 }
 
+/* Of units of time the one that is plausible: 10 Hz to 20 MHz, and a velocity change that a shock has. */
+static const double RATE_LEAST_HZ = 10, RATE_MOST_HZ = 20e6, CHANGE_LEAST_M_S = 0.02, CHANGE_MOST_M_S = 200;
+
+/* Area under the largest peak down to a tenth of it, in g times rows. */
+static double largest_area(const struct record *record)
+{
+	double peak = 0, area = 0;
+	const struct channel *of = NULL;
+	size_t at = 0;
+
+	for (size_t c = 0; c < record->channel_count; c++)
+		for (size_t k = 0; k < record->channels[c].count; k++)
+			if (fabs(record->channels[c].value_g[k]) > fabs(peak)) {
+				of = &record->channels[c];
+				peak = of->value_g[k];
+				at = k;
+			}
+	for (size_t k = at; of != NULL && k < of->count && of->value_g[k] / peak > 0.1; k++)
+		area += fabs(of->value_g[k]);
+	for (size_t k = at; of != NULL && k-- > 0 && of->value_g[k] / peak > 0.1;)
+		area += fabs(of->value_g[k]);
+	return area;
+}
+
+/* Finds the unit that a time column does not tell, or refuses with what each would be. */
+static int assume_unit(struct reading *reading)
+{
+	static const char *const names[] = {"s", "ms", "us", "ns"};
+	double span = reading->time_s[reading->rows - 1] - reading->time_s[0], divisor = 1, chosen = 1;
+	double step = span / (double)(reading->rows - 1), area = largest_area(reading->record);
+	unsigned plausible = 0;
+
+	for (size_t i = 0; i < 4; i++, divisor *= 1e3) {
+		double change_m_s = area * UNITS_G_M_S2 * step / divisor;
+
+		if (!(divisor / step >= RATE_LEAST_HZ && divisor / step <= RATE_MOST_HZ &&
+		      change_m_s >= CHANGE_LEAST_M_S && change_m_s <= CHANGE_MOST_M_S))
+			continue;
+		plausible++;
+		reading->assumed = names[i];
+		chosen = divisor;
+	}
+	if (plausible != 1)
+		return source_refuse(
+		        reading->message, DT_E_FORMAT, reading->source->file, 0,
+		        "the time column tells no unit: in s the rate is %.6g Hz and the largest peak %.3g "
+		        "m/s, "
+		        "in ms %.6g Hz and %.3g m/s, in us %.6g Hz and %.3g m/s; expected --columns with "
+		        "time:s, time:ms or time:us",
+		        1 / step, area * UNITS_G_M_S2 * step, 1e3 / step, area * UNITS_G_M_S2 * step / 1e3,
+		        1e6 / step, area * UNITS_G_M_S2 * step / 1e6);
+	for (size_t k = 0; k < reading->rows; k++)
+		reading->time_s[k] /= chosen;
+	for (size_t i = 0; i < reading->columns.count; i++)
+		if (reading->columns.column[i].kind == COLUMN_TIME)
+			reading->columns.column[i].divisor = chosen;
+	return 0;
+}
+
+/* What the file tells besides its time column must be so. */
+static int check_told_rate(const struct reading *reading, const struct timebase *timebase)
+{
+	double told_hz = reading->sniff != NULL ? reading->sniff->told_rate_hz : 0;
+
+	if (!(told_hz > 0) || fabs(told_hz * timebase->step_s - 1) < 0.01)
+		return 0;
+	return source_refuse(
+	        reading->message, DT_E_FORMAT, reading->source->file, reading->sniff->rate_line,
+	        "tells a rate of %.9g Hz, but the time column steps by %.9g s (%.9g Hz), expected "
+	        "one: --columns with time:s, or name:g@%.9g and - for the time",
+	        told_hz, timebase->step_s, 1 / timebase->step_s, told_hz);
+}
+
 static int find_timebase(struct reading *reading, struct timebase *timebase)
 {
 	struct timebase_fault fault;
@@ -327,6 +435,11 @@ static int find_timebase(struct reading *reading, struct timebase *timebase)
 		return 0;
 	while (reading->columns.column[i].kind != COLUMN_TIME)
 		i++;
+	if (reading->sniff != NULL && reading->sniff->time_unit_open) {
+		error = assume_unit(reading);
+		if (error)
+			return error;
+	}
 	step_s = reading->is_lvm ? lvm_time_step(&reading->lvm, i) : 0;
 	error = timebase_find(reading->time_s, reading->rows,
 	                      digit_s(reading, reading->columns.column[i].divisor), step_s, timebase, &fault);
@@ -334,7 +447,7 @@ static int find_timebase(struct reading *reading, struct timebase *timebase)
 		return refuse_memory(reading);
 	return error ? source_refuse(reading->message, error, reading->source->file,
 	                             reading->row_line[fault.row], "%s", fault.why)
-	             : 0;
+	             : check_told_rate(reading, timebase);
 }
 
 /* A channel of a LabVIEW file has its own step, beginning and count of samples. */
@@ -370,7 +483,11 @@ static int read_delimited_finish_channel(struct reading *reading, size_t i, cons
 	channel->count = reading->rows;
 	channel->flags = timebase->uneven ? RECORD_FLAG_UNEVEN : 0;
 	channel->flags |= reading->unterminated ? RECORD_FLAG_NO_LINE_END : 0;
-	channel->flags |= header_has_twins(&reading->header, &reading->columns) ? RECORD_FLAG_SAME_NAMES : 0;
+	channel->flags |= reading->assumed != NULL ? RECORD_FLAG_ASSUMED : 0;
+	channel->flags |= header_has_twins(&reading->header, &reading->columns) ||
+	                                  (reading->sniff != NULL && reading->sniff->twins)
+	                          ? RECORD_FLAG_SAME_NAMES
+	                          : 0;
 	if (reading->is_lvm)
 		error = finish_lvm(reading, i, channel);
 	if (!error && (channel->count == 0 || reading->bad[i] > channel->count / 2))
@@ -380,6 +497,25 @@ static int read_delimited_finish_channel(struct reading *reading, size_t i, cons
 	if (!error && timebase_spread(timebase, channel) != 0)
 		error = refuse_memory(reading);
 	return error;
+}
+
+static void tell_reading(struct reading *reading)
+{
+	char *text = reading->record->read_as;
+	size_t size = sizeof(reading->record->read_as), used;
+
+	if (reading->profile != NULL) {
+		used = (size_t)snprintf(text, size, "profile %.100s says: ", reading->profile->path);
+		columns_text(&reading->columns, text + used, size - used);
+	}
+	if (reading->sniff == NULL)
+		return;
+	sniff_tell(reading->sniff, reading->is_lvm ? NULL : reading->encoding, text, size);
+	used = strlen(text);
+	snprintf(text + used, size - used, "; %.9g Hz", reading->record->channels[0].rate_hz);
+	used = strlen(text);
+	if (reading->assumed != NULL)
+		snprintf(text + used, size - used, "; assumed: time in %s", reading->assumed);
 }
 
 static int read_delimited_finish(struct reading *reading)
@@ -397,6 +533,7 @@ static int read_delimited_finish(struct reading *reading)
 		return error;
 	record_begin_at_zero(record);
 	strcpy(record->format, reading->is_lvm ? "lvm" : "delimited");
+	tell_reading(reading);
 	record_finish(record);
 	return 0;
 }
@@ -411,6 +548,45 @@ static bool any_delta(const struct reading *reading)
 	return false;
 }
 
+/* Channels of a LabVIEW file are columns labelled with a unit of acceleration; each has a step of its own. */
+static int sniff_lvm(struct reading *reading)
+{
+	struct sniff *sniff = reading->sniff;
+	struct source_line line = reading->line;
+	struct piece units[COLUMNS_MAX] = {{0}};
+	size_t count = 0;
+
+	if (source_next_line(reading->source, &line))
+		cells_split(reading->style, line.text, line.length, &reading->row);
+	for (size_t i = 0; i < reading->row.count && i < COLUMNS_MAX; i++) {
+		sniff->name[i] = reading->row.cell[i];
+		units[i] = i < reading->lvm.columns ? reading->lvm.column[i].unit : (struct piece){0};
+		count = i + 1;
+	}
+	/* LabVIEW itself adds a column of comments, which has no cells */
+	if (count > 1 && sniff->name[count - 1].length == 7 &&
+	    memcmp(sniff->name[count - 1].text, "Comment", 7) == 0)
+		count--;
+	return sniff_names(sniff, count, units, any_delta(reading), reading->source->file, reading->message);
+}
+
+/* A file of other names is of another origin than the profile. */
+static int check_profile(const struct reading *reading)
+{
+	const struct profile *profile = reading->profile;
+	const struct cells *cells = &reading->header.names;
+	char names[PROFILE_NAMES_MAX] = "";
+
+	if (profile->names[0] == '\0')
+		return 0;
+	profile_names(cells->cell, cells->count < CELLS_MAX ? cells->count : CELLS_MAX, names);
+	if (strcmp(names, profile->names) == 0)
+		return 0;
+	return source_refuse(reading->message, DT_E_FORMAT, reading->source->file, reading->header.names_line,
+	                     "names \"%.100s\", but profile %.100s is of files with \"%.100s\"", names,
+	                     profile->path, profile->names);
+}
+
 static int read_headers(struct reading *reading)
 {
 	const struct source *source = reading->source;
@@ -421,6 +597,18 @@ static int read_headers(struct reading *reading)
 		error = lvm_read(&reading->lvm, source, &reading->line, reading->message);
 		reading->style = reading->lvm.style;
 	}
+	if (!error && reading->sniff != NULL)
+		error = reading->is_lvm ? sniff_lvm(reading)
+		                        : sniff_text(reading->sniff, source, reading->message);
+	if (!error && reading->sniff != NULL) {
+		reading->columns = reading->sniff->columns;
+		if (!reading->is_lvm) {
+			reading->style = reading->sniff->style;
+			reading->rows_only = *source;
+			reading->rows_only.size = reading->sniff->end;
+			reading->source = &reading->rows_only;
+		}
+	}
 	if (!error && !reading->columns.has_time && reading->columns.rate_hz == 0 && !any_delta(reading))
 		error = source_refuse(
 		        reading->message, DT_E_ARGUMENT, source->file, 0,
@@ -429,6 +617,8 @@ static int read_headers(struct reading *reading)
 		error = find_data(reading);
 	if (!error)
 		error = header_check(&reading->header, &reading->columns, source->file, reading->message);
+	if (!error && reading->profile != NULL)
+		error = check_profile(reading);
 	return error || !reading->is_lvm
 	               ? error
 	               : lvm_check(&reading->lvm, &reading->columns, source->file, reading->message);
@@ -445,32 +635,60 @@ static int read_delimited_all(struct reading *reading)
 	return error ? error : read_delimited_finish(reading);
 }
 
-int read_delimited(struct record *record, const struct source *source, const char *columns,
+/* "@PATH" is a profile, and so is the one beside a file without columns. */
+static int take_profile(struct reading *reading, const char *columns)
+{
+	char path[4096];
+	int error;
+
+	if (columns == NULL ? !profile_beside(reading->source->file, path) : columns[0] != '@')
+		return 0;
+	reading->profile = calloc(1, sizeof(*reading->profile));
+	if (reading->profile == NULL)
+		return refuse_memory(reading);
+	error = profile_read(reading->profile, columns != NULL ? columns + 1 : path, reading->message);
+	reading->style = reading->profile->style;
+	return error;
+}
+
+static int read_delimited_by(struct reading *reading, const char *columns)
+{
+	int error = take_profile(reading, columns);
+
+	if (!error && reading->profile != NULL)
+		columns = reading->profile->columns;
+	if (!error && columns != NULL)
+		error = columns_parse(&reading->columns, columns, reading->message);
+	if (!error && columns == NULL) {
+		reading->sniff = calloc(1, sizeof(*reading->sniff));
+		error = reading->sniff == NULL ? refuse_memory(reading) : 0;
+	}
+	if (!error)
+		error = read_delimited_all(reading);
+	free(reading->sniff);
+	free(reading->profile);
+	return error;
+}
+
+int read_delimited(struct record *record, struct source *source, const char *columns,
                    char message[READ_MESSAGE_MAX])
 {
 	struct record filled;
 	struct reading *reading;
-	int error;
+	const char *encoding;
+	int error = encoding_settle(source, &encoding, message);
 
-	if (source->size >= 2 &&
-	    (memcmp(source->bytes, "\xff\xfe", 2) == 0 || memcmp(source->bytes, "\xfe\xff", 2) == 0))
-		return source_refuse(
-		        message, DT_E_FORMAT, source->file, 0,
-		        "text in UTF-16, expected UTF-8: 'iconv -f UTF-16 -t UTF-8' makes it so");
-	if (!columns)
-		return source_refuse(message, DT_E_FORMAT, source->file, 0,
-		                     "not a log of a drop tower; for other text expected --columns "
-		                     "\"time:ms,name:g,-\", one entry per column");
+	if (error)
+		return error;
 	reading = calloc(1, sizeof(*reading));
 	if (!reading)
 		return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
 	reading->source = source;
 	reading->message = message;
 	reading->record = &filled;
-	error = columns_parse(&reading->columns, columns, message);
+	reading->encoding = encoding;
 	record_init(&filled);
-	if (!error)
-		error = read_delimited_all(reading);
+	error = read_delimited_by(reading, columns);
 	free(reading->time_s);
 	free(reading->row_line);
 	free(reading);

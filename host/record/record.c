@@ -74,7 +74,8 @@ const struct channel *record_axis(const struct record *record, const char *which
 static void record_finish_channel(struct record *record, struct channel *channel)
 {
 	const double full_scale_g = (double)WIRE_SAMPLE_FULL_SCALE / WIRE_COUNTS_PER_G;
-	const unsigned readers = RECORD_FLAG_UNEVEN | RECORD_FLAG_NO_LINE_END | RECORD_FLAG_SAME_NAMES;
+	const unsigned readers =
+	        RECORD_FLAG_UNEVEN | RECORD_FLAG_NO_LINE_END | RECORD_FLAG_SAME_NAMES | RECORD_FLAG_ASSUMED;
 	unsigned flags = channel->flags & readers; /* only the reader knows */
 	uint64_t lost = 0;
 
@@ -181,6 +182,7 @@ const char *record_flag_name(unsigned flags)
 	        "separated_late",
 	        "dropout_changed",
 	        "frame_not_down",
+	        "assumed",
 	};
 
 	for (size_t bit = 0; bit < sizeof(names) / sizeof(names[0]); bit++)

@@ -59,6 +59,7 @@ enum {
 	RECORD_FLAG_SEPARATED_LATE = 1u << 26,  /* "separated_late" */
 	RECORD_FLAG_DROPOUT_CHANGED = 1u << 27, /* "dropout_changed": of the magnet */
 	RECORD_FLAG_FRAME_NOT_DOWN = 1u << 28,  /* "frame_not_down" */
+	RECORD_FLAG_ASSUMED = 1u << 29, /* "assumed": of foreign text, the unit of time; read_as says which */
 };
 
 struct channel {
@@ -97,9 +98,10 @@ struct record_counters {
 };
 
 struct record {
-	char file[4096];  /* as given on the command line, or the link's URL */
-	char format[16];  /* "live" "candump" "lcm" "csv" "uff58" "hdf5" "delimited" "lvm" */
-	bool file_sealed; /* the file says its own SHA-256, and that is so */
+	char file[4096];   /* as given on the command line, or the link's URL */
+	char format[16];   /* "live" "candump" "lcm" "csv" "uff58" "hdf5" "delimited" "lvm" ... */
+	char read_as[400]; /* of a foreign file, what was understood of it without --columns; else "" */
+	bool file_sealed;  /* the file says its own SHA-256, and that is so */
 	struct channel *channels;
 	size_t channel_count;
 

@@ -41,9 +41,10 @@ __attribute__((format(printf, 5, 6))) int source_refuse(char message[READ_MESSAG
                                                         const char *file, uint64_t line, const char *format,
                                                         ...);
 
-/* The formats that are no logs. Each fills *record, initialised by the call, except for its file name. */
+/* The formats that are no logs. Each fills *record, initialised by the call, except for its file name.
+ * Delimited text becomes UTF-8 in its source; without columns it must tell them itself (sniff.h). */
 DT_MUST_USE int read_csv(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX]);
-DT_MUST_USE int read_delimited(struct record *record, const struct source *source, const char *columns,
+DT_MUST_USE int read_delimited(struct record *record, struct source *source, const char *columns,
                                char message[READ_MESSAGE_MAX]);
 
 #endif

@@ -18,6 +18,7 @@ struct unit {
 	const char *name;
 	enum unit_kind kind;
 	double divisor; /* number / divisor = s or g; 0 for others */
+	double scale;   /* of what a sensor gives: V or C in one of it; else 0 */
 };
 
 /* The unit that is the whole text; NULL for one that is not known. */

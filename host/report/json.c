@@ -230,6 +230,8 @@ static cJSON *build(struct builder *b, const struct report *report)
 	b->failed = !root;
 	put_text(b, root, "file", r->file);
 	put_text(b, root, "format", r->format);
+	if (r->read_as[0] != '\0')
+		put_text(b, root, "read_as", r->read_as);
 	put_text(b, root, "quantities", quantity_version());
 	if (record_lacks_seal(r)) /* by an older version or another program */
 		put_item(b, root, "sealed", cJSON_CreateFalse());

@@ -78,6 +78,8 @@ static void write_head(const struct report *report, FILE *out)
 	if (r->is_drop && isfinite(r->frame_speed_m_s))
 		fprintf(out, ", frame %.3f m/s between the gates", r->frame_speed_m_s);
 	fputc('\n', out);
+	if (r->read_as[0] != '\0')
+		fprintf(out, "read as %s\n", r->read_as);
 	if (report->scene)
 		fprintf(out, "%s, %g deg, from %g m\n",
 		        report->scene->title[0] ? report->scene->title : report->scene->name,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Foreign text: the first byte chooses what the columns are said to be, the rest is the file. What is read is
- * analysed, too.
+ * Foreign text: the first byte chooses what the columns are said to be, if anything, the rest is the file.
+ * What is read is analysed, too.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -14,9 +14,14 @@ enum { SAMPLES_MAX = 4000 };
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
-	static const char *const columns[] = {"time:s,a:g",      "time:ms,a:g,b:-m/s2",
-	                                      "a:g@10000",       "time:s,a:m/s2,b:g,-,-",
-	                                      "-,time:us,-,a:g", "a:g@51200,b:m/s^2@51200,c:-g@51200"};
+	static const char *const columns[] = {"time:s,a:g",
+	                                      "time:ms,a:g,b:-m/s2",
+	                                      "a:g@10000",
+	                                      "time:s,a:m/s2,b:g,-,-",
+	                                      "-,time:us,-,a:g",
+	                                      "a:g@51200,b:m/s^2@51200,c:-g@51200",
+	                                      "time:clock,a:mV/(10mV/g)",
+	                                      NULL};
 	char message[READ_MESSAGE_MAX] = "";
 	const struct estimate_options options = {0};
 	struct analysis analysis;

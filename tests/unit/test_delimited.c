@@ -212,11 +212,15 @@ static void test_refused_texts(void **state)
 	static const char rows[] = "t a\n0 1\n1 2\n2 3\n";
 
 	(void)state;
-	refuse(rows, NULL, DT_E_FORMAT, ": not a log of a drop tower; for other text expected --columns");
+	refuse(rows, NULL, DT_E_FORMAT,
+	       ": neither the unit of time nor one of acceleration is told, expected --columns "
+	       "\"time:s,a:g\" or "
+	       "\"time:ms,a:g\"");
+	refuse("only\nwords\n", NULL, DT_E_FORMAT, ":1: not a log of a drop tower, and no table of numbers");
 	refuse("\xff\xfe"
 	       "0",
-	       "time:s,a:g", DT_E_FORMAT, ": text in UTF-16, expected UTF-8");
-	refuse("\xfe\xff", NULL, DT_E_FORMAT, ": text in UTF-16, expected UTF-8");
+	       "time:s,a:g", DT_E_FORMAT, ": text in UTF-16 of an odd number of bytes");
+	refuse("\xfe\xff", NULL, DT_E_FORMAT, ": not a log of a drop tower, and no table of numbers");
 	refuse(rows, "time:s,a:g,b:g", DT_E_FORMAT, ":2: 2 columns, expected 3");
 	refuse(rows, "time:s", DT_E_ARGUMENT, "--columns: ");
 	refuse("0 1\n1 2\n2 3 4\n", "time:s,a:g", DT_E_FORMAT, ":3: 3 columns, expected 2");
@@ -249,9 +253,14 @@ static void test_refused_columns(void **state)
 	        {"time:s,:g", "--columns: \":g\", expected name:unit"},
 	        {"time:s,a:", "--columns: \"a:\", expected unit g"},
 	        {"time:s,a:-", "--columns: \"a:-\", expected unit g"},
-	        {"time:s,a:kg", "--columns: \"a:kg\", expected unit g, m/s2"},
-	        {"time:parsec,a:g", "--columns: \"time:parsec\", expected unit s, ms or us"},
-	        {"time:-s,a:g", "--columns: \"time:-s\", expected unit s, ms or us"},
+	        {"time:s,a:min", "--columns: \"a:min\", expected unit g, m/s2"},
+	        {"time:s,a:V", "--columns: \"a:V\", expected unit g, m/s2"},
+	        {"time:s,a:g*0", "--columns: \"a:g*0\", expected unit g, m/s2"},
+	        {"time:s,a:V/(0mV/g)", "--columns: \"a:V/(0mV/g)\", expected unit g, m/s2"},
+	        {"time:s,a:V/(10pC/g)", "--columns: \"a:V/(10pC/g)\", expected unit g, m/s2"},
+	        {"time:s,a:V/(10mV/s)", "--columns: \"a:V/(10mV/s)\", expected unit g, m/s2"},
+	        {"time:parsec,a:g", "--columns: \"time:parsec\", expected unit s, ms, us"},
+	        {"time:-s,a:g", "--columns: \"time:-s\", expected unit s, ms, us"},
 	        {"time:s,time:s", "--columns: \"time:s\", expected unit g"},
 	        {"time:s,a:g,a:g", "--columns: \"a:g\", expected every name once"},
 	        {"a:g@", "--columns: \"a:g@\", expected a rate"},

@@ -85,6 +85,7 @@ export const FLAGS = {
 	settling: "zero decays from the record's beginning on; that was taken off: let the supply settle first",
 	no_line_end: "the file ends without a line end: its last row may be cut",
 	same_names: "two columns have the same name in the file: check which is which",
+	assumed: "the file does not tell its unit of time; it was taken by what a shock can be: check it",
 };
 
 const STATUS = {

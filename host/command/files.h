@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_COMMAND_FILES_H
+#define DT_HOST_COMMAND_FILES_H
+/*
+ * The files that words of a command line stand for: a file itself, of a folder its files in the order of
+ * their names (not those of its folders, hidden ones, profiles and indexes), of a pattern (* ? []) in the
+ * last part of a path the files that match.
+ */
+#include <stddef.h>
+
+struct files {
+	char **file;
+	size_t count, room;
+	int named; /* words that were files themselves */
+};
+
+/* A COMMAND_* code; errors were printed, and there is nothing to free then. */
+int files_expand(struct files *files, char **words, int count);
+void files_free(struct files *files);
+
+#endif

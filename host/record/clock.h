@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_CLOCK_H
+#define DT_HOST_RECORD_CLOCK_H
+/*
+ * Times of day and dates as text: "13:04:05.123", "2026-11-24T13:04:05.123Z", "2026-11-24 13:04:05,1". Whole
+ * nanoseconds, since a double of this century's seconds ends at a quarter of a microsecond. Any context.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "host/record/cells.h"
+
+/* All of the text. *ns since midnight, or since 1970 with a date; *digits behind the seconds, at most 9. A
+ * zone is taken off. */
+bool clock_parse(struct piece text, int64_t *ns, int *digits);
+
+/* A date alone: three numbers with '-', '.' or '/' between them, one of them a year of four digits. */
+bool clock_is_date(struct piece text);
+
+#endif

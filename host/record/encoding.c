@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/encoding.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { LOOKED_AT = 4096, UTF8_MOST = 4, REPLACEMENT = 0xFFFD };
+
+/* Part of the odd or even bytes that are zero in UTF-16 of Latin letters and digits. */
+static const double ZEROS = 0.3;
+
+static size_t put_utf8(char *to, uint32_t c)
+{
+	if (c < 0x80) {
+		to[0] = (char)c;
+		return 1;
+	}
+	if (c < 0x800) {
+		to[0] = (char)(0xC0 | c >> 6);
+		to[1] = (char)(0x80 | (c & 0x3F));
+		return 2;
+	}
+	if (c < 0x10000) {
+		to[0] = (char)(0xE0 | c >> 12);
+		to[1] = (char)(0x80 | (c >> 6 & 0x3F));
+		to[2] = (char)(0x80 | (c & 0x3F));
+		return 3;
+	}
+	to[0] = (char)(0xF0 | c >> 18);
+	to[1] = (char)(0x80 | (c >> 12 & 0x3F));
+	to[2] = (char)(0x80 | (c >> 6 & 0x3F));
+	to[3] = (char)(0x80 | (c & 0x3F));
+	return 4;
+}
+
+static uint32_t unit_at(const unsigned char *bytes, size_t at, bool big)
+{
+	return big ? (uint32_t)bytes[at] << 8 | bytes[at + 1] : (uint32_t)bytes[at + 1] << 8 | bytes[at];
+}
+
+static size_t from_utf16(const unsigned char *bytes, size_t size, bool big, char *to)
+{
+	size_t used = 0;
+
+	for (size_t at = 0; at + 1 < size; at += 2) {
+		uint32_t c = unit_at(bytes, at, big);
+		uint32_t low = at + 3 < size ? unit_at(bytes, at + 2, big) : 0;
+
+		if (c == 0xFEFF && at == 0)
+			continue;
+		if (c >= 0xD800 && c < 0xDC00 && low >= 0xDC00 && low < 0xE000) {
+			c = 0x10000 + ((c - 0xD800) << 10) + (low - 0xDC00);
+			at += 2;
+		} else if (c >= 0xD800 && c < 0xE000) {
+			c = REPLACEMENT;
+		}
+		used += put_utf8(to + used, c);
+	}
+	return used;
+}
+
+static size_t from_cp1252(const unsigned char *bytes, size_t size, char *to)
+{
+	size_t used = 0;
+
+	for (size_t at = 0; at < size; at++) /* what is between stands in no unit */
+		used += put_utf8(to + used, bytes[at] >= 0x80 && bytes[at] < 0xA0 ? '?' : bytes[at]);
+	return used;
+}
+
+static bool is_utf8(const unsigned char *bytes, size_t size)
+{
+	for (size_t at = 0; at < size; at++) {
+		unsigned char c = bytes[at];
+		size_t more = c < 0x80 ? 0 : c >> 5 == 6 ? 1 : c >> 4 == 14 ? 2 : c >> 3 == 30 ? 3 : 4;
+
+		if (more == 4 || at + more >= size + (more == 0))
+			return false;
+		for (size_t k = 1; k <= more; k++)
+			if (bytes[at + k] >> 6 != 2)
+				return false;
+		at += more;
+	}
+	return true;
+}
+
+/* 'l', 'b', or 0 where it is no UTF-16. */
+static char utf16_order(const unsigned char *bytes, size_t size)
+{
+	size_t looked = size < LOOKED_AT ? size : LOOKED_AT, odd = 0, even = 0;
+
+	if (size >= 2 && bytes[0] == 0xFF && bytes[1] == 0xFE)
+		return 'l';
+	if (size >= 2 && bytes[0] == 0xFE && bytes[1] == 0xFF)
+		return 'b';
+	for (size_t at = 0; at < looked; at++)
+		*(at % 2 ? &odd : &even) += bytes[at] == 0;
+	if ((double)odd > ZEROS * (double)looked && even == 0)
+		return 'l';
+	return (double)even > ZEROS * (double)looked && odd == 0 ? 'b' : '\0';
+}
+
+int encoding_settle(struct source *source, const char **name, char message[READ_MESSAGE_MAX])
+{
+	const unsigned char *bytes = (const unsigned char *)source->bytes;
+	char order = utf16_order(bytes, source->size), *text;
+	size_t used;
+
+	*name = "utf-8";
+	if (order == '\0' && memchr(bytes, '\0', source->size) != NULL)
+		return source_refuse(message, DT_E_FORMAT, source->file, 0,
+		                     "binary file of no kind that is known here");
+	if (order == '\0' && is_utf8(bytes, source->size))
+		return 0;
+	if (order != '\0' && source->size % 2 != 0)
+		return source_refuse(message, DT_E_FORMAT, source->file, 0,
+		                     "text in UTF-16 of an odd number of bytes: the file is cut");
+	text = malloc(2 * source->size + UTF8_MOST);
+	if (text == NULL)
+		return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
+	*name = order == 'l' ? "utf-16le" : order == 'b' ? "utf-16be" : "cp1252";
+	used = order != '\0' ? from_utf16(bytes, source->size, order == 'b', text)
+	                     : from_cp1252(bytes, source->size, text);
+	free(source->bytes);
+	source->bytes = text;
+	source->size = used;
+	return 0;
+}

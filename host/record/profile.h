@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_PROFILE_H
+#define DT_HOST_RECORD_PROFILE_H
+/*
+ * A profile: how files of one origin are read, kept as an INI file and held against each of them.
+ *
+ *     [import]
+ *     columns = time:ms,fixture:g,board:mV/(10.2mV/g),-      as --columns
+ *     separator = tab                                          tab, semicolon, comma, bar, blanks; without
+ * it, any decimal = comma                                          comma or point; without it, as the lines
+ * look names = Time|Accel|IntAccel                              of the file's columns; a file with others is
+ * refused
+ *
+ * "@PATH" in place of --columns names one. Without --columns the file import.ini in the recording's folder is
+ * one, for text and tables of other people.
+ */
+#include "host/record/cells.h"
+#include "host/record/read.h"
+
+enum { PROFILE_COLUMNS_MAX = 4096, PROFILE_NAMES_MAX = 1024 };
+
+struct profile {
+	char path[4096];
+	char columns[PROFILE_COLUMNS_MAX];
+	struct cells_style style;
+	char names[PROFILE_NAMES_MAX]; /* "" where any will do */
+};
+
+/* 0, or an error told in message. */
+DT_MUST_USE int profile_read(struct profile *profile, const char *path, char message[READ_MESSAGE_MAX]);
+
+/* Whether there is one in the folder of a recording; its path. */
+bool profile_beside(const char *file, char path[4096]);
+
+/* Names as a profile has them. */
+void profile_names(const struct piece *name, size_t count, char names[PROFILE_NAMES_MAX]);
+
+/* Writes what was understood of a text file, with columns instead of what it tells where they are not NULL.
+ */
+DT_MUST_USE int profile_save(const char *path, const char *file, const char *columns,
+                             char message[READ_MESSAGE_MAX]);
+
+#endif
