@@ -246,7 +246,8 @@ const char *report_flag_words(unsigned flag)
 	case RECORD_FLAG_SAME_NAMES:
 		return "two columns have one name in the file: check which is which";
 	case RECORD_FLAG_ASSUMED:
-		return "the file does not tell its unit of time; it was taken by what a shock can be: check it";
+		return "the file does not tell its unit of time; it was taken by what a shock can be: check "
+		       "it";
 	default:
 		return record_flag_name(flag);
 	}
