@@ -8,8 +8,7 @@
 #include "host/chart/model_study.h"
 #include "host/chart/timing.h"
 #include "host/chart/plot.h"
-#include "host/model/coupled.h"
-#include "host/model/planar.h"
+#include "host/model/course.h"
 
 /* Readings of box and plate are compared at these instants: through the contact and on to 6 ms. */
 #define EVERY_S 0.75e-3
@@ -26,8 +25,7 @@ struct readings {
 /* The study's 2A at 25 deg, as both sides put it. */
 struct problem {
 	struct motion motion;
-	struct coupled coupled;
-	struct planar planar;
+	struct course course;
 	struct readings truth;
 	double peak[2]; /* of ours at its tightest: box, plate */
 };
@@ -78,36 +76,29 @@ static int theirs(const struct problem *p, enum way way, double setting, struct 
 
 static int ours(const struct problem *p, double tolerance, struct readings *r)
 {
-	struct coupled_sample coupled[INSTANTS];
-	struct planar_sample planar[INSTANTS];
-	struct coupled c = p->coupled;
-	struct planar q = p->planar;
+	struct course_sample sample[INSTANTS];
+	struct course course = p->course;
 	int status;
 
-	c.tolerance = q.tolerance = tolerance;
-	status = p->motion.planar ? planar_history(&q, EVERY_S, EVERY_S, planar, INSTANTS)
-	                          : coupled_history(&c, EVERY_S, EVERY_S, coupled, INSTANTS);
+	course.tolerance = tolerance;
+	status = course_history(&course, EVERY_S, EVERY_S, sample, INSTANTS);
 	for (size_t i = 0; i < INSTANTS && !status; i++) {
-		r->box[i] = p->motion.planar ? hypot(planar[i].axis[PLANAR_S2X], planar[i].axis[PLANAR_S2Y])
-		                             : fabs(coupled[i].box);
-		r->plate[i] = p->motion.planar ? hypot(planar[i].axis[PLANAR_S1X], planar[i].axis[PLANAR_S1Y])
-		                               : fabs(coupled[i].plate);
+		r->box[i] = hypot(sample[i].axis[COURSE_S2X], sample[i].axis[COURSE_S2Y]);
+		r->plate[i] = hypot(sample[i].axis[COURSE_S1X], sample[i].axis[COURSE_S1Y]);
 	}
 	return status;
 }
 
 static int our_peaks(const struct problem *p, double tolerance, double peak[2])
 {
-	struct coupled_result r = {0};
-	struct planar_result s = {0};
-	struct coupled c = p->coupled;
-	struct planar q = p->planar;
+	struct course_result r = {0};
+	struct course course = p->course;
 	int status;
 
-	c.tolerance = q.tolerance = tolerance;
-	status = p->motion.planar ? planar_solve(&q, &s) : coupled_solve(&c, &r);
-	peak[0] = p->motion.planar ? s.peak[PLANAR_CENTRE_R].value : fabs(r.box.value);
-	peak[1] = p->motion.planar ? s.peak[PLANAR_S1R].value : fabs(r.plate.value);
+	course.tolerance = tolerance;
+	status = course_solve(&course, &r);
+	peak[0] = r.peak[COURSE_CENTRE_R].value;
+	peak[1] = r.peak[COURSE_S1R].value;
 	return status;
 }
 
@@ -168,27 +159,19 @@ static int problem_of(bool planar, struct problem *p)
 	                            law.damping,
 	                            s.mount_stiffness_n_m,
 	                            mount_c};
-	p->coupled = (struct coupled){.case_mass_kg = s.product_case_mass_kg,
-	                              .plate_mass_kg = s.mount_plate_mass_kg,
-	                              .gravity_m_s2 = s.drop_gravity_m_s2,
-	                              .speed_m_s = speed,
-	                              .stiffness_n_m15 = k,
-	                              .law = law,
-	                              .mount_n_m = s.mount_stiffness_n_m,
-	                              .mount_damping_n_s_m = mount_c,
-	                              .share_x = 1};
-	p->planar = (struct planar){.case_mass_kg = s.product_case_mass_kg,
-	                            .plate_mass_kg = s.mount_plate_mass_kg,
-	                            .inertia_kg_m2 = inertia,
-	                            .angle_rad = UNITS_RAD(s.drop_angle_deg),
-	                            .gravity_m_s2 = s.drop_gravity_m_s2,
-	                            .speed_m_s = speed,
-	                            .lever_x_m = lever_x,
-	                            .lever_y_m = lever_y,
-	                            .stiffness_n_m15 = k,
-	                            .law = law,
-	                            .mount_n_m = s.mount_stiffness_n_m,
-	                            .mount_damping_n_s_m = mount_c};
+	p->course.body = (struct body){.turns = planar,
+	                               .case_mass_kg = s.product_case_mass_kg,
+	                               .plate_mass_kg = s.mount_plate_mass_kg,
+	                               .inertia_kg_m2 = inertia,
+	                               .angle_rad = UNITS_RAD(s.drop_angle_deg),
+	                               .gravity_m_s2 = s.drop_gravity_m_s2,
+	                               .speed_m_s = speed,
+	                               .lever_x_m = lever_x,
+	                               .lever_y_m = lever_y,
+	                               .stiffness_n_m15 = k,
+	                               .law = law,
+	                               .mount_n_m = s.mount_stiffness_n_m,
+	                               .mount_damping_n_s_m = mount_c};
 	status = our_peaks(p, 1e-13, p->peak);
 	return status ? status : theirs(p, RK8PD, REFERENCE_TOLERANCE, &p->truth);
 }

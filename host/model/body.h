@@ -10,11 +10,11 @@
  *            first, at the state body_start gives
  *   across   N = K d^1.5 (1 + D d'/v), never pulling; v the speed of the touch, K of the angle at the touch
  *            if `wedge`; both are kept per corner and set by body_touch
- *   along    a spring of `grip` times the normal one's tangent, its force held to friction times the normal
- *            one; beyond that limit it stretches no further (Mindlin 1949 gives 2/3 for two smooth bodies);
- *            grip = 0: frictionless
- *   mounts   k (1 + softening/(1 + |u|^2 softening_per_m2)) u + c u', u the plate's place as seen from the
- *            turning box (mounts_turn) or from the room
+ *   along    a spring of `grip` times the normal one's tangent (Mindlin 1949 gives 2/3 for two smooth
+ *            bodies), its force held to friction times the normal one: a corner that would slide further
+ *            slips, its deflection grows with the limit only and does not fall with it; grip = 0:
+ * frictionless mounts   k (1 + softening/(1 + |u|^2 softening_per_m2)) u + c u', u the plate's place as seen
+ * from the turning box (mounts_turn) or from the room
  *
  * A body that does not turn moves along the vertical only: four states, no grip. Its S2 reads what a box that
  * felt this force would turn by all the same.
@@ -24,6 +24,8 @@
  * functions, any thread.
  */
 #include <stdbool.h>
+
+#include "host/model/contact.h"
 
 enum { BODY_CORNERS = 4, BODY_FIRST = 1 }; /* BODY_FIRST: the mask of corner 0 */
 
@@ -45,9 +47,17 @@ enum body_state {
 	BODY_STATES = BODY_ONE_CORNER + BODY_CORNERS - 1 /* then that under the others */
 };
 
+enum body_hold {
+	BODY_STICKS, /* the deflection follows the corner */
+	BODY_SLIPS,  /* it follows the limit, which grows more slowly than the corner slides */
+	BODY_LAGS    /* it stays beyond a limit that fell, until that catches up or the corner turns back */
+};
+
 struct body_touch {
 	double stiffness_n_m15; /* K of the touch a corner is in */
-	double speed_m_s;       /* its v */
+	double damping_s_m;     /* D over the speed of that touch */
+	enum body_hold hold;
+	double side; /* -1 or 1: where to the corner is deflected; of one that does not stick */
 };
 
 struct body {
@@ -59,17 +69,19 @@ struct body {
 	double lever_x_m, lever_y_m;
 	double stiffness_n_m15; /* K; with wedge, at BODY_WEDGE_RAD */
 	bool wedge;             /* K times sin(50 deg)/sin(2 angle), the width of a right angle's imprint */
-	double damping;         /* D, of the restitution: contact.h */
+	struct contact_law law;
 	double grip, friction;
 	double mount_n_m, mount_damping_n_s_m;
 	double softening, softening_per_m2; /* 1/u_s^2 */
 	bool mounts_turn;                   /* their dampers turn with the box */
 	double s2_offset_m, s1_yaw_rad;
+	bool clips; /* for steps that do not end where a hold does: none beyond the limit in between */
 
 	/* by body_prepare */
 	double cosine, sine, corner_up_m; /* of the angle; of corner 0 from the centre, at the touch */
 	double yaw_cosine, yaw_sine;
-	double per_mass; /* 1/m_p + 1/m_B, 0 without a plate */
+	double per_case, per_plate, per_inertia; /* reciprocals; per_plate 0 without a plate */
+	double per_mass;                         /* 1/m_p + 1/m_B, 0 without a plate */
 	struct body_touch touch[BODY_CORNERS];
 };
 
@@ -91,8 +103,12 @@ void body_start(const struct body *body, double y[BODY_STATES]);
 double body_depth(const struct body *body, const double y[], int corner);
 double body_closing(const struct body *body, const double y[], int corner);
 
-/* A corner touches now: sets its K and v, clears its grip. */
+/* A corner touches now: sets its K, v and hold, clears its grip. */
 void body_touches(struct body *body, double y[], int corner);
+
+/* Above 0 where a touching corner's hold is over; body_holds then gives it the next one. */
+double body_lets_go(const struct body *body, unsigned touching, const double y[], int corner);
+void body_holds(struct body *body, unsigned touching, double y[], int corner);
 /* Where the tangential deflection under a corner stands in the state. */
 int body_grip(int corner);
 

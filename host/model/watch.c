@@ -20,9 +20,10 @@ static void watch_sample(struct watch *w, const struct ode *ode, double t)
 
 	memmove(&w->time_s[0], &w->time_s[1], 2 * sizeof(w->time_s[0]));
 	memmove(&w->value[0], &w->value[1], 2 * sizeof(w->value[0]));
-	ode_at(ode, t, y);
+	if (t != ode->t)
+		ode_at(ode, t, y);
 	w->time_s[2] = t;
-	w->signals(w->context, y, w->value[2]);
+	w->signals(w->context, t != ode->t ? y : ode->y, w->value[2]);
 	if (w->seen < 3)
 		w->seen++;
 }
@@ -179,10 +180,12 @@ static void watch_look(struct watch *w, const struct ode *ode, double t)
 	if (w->seen < 3)
 		return;
 	for (size_t i = 0; i < w->count; i++) {
-		double f[3] = {fabs(w->value[0][i]), fabs(w->value[1][i]), fabs(w->value[2][i])};
+		double f[3];
 
 		if (w->skipped >> i & 1u)
 			continue;
+		for (int k = 0; k < 3; k++)
+			f[k] = fabs(w->value[k][i]);
 		if (f[1] >= f[0] && f[1] > f[2] && f[1] * HIDDEN_SHARE > fabs(w->peak[i].value))
 			watch_refine(w, ode, i, w->time_s, f);
 		if (w->resumed && f[0] * HIDDEN_SHARE > fabs(w->peak[i].value))

@@ -12,60 +12,62 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>
 
-#include "host/model/coupled.h"
+#include "host/model/course.h"
 #include "tests/unit/near.h"
 
 #define IMPACT_M_S 4.18811174636017
 #define G 9.81
+#define ANGLE_COSINE 0.8
 
-static struct coupled study(double mount_n_m, double restitution, double tolerance)
+static struct course study(double mount_n_m, double restitution, double tolerance)
 {
-	struct coupled c = {.case_mass_kg = 0.169,
-	                    .plate_mass_kg = 0.014,
-	                    .gravity_m_s2 = G,
-	                    .speed_m_s = IMPACT_M_S,
-	                    .stiffness_n_m15 = 4227303.27134065,
-	                    .mount_n_m = mount_n_m,
-	                    .mount_damping_n_s_m = 2 * 0.1 * sqrt(mount_n_m * 0.014),
-	                    .share_x = 0.8,
-	                    .share_y = 0.6,
-	                    .tolerance = tolerance};
+	struct course c = {.body.case_mass_kg = 0.169,
+	                   .body.plate_mass_kg = 0.014,
+	                   .body.gravity_m_s2 = G,
+	                   .body.speed_m_s = IMPACT_M_S,
+	                   .body.stiffness_n_m15 = 4227303.27134065,
+	                   .body.mount_n_m = mount_n_m,
+	                   .body.mount_damping_n_s_m = 2 * 0.1 * sqrt(mount_n_m * 0.014),
+	                   .body.angle_rad = acos(ANGLE_COSINE),
+	                   .body.inertia_kg_m2 = 1.0,
+	                   .tolerance = tolerance};
 
-	assert_int_equal(contact_law_init(&c.law, restitution), 0);
+	assert_int_equal(contact_law_init(&c.body.law, restitution), 0);
 	if (restitution < 0.49 || restitution > 0.51)
-		c.stiffness_n_m15 = contact_stiffness(&c.law, 0.169, IMPACT_M_S, 0.003);
+		c.body.stiffness_n_m15 = contact_stiffness(&c.body.law, 0.169, IMPACT_M_S, 0.003);
 	return c;
 }
 
-static struct coupled_result solve(const struct coupled *c)
+static struct course_result solve(const struct course *c)
 {
-	struct coupled_result r;
+	struct course_result r;
 
-	assert_int_equal(coupled_solve(c, &r), 0);
+	assert_int_equal(course_solve(c, &r), 0);
 	return r;
 }
 
 static void the_reference(void **state)
 {
-	struct coupled a = study(7550.0, 0.5, 1e-11), b = study(7550.0 * 5 / 3, 0.5, 1e-11);
-	struct coupled_result r = solve(&a);
+	struct course a = study(7550.0, 0.5, 1e-11), b = study(7550.0 * 5 / 3, 0.5, 1e-11);
+	struct course_result r = solve(&a);
 
 	(void)state;
-	assert_near_part(r.box.value, 5373.05617460464, 1e-10);
-	assert_near(r.box.time_s, 0.744308e-3, 1e-9); /* given to six digits */
-	assert_near_part(r.plate.value, 3691.88490, 2e-9);
-	assert_near_part(r.plate.time_s, 2.69475824e-3, 2e-9);
-	assert_near(r.plate.time_s - r.box.time_s, 1.95045e-3, 1e-8);
-	assert_near_part(r.depth_m, 2.94122581e-3, 1e-8);
-	assert_near_part(r.travel_m, 6.70338575e-3, 1e-7);
+	assert_near_part(r.peak[COURSE_CENTRE_R].value, 5373.05617460464, 1e-10);
+	assert_near(r.peak[COURSE_CENTRE_R].time_s, 0.744308e-3, 1e-9); /* given to six digits */
+	assert_near_part(r.peak[COURSE_S1R].value, 3691.88490, 2e-9);
+	assert_near_part(r.peak[COURSE_S1R].time_s, 2.69475824e-3, 2e-9);
+	assert_near(r.peak[COURSE_S1R].time_s - r.peak[COURSE_CENTRE_R].time_s, 1.95045e-3, 1e-8);
+	assert_near_part(r.peak[COURSE_DEPTH].value, 2.94122581e-3, 1e-8);
+	assert_near_part(fabs(r.peak[COURSE_TRAVEL].value), 6.70338575e-3, 1e-7);
 	r = solve(&b);
-	assert_near_part(r.box.value, 5357.37182846565, 1e-10);
-	assert_near_part(r.box.time_s, 0.000742919065757884, 1e-8);
-	assert_near_part(r.plate.value, 4540.28203567002, 1e-10);
-	assert_near_part(r.plate.time_s, 0.00231208947364579, 1e-9);
-	assert_near_part(r.plate.time_s - r.box.time_s, 0.00156917040788791, 1e-8);
-	assert_near_part(r.depth_m, 0.00294503122423836, 1e-7);
-	assert_near_part(r.travel_m, 0.00495378957990159, 1e-7);
+	assert_near_part(r.peak[COURSE_CENTRE_R].value, 5357.37182846565, 1e-10);
+	assert_near_part(r.peak[COURSE_CENTRE_R].time_s, 0.000742919065757884, 1e-8);
+	assert_near_part(r.peak[COURSE_S1R].value, 4540.28203567002, 1e-10);
+	assert_near_part(r.peak[COURSE_S1R].time_s, 0.00231208947364579, 1e-9);
+	assert_near_part(r.peak[COURSE_S1R].time_s - r.peak[COURSE_CENTRE_R].time_s, 0.00156917040788791,
+	                 1e-8);
+	assert_near_part(r.peak[COURSE_DEPTH].value, 0.00294503122423836, 1e-7);
+	assert_near_part(fabs(r.peak[COURSE_TRAVEL].value), 0.00495378957990159, 1e-7);
 }
 
 /* What one step may miss adds up to less than thirty of them in the peaks, wherever these lie: in the
@@ -76,13 +78,17 @@ static void what_tolerance_means(void **state)
 	for (double tolerance = 1e-7; tolerance < 2e-5; tolerance *= 100.0)
 		for (double k = 500.0; k < 100000.0; k *= 1.1)
 			for (double e = 0.2; e < 0.96; e += 0.15) {
-				struct coupled c = study(k, e, tolerance), exact = study(k, e, 1e-13);
-				struct coupled_result r = solve(&c), x = solve(&exact);
+				struct course c = study(k, e, tolerance), exact = study(k, e, 1e-13);
+				struct course_result r = solve(&c), x = solve(&exact);
 
-				assert_near_part(r.box.value, x.box.value, 30 * tolerance);
-				assert_near_part(r.plate.value, x.plate.value, 30 * tolerance);
-				assert_near_part(r.depth_m, x.depth_m, 30 * tolerance);
-				assert_near_part(r.turned_r.value, x.turned_r.value, 30 * tolerance);
+				assert_near_part(r.peak[COURSE_CENTRE_R].value, x.peak[COURSE_CENTRE_R].value,
+				                 30 * tolerance);
+				assert_near_part(r.peak[COURSE_S1R].value, x.peak[COURSE_S1R].value,
+				                 30 * tolerance);
+				assert_near_part(r.peak[COURSE_DEPTH].value, x.peak[COURSE_DEPTH].value,
+				                 30 * tolerance);
+				assert_near_part(r.peak[COURSE_S2R].value, x.peak[COURSE_S2R].value,
+				                 30 * tolerance);
 			}
 }
 
@@ -93,14 +99,14 @@ static void a_peak_at_the_release(void **state)
 
 	(void)state;
 	for (double k = 4000.0; k < 9000.0; k += 10.0) {
-		struct coupled c = study(k, 0.5, 1e-6);
-		struct coupled_result r = solve(&c);
-		double step = r.plate.value - last;
+		struct course c = study(k, 0.5, 1e-6);
+		struct course_result r = solve(&c);
+		double step = r.peak[COURSE_S1R].value - last;
 
 		if (last_step > 0.0 && !(fabs(step / last_step - 1.0) < 0.02))
 			fail_msg("k %g: step of %.9g after one of %.9g", k, step, last_step);
 		last_step = last > 0.0 ? step : 0.0;
-		last = r.plate.value;
+		last = r.peak[COURSE_S1R].value;
 	}
 }
 
@@ -108,22 +114,22 @@ static void a_peak_at_the_release(void **state)
 
 static int room(double t, const double y[], double rate[], void *user)
 {
-	const struct coupled *c = user;
+	const struct course *c = user;
 	double depth = -y[0], force = 0.0;
-	double mount = c->mount_n_m * (y[2] - y[0]) + c->mount_damping_n_s_m * (y[3] - y[1]);
+	double mount = c->body.mount_n_m * (y[2] - y[0]) + c->body.mount_damping_n_s_m * (y[3] - y[1]);
 
 	(void)t;
 	if (depth > 0.0)
-		force = fmax(0.0, c->stiffness_n_m15 * pow(depth, 1.5) *
-		                          (1.0 - c->law.damping * y[1] / c->speed_m_s));
+		force = fmax(0.0, c->body.stiffness_n_m15 * pow(depth, 1.5) *
+		                          (1.0 - c->body.law.damping * y[1] / c->body.speed_m_s));
 	rate[0] = y[1];
-	rate[1] = (force + mount) / c->case_mass_kg - G;
+	rate[1] = (force + mount) / c->body.case_mass_kg - G;
 	rate[2] = y[3];
-	rate[3] = -mount / c->plate_mass_kg - G;
+	rate[3] = -mount / c->body.plate_mass_kg - G;
 	return GSL_SUCCESS;
 }
 
-static void check_against_gsl(const struct coupled *c)
+static void check_against_gsl(const struct course *c)
 {
 	enum { SAMPLES = 120 };
 	const double step_s = 1e-4;
@@ -131,20 +137,24 @@ static void check_against_gsl(const struct coupled *c)
 	gsl_odeiv2_driver *driver =
 	        gsl_odeiv2_driver_alloc_y_new(&system, gsl_odeiv2_step_rk8pd, 1e-7, 1e-13, 1e-12);
 	double y[4] = {0.0, -IMPACT_M_S, 0.0, -IMPACT_M_S}, rate[4], t = 0.0;
-	struct coupled_sample samples[SAMPLES];
-	struct coupled_result r = solve(c);
+	struct course_sample samples[SAMPLES];
+	struct course_result r = solve(c);
 
 	assert_non_null(driver);
-	assert_int_equal(coupled_history(c, step_s, step_s, samples, SAMPLES), 0);
+	assert_int_equal(course_history(c, step_s, step_s, samples, SAMPLES), 0);
 	for (int i = 0; i < SAMPLES; i++) {
 		assert_int_equal(gsl_odeiv2_driver_apply(driver, &t, step_s * (i + 1), y), GSL_SUCCESS);
 		room(t, y, rate, system.params);
-		assert_near(samples[i].box, rate[1] + G, 1e-7 * r.box.value);
-		assert_near(samples[i].plate, rate[3] + G, 1e-7 * r.plate.value);
-		assert_near(samples[i].travel_m, y[2] - y[0], 1e-7 * r.travel_m);
-		assert_near(samples[i].depth_m, fmax(-y[0], 0.0), 1e-7 * r.depth_m);
-		assert_true(fabs(samples[i].box) <= r.box.value * (1 + 1e-9));
-		assert_true(fabs(samples[i].plate) <= fabs(r.plate.value) * (1 + 1e-9));
+		assert_near(samples[i].axis[COURSE_S2X] / ANGLE_COSINE, rate[1] + G,
+		            1e-7 * r.peak[COURSE_CENTRE_R].value);
+		assert_near(samples[i].axis[COURSE_S1X] / ANGLE_COSINE, rate[3] + G,
+		            1e-7 * r.peak[COURSE_S1R].value);
+		assert_near(samples[i].travel_m, y[2] - y[0], 1e-7 * fabs(r.peak[COURSE_TRAVEL].value));
+		assert_near(samples[i].depth_m, fmax(-y[0], 0.0), 1e-7 * r.peak[COURSE_DEPTH].value);
+		assert_true(fabs(samples[i].axis[COURSE_S2X] / ANGLE_COSINE) <=
+		            r.peak[COURSE_CENTRE_R].value * (1 + 1e-9));
+		assert_true(fabs(samples[i].axis[COURSE_S1X] / ANGLE_COSINE) <=
+		            fabs(r.peak[COURSE_S1R].value) * (1 + 1e-9));
 	}
 	gsl_odeiv2_driver_free(driver);
 }
@@ -156,12 +166,12 @@ static void like_rk8pd(void **state)
 	(void)state;
 	for (size_t e = 0; e < sizeof(restitutions) / sizeof(restitutions[0]); e++)
 		for (size_t k = 0; k < sizeof(mounts) / sizeof(mounts[0]); k++) {
-			struct coupled c = study(mounts[k], restitutions[e], 1e-11);
+			struct course c = study(mounts[k], restitutions[e], 1e-11);
 
 			check_against_gsl(&c);
-			c.mount_damping_n_s_m *= 15.0; /* overdamped */
+			c.body.mount_damping_n_s_m *= 15.0; /* overdamped */
 			check_against_gsl(&c);
-			c.mount_damping_n_s_m = 0.0;
+			c.body.mount_damping_n_s_m = 0.0;
 			check_against_gsl(&c);
 		}
 }
@@ -171,38 +181,39 @@ static void without_a_plate(void **state)
 {
 	(void)state;
 	for (double e = 0.2; e <= 1.0; e += 0.1) {
-		struct coupled c = study(1.0, e, 1e-9);
-		struct coupled_result r;
+		struct course c = study(1.0, e, 1e-9);
+		struct course_result r;
 		double force, share,
-		        duration = contact_duration(&c.law, 0.169, IMPACT_M_S, c.stiffness_n_m15);
+		        duration = contact_duration(&c.body.law, 0.169, IMPACT_M_S, c.body.stiffness_n_m15);
 
-		c.plate_mass_kg = 0.0;
+		c.body.plate_mass_kg = 0.0;
 		r = solve(&c);
-		assert_int_equal(contact_law_peak(&c.law, &force, &share), 0);
-		assert_near_part(r.box.value * 0.169,
-		                 force * pow(pow(0.169, 3) * pow(IMPACT_M_S, 6) * c.stiffness_n_m15 *
-		                                     c.stiffness_n_m15,
+		assert_int_equal(contact_law_peak(&c.body.law, &force, &share), 0);
+		assert_near_part(r.peak[COURSE_CENTRE_R].value * 0.169,
+		                 force * pow(pow(0.169, 3) * pow(IMPACT_M_S, 6) * c.body.stiffness_n_m15 *
+		                                     c.body.stiffness_n_m15,
 		                             0.2),
 		                 4e-3);
 		assert_near_part(r.contact_time_s, duration, 0.02);
-		assert_near_part(r.depth_m, contact_depth(&c.law, 0.169, IMPACT_M_S, c.stiffness_n_m15),
-		                 4e-3);
+		assert_near_part(r.peak[COURSE_DEPTH].value,
+		                 contact_depth(&c.body.law, 0.169, IMPACT_M_S, c.body.stiffness_n_m15), 4e-3);
 		assert_near(r.restitution, e, 0.01);
 		assert_near_part(r.velocity_change_m_s, (1 + e) * IMPACT_M_S, 6e-3);
-		assert_true(r.plate.value == r.box.value && r.travel_m == 0.0);
+		assert_true(r.peak[COURSE_S1R].value == r.peak[COURSE_CENTRE_R].value &&
+		            fabs(r.peak[COURSE_TRAVEL].value) == 0.0);
 	}
 }
 
 /* Momentum: what the contact gave both masses is what they have. */
 static void momentum_is_kept(void **state)
 {
-	struct coupled c = study(7550.0, 0.5, 1e-10);
-	struct coupled_result r = solve(&c);
-	struct coupled_sample samples[4001];
+	struct course c = study(7550.0, 0.5, 1e-10);
+	struct course_result r = solve(&c);
+	struct course_sample samples[4001];
 	double impulse = 0.0;
 
 	(void)state;
-	assert_int_equal(coupled_history(&c, 0.0, 1e-6, samples, 4001), 0);
+	assert_int_equal(course_history(&c, 0.0, 1e-6, samples, 4001), 0);
 	for (int i = 1; i < 4000; i++)
 		impulse += samples[i].force_n * 1e-6;
 	assert_near_part(r.velocity_change_m_s, impulse / 0.183, 1e-6);
@@ -216,34 +227,37 @@ static void over_all_restitutions(void **state)
 	(void)state;
 	for (int i = 0; i < 160; i++) {
 		double e = i < 60 ? 1e-3 * pow(10.0, i / 22.25) : 1.0 - 0.5 * pow(0.8, i - 60);
-		struct coupled c = study(7550.0, e, 1e-6);
-		struct coupled_result r = solve(&c);
+		struct course c = study(7550.0, e, 1e-6);
+		struct course_result r = solve(&c);
 
-		assert_true(isfinite(r.box.value) && isfinite(r.plate.value) && isfinite(r.depth_m));
-		if (last > 0.0 && !(fabs(r.plate.value / last - 1.0) < 0.1))
-			fail_msg("plate %.9g after %.9g at e %g", r.plate.value, last, e);
-		last = r.plate.value;
+		assert_true(isfinite(r.peak[COURSE_CENTRE_R].value) && isfinite(r.peak[COURSE_S1R].value) &&
+		            isfinite(r.peak[COURSE_DEPTH].value));
+		if (last > 0.0 && !(fabs(r.peak[COURSE_S1R].value / last - 1.0) < 0.1))
+			fail_msg("plate %.9g after %.9g at e %g", r.peak[COURSE_S1R].value, last, e);
+		last = r.peak[COURSE_S1R].value;
 	}
 	{
-		struct coupled c = study(7550.0, 1e-4, 1e-6);
-		struct coupled_result r = solve(&c);
+		struct course c = study(7550.0, 1e-4, 1e-6);
+		struct course_result r = solve(&c);
 
-		assert_true(isfinite(r.plate.value) && r.plate.value > 2000.0 && r.plate.value < 3000.0);
+		assert_true(isfinite(r.peak[COURSE_S1R].value) && r.peak[COURSE_S1R].value > 2000.0 &&
+		            r.peak[COURSE_S1R].value < 3000.0);
 	}
 }
 
 /* A box so soft and slow that its own weight keeps it in the mat. */
 static void a_box_that_stays(void **state)
 {
-	struct coupled c = study(7550.0, 0.01, 1e-6);
-	struct coupled_result r;
+	struct course c = study(7550.0, 0.01, 1e-6);
+	struct course_result r;
 
 	(void)state;
-	c.speed_m_s = 0.05;
-	c.stiffness_n_m15 = 1e4;
+	c.body.speed_m_s = 0.05;
+	c.body.stiffness_n_m15 = 1e4;
 	r = solve(&c);
 	assert_true(isnan(r.contact_time_s) && isnan(r.restitution));
-	assert_true(isfinite(r.plate.value) && isfinite(r.box.value) && r.depth_m > 0.0);
+	assert_true(isfinite(r.peak[COURSE_S1R].value) && isfinite(r.peak[COURSE_CENTRE_R].value) &&
+	            r.peak[COURSE_DEPTH].value > 0.0);
 }
 
 int main(void)

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * The turning box against reference values of two unrelated integrators, against GSL's rk8pd over the
- * equations written out again here (both masses in the room), and against balances.
+ * The turning box against reference values of two unrelated integrators, over the equations
+ * written out again here (both masses in the room) against GSL's rk8pd and, with a mat that grips, against
+ * small steps, and against balances.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,11 +10,13 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
+#include <string.h>
+
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>
 
 #include "common/units.h"
-#include "host/model/planar.h"
+#include "host/model/course.h"
 #include "tests/unit/near.h"
 
 #define IMPACT_M_S 4.18811174636017
@@ -24,59 +27,60 @@ static bool is_box(const char *geometry)
 }
 
 /* The nominal corner, frictionless, linear mounts; geometry 1 with the mass it was computed with. */
-static struct planar sharp(const char *geometry, double angle_deg)
+static struct course sharp(const char *geometry, double angle_deg)
 {
 	double mount = geometry[1] == 'A' ? 7550.0 : 7550.0 * 5 / 3;
-	struct planar p = {.case_mass_kg = is_box(geometry) ? 0.183 : 0.169,
-	                   .plate_mass_kg = is_box(geometry) ? 0.0 : 0.014,
-	                   .angle_rad = UNITS_RAD(angle_deg),
-	                   .gravity_m_s2 = 9.81, /* as the reference values were computed */
-	                   .speed_m_s = IMPACT_M_S,
-	                   .lever_x_m = 0.1445,
-	                   .lever_y_m = 0.0505,
-	                   .stiffness_n_m15 = 4227303.27134065,
-	                   .mount_n_m = mount,
-	                   .mount_damping_n_s_m = 2 * 0.1 * sqrt(mount * 0.014),
-	                   .s2_offset_m = 0.065,
+	struct course p = {.body.turns = true,
+	                   .body.case_mass_kg = is_box(geometry) ? 0.183 : 0.169,
+	                   .body.plate_mass_kg = is_box(geometry) ? 0.0 : 0.014,
+	                   .body.angle_rad = UNITS_RAD(angle_deg),
+	                   .body.gravity_m_s2 = 9.81, /* as the reference values were computed */
+	                   .body.speed_m_s = IMPACT_M_S,
+	                   .body.lever_x_m = 0.1445,
+	                   .body.lever_y_m = 0.0505,
+	                   .body.stiffness_n_m15 = 4227303.27134065,
+	                   .body.mount_n_m = mount,
+	                   .body.mount_damping_n_s_m = 2 * 0.1 * sqrt(mount * 0.014),
+	                   .body.s2_offset_m = 0.065,
 	                   .tolerance = 1e-11};
 
-	p.inertia_kg_m2 = p.case_mass_kg * (0.289 * 0.289 + 0.101 * 0.101) / 12;
-	assert_int_equal(contact_law_init(&p.law, 0.5), 0);
+	p.body.inertia_kg_m2 = p.body.case_mass_kg * (0.289 * 0.289 + 0.101 * 0.101) / 12;
+	assert_int_equal(contact_law_init(&p.body.law, 0.5), 0);
 	return p;
 }
 
 /* All that was found to explain the recorded drops. */
-static struct planar identified(const char *geometry, double angle_deg)
+static struct course identified(const char *geometry, double angle_deg)
 {
-	struct planar p = sharp(geometry, angle_deg);
+	struct course p = sharp(geometry, angle_deg);
 
-	p.inertia_kg_m2 *= 0.173 / 0.183;
-	p.case_mass_kg = 0.173;
+	p.body.inertia_kg_m2 *= 0.173 / 0.183;
+	p.body.case_mass_kg = 0.173;
 	if (!is_box(geometry)) {
-		p.case_mass_kg = 0.169;
-		p.inertia_kg_m2 = 0.169 * (0.289 * 0.289 + 0.101 * 0.101) / 12;
+		p.body.case_mass_kg = 0.169;
+		p.body.inertia_kg_m2 = 0.169 * (0.289 * 0.289 + 0.101 * 0.101) / 12;
 	}
-	p.lever_x_m = 0.1083;
-	p.stiffness_n_m15 = 3.81e6 * sin(UNITS_RAD(50.0)) / sin(2 * p.angle_rad);
-	p.grip = 2.5;
-	p.friction = 0.8;
-	p.mount_damping_n_s_m = geometry[1] == 'A' ? 2.0838 : 3.4730;
-	p.softening = 1.0 / 3;
-	p.softening_m = 0.8 * (geometry[1] == 'A' ? 0.003 : 0.005);
-	p.mounts_turn = true;
-	p.s1_yaw_rad = geometry[1] == 'B' ? UNITS_RAD(4.7) : 0.0;
+	p.body.lever_x_m = 0.1083;
+	p.body.stiffness_n_m15 = 3.81e6 * sin(UNITS_RAD(50.0)) / sin(2 * p.body.angle_rad);
+	p.body.grip = 2.5;
+	p.body.friction = 0.8;
+	p.body.mount_damping_n_s_m = geometry[1] == 'A' ? 2.0838 : 3.4730;
+	p.body.softening = 1.0 / 3;
+	p.body.softening_per_m2 = 1.0 / pow(0.8 * (geometry[1] == 'A' ? 0.003 : 0.005), 2.0);
+	p.body.mounts_turn = true;
+	p.body.s1_yaw_rad = geometry[1] == 'B' ? UNITS_RAD(4.7) : 0.0;
 	return p;
 }
 
-static struct planar_result solve(const struct planar *p)
+static struct course_result solve(const struct course *p)
 {
-	struct planar_result r;
+	struct course_result r;
 
-	assert_int_equal(planar_solve(p, &r), 0);
+	assert_int_equal(course_solve(p, &r), 0);
 	return r;
 }
 
-enum { SHARP_PEAKS = PLANAR_CENTRE_R + 1, PEAKS = PLANAR_S2R + 1 };
+enum { SHARP_PEAKS = COURSE_CENTRE_R + 1, PEAKS = COURSE_S2R + 1 };
 
 static void the_sharp_corner(void **state)
 {
@@ -151,8 +155,8 @@ static void the_sharp_corner(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof(reference) / sizeof(reference[0]); i++) {
-		struct planar p = sharp(reference[i].geometry, reference[i].angle_deg);
-		struct planar_result r = solve(&p);
+		struct course p = sharp(reference[i].geometry, reference[i].angle_deg);
+		struct course_result r = solve(&p);
 
 		for (int k = 0; k < SHARP_PEAKS; k++) {
 			assert_near_part(r.peak[k].value, reference[i].value[k], 1e-9);
@@ -245,17 +249,17 @@ static void the_identified_contact(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof(reference) / sizeof(reference[0]); i++) {
-		struct planar p = identified(reference[i].geometry, reference[i].angle_deg);
+		struct course p = identified(reference[i].geometry, reference[i].angle_deg);
 		const double *at = reference[i].at_resultant;
-		struct planar_result r;
+		struct course_result r;
 
-		p.law.damping = 1.43275053;
+		p.body.law.damping = 1.43275053;
 		r = solve(&p);
 		for (int k = 0; k < PEAKS; k++) {
 			assert_near_part(r.peak[k].value, reference[i].value[k], 1e-7);
 			assert_near_part(r.peak[k].time_s, reference[i].time_s[k], 1e-7);
 		}
-		assert_near(r.peak[PLANAR_S1R].time_s - r.peak[PLANAR_S2R].time_s, reference[i].lag_s,
+		assert_near(r.peak[COURSE_S1R].time_s - r.peak[COURSE_S2R].time_s, reference[i].lag_s,
 		            1e-7 * 2e-3);
 		assert_near(r.s1_direction_rad, atan2(at[1], at[0]), 1e-7);
 		assert_near(r.s2_direction_rad, atan2(at[3], at[2]), 1e-7);
@@ -266,23 +270,23 @@ static void the_identified_contact(void **state)
  * contact 3.13 ms, restitution .498, dent 3.09 mm, travel 6.3 and 4.2 mm. */
 static void the_study_s_features(void **state)
 {
-	struct planar p = identified("G1", 25);
-	struct planar_result r = solve(&p);
+	struct course p = identified("G1", 25);
+	struct course_result r = solve(&p);
 
 	(void)state;
 	assert_near(r.contact_time_s, 3.13e-3, 0.005e-3);
 	assert_near(r.restitution, 0.498, 0.001);
-	assert_near(r.peak[PLANAR_DEPTH].value, 3.09e-3, 0.005e-3);
+	assert_near(r.peak[COURSE_DEPTH].value, 3.09e-3, 0.005e-3);
 	p = identified("2A", 25);
 	p.count_ring = true;
 	r = solve(&p);
-	assert_near(r.peak[PLANAR_TRAVEL].value, 6.3e-3, 0.05e-3);
+	assert_near(r.peak[COURSE_TRAVEL].value, 6.3e-3, 0.05e-3);
 	assert_near(r.ring_hz, 131.4, 2.0); /* counted from readings there, from the travel here */
 	assert_near(r.ring_damping, 0.089, 0.01);
 	p = identified("2B", 25);
 	p.count_ring = true;
 	r = solve(&p);
-	assert_near(r.peak[PLANAR_TRAVEL].value, 4.2e-3, 0.05e-3);
+	assert_near(r.peak[COURSE_TRAVEL].value, 4.2e-3, 0.05e-3);
 	assert_near(r.ring_hz, 176.0, 3.0);
 	assert_near(r.ring_damping, 0.115, 0.01);
 }
@@ -295,137 +299,178 @@ struct force {
 	double x, y, torque; /* on the box, counter-clockwise */
 };
 
-static struct force mat(const struct planar *p, const double s[], double *creep)
+static struct force mat(const struct course *p, const double s[], double *creep)
 {
 	double sn = sin(s[ANGLE]), cs = cos(s[ANGLE]), w = -s[TURNING];
-	double rx = -p->lever_x_m * sn + p->lever_y_m * cs, ry = -p->lever_x_m * cs - p->lever_y_m * sn;
+	double rx = -p->body.lever_x_m * sn + p->body.lever_y_m * cs,
+	       ry = -p->body.lever_x_m * cs - p->body.lever_y_m * sn;
 	double depth = -(s[Y] + ry), rising = s[VY] + w * rx, sliding = s[VX] - w * ry, normal, side;
 
 	*creep = 0.0;
 	if (depth <= 0.0)
 		return (struct force){0, 0, 0};
-	normal = p->stiffness_n_m15 * pow(depth, 1.5) * (1 - p->law.damping * rising / p->speed_m_s);
+	normal = p->body.stiffness_n_m15 * pow(depth, 1.5) *
+	         (1 - p->body.law.damping * rising / p->body.speed_m_s);
 	if (normal <= 0.0)
 		return (struct force){0, 0, 0};
-	side = -p->grip * 1.5 * p->stiffness_n_m15 * sqrt(depth) * s[SLIP];
-	*creep = p->grip > 0.0 ? sliding : 0.0;
-	if (fabs(side) > p->friction * normal) {
-		double over = fabs(side) / (p->friction * normal) - 1.0;
-
-		side = copysign(p->friction * normal, side);
-		if (sliding * s[SLIP] > 0.0) /* stops over two percent of the limit */
-			*creep = sliding * fmax(0.0, 1.0 - over / 0.02);
-	}
+	side = -p->body.grip * 1.5 * p->body.stiffness_n_m15 * sqrt(depth) * s[SLIP];
+	side = copysign(fmin(fabs(side), p->body.friction * normal), side);
+	*creep = p->body.grip > 0.0 ? sliding : 0.0;
 	return (struct force){side, normal, rx * normal - ry * side};
 }
 
-static struct force mounts(const struct planar *p, const double s[])
+static struct force mounts(const struct course *p, const double s[])
 {
-	double dx = s[PX] - s[X], dy = s[PY] - s[Y], w = p->mounts_turn ? -s[TURNING] : 0.0;
-	double k = p->mount_n_m, c = p->mount_damping_n_s_m;
+	double dx = s[PX] - s[X], dy = s[PY] - s[Y], w = p->body.mounts_turn ? -s[TURNING] : 0.0;
+	double k = p->body.mount_n_m, c = p->body.mount_damping_n_s_m;
 
-	if (p->plate_mass_kg <= 0.0)
+	if (p->body.plate_mass_kg <= 0.0)
 		return (struct force){0, 0, 0};
-	if (p->softening > 0.0)
-		k *= 1 + p->softening / (1 + (dx * dx + dy * dy) / (p->softening_m * p->softening_m));
+	if (p->body.softening > 0.0)
+		k *= 1 + p->body.softening / (1 + (dx * dx + dy * dy) * p->body.softening_per_m2);
 	return (struct force){k * dx + c * (s[PVX] - s[VX] + w * dy), k * dy + c * (s[PVY] - s[VY] - w * dx),
 	                      0};
 }
 
 static int room(double t, const double s[], double rate[], void *user)
 {
-	const struct planar *p = user;
+	const struct course *p = user;
 	struct force contact = mat(p, s, &rate[SLIP]), mount = mounts(p, s);
 
 	(void)t;
 	rate[X] = s[VX];
 	rate[Y] = s[VY];
 	rate[ANGLE] = s[TURNING];
-	rate[VX] = (contact.x + mount.x) / p->case_mass_kg;
-	rate[VY] = (contact.y + mount.y) / p->case_mass_kg - p->gravity_m_s2;
-	rate[TURNING] = -contact.torque / p->inertia_kg_m2;
+	rate[VX] = (contact.x + mount.x) / p->body.case_mass_kg;
+	rate[VY] = (contact.y + mount.y) / p->body.case_mass_kg - p->body.gravity_m_s2;
+	rate[TURNING] = -contact.torque / p->body.inertia_kg_m2;
 	rate[PX] = s[PVX];
 	rate[PY] = s[PVY];
-	rate[PVX] = p->plate_mass_kg > 0 ? -mount.x / p->plate_mass_kg : 0.0;
-	rate[PVY] = p->plate_mass_kg > 0 ? -mount.y / p->plate_mass_kg - p->gravity_m_s2 : 0.0;
+	rate[PVX] = p->body.plate_mass_kg > 0 ? -mount.x / p->body.plate_mass_kg : 0.0;
+	rate[PVY] = p->body.plate_mass_kg > 0 ? -mount.y / p->body.plate_mass_kg - p->body.gravity_m_s2 : 0.0;
 	return GSL_SUCCESS;
 }
 
 /* What the sensors read, S1X S1Y S2X S2Y. */
-static void readings(const struct planar *p, const double s[], double value[4])
+static void readings(const struct course *p, const double s[], double value[4])
 {
 	double rate[STATES], sn = sin(s[ANGLE]), cs = cos(s[ANGLE]);
 	double ax, ay, bx, by, x, y;
 
 	room(0.0, s, rate, (void *)(uintptr_t)(const void *)p);
-	bx = rate[VX] * sn + (rate[VY] + p->gravity_m_s2) * cs;
-	by = -rate[VX] * cs + (rate[VY] + p->gravity_m_s2) * sn;
-	value[2] = bx - s[TURNING] * s[TURNING] * p->s2_offset_m;
-	value[3] = by - rate[TURNING] * p->s2_offset_m;
-	ax = p->plate_mass_kg > 0 ? rate[PVX] : rate[VX];
-	ay = (p->plate_mass_kg > 0 ? rate[PVY] : rate[VY]) + p->gravity_m_s2;
+	bx = rate[VX] * sn + (rate[VY] + p->body.gravity_m_s2) * cs;
+	by = -rate[VX] * cs + (rate[VY] + p->body.gravity_m_s2) * sn;
+	value[2] = bx - s[TURNING] * s[TURNING] * p->body.s2_offset_m;
+	value[3] = by - rate[TURNING] * p->body.s2_offset_m;
+	ax = p->body.plate_mass_kg > 0 ? rate[PVX] : rate[VX];
+	ay = (p->body.plate_mass_kg > 0 ? rate[PVY] : rate[VY]) + p->body.gravity_m_s2;
 	x = ax * sn + ay * cs;
 	y = -ax * cs + ay * sn;
-	value[0] = x * cos(p->s1_yaw_rad) - y * sin(p->s1_yaw_rad);
-	value[1] = x * sin(p->s1_yaw_rad) + y * cos(p->s1_yaw_rad);
+	value[0] = x * cos(p->body.s1_yaw_rad) - y * sin(p->body.s1_yaw_rad);
+	value[1] = x * sin(p->body.s1_yaw_rad) + y * cos(p->body.s1_yaw_rad);
 }
 
 /* Whether a corner other than the first is in the mat, or the first one came back to it: from there on the
  * equations above lack something. */
-static bool strikes_again(const struct planar *p, const double s[], bool *flew)
+static bool strikes_again(const struct course *p, const double s[], bool *flew)
 {
-	double sn = sin(s[ANGLE]), cs = cos(s[ANGLE]), x = p->lever_x_m * cs, y = p->lever_y_m * sn;
+	double sn = sin(s[ANGLE]), cs = cos(s[ANGLE]), x = p->body.lever_x_m * cs, y = p->body.lever_y_m * sn;
 	bool touches = s[Y] - x - y < 0.0;
 
 	*flew = *flew || !touches;
 	return (touches && *flew) || s[Y] + x - y < 0.0 || s[Y] - x + y < 0.0 || s[Y] + x + y < 0.0;
 }
 
-static void check_against_gsl(const struct planar *p)
+/* The mat does not stretch beyond where friction gives way, but does not shrink with a limit that falls. */
+static void give_way(const struct course *p, const double before[], double s[])
 {
-	enum { SAMPLES = 60 };
+	double sn = sin(s[ANGLE]), cs = cos(s[ANGLE]), w = -s[TURNING];
+	double rx = -p->body.lever_x_m * sn + p->body.lever_y_m * cs,
+	       ry = -p->body.lever_x_m * cs - p->body.lever_y_m * sn;
+	double depth = -(s[Y] + ry), rising = s[VY] + w * rx;
+	double limit = p->body.friction * depth * (1 - p->body.law.damping * rising / p->body.speed_m_s) /
+	               (1.5 * p->body.grip);
+
+	if (fabs(s[SLIP]) > limit && fabs(s[SLIP]) > fabs(before[SLIP]))
+		s[SLIP] = copysign(fmax(fabs(before[SLIP]), limit), s[SLIP]);
+}
+
+/* The classical method, the mat given way after each of the steps. */
+static void small_steps(const struct course *p, double step_s, int steps, double s[])
+{
+	double k[4][STATES], mid[STATES], before[STATES];
+	static const double share[4] = {0.0, 0.5, 0.5, 1.0};
+
+	for (int n = 0; n < steps; n++) {
+		memcpy(before, s, sizeof(before));
+		for (int j = 0; j < 4; j++) {
+			for (int i = 0; i < STATES; i++)
+				mid[i] = before[i] + (j > 0 ? share[j] * step_s * k[j - 1][i] : 0.0);
+			room(0.0, mid, k[j], (void *)(uintptr_t)(const void *)p);
+		}
+		for (int i = 0; i < STATES; i++)
+			s[i] += step_s / 6.0 * (k[0][i] + 2.0 * (k[1][i] + k[2][i]) + k[3][i]);
+		give_way(p, before, s);
+	}
+}
+
+static void check_against_others(const struct course *p)
+{
+	enum { SAMPLES = 60, SMALL_STEPS = 2000 };
 	const double step_s = 2e-4;
 	gsl_odeiv2_system system = {room, NULL, STATES, (void *)(uintptr_t)(const void *)p};
 	gsl_odeiv2_driver *driver =
 	        gsl_odeiv2_driver_alloc_y_new(&system, gsl_odeiv2_step_rk8pd, 1e-7, 1e-13, 1e-11);
-	double height = p->lever_x_m * cos(p->angle_rad) + p->lever_y_m * sin(p->angle_rad), t = 0.0;
-	double s[STATES] = {
-	        [Y] = height, [ANGLE] = p->angle_rad, [VY] = -IMPACT_M_S, [PY] = height, [PVY] = -IMPACT_M_S};
-	struct planar_sample samples[SAMPLES];
+	double height = p->body.lever_x_m * cos(p->body.angle_rad) +
+	                p->body.lever_y_m * sin(p->body.angle_rad),
+	       t = 0.0;
+	double s[STATES] = {[Y] = height,
+	                    [ANGLE] = p->body.angle_rad,
+	                    [VY] = -IMPACT_M_S,
+	                    [PY] = height,
+	                    [PVY] = -IMPACT_M_S};
+	struct course_sample samples[SAMPLES];
+	/* where a slip begins or ends the small steps are good to the first order only: at an eighth of them
+	 * the difference is an eighth */
+	double part = p->body.grip > 0.0 ? 2e-5 : 1e-7;
 	bool flew = false;
 
 	assert_non_null(driver);
-	assert_int_equal(planar_history(p, step_s, step_s, samples, SAMPLES), 0);
+	assert_int_equal(course_history(p, step_s, step_s, samples, SAMPLES), 0);
 	for (int i = 0; i < SAMPLES; i++) {
 		double value[4];
 
-		assert_int_equal(gsl_odeiv2_driver_apply(driver, &t, step_s * (i + 1), s), GSL_SUCCESS);
+		if (p->body.grip > 0.0)
+			small_steps(p, step_s / SMALL_STEPS, SMALL_STEPS, s);
+		else
+			assert_int_equal(gsl_odeiv2_driver_apply(driver, &t, step_s * (i + 1), s),
+			                 GSL_SUCCESS);
 		if (strikes_again(p, s, &flew)) {
 			assert_true(flew); /* all of the first touch is compared */
 			break;
 		}
 		readings(p, s, value);
 		for (int k = 0; k < 4; k++)
-			assert_near(samples[i].axis[k], value[k], 1e-7 * 5000.0);
-		assert_near(samples[i].angle_rad, s[ANGLE], 1e-8);
+			assert_near(samples[i].axis[k], value[k], part * 5000.0);
+		assert_near(samples[i].angle_rad, s[ANGLE], 0.1 * part);
 	}
 	gsl_odeiv2_driver_free(driver);
 }
 
-static void like_rk8pd(void **state)
+static void like_plain_methods(void **state)
 {
 	static const char *const geometries[] = {"G1", "2A", "2B"};
 
 	(void)state;
 	for (int g = 0; g < 3; g++)
 		for (double angle = 12.0; angle < 79.0; angle += 11.0) {
-			struct planar p = sharp(geometries[g], angle);
+			struct course p = sharp(geometries[g], angle);
 
-			check_against_gsl(&p);
+			check_against_others(&p);
 			p = identified(geometries[g], angle);
-			check_against_gsl(&p);
-			p.friction = 0.05; /* slips all along */
-			check_against_gsl(&p);
+			check_against_others(&p);
+			p.body.friction = 0.05; /* slips all along */
+			check_against_others(&p);
 		}
 }
 
@@ -437,8 +482,8 @@ static void what_tolerance_means(void **state)
 	(void)state;
 	for (double tolerance = 1e-9; tolerance < 2e-5; tolerance *= 10.0)
 		for (double angle = 15.0; angle < 36.0; angle += 5.0) {
-			struct planar p = identified("2A", angle);
-			struct planar_result exact = solve(&p), r;
+			struct course p = identified("2A", angle);
+			struct course_result exact = solve(&p), r;
 
 			p.tolerance = tolerance;
 			r = solve(&p);
@@ -454,33 +499,33 @@ static void what_tolerance_means(void **state)
 /* At the balance angle without friction nothing turns and the box is coupled's. */
 static void at_the_balance_angle(void **state)
 {
-	struct planar p = sharp("G1", 25);
-	struct planar_result r;
+	struct course p = sharp("G1", 25);
+	struct course_result r;
 
 	(void)state;
-	p.case_mass_kg = 0.173;
-	p.lever_x_m = p.lever_y_m / tan(UNITS_RAD(25.0));
+	p.body.case_mass_kg = 0.173;
+	p.body.lever_x_m = p.body.lever_y_m / tan(UNITS_RAD(25.0));
 	r = solve(&p);
 	assert_near(r.spin_rad_s, 0.0, 1e-9);
 	assert_near(UNITS_DEG(r.s2_direction_rad), 25.0, 1e-9);
-	assert_near_part(r.peak[PLANAR_S2R].value, r.peak[PLANAR_CENTRE_R].value, 1e-12);
-	assert_near_part(r.peak[PLANAR_CENTRE_R].value, 5346.98884644484, 4e-3); /* gravity apart */
+	assert_near_part(r.peak[COURSE_S2R].value, r.peak[COURSE_CENTRE_R].value, 1e-12);
+	assert_near_part(r.peak[COURSE_CENTRE_R].value, 5346.98884644484, 4e-3); /* gravity apart */
 }
 
 /* Without friction no force is along the mat; with a mirrored box all mirrors. */
 static void mirrored(void **state)
 {
-	struct planar p = sharp("G1", 60.0), q = p;
-	struct planar_result r, m;
+	struct course p = sharp("G1", 60.0), q = p;
+	struct course_result r, m;
 
 	(void)state;
-	q.angle_rad = UNITS_RAD(30.0);
-	q.lever_x_m = p.lever_y_m;
-	q.lever_y_m = p.lever_x_m;
+	q.body.angle_rad = UNITS_RAD(30.0);
+	q.body.lever_x_m = p.body.lever_y_m;
+	q.body.lever_y_m = p.body.lever_x_m;
 	r = solve(&p);
 	m = solve(&q);
-	assert_near_part(r.peak[PLANAR_S1X].value, m.peak[PLANAR_S1Y].value, 1e-9);
-	assert_near_part(r.peak[PLANAR_S1Y].value, m.peak[PLANAR_S1X].value, 1e-9);
+	assert_near_part(r.peak[COURSE_S1X].value, m.peak[COURSE_S1Y].value, 1e-9);
+	assert_near_part(r.peak[COURSE_S1Y].value, m.peak[COURSE_S1X].value, 1e-9);
 	assert_near_part(r.spin_rad_s, -m.spin_rad_s, 1e-9);
 	assert_near_part(r.contact_time_s, m.contact_time_s, 1e-9);
 }
@@ -492,16 +537,16 @@ static void energy_is_lost_not_won(void **state)
 	(void)state;
 	for (double e = 0.25; e <= 1.0; e += 0.25)
 		for (double angle = 12.0; angle < 79.0; angle += 11.0) {
-			struct planar p = sharp("G1", angle);
-			struct planar_result r;
+			struct course p = sharp("G1", angle);
+			struct course_result r;
 			double rise, energy;
 
-			assert_int_equal(contact_law_init(&p.law, e), 0);
+			assert_int_equal(contact_law_init(&p.body.law, e), 0);
 			r = solve(&p);
 			rise = r.velocity_change_m_s - IMPACT_M_S - 9.81 * r.contact_time_s;
-			energy = 0.5 * p.case_mass_kg * rise * rise +
-			         0.5 * p.inertia_kg_m2 * r.spin_rad_s * r.spin_rad_s;
-			energy /= 0.5 * p.case_mass_kg * IMPACT_M_S * IMPACT_M_S;
+			energy = 0.5 * p.body.case_mass_kg * rise * rise +
+			         0.5 * p.body.inertia_kg_m2 * r.spin_rad_s * r.spin_rad_s;
+			energy /= 0.5 * p.body.case_mass_kg * IMPACT_M_S * IMPACT_M_S;
 			assert_true(energy < 1.0 + 8e-3 && energy > e * e - 8e-3);
 			if (e > 0.99)
 				assert_near(energy, 1.0, 8e-3);
@@ -514,7 +559,7 @@ int main(void)
 	        cmocka_unit_test(the_sharp_corner),
 	        cmocka_unit_test(the_identified_contact),
 	        cmocka_unit_test(the_study_s_features),
-	        cmocka_unit_test(like_rk8pd),
+	        cmocka_unit_test(like_plain_methods),
 	        cmocka_unit_test(what_tolerance_means),
 	        cmocka_unit_test(at_the_balance_angle),
 	        cmocka_unit_test(mirrored),

@@ -18,10 +18,10 @@
 #include "hil/product.h"
 #include "host/model/model.h"
 
-/* Steps of the plant in a contact time. */
-enum { STEPS = 4000, DROPS = 60 };
+/* Steps of the plant in a contact time: a slip begins and ends with one of them. */
+enum { STEPS = 40000, DROPS = 60 };
 #define PEAK_SHARE 1e-4
-#define TIME_SHARE 1e-3
+#define TIME_SHARE 1e-4
 
 static int drops = DROPS;
 static uint64_t seed = 7;
@@ -55,7 +55,7 @@ static struct scene random_scene(void)
 	        .contact_mass_kg = mass,
 	        .contact_mat_thickness_m = 10.0,
 	        .contact_tangential_ratio = uniform(0.0, 3.0),
-	        .contact_friction = 100.0, /* no slip, whose onset the rung spreads */
+	        .contact_friction = uniform(0.05, 1.0),
 	        .sensor_s2_offset_m = side * uniform(0.0, 0.4),
 	        .mount_plate_mass_kg = mass * spread(0.001, 2.0),
 	        .mount_cube_m = 0.003,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/model/planar.h"
+#include "host/model/course.h"
 
 #include <math.h>
 #include <string.h>
@@ -35,78 +35,56 @@ enum { OFF_ACROSS, OFF_UP, OFF_V_ACROSS, OFF_V_UP, OFF_STATES };
 
 enum { RING_CROSSINGS = 6, RING_PERIODS = RING_CROSSINGS / 2 };
 
+enum change { TOUCHES, LEAVES, LETS_GO };
+
+/* What the last step ended with. */
+struct event {
+	int corner; /* -1: nothing */
+	enum change change;
+};
+
 /* The drop and where it has come to. */
-struct course {
-	const struct planar *in;
+struct run {
+	const struct course *in;
 	struct body body;
 	unsigned touching; /* mask of the corners */
 	struct ode ode;
 	double released_s; /* corner 0 left the mat first; NAN: not yet */
 	double second_s;   /* the second touch of any corner; NAN: none yet */
 	int second_corner;
-	int event;            /* the corner that touches or leaves at the end of the last step; -1: none */
+	struct event event;
 	double contact_end_s; /* whoever has not left the mat by then will not */
 	double period_s;      /* of the plate, 0 without one */
 };
 
-static void planar_rates(const void *context, const double y[], double rate[])
+static void course_rates(const void *context, const double y[], double rate[])
 {
-	const struct course *c = context;
+	const struct run *c = context;
 
 	body_rates(&c->body, c->touching, y, rate);
 }
 
-static void planar_signals(const void *context, const double y[], double value[])
+static void course_signals(const void *context, const double y[], double value[])
 {
-	const struct course *c = context;
+	const struct run *c = context;
 	struct body_reading r;
 
 	body_read(&c->body, c->touching, y, &r);
-	value[PLANAR_S1X] = r.s1_x;
-	value[PLANAR_S1Y] = r.s1_y;
-	value[PLANAR_S2X] = r.s2_x;
-	value[PLANAR_S2Y] = r.s2_y;
-	value[PLANAR_S1R] = sqrt(r.s1_x * r.s1_x + r.s1_y * r.s1_y);
-	value[PLANAR_S2R] = sqrt(r.s2_x * r.s2_x + r.s2_y * r.s2_y);
-	value[PLANAR_CENTRE_R] = sqrt(r.box_x * r.box_x + r.box_y * r.box_y);
-	value[PLANAR_DEPTH] = r.depth_m;
-	value[PLANAR_TRAVEL] = r.travel_m;
-}
-
-static struct body body_of(const struct planar *p)
-{
-	struct body b = {
-	        .turns = true,
-	        .case_mass_kg = p->case_mass_kg,
-	        .plate_mass_kg = p->plate_mass_kg,
-	        .inertia_kg_m2 = p->inertia_kg_m2,
-	        .angle_rad = p->angle_rad,
-	        .gravity_m_s2 = p->gravity_m_s2,
-	        .speed_m_s = p->speed_m_s,
-	        .lever_x_m = p->lever_x_m,
-	        .lever_y_m = p->lever_y_m,
-	        .stiffness_n_m15 = p->stiffness_n_m15,
-	        .wedge = p->wedge,
-	        .damping = p->law.damping,
-	        .grip = p->grip,
-	        .friction = p->friction,
-	        .mount_n_m = p->mount_n_m,
-	        .mount_damping_n_s_m = p->mount_damping_n_s_m,
-	        .softening = p->softening,
-	        .softening_per_m2 = p->softening > 0.0 ? 1.0 / (p->softening_m * p->softening_m) : 0.0,
-	        .mounts_turn = p->mounts_turn,
-	        .s2_offset_m = p->s2_offset_m,
-	        .s1_yaw_rad = p->s1_yaw_rad,
-	};
-
-	body_prepare(&b);
-	return b;
+	value[COURSE_S1X] = r.s1_x;
+	value[COURSE_S1Y] = r.s1_y;
+	value[COURSE_S2X] = r.s2_x;
+	value[COURSE_S2Y] = r.s2_y;
+	value[COURSE_S1R] = sqrt(r.s1_x * r.s1_x + r.s1_y * r.s1_y);
+	value[COURSE_S2R] = sqrt(r.s2_x * r.s2_x + r.s2_y * r.s2_y);
+	value[COURSE_CENTRE_R] = sqrt(r.box_x * r.box_x + r.box_y * r.box_y);
+	value[COURSE_DEPTH] = r.depth_m;
+	value[COURSE_TRAVEL] = r.travel_m;
 }
 
 /* What counts as much in each state. */
-static void planar_scale(const struct course *c, double depth, double scale[])
+static void course_scale(const struct run *c, double depth, double scale[])
 {
-	const struct planar *p = c->in;
+	const struct body *p = &c->body;
 	double stiff = 1.0, reach = sqrt(p->lever_x_m * p->lever_x_m + p->lever_y_m * p->lever_y_m);
 
 	if (p->plate_mass_kg > 0.0) /* a stiff mount moves little */
@@ -122,16 +100,18 @@ static void planar_scale(const struct course *c, double depth, double scale[])
 		scale[body_grip(i)] = depth;
 }
 
-static void planar_start(struct course *c, const struct planar *p)
+static void course_start(struct run *c, const struct course *in)
 {
+	const struct body *p = &in->body;
 	double stiffness, depth, y[BODY_STATES];
 
-	*c = (struct course){.in = p,
-	                     .body = body_of(p),
-	                     .touching = BODY_FIRST,
-	                     .event = -1,
-	                     .released_s = (double)NAN,
-	                     .second_s = (double)NAN};
+	*c = (struct run){.in = in,
+	                  .body = *p,
+	                  .touching = BODY_FIRST,
+	                  .event = {.corner = -1},
+	                  .released_s = (double)NAN,
+	                  .second_s = (double)NAN};
+	body_prepare(&c->body);
 	stiffness = c->body.touch[0].stiffness_n_m15;
 	depth = contact_depth(&p->law, p->case_mass_kg, p->speed_m_s, stiffness);
 	if (p->plate_mass_kg > 0.0)
@@ -139,73 +119,85 @@ static void planar_start(struct course *c, const struct planar *p)
 	c->contact_end_s =
 	        CONTACTS_MAX * contact_duration(&p->law, p->case_mass_kg, p->speed_m_s, stiffness) +
 	        FLIGHT_SHARE * c->period_s;
-	c->ode.count = BODY_ONE_CORNER;
-	c->ode.rates = planar_rates;
+	c->ode.count = p->turns ? BODY_ONE_CORNER : BODY_UPRIGHT;
+	c->ode.rates = course_rates;
 	c->ode.context = c;
-	c->ode.tolerance = p->tolerance;
-	planar_scale(c, depth, c->ode.scale);
+	c->ode.tolerance = in->tolerance;
+	course_scale(c, depth, c->ode.scale);
 	body_start(&c->body, y);
-	ode_start(&c->ode, y, (p->rough ? FIRST_STEP_ROUGH : FIRST_STEP) * depth / p->speed_m_s);
+	ode_start(&c->ode, y, (in->rough ? FIRST_STEP_ROUGH : FIRST_STEP) * depth / p->speed_m_s);
 }
 
-/* ---- touches and releases ---- */
+/* ---- touches, releases, slip ---- */
 
-struct corner_of {
-	const struct course *course;
-	int corner;
+struct change_of {
+	const struct run *run;
+	struct event event;
 };
 
-static double depth_then(double t, void *context)
+/* Above 0 from where the change happened. */
+static double changed(const struct run *c, struct event e, const double y[])
 {
-	const struct corner_of *k = context;
+	double depth;
+
+	if (e.change == LETS_GO)
+		return body_lets_go(&c->body, c->touching, y, e.corner);
+	depth = body_depth(&c->body, y, e.corner);
+	return e.change == TOUCHES ? depth : -depth;
+}
+
+static double changed_then(double t, void *context)
+{
+	const struct change_of *k = context;
 	double y[BODY_STATES] = {0.0};
 
-	ode_at(&k->course->ode, t, y);
-	return body_depth(&k->course->body, y, k->corner);
+	ode_at(&k->run->ode, t, y);
+	return changed(k->run, k->event, y);
 }
 
-/* Whether the mat and a corner part or meet in the last step, and when: its depth, given half way and at the
- * end of it, then changes sign for good, or, of a corner above the mat, dips below within the step. */
-static bool changes(const struct course *c, int corner, double half, double end, double *at)
+/* Whether, and when, a change happens in the last step: by its end, or, of a touch or a hold, by half of it.
+ */
+static bool changes(const struct run *c, struct event e, const double half[], double *at)
 {
-	struct corner_of k = {c, corner};
+	struct change_of k = {c, e};
 	const struct ode_piece *p = &c->ode.last;
-	bool touches = c->touching >> corner & 1u;
-	double middle = 0.5 * (p->from + p->end), low = p->from, high = p->end;
+	bool early = changed(c, e, half) > 0.0;
+	double middle = 0.5 * (p->from + p->end);
 
-	if (touches == (end > 0.0)) {
-		if (touches || !(half > 0.0))
-			return false;
-		high = middle;
-	} else if (touches == (half > 0.0)) {
-		low = middle;
+	if (!(changed(c, e, c->ode.y) > 0.0) && (!early || e.change == LEAVES))
+		return false;
+	if (changed_then(p->from, &k) > 0.0) { /* just left or touched, but for rounding */
+		*at = p->from;
+		return e.change == LETS_GO ||
+		       (e.change == TOUCHES && body_closing(&c->body, p->term[0], e.corner) > 0.0);
 	}
-	if (touches !=
-	    (depth_then(low, &k) > 0.0)) { /* at the very start: just touched or left, but for rounding */
-		*at = low;
-		return !touches && body_closing(&c->body, p->term[0], corner) > 0.0;
-	}
-	return root_find(depth_then, &k, low, high, at) == 0;
+	return root_find(changed_then, &k, p->from, early ? middle : p->end, at) == 0;
 }
 
-/* The first corner that touches or leaves in the last step, -1: none. */
-static int first_change(const struct course *c, double *first)
+/* The first change in the last step. */
+static struct event first_change(const struct run *c, double *first)
 {
+	int corners = c->body.turns ? BODY_CORNERS : 1;
+	bool grips = c->body.turns && c->body.grip > 0.0;
 	double half[BODY_STATES] = {0.0}, at;
-	int corner = -1;
+	struct event found = {.corner = -1};
 
 	*first = INFINITY;
 	ode_at(&c->ode, 0.5 * (c->ode.last.from + c->ode.last.end), half);
-	for (int i = 0; i < BODY_CORNERS; i++)
-		if (changes(c, i, body_depth(&c->body, half, i), body_depth(&c->body, c->ode.y, i), &at) &&
-		    at < *first) {
-			*first = at;
-			corner = i;
-		}
-	return corner;
+	for (int i = 0; i < corners; i++) {
+		bool touches = c->touching >> i & 1u;
+		struct event each[] = {{i, touches ? LEAVES : TOUCHES}, {i, LETS_GO}};
+
+		for (int k = 0; k < (touches && grips ? 2 : 1); k++)
+			if (changes(c, each[k], half, &at) && at < *first) {
+				*first = at;
+				found = each[k];
+			}
+	}
+	return found;
 }
 
-static void planar_touch(struct course *c, int corner)
+static void course_touch(struct run *c, int corner)
 {
 	c->touching |= 1u << corner;
 	if (isnan(c->second_s)) {
@@ -217,54 +209,59 @@ static void planar_touch(struct course *c, int corner)
 	body_touches(&c->body, c->ode.y, corner);
 }
 
-static void planar_leave(struct course *c, int corner)
+static void course_leave(struct run *c, int corner)
 {
 	c->touching &= ~(1u << corner);
 	if (corner == 0 && isnan(c->released_s))
 		c->released_s = c->ode.t;
+	c->body.touch[corner].hold = BODY_STICKS;
+	if (!c->body.turns)
+		return;
 	c->ode.y[body_grip(corner)] = 0.0;
 	if (c->touching <= BODY_FIRST)
 		c->ode.count = BODY_ONE_CORNER;
 }
 
-/* One step, which ends where a corner touches or leaves the mat. */
-static int planar_step(struct course *c, double until)
+/* One step, which ends where something changes. */
+static int course_step(struct run *c, double until)
 {
 	double at;
 	int error;
 
-	if (!c->touching)
+	if (!c->touching && c->body.turns)
 		c->ode.next = fmin(c->ode.next, TURN_MAX / fabs(c->ode.y[BODY_SPIN]));
 	error = ode_step(&c->ode, until);
 	if (error || !(c->ode.last.from > 0.0))
 		return error;
 	c->event = first_change(c, &at);
-	if (c->event >= 0)
+	if (c->event.corner >= 0)
 		ode_cut(&c->ode, at);
 	return 0;
 }
 
 /* What the last step ended with takes effect; true at corner 0's first release. */
-static bool planar_turn_over(struct course *c)
+static bool course_turn_over(struct run *c)
 {
 	bool held = isnan(c->released_s);
-	int corner = c->event;
+	struct event e = c->event;
 
-	if (corner < 0)
+	if (e.corner < 0)
 		return false;
-	c->event = -1;
-	if (c->touching >> corner & 1u)
-		planar_leave(c, corner);
+	c->event.corner = -1;
+	if (e.change == LETS_GO)
+		body_holds(&c->body, c->touching, c->ode.y, e.corner);
+	else if (e.change == LEAVES)
+		course_leave(c, e.corner);
 	else
-		planar_touch(c, corner);
+		course_touch(c, e.corner);
 	ode_renew(&c->ode);
 	return held && !isnan(c->released_s);
 }
 
 /* At corner 0's first release, or at the end of a drop without one. */
-static void conclude_contact(const struct course *c, struct planar_result *r)
+static void conclude_contact(const struct run *c, struct course_result *r)
 {
-	const struct planar *p = c->in;
+	const struct body *p = &c->body;
 	const double *y = c->ode.y;
 	bool released = !isnan(c->released_s);
 
@@ -273,7 +270,7 @@ static void conclude_contact(const struct course *c, struct planar_result *r)
 	r->velocity_change_m_s = p->speed_m_s + y[BODY_V_UP] +
 	                         y[BODY_OFF_V_UP] * p->plate_mass_kg / (p->plate_mass_kg + p->case_mass_kg) +
 	                         p->gravity_m_s2 * c->ode.t;
-	r->spin_rad_s = y[BODY_SPIN];
+	r->spin_rad_s = p->turns ? y[BODY_SPIN] : 0.0;
 }
 
 /* A box whose spin stays, for the plate alone. */
@@ -295,7 +292,7 @@ struct ring {
 	double first_s, first_m_s;
 };
 
-static void ring_step(struct ring *ring, const struct ode *ode, struct planar_result *r)
+static void ring_step(struct ring *ring, const struct ode *ode, struct course_result *r)
 {
 	double t, fall, off[ODE_STATES_MAX];
 
@@ -315,20 +312,20 @@ static void ring_step(struct ring *ring, const struct ode *ode, struct planar_re
 }
 
 /* Whether all peaks asked for are behind; an axis may have a second one, the other way. */
-static bool all_passed(const struct planar *p, const struct watch *watch)
+static bool all_passed(const struct course *p, const struct watch *watch)
 {
-	const unsigned axes = 1u << PLANAR_S1X | 1u << PLANAR_S1Y | 1u << PLANAR_S2X | 1u << PLANAR_S2Y;
+	const unsigned axes = 1u << COURSE_S1X | 1u << COURSE_S1Y | 1u << COURSE_S2X | 1u << COURSE_S2Y;
 
 	if (p->count_ring || (axes & ~p->skipped))
 		return false;
-	for (size_t i = 0; i < PLANAR_SIGNALS; i++)
-		if (!(p->skipped >> i & 1u) && i != PLANAR_DEPTH && !watch_passed(watch, i, PASSED_SHARE))
+	for (size_t i = 0; i < COURSE_SIGNALS; i++)
+		if (!(p->skipped >> i & 1u) && i != COURSE_DEPTH && !watch_passed(watch, i, PASSED_SHARE))
 			return false;
 	return true;
 }
 
 /* The plate alone in undisturbed flight from here on, until three oscillations are counted. */
-static int ring_down(struct course *c, struct planar_result *r)
+static int ring_down(struct run *c, struct course_result *r)
 {
 	const double *y = c->ode.y, *scale = c->ode.scale;
 	const double off[OFF_STATES] = {y[BODY_OFF_ACROSS], y[BODY_OFF_UP], y[BODY_OFF_V_ACROSS],
@@ -356,39 +353,40 @@ static int ring_down(struct course *c, struct planar_result *r)
 
 /* Whether anything asked for may peak after the release. Of the box's signals none does above a light plate
  * that leaves it alone. */
-static bool planar_peaks_in_flight(const struct planar *p)
+static bool course_peaks_in_flight(const struct course *in)
 {
-	const unsigned plate = 1u << PLANAR_S1X | 1u << PLANAR_S1Y | 1u << PLANAR_S1R | 1u << PLANAR_TRAVEL;
+	const struct body *p = &in->body;
+	const unsigned plate = 1u << COURSE_S1X | 1u << COURSE_S1Y | 1u << COURSE_S1R | 1u << COURSE_TRAVEL;
 
 	return p->plate_mass_kg > LIGHT_PLATE * p->case_mass_kg ||
-	       (p->plate_mass_kg > 0.0 && (p->count_ring || (plate & ~p->skipped)));
+	       (p->plate_mass_kg > 0.0 && (in->count_ring || (plate & ~in->skipped)));
 }
 
 /* Steps until the window of peaks ends: the release and, if anything may peak then, a share of the plate's
  * period after it. */
-static int follow(struct course *c, struct watch *watch, struct planar_result *r)
+static int follow(struct run *c, struct watch *watch, struct course_result *r)
 {
-	const struct planar *p = c->in;
-	bool flies = planar_peaks_in_flight(p);
+	const struct course *in = c->in;
+	bool flies = course_peaks_in_flight(in);
 	double end = c->contact_end_s;
 	int error = 0;
 
 	while (!error && c->ode.t < end) {
-		error = planar_step(c, end);
+		error = course_step(c, end);
 		if (error)
 			break;
 		watch_step(watch, &c->ode);
-		if (p->rough && watch_passed(watch, PLANAR_DEPTH, 1.0) && all_passed(p, watch)) {
+		if (in->rough && watch_passed(watch, COURSE_DEPTH, 1.0) && all_passed(in, watch)) {
 			r->cut_short = isnan(c->released_s);
 			break;
 		}
-		if (c->event < 0)
+		if (c->event.corner < 0)
 			continue;
 		watch_end(watch, &c->ode);
-		if (planar_turn_over(c)) {
+		if (course_turn_over(c)) {
 			conclude_contact(c, r);
 			end = flies ? c->ode.t + FLIGHT_SHARE * c->period_s : c->ode.t;
-			if (p->count_ring)
+			if (in->count_ring)
 				error = ring_down(c, r);
 		}
 		watch_resume(watch, &c->ode);
@@ -397,77 +395,91 @@ static int follow(struct course *c, struct watch *watch, struct planar_result *r
 	return error;
 }
 
-int planar_solve(const struct planar *planar, struct planar_result *result)
+/* Of a body that does not turn these are shares of S1R and CENTRE_R. */
+#define UPRIGHT_SKIPS (1u << COURSE_S1X | 1u << COURSE_S1Y | 1u << COURSE_S2X)
+
+static void peaks_upright(struct watch *w)
 {
-	struct planar_result r = {.ring_hz = (double)NAN, .ring_damping = (double)NAN};
-	struct course course;
-	struct watch watch = {.count = PLANAR_SIGNALS,
-	                      .signals = planar_signals,
-	                      .context = &course,
-	                      .skipped = planar->skipped,
-	                      .rough = planar->rough};
+	const enum course_signal of[] = {
+	        [COURSE_S1X] = COURSE_S1R, [COURSE_S1Y] = COURSE_S1R, [COURSE_S2X] = COURSE_CENTRE_R};
+
+	for (int i = COURSE_S1X; i <= COURSE_S2X; i++)
+		w->peak[i] = (struct watch_peak){w->with[of[i]][i], w->peak[of[i]].time_s};
+}
+
+int course_solve(const struct course *in, struct course_result *result)
+{
+	struct course_result r = {.ring_hz = (double)NAN, .ring_damping = (double)NAN};
+	struct run run;
+	struct watch watch = {.count = COURSE_SIGNALS,
+	                      .signals = course_signals,
+	                      .context = &run,
+	                      .skipped = in->skipped | (in->body.turns ? 0u : UPRIGHT_SKIPS),
+	                      .rough = in->rough};
 	int error;
 
-	planar_start(&course, planar);
-	watch_start(&watch, &course.ode);
-	error = follow(&course, &watch, &r);
+	course_start(&run, in);
+	watch_start(&watch, &run.ode);
+	error = follow(&run, &watch, &r);
 	if (error)
 		return error;
-	if (isnan(course.released_s))
-		conclude_contact(&course, &r);
-	for (int i = 0; i < PLANAR_SIGNALS; i++)
+	if (isnan(run.released_s))
+		conclude_contact(&run, &r);
+	if (!in->body.turns)
+		peaks_upright(&watch);
+	for (int i = 0; i < COURSE_SIGNALS; i++)
 		r.peak[i] = watch.peak[i];
-	r.s1_direction_rad = atan2(watch.with[PLANAR_S1R][PLANAR_S1Y], watch.with[PLANAR_S1R][PLANAR_S1X]);
-	r.s2_direction_rad = atan2(watch.with[PLANAR_S2R][PLANAR_S2Y], watch.with[PLANAR_S2R][PLANAR_S2X]);
+	r.s1_direction_rad = atan2(watch.with[COURSE_S1R][COURSE_S1Y], watch.with[COURSE_S1R][COURSE_S1X]);
+	r.s2_direction_rad = atan2(watch.with[COURSE_S2R][COURSE_S2Y], watch.with[COURSE_S2R][COURSE_S2X]);
 	if (r.cut_short)
 		r.velocity_change_m_s = r.spin_rad_s = (double)NAN;
-	r.second_s = course.second_s;
-	r.second_corner = course.second_corner;
-	r.until_s = course.ode.t;
-	r.evaluations = course.ode.evaluations;
+	r.second_s = run.second_s;
+	r.second_corner = run.second_corner;
+	r.until_s = run.ode.t;
+	r.evaluations = run.ode.evaluations;
 	*result = r;
 	return 0;
 }
 
 /* ---- the history ---- */
 
-static struct planar_sample planar_sample_of(const struct course *c, const double y[])
+static struct course_sample course_sample_of(const struct run *c, const double y[])
 {
 	struct body_reading r;
 
 	body_read(&c->body, c->touching, y, &r);
-	return (struct planar_sample){
+	return (struct course_sample){
 	        .axis = {r.s1_x, r.s1_y, r.s2_x, r.s2_y},
 	        .force_n = r.normal_n,
 	        .depth_m = r.depth_m,
 	        .travel_m = r.travel_m,
-	        .angle_rad = c->in->angle_rad + y[BODY_TURN],
+	        .angle_rad = c->body.angle_rad + (c->body.turns ? y[BODY_TURN] : 0.0),
 	};
 }
 
-int planar_history(const struct planar *planar, double start_s, double step_s, struct planar_sample *samples,
+int course_history(const struct course *in, double start_s, double step_s, struct course_sample *samples,
                    size_t count)
 {
 	double end = start_s + step_s * (double)count;
-	struct course course;
+	struct run run;
 	int error = 0;
 
-	planar_start(&course, planar);
+	course_start(&run, in);
 	for (size_t i = 0; i < count && !error; i++) {
 		double t = start_s + (double)i * step_s, y[BODY_STATES] = {0.0};
 
 		if (!(t > 0.0)) {
-			samples[i] = (struct planar_sample){.angle_rad = planar->angle_rad};
+			samples[i] = (struct course_sample){.angle_rad = in->body.angle_rad};
 			continue;
 		}
-		while (!error && course.ode.t < t) {
-			planar_turn_over(&course);
-			error = planar_step(&course, end);
+		while (!error && run.ode.t < t) {
+			course_turn_over(&run);
+			error = course_step(&run, end);
 		}
 		if (error)
 			break;
-		ode_at(&course.ode, t, y);
-		samples[i] = planar_sample_of(&course, y);
+		ode_at(&run.ode, t, y);
+		samples[i] = course_sample_of(&run, y);
 	}
 	return error;
 }
