@@ -6,6 +6,7 @@ A test is a function named test_*; it passes unless it raises. `skip(why)` marks
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -67,6 +68,7 @@ def main(namespace):
     """All tests, or those that stand behind the two build folders."""
     tests = [(name, f) for name, f in namespace.items() if name.startswith("test_") and callable(f)]
     tests = [(name, f) for name, f in tests if name in (sys.argv[3:] or [name])]
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # through what cleans up
     print(f"1..{len(tests)}", flush=True)
     failed = False
     for number, (name, test) in enumerate(tests, 1):

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "tests/unit/archive_trial.h"
+#include "tests/unit/scratch.h"
 
 char trial_folder[64];
 char trial_message[ARCHIVE_MESSAGE_MAX];
@@ -17,8 +18,7 @@ char trial_message[ARCHIVE_MESSAGE_MAX];
 int trial_make_folder(void **state)
 {
 	(void)state;
-	strcpy(trial_folder, "/tmp/droptower-archive-XXXXXX");
-	return mkdtemp(trial_folder) == NULL;
+	return mkdtemp(scratch_name(trial_folder, "archive")) == NULL;
 }
 
 int trial_remove_folder(void **state)

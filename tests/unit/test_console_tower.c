@@ -28,6 +28,7 @@
 #include "host/console/tower.h"
 #include "host/console/work.h"
 #include "tests/unit/drop_by_hand.h"
+#include "tests/unit/scratch.h"
 
 enum {
 	WAIT_MS = 15000, /* for what must come; a test that waits this long has failed */
@@ -380,8 +381,7 @@ static void set_up_fake(void)
 
 static void set_up_folder(void)
 {
-	snprintf(directory, sizeof(directory), "/tmp/droptower-test-XXXXXX");
-	assert_non_null(mkdtemp(directory));
+	assert_non_null(mkdtemp(scratch_name(directory, "tower")));
 	snprintf(bus, sizeof(bus), "%s/bus", directory);
 	snprintf(url, sizeof(url), "unix:%s/socket", bus);
 	snprintf(archive_name, sizeof(archive_name), "%s/archive", directory);

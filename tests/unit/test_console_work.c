@@ -25,6 +25,7 @@
 #include "tests/unit/archive_stock.h"
 #include "tests/unit/drop_by_hand.h"
 #include "tests/unit/near.h"
+#include "tests/unit/scratch.h"
 
 #define SCENE "common/scenes/geometry-2A.ini"
 #define BARE "common/scenes/geometry-1.ini"
@@ -40,13 +41,12 @@ static bool saved_on_disk;
 static int make_folder(void **state)
 {
 	(void)state;
-	strcpy(folder, "/tmp/droptower-work-XXXXXX");
 	memset(&console, 0, sizeof(console));
 	console.at_rest = true;
 	sem_init(&answered, 0, 0);
 	job_queue_init(&console.work_queue);
 	job_queue_init(&console.tower_queue);
-	return mkdtemp(folder) == NULL;
+	return mkdtemp(scratch_name(folder, "work")) == NULL;
 }
 
 static int remove_folder(void **state)

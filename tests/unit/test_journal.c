@@ -18,14 +18,14 @@
 #include <unistd.h>
 
 #include "host/session/journal.h"
+#include "tests/unit/scratch.h"
 
 static char folder[64];
 
 static int set_up(void **state)
 {
 	(void)state;
-	snprintf(folder, sizeof(folder), "/tmp/droptower-journal-XXXXXX");
-	return mkdtemp(folder) == NULL;
+	return mkdtemp(scratch_name(folder, "journal")) == NULL;
 }
 
 static int tear_down(void **state)

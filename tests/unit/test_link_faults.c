@@ -29,6 +29,7 @@
 #include <unistd.h>
 
 #include "common/link/link.h"
+#include "tests/unit/scratch.h"
 
 static struct {
 	unsigned calls, fail_at; /* 0: none */
@@ -173,13 +174,12 @@ static void fail_each(void (*use)(const char *, enum link_mode), const char *url
 		}
 }
 
-static char folder[] = "/tmp/droptower-faults-XXXXXX", path[64], url[80];
+static char folder[SCRATCH_MAX], path[96], url[128];
 
 static int make_folder(void **state)
 {
 	(void)state;
-	strcpy(folder, "/tmp/droptower-faults-XXXXXX");
-	return mkdtemp(folder) == NULL ? -1 : 0;
+	return mkdtemp(scratch_name(folder, "faults")) == NULL ? -1 : 0;
 }
 
 static int remove_folder(void **state)

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "common/link/link.h"
+#include "tests/unit/scratch.h"
 
 #define LINE "(1700000000.000001) can0 123#1122\n"
 
@@ -27,8 +28,7 @@ static int set_up(void **state)
 	int file;
 
 	(void)state;
-	(void)snprintf(path, sizeof(path), "/tmp/droptower-test-XXXXXX");
-	file = mkstemp(path);
+	file = mkstemp(scratch_name(path, "log"));
 	if (file < 0 || close(file) != 0)
 		return -1;
 	(void)snprintf(url, sizeof(url), "log:%s", path);

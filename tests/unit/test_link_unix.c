@@ -24,6 +24,7 @@
 
 #include "common/link/link.h"
 #include "tests/unit/interrupted.h"
+#include "tests/unit/scratch.h"
 
 #define PACKET_BYTES 76u
 #define MANY 20000u
@@ -34,8 +35,7 @@ static char directory[64], path[96], url[128], message[256];
 static int set_up(void **state)
 {
 	(void)state;
-	(void)snprintf(directory, sizeof(directory), "/tmp/droptower-test-XXXXXX");
-	if (mkdtemp(directory) == NULL)
+	if (mkdtemp(scratch_name(directory, "unix")) == NULL)
 		return -1;
 	(void)snprintf(path, sizeof(path), "%s/bus", directory);
 	(void)snprintf(url, sizeof(url), "unix:%s", path);

@@ -15,6 +15,7 @@
 
 #include "common/scenes/scene.h"
 #include "tests/unit/near.h"
+#include "tests/unit/scratch.h"
 
 static char message[SCENE_MESSAGE_MAX];
 
@@ -61,8 +62,7 @@ static int read_changed(const char *key, const char *line, char name[64])
 	int descriptor, result, done = 0;
 
 	assert_non_null(in);
-	strcpy(name, "/tmp/droptower-scene-XXXXXX");
-	descriptor = mkstemp(name);
+	descriptor = mkstemp(scratch_name(name, "scene"));
 	assert_true(descriptor >= 0);
 	out = fdopen(descriptor, "w");
 	assert_non_null(out);

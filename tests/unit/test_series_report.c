@@ -19,6 +19,7 @@
 #include "host/record/drop.h"
 #include "host/record/write.h"
 #include "host/report/series.h"
+#include "tests/unit/scratch.h"
 
 #define TITLE "Box <script>alert(1)</script> & \"plate\""
 
@@ -47,8 +48,7 @@ static int set_up(void **state)
 
 	(void)state;
 	simulated = false;
-	strcpy(folder, "/tmp/droptower-series-XXXXXX");
-	if (!mkdtemp(folder))
+	if (!mkdtemp(scratch_name(folder, "series")))
 		return 1;
 	snprintf(scene, sizeof(scene), "%s/scene.ini", folder);
 	write_scene(scene);

@@ -18,6 +18,7 @@
 
 #include "common/base/number.h"
 #include "common/scenes/settings.h"
+#include "tests/unit/scratch.h"
 
 struct reader {
 	struct settings settings;
@@ -46,8 +47,7 @@ static int read_text(struct reader *reader, const char *text)
 	FILE *out;
 	int result;
 
-	strcpy(file, "/tmp/droptower-settings-XXXXXX");
-	out = fdopen(mkstemp(file), "w");
+	out = fdopen(mkstemp(scratch_name(file, "settings")), "w");
 	assert_non_null(out);
 	fputs(text, out);
 	fclose(out);
