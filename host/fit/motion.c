@@ -5,27 +5,7 @@
 #include <stdbool.h>
 
 #include "common/units.h"
-#include "host/model/contact.h"
-
-enum { UP, TURN, GRIP, V_ACROSS, V_UP, SPIN, OFF_ACROSS, OFF_UP, OFF_V_ACROSS, OFF_V_UP, STATES };
-
-/* Below this angle from the touch on, series are exact to the last digit. */
-#define SMALL_TURN 0.05
-
-struct body {
-	double mass, plate, inertia, gravity, speed;
-	double lever_x, lever_y, cosine, sine, corner_up;
-	double stiffness, damping, grip, friction;
-	double mount_k, mount_c, softening, per_far2;
-	double s2_offset, yaw_cosine, yaw_sine;
-	bool released;
-};
-
-struct load {
-	double cosine, sine, depth, normal;
-	double box_across, box_up, spin_rate; /* accelerations as felt: without gravity */
-	double plate_across, plate_up;
-};
+#include "host/model/body.h"
 
 double motion_node_s(size_t node)
 {
@@ -69,160 +49,62 @@ static void motion_mounts(const struct scene *s, const double p[], struct body *
 {
 	double far = exp(p[MOTION_LN_STRAIN]) * s->mount_cube_m;
 
-	b->mount_k = exp(p[MOTION_LN_MOUNT_K]);
-	b->mount_c = exp(p[MOTION_LN_MOUNT_C]);
+	b->mount_n_m = exp(p[MOTION_LN_MOUNT_K]);
+	b->mount_damping_n_s_m = exp(p[MOTION_LN_MOUNT_C]);
 	b->softening = p[MOTION_SOFTENING];
-	b->per_far2 = 1.0 / (far * far);
+	b->softening_per_m2 = 1.0 / (far * far);
 }
 
 static int motion_body(const struct scene *s, const double p[], struct body *b)
 {
 	double angle = UNITS_RAD(p[MOTION_GAMMA_DEG]), balance = UNITS_RAD(p[MOTION_BALANCE_DEG]);
-	double yaw = UNITS_RAD(p[MOTION_YAW_DEG]);
+	double length = s->product_length_m, width = s->product_width_m;
 	struct contact_law law;
 
 	if (!(angle > 0.0 && angle < UNITS_PI / 2.0 && balance > 0.0 && balance < UNITS_PI / 2.0) ||
 	    contact_law_begin(&law, 1.0 / (1.0 + exp(-p[MOTION_LOGIT_RESTITUTION]))) != 0)
 		return DT_E_NUMERIC;
-	*b = (struct body){.mass = s->product_case_mass_kg,
-	                   .plate = s->mount_plate_mass_kg,
-	                   .gravity = s->drop_gravity_m_s2,
-	                   .speed = exp(p[MOTION_LN_SPEED]),
-	                   .lever_y = s->product_width_m / 2.0,
-	                   .cosine = cos(angle),
-	                   .sine = sin(angle),
-	                   .damping = law.damping,
+	*b = (struct body){.turns = true,
+	                   .clips = true,
+	                   .case_mass_kg = s->product_case_mass_kg,
+	                   .plate_mass_kg = s->mount_plate_mass_kg,
+	                   .inertia_kg_m2 = s->product_inertia_ratio * s->product_case_mass_kg *
+	                                    (length * length + width * width) / 12.0,
+	                   .angle_rad = angle,
+	                   .gravity_m_s2 = s->drop_gravity_m_s2,
+	                   .speed_m_s = exp(p[MOTION_LN_SPEED]),
+	                   .lever_x_m = width / 2.0 / tan(balance),
+	                   .lever_y_m = width / 2.0,
+	                   .stiffness_n_m15 = exp(p[MOTION_LN_STIFFNESS]),
+	                   .wedge = true,
+	                   .law = law,
 	                   .grip = exp(p[MOTION_LN_GRIP]),
 	                   .friction = s->contact_friction,
-	                   .s2_offset = s->sensor_s2_offset_m,
-	                   .yaw_cosine = cos(yaw),
-	                   .yaw_sine = sin(yaw)};
-	b->inertia = s->product_inertia_ratio * b->mass *
-	             (s->product_length_m * s->product_length_m + s->product_width_m * s->product_width_m) /
-	             12.0;
-	b->lever_x = b->lever_y / tan(balance);
-	b->corner_up = -(b->lever_x * b->cosine + b->lever_y * b->sine);
-	b->stiffness = exp(p[MOTION_LN_STIFFNESS]) * sin(UNITS_RAD(50.0)) / sin(2.0 * angle);
-	if (b->plate > 0.0)
+	                   .mounts_turn = true,
+	                   .s2_offset_m = s->sensor_s2_offset_m,
+	                   .s1_yaw_rad = UNITS_RAD(p[MOTION_YAW_DEG])};
+	if (b->plate_mass_kg > 0.0)
 		motion_mounts(s, p, b);
+	body_prepare(b);
 	return 0;
 }
 
-static void motion_turned(const struct body *b, double turn, struct load *l)
-{
-	double t2 = turn * turn, c, s;
-
-	if (t2 < SMALL_TURN * SMALL_TURN) {
-		c = 1.0 - t2 / 2.0 * (1.0 - t2 / 12.0 * (1.0 - t2 / 30.0 * (1.0 - t2 / 56.0)));
-		s = turn * (1.0 - t2 / 6.0 * (1.0 - t2 / 20.0 * (1.0 - t2 / 42.0)));
-	} else {
-		c = cos(turn);
-		s = sin(turn);
-	}
-	l->cosine = b->cosine * c - b->sine * s;
-	l->sine = b->sine * c + b->cosine * s;
-}
-
-/* along: force along the mat; rate: of the tangential deflection */
-static void motion_press(const struct body *b, const double y[], const double arm[2], struct load *l,
-                         double *along, double *rate)
-{
-	double root = sqrt(l->depth), closing = y[SPIN] * arm[0] - y[V_UP],
-	       sliding = y[V_ACROSS] + y[SPIN] * arm[1];
-	double most;
-
-	l->normal = b->stiffness * l->depth * root * (1.0 + b->damping * closing / b->speed);
-	if (!(l->normal > 0.0)) {
-		l->normal = 0.0;
-		return;
-	}
-	most = b->friction * l->normal;
-	*along = -1.5 * b->grip * b->stiffness * root * y[GRIP];
-	*rate = sliding;
-	if (fabs(*along) > most) {
-		*along = copysign(most, *along);
-		if (sliding * y[GRIP] > 0.0)
-			*rate = 0.0;
-	}
-}
-
-static struct load motion_rates(const struct body *b, const double y[], double rate[])
-{
-	struct load l = {.normal = 0.0};
-	double arm[2], along = 0.0, pull[2] = {0.0, 0.0};
-
-	motion_turned(b, y[TURN], &l);
-	arm[0] = b->lever_y * l.cosine - b->lever_x * l.sine;
-	arm[1] = -(b->lever_x * l.cosine + b->lever_y * l.sine);
-	l.depth = b->corner_up - arm[1] - y[UP];
-	rate[GRIP] = 0.0;
-	if (l.depth > 0.0 && !b->released)
-		motion_press(b, y, arm, &l, &along, &rate[GRIP]);
-	if (b->plate > 0.0) {
-		const double *off = y + OFF_ACROSS;
-		double k = b->mount_k *
-		           (1.0 + b->softening / (1.0 + (off[0] * off[0] + off[1] * off[1]) * b->per_far2));
-
-		pull[0] = k * off[0] + b->mount_c * (y[OFF_V_ACROSS] - y[SPIN] * off[1]);
-		pull[1] = k * off[1] + b->mount_c * (y[OFF_V_UP] + y[SPIN] * off[0]);
-		l.plate_across = -pull[0] / b->plate;
-		l.plate_up = -pull[1] / b->plate;
-	}
-	l.box_across = (along + pull[0]) / b->mass;
-	l.box_up = (l.normal + pull[1]) / b->mass;
-	l.spin_rate = (arm[1] * along - arm[0] * l.normal) / b->inertia;
-	rate[UP] = y[V_UP];
-	rate[TURN] = y[SPIN];
-	rate[V_ACROSS] = l.box_across;
-	rate[V_UP] = l.box_up - b->gravity;
-	rate[SPIN] = l.spin_rate;
-	rate[OFF_ACROSS] = y[OFF_V_ACROSS];
-	rate[OFF_UP] = y[OFF_V_UP];
-	rate[OFF_V_ACROSS] = l.plate_across - l.box_across;
-	rate[OFF_V_UP] = l.plate_up - l.box_up;
-	return l;
-}
-
 /* rate: at y */
-static void motion_step(const struct body *b, double y[], const double rate[], size_t states, double h)
+static void motion_step(const struct body *b, unsigned touching, double y[], const double rate[], double h)
 {
-	double k2[STATES], k3[STATES], k4[STATES], mid[STATES];
+	double k2[BODY_ONE_CORNER], k3[BODY_ONE_CORNER], k4[BODY_ONE_CORNER], mid[BODY_ONE_CORNER];
 
-	for (size_t i = 0; i < STATES; i++)
+	for (size_t i = 0; i < BODY_ONE_CORNER; i++)
 		mid[i] = y[i] + 0.5 * h * rate[i];
-	motion_rates(b, mid, k2);
-	for (size_t i = 0; i < STATES; i++)
+	body_rates(b, touching, mid, k2, NULL);
+	for (size_t i = 0; i < BODY_ONE_CORNER; i++)
 		mid[i] = y[i] + 0.5 * h * k2[i];
-	motion_rates(b, mid, k3);
-	for (size_t i = 0; i < STATES; i++)
+	body_rates(b, touching, mid, k3, NULL);
+	for (size_t i = 0; i < BODY_ONE_CORNER; i++)
 		mid[i] = y[i] + h * k3[i];
-	motion_rates(b, mid, k4);
-	for (size_t i = 0; i < states; i++)
+	body_rates(b, touching, mid, k4, NULL);
+	for (size_t i = 0; i < BODY_ONE_CORNER; i++)
 		y[i] += h / 6.0 * (rate[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
-}
-
-static void motion_read(const struct body *b, const struct load *l, double spin, double axis[MOTION_AXES])
-{
-	double box_x = l->box_across * l->sine + l->box_up * l->cosine;
-	double box_y = l->box_up * l->sine - l->box_across * l->cosine;
-	double x = box_x, y = box_y;
-
-	if (b->plate > 0.0) {
-		x = l->plate_across * l->sine + l->plate_up * l->cosine;
-		y = l->plate_up * l->sine - l->plate_across * l->cosine;
-	}
-	axis[MOTION_S1X] = (x * b->yaw_cosine - y * b->yaw_sine) / UNITS_G_M_S2;
-	axis[MOTION_S1Y] = (x * b->yaw_sine + y * b->yaw_cosine) / UNITS_G_M_S2;
-	axis[MOTION_S2X] = (box_x - spin * spin * b->s2_offset) / UNITS_G_M_S2;
-	axis[MOTION_S2Y] = (box_y - l->spin_rate * b->s2_offset) / UNITS_G_M_S2;
-}
-
-/* The deepest of the other three corners is in the mat. */
-static bool motion_other_touches(const struct body *b, const struct load *l, const double y[])
-{
-	double x = b->lever_x * l->cosine, side = b->lever_y * l->sine, up = y[UP] - b->corner_up;
-
-	return up - x - side + 2.0 * fmin(x, side) <= 0.0;
 }
 
 /* ---- what is derived ---- */
@@ -261,24 +143,24 @@ static void derived_release(struct derived *d, const struct body *b, size_t node
 	double share = d->depth / (d->depth - depth), from = motion_node_s(node - 1);
 
 	d->into[MOTION_CONTACT_S] = from + share * (motion_node_s(node) - from);
-	d->into[MOTION_RESTITUTION] = (d->up + share * (up - d->up)) / b->speed;
+	d->into[MOTION_RESTITUTION] = (d->up + share * (up - d->up)) / b->speed_m_s;
 	d->into[MOTION_SPIN_RAD_S] = d->spin + share * (spin - d->spin);
 }
 
-static void derived_node(struct derived *d, const struct body *b, size_t node, const double y[],
-                         const struct load *l, const double axis[])
+static void derived_node(struct derived *d, const struct body *b, size_t node, const double y[], double depth,
+                         bool released, const double axis[])
 {
-	double up = y[V_UP] + y[OFF_V_UP] * b->plate / (b->plate + b->mass);
+	double up = y[BODY_V_UP] + y[BODY_OFF_V_UP] * b->plate_mass_kg / (b->plate_mass_kg + b->case_mass_kg);
 
 	for (int i = 0; i < MOTION_AXES; i++)
 		motion_peak(&d->axis[i], node, axis[i]);
 	for (int s = 0; s < 2; s++)
 		motion_peak(&d->resultant[s], node, hypot(axis[2 * s], axis[2 * s + 1]));
-	if (node > 0 && !b->released && l->depth <= 0.0)
-		derived_release(d, b, node, l->depth, up, y[SPIN]);
-	d->depth = l->depth;
+	if (node > 0 && !released && depth <= 0.0)
+		derived_release(d, b, node, depth, up, y[BODY_SPIN]);
+	d->depth = depth;
 	d->up = up;
-	d->spin = y[SPIN];
+	d->spin = y[BODY_SPIN];
 }
 
 static void derived_end(struct derived *d)
@@ -288,6 +170,14 @@ static void derived_end(struct derived *d)
 	d->into[MOTION_S2R_G] = d->resultant[1].value;
 	for (int i = 0; i < MOTION_AXES; i++)
 		d->into[MOTION_PEAK_S1X_G + i] = d->axis[i].value;
+}
+
+static void motion_read(const struct body_reading *r, double axis[MOTION_AXES])
+{
+	axis[MOTION_S1X] = r->s1_x / UNITS_G_M_S2;
+	axis[MOTION_S1Y] = r->s1_y / UNITS_G_M_S2;
+	axis[MOTION_S2X] = r->s2_x / UNITS_G_M_S2;
+	axis[MOTION_S2Y] = r->s2_y / UNITS_G_M_S2;
 }
 
 /* ---- the sensors' high-pass: exact for what goes straight between nodes ---- */
@@ -320,7 +210,8 @@ int motion_solve(const struct scene *scene, const double p[MOTION_PARAMETERS], s
 	const struct high_pass pass[2] = {high_pass_of(scene->sensor_iepe_time_constant_s, MOTION_FINE_S),
 	                                  high_pass_of(scene->sensor_iepe_time_constant_s, MOTION_COARSE_S)};
 	struct derived derived = {.into = into};
-	double y[STATES] = {0.0}, rate[STATES], raw[2][MOTION_AXES];
+	double y[BODY_STATES], rate[BODY_STATES], raw[2][MOTION_AXES];
+	bool released = false;
 	struct body b;
 	int error = motion_body(scene, p, &b);
 
@@ -329,26 +220,29 @@ int motion_solve(const struct scene *scene, const double p[MOTION_PARAMETERS], s
 	if (into)
 		for (int i = 0; i < MOTION_DERIVED; i++)
 			into[i] = (double)NAN;
-	y[V_UP] = -b.speed;
+	body_start(&b, y);
 	for (size_t n = 0; n < most; n++) {
-		struct load l = motion_rates(&b, y, rate);
+		struct body_reading r;
+		double depth;
 
-		if (b.released && motion_other_touches(&b, &l, y))
+		body_rates(&b, released ? 0u : BODY_FIRST, y, rate, &r);
+		if (released && r.lowest_m > 0.0)
 			break;
-		motion_read(&b, &l, y[SPIN], raw[n & 1]);
+		motion_read(&r, raw[n & 1]);
 		motion_sense(&pass[n > MOTION_FINE_NODES], n ? raw[~n & 1] : zero, raw[n & 1],
 		             n ? motion->axis[n - 1] : zero, motion->axis[n]);
+		depth = released || r.depth_m > 0.0 ? r.depth_m : body_depth(&b, y, 0);
 		if (into)
-			derived_node(&derived, &b, n, y, &l, raw[n & 1]);
-		b.released = b.released || (n > 0 && l.depth <= 0.0);
+			derived_node(&derived, &b, n, y, depth, released, raw[n & 1]);
+		released = released || (n > 0 && depth <= 0.0);
 		motion->nodes = n + 1;
-		motion_step(&b, y, rate, b.plate > 0.0 ? STATES : OFF_ACROSS,
+		motion_step(&b, released ? 0u : BODY_FIRST, y, rate,
 		            n < MOTION_FINE_NODES ? MOTION_FINE_S : MOTION_COARSE_S);
 	}
 	motion->end_s = motion_node_s(motion->nodes - 1);
 	if (into)
 		derived_end(&derived);
-	for (int i = 0; i < STATES; i++)
+	for (int i = 0; i < BODY_ONE_CORNER; i++)
 		if (!isfinite(y[i]))
 			return DT_E_NUMERIC;
 	return 0;

@@ -2,10 +2,10 @@
 #ifndef DT_HOST_FIT_MOTION_H
 #define DT_HOST_FIT_MOTION_H
 /*
- * The history of one drop for a fit: the body of host/model/course.h (its mounts turn with the box) by
- * classical Runge-Kutta on fixed nodes, the same for every set of parameters, so that differences of two
- * histories are smooth in what differs. Only the first touch of one corner; its contact is over for good when
- * the depth is back at 0. Time 0 is the touch. SI units; pure functions, any thread.
+ * The history of one drop for a fit: host/model/body.h (its mounts turn with the box) by classical
+ * Runge-Kutta on fixed nodes, the same for every set of parameters, so that differences of two histories are
+ * smooth in what differs. Only the first touch of one corner; its contact is over for good when the depth is
+ * back at 0. Time 0 is the touch. SI units; pure functions, any thread.
  */
 #include <stddef.h>
 

@@ -75,7 +75,7 @@ struct body {
 	double softening, softening_per_m2; /* 1/u_s^2 */
 	bool mounts_turn;                   /* their dampers turn with the box */
 	double s2_offset_m, s1_yaw_rad;
-	bool clips; /* for steps that do not end where a hold does: none beyond the limit in between */
+	bool clips; /* for steps that do not end where a hold does: the deflection stops beyond the limit */
 
 	/* by body_prepare */
 	double cosine, sine, corner_up_m; /* of the angle; of corner 0 from the centre, at the touch */
@@ -112,19 +112,21 @@ void body_holds(struct body *body, unsigned touching, double y[], int corner);
 /* Where the tangential deflection under a corner stands in the state. */
 int body_grip(int corner);
 
-/* Rates of the states; `touching`: the mask of the corners the mat may push now (its grip states other than
- * corner 0's are left alone unless one of theirs is in it). */
-void body_rates(const struct body *body, unsigned touching, const double y[], double rate[]);
-
 /* What the sensors read, and what else an instant shows. */
 struct body_reading {
 	double s1_x, s1_y, s2_x, s2_y; /* m/s^2 */
 	double box_x, box_y;           /* at the box's centre of gravity */
 	double normal_n;               /* of all corners together */
 	double depth_m;                /* of the deepest touching corner, 0 when none touches */
+	double lowest_m;               /* of the lowest corner: its depth, below 0 above the mat */
 	double travel_m;               /* plate against box; signed if the body does not turn */
 };
 void body_read(const struct body *body, unsigned touching, const double y[], struct body_reading *reading);
+
+/* Rates of the states; `touching`: the mask of the corners the mat may push now (its grip states other than
+ * corner 0's are left alone unless one of theirs is in it). reading may be NULL. */
+void body_rates(const struct body *body, unsigned touching, const double y[], double rate[],
+                struct body_reading *reading);
 
 /* The plate alone in free flight, the box's spin constant: rates of its off-states, in the order
  * across, up, v_across, v_up. */

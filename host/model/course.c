@@ -61,7 +61,7 @@ static void course_rates(const void *context, const double y[], double rate[])
 {
 	const struct run *c = context;
 
-	body_rates(&c->body, c->touching, y, rate);
+	body_rates(&c->body, c->touching, y, rate, NULL);
 }
 
 static void course_signals(const void *context, const double y[], double value[])
