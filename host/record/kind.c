@@ -15,10 +15,7 @@ static const struct {
         {257, "ustar", 5, "a tar archive: unpack it"},
         {0, "MATLAB 5.0 ", 11, "a MATLAB 5 file: save the matrix as text, or as .npy"},
         {0, "MATLAB 7.3 ", 11, "a MATLAB 7.3 file: save the matrix with -v6 or -v7, or as text"},
-        {0, "\x93NUMPY", 6, "a NumPy array"},
-        {0, "RIFF", 4, "a WAV file"},
-        {0, "RF64", 4, "a WAV file (RF64)"},
-        {0, "TDSm", 4, "a TDMS file"},
+        {0, "RF64", 4, "a WAV file of more than 4 GiB (RF64): cut it"},
         {0, "\x1a\x45\xdf\xa3", 4, "an EBML file, as the IDE files of enDAQ are: export it as CSV"},
         {0, "MDF     ", 8, "an MDF file of ASAM: export it as CSV"},
         {0, "LOGG", 4, "a CAN log of Vector (BLF): save it as ASC or candump text"},
@@ -40,5 +37,10 @@ int kind_refuse(const struct source *source, char message[READ_MESSAGE_MAX])
 		    memcmp(source->bytes + kinds[i].at, kinds[i].magic, kinds[i].length) == 0)
 			return source_refuse(message, DT_E_UNKNOWN, source->file, 0, "this is %s",
 			                     kinds[i].name);
+	if (source->size > 5 && memcmp(source->bytes, "date ", 5) == 0 &&
+	    memmem(source->bytes, source->size < 200 ? source->size : 200, "\nbase ", 6) != NULL)
+		return source_refuse(
+		        message, DT_E_UNKNOWN, source->file, 0,
+		        "this is a CAN log of Vector (ASC): asc2log of can-utils makes candump text of it");
 	return 0;
 }

@@ -9,6 +9,7 @@
 #include "host/record/lcm_codec.h"
 #include "host/record/log_index.h"
 #include "host/record/seal.h"
+#include "host/record/table_data.h"
 #include "host/record/uff58.h"
 
 /* ---- what is no log ---- */
@@ -26,6 +27,24 @@ static int refuse_columns(const char *file, char *message)
 	                     "this format names its channels itself, expected no --columns");
 }
 
+/* Without names and units of ours. */
+static int read_foreign(struct record *record, struct source *source, const char *columns, char *message)
+{
+	table_reader *reader = table_reader_of(source);
+	struct table_data table = {.format = NULL};
+	int error;
+
+	if (reader == NULL) {
+		error = kind_refuse(source, message);
+		return error ? error : read_delimited(record, source, columns, message);
+	}
+	error = reader(&table, source, message);
+	if (!error)
+		error = table_data_record(&table, record, source, columns, message);
+	table_data_free(&table);
+	return error;
+}
+
 static int read_dispatch(struct record *record, struct source *source, const char *columns,
                          char message[READ_MESSAGE_MAX])
 {
@@ -38,11 +57,8 @@ static int read_dispatch(struct record *record, struct source *source, const cha
 		reader = read_csv;
 	else if (uff58_is(source))
 		reader = read_uff58;
-	sealed = reader == NULL ? kind_refuse(source, message) : 0;
-	if (sealed < 0)
-		return sealed;
 	if (!reader)
-		return read_delimited(record, source, columns, message);
+		return read_foreign(record, source, columns, message);
 	if (columns)
 		return refuse_columns(source->file, message);
 	sealed = reader == read_csv || reader == read_uff58 ? seal_check(source, message) : 0;

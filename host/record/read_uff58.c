@@ -56,7 +56,7 @@ static void name_channel(const struct reading *reading, const struct uff58_head 
 		snprintf(name, 32, "channel %zu", reading->record->channel_count + 1);
 }
 
-static int read_uff58_check_channel(struct reading *reading, const struct uff58_head *head)
+static int read_uff58_check_channel(struct reading *reading, const struct uff58_head *head, size_t least)
 {
 	struct source_line at = reading->text.line;
 	int error = 0;
@@ -70,8 +70,8 @@ static int read_uff58_check_channel(struct reading *reading, const struct uff58_
 		error = UFF58_REFUSE(&reading->text, DT_E_FORMAT,
 		                     "\"%.32s\" has a step of %g s, expected more than 0", head->id[0],
 		                     head->step_s);
-	/* a number takes 13 bytes at least: this bounds the memory */
-	else if (head->count < 2 || head->count > (reading->text.source->size - reading->samples) / 13)
+	/* a number takes so many bytes at least: this bounds the memory */
+	else if (head->count < 2 || head->count > (reading->text.source->size - reading->samples) / least)
 		error = UFF58_REFUSE(&reading->text, DT_E_FORMAT,
 		                     "\"%.32s\" has %zu samples, expected 2 to what the file holds",
 		                     head->id[0], head->count);
@@ -115,11 +115,12 @@ static int settle_times(struct reading *reading, const struct uff58_head *head, 
 	return error ? UFF58_REFUSE(&reading->text, error, "%s", error_text(error)) : 0;
 }
 
-static int read_uff58_channel(struct reading *reading, const struct uff58_head *head)
+static int read_uff58_channel(struct reading *reading, const struct uff58_head *head,
+                              const struct uff58_binary *binary)
 {
 	struct channel *channel;
 	double *time_s = NULL;
-	int error = read_uff58_check_channel(reading, head);
+	int error = read_uff58_check_channel(reading, head, binary != NULL ? 4 : 13);
 	uint64_t line;
 	char name[32];
 
@@ -138,7 +139,8 @@ static int read_uff58_channel(struct reading *reading, const struct uff58_head *
 	line = reading->text.line.number + 1;
 	if (reading->record->channel_count <= DROP_CHANNELS)
 		reading->line[reading->record->channel_count - 1] = line;
-	error = uff58_read_data(&reading->text, head, channel->value_g, time_s);
+	error = binary != NULL ? uff58_read_bytes(&reading->text, head, binary, channel->value_g)
+	                       : uff58_read_data(&reading->text, head, channel->value_g, time_s);
 	if (!error)
 		settle_samples(channel, unit_factor_g(head->unit));
 	if (!error && time_s)
@@ -271,23 +273,33 @@ static int read_mask(struct reading *reading, const struct uff58_head *head)
 
 /* ---- the file ---- */
 
-static int read_dataset(struct reading *reading)
+/* Programs also call an acceleration general, and tell it by its unit. */
+static bool is_acceleration(const struct uff58_head *head)
+{
+	return head->function == UFF58_TIME_RESPONSE &&
+	       (head->quantity == UFF58_ACCELERATION || head->quantity == UFF58_UNKNOWN ||
+	        (head->quantity == UFF58_GENERAL && unit_factor_g(head->unit) > 0));
+}
+
+static int read_dataset(struct reading *reading, const struct uff58_binary *binary)
 {
 	struct uff58_head head = {.function = 0};
 	int error = uff58_read_head(&reading->text, &head);
-	bool own = strncmp(head.id[1], UFF58_OWN, strlen(UFF58_OWN)) == 0;
+	bool own = binary == NULL && strncmp(head.id[1], UFF58_OWN, strlen(UFF58_OWN)) == 0;
+	size_t data = reading->text.line.next;
 
 	if (error)
 		return error;
 	if (own && head.function == UFF58_UNKNOWN) {
 		error = read_mask(reading, &head);
-	} else if (head.function == UFF58_TIME_RESPONSE &&
-	           (head.quantity == UFF58_ACCELERATION || head.quantity == UFF58_UNKNOWN)) {
-		error = read_uff58_channel(reading, &head);
+	} else if (is_acceleration(&head)) {
+		error = read_uff58_channel(reading, &head, binary);
 		if (!error && own)
 			error = read_own_channel(reading, &head);
 		reading->foreign |= !own;
 	}
+	if (binary != NULL)
+		uff58_skip_bytes(&reading->text, data, binary);
 	return error ? error : uff58_skip_dataset(&reading->text);
 }
 
@@ -307,11 +319,16 @@ static int read_uff58_all(struct reading *reading)
 		if (error)
 			return error;
 		uff58_take(&reading->text.line, 0, reading->text.line.length, number, sizeof(number));
-		if (strncmp(number, "58b", 3) == 0)
-			return UFF58_REFUSE(&reading->text, DT_E_FORMAT,
-			                    "dataset 58b is binary, expected ASCII (58)");
-		error = strcmp(number, "58") == 0 ? read_dataset(reading)
-		                                  : uff58_skip_dataset(&reading->text);
+		if (strncmp(number, "58b", 3) == 0) {
+			struct uff58_binary binary;
+
+			error = uff58_read_binary(&reading->text, &binary);
+			if (!error)
+				error = read_dataset(reading, &binary);
+		} else {
+			error = strcmp(number, "58") == 0 ? read_dataset(reading, NULL)
+			                                  : uff58_skip_dataset(&reading->text);
+		}
 	}
 	if (!error && reading->record->channel_count == 0)
 		return UFF58_REFUSE(&reading->text, DT_E_FORMAT,

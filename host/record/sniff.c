@@ -480,15 +480,16 @@ static int settle_time(struct sniff *sniff, const struct times *times, const cha
 	return 0;
 }
 
-static int refuse_no_channel(struct sniff *sniff, const struct times *times, const char *file, char *message)
+static int refuse_no_channel(struct sniff *sniff, const struct times *times, bool has_rate, const char *file,
+                             char *message)
 {
 	char one[SPEC_MAX], other[SPEC_MAX];
-	size_t time = times->count > 0 ? times->first : 0;
+	size_t time = times->count > 0 ? times->first : has_rate ? sniff->columns.count : 0;
 	const struct unit *unit = times->count > 0 ? times->unit[times->first] : NULL;
 
 	suggest(sniff, time, unit != NULL ? unit->name : "s", true, one);
 	suggest(sniff, time, "ms", true, other);
-	if (unit != NULL)
+	if (unit != NULL || has_rate)
 		return source_refuse(
 		        message, DT_E_FORMAT, file, 0,
 		        "no column tells a unit of acceleration, expected --columns \"%s\" or with m/s2 "
@@ -541,7 +542,7 @@ static int settle_names(struct sniff *sniff, const struct piece *units, struct t
 			offer_time(times, i, times->unit[i] != NULL ? times->unit[i] : unit);
 	}
 	if (columns->channels == 0)
-		return refuse_no_channel(sniff, times, file, message);
+		return refuse_no_channel(sniff, times, has_rate, file, message);
 	if (!has_rate || times->count == 1) {
 		error = settle_time(sniff, times, file, message);
 		if (error)

@@ -13,6 +13,7 @@
 enum {
 	UFF58_UNKNOWN = 0,       /* function type, quantity */
 	UFF58_TIME_RESPONSE = 1, /* function type */
+	UFF58_GENERAL = 1,       /* quantity */
 	UFF58_ACCELERATION = 12, /* quantity */
 	UFF58_TIME = 17,         /* quantity */
 	UFF58_SINGLE = 2,        /* real data, 13 columns a number */

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "common/base/number.h"
+#include "host/record/table_data.h"
 
 /* ---- columns ---- */
 
@@ -197,6 +198,52 @@ int uff58_read_data(struct uff58_text *text, const struct uff58_head *head, doub
 			                     k ? time_s[k - 1] : 0.0);
 	}
 	return error;
+}
+
+/* Format (I6,1A1,I6,I6,I12,I12,I6,I6,I12,I12): "    58b     1     2          11       20000 ..." */
+int uff58_read_binary(struct uff58_text *text, struct uff58_binary *binary)
+{
+	int order, format, lines, bytes;
+
+	if (!uff58_text_take_whole(&text->line, 7, 6, &order) ||
+	    !uff58_text_take_whole(&text->line, 13, 6, &format) ||
+	    !uff58_text_take_whole(&text->line, 19, 12, &lines) ||
+	    !uff58_text_take_whole(&text->line, 31, 12, &bytes))
+		return UFF58_REFUSE(text, DT_E_FORMAT,
+		                    "58b without byte order, format, lines and bytes in their columns");
+	if ((order != 1 && order != 2) || format != 2 || lines != 11 || bytes < 0)
+		return UFF58_REFUSE(
+		        text, DT_E_FORMAT,
+		        "58b with byte order %d, format %d, %d lines, expected 1 or 2, 2 (IEEE), 11", order,
+		        format, lines);
+	*binary = (struct uff58_binary){.big = order == 2, .bytes = (size_t)bytes};
+	return 0;
+}
+
+int uff58_read_bytes(struct uff58_text *text, const struct uff58_head *head,
+                     const struct uff58_binary *binary, double *value)
+{
+	enum bytes_kind kind = head->precision == UFF58_DOUBLE ? BYTES_F64 : BYTES_F32;
+	size_t size = bytes_size(kind), room = text->source->size - text->line.next;
+
+	if (!head->even)
+		return UFF58_REFUSE(text, DT_E_FORMAT,
+		                    "\"%.32s\" is binary with uneven times, expected even ones", head->id[0]);
+	if (binary->bytes != head->count * size || binary->bytes > room)
+		return UFF58_REFUSE(
+		        text, DT_E_FORMAT,
+		        "\"%.32s\" has %zu samples of %zu bytes, 58b says %zu bytes and %zu are there",
+		        head->id[0], head->count, size, binary->bytes, room);
+	for (size_t k = 0; k < head->count; k++)
+		value[k] = bytes_value(text->source->bytes + text->line.next + k * size, kind, binary->big);
+	return 0;
+}
+
+void uff58_skip_bytes(struct uff58_text *text, size_t data, const struct uff58_binary *binary)
+{
+	size_t room = text->source->size - data;
+
+	text->line.next = data + (binary->bytes < room ? binary->bytes : room);
 }
 
 bool uff58_is(const struct source *source)

@@ -47,6 +47,22 @@ DT_MUST_USE int uff58_skip_dataset(struct uff58_text *text);
 
 DT_MUST_USE int uff58_read_head(struct uff58_text *text, struct uff58_head *head);
 
+/* What the first line of a dataset 58b says of its numbers. */
+struct uff58_binary {
+	bool big;
+	size_t bytes; /* behind the head's lines */
+};
+
+/* Of the line read last. Other than IEEE numbers behind eleven lines are refused. */
+DT_MUST_USE int uff58_read_binary(struct uff58_text *text, struct uff58_binary *binary);
+
+/* As uff58_read_data, of the bytes behind the head; evenly spaced only. */
+DT_MUST_USE int uff58_read_bytes(struct uff58_text *text, const struct uff58_head *head,
+                                 const struct uff58_binary *binary, double *value);
+
+/* Behind the bytes, wherever the line read last was. */
+void uff58_skip_bytes(struct uff58_text *text, size_t data, const struct uff58_binary *binary);
+
 /* head->count values; time_s only for uneven spacing, else NULL. */
 DT_MUST_USE int uff58_read_data(struct uff58_text *text, const struct uff58_head *head, double *value,
                                 double *time_s);

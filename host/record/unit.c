@@ -108,6 +108,11 @@ static size_t sign_at(const char *text, size_t length, char *as)
 			*as = signs[i].as;
 			return 2;
 		}
+	/* the same signs in one byte, as files without UTF-8 have them */
+	if (*text == '\262' || *text == '\265') {
+		*as = *text == '\262' ? '2' : 'u';
+		return 1;
+	}
 	*as = *text >= 'A' && *text <= 'Z' ? (char)(*text - 'A' + 'a') : *text;
 	return 1;
 }

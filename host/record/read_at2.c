@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ *
+ * Ground motion of PEER (.AT2): title lines, one with UNITS OF G, one with NPTS and DT in one of four
+ * spellings, then numbers, as many as that says.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "common/base/number.h"
+#include "host/record/cells.h"
+#include "host/record/table_data.h"
+
+enum { AT2_HEAD_LINES = 12 };
+
+struct at2 {
+	size_t points;
+	double step_s;
+	bool has_units;
+	struct source_line line; /* of NPTS: numbers follow */
+};
+
+static const char *at2_find(const struct source_line *line, const char *word)
+{
+	size_t length = strlen(word);
+
+	for (size_t i = 0; i + length <= line->length; i++)
+		if (strncasecmp(line->text + i, word, length) == 0)
+			return line->text + i;
+	return NULL;
+}
+
+/* The numbers of a line, in order. */
+static size_t at2_numbers(const struct source_line *line, double value[2])
+{
+	size_t found = 0;
+
+	for (size_t at = 0; at < line->length && found < 2;) {
+		size_t end = at;
+
+		while (end < line->length && !strchr(" \t,=", line->text[end]))
+			end++;
+		found += end > at && number_parse(line->text + at, end - at, '.', &value[found]);
+		at = end + 1;
+	}
+	return found;
+}
+
+static bool at2_head(const struct source *source, struct at2 *at2)
+{
+	struct source_line line = {0};
+	double value[2] = {0, 0};
+
+	while (line.number < AT2_HEAD_LINES && source_next_line(source, &line)) {
+		if (at2_find(&line, "UNITS OF G") != NULL)
+			at2->has_units = true;
+		if (at2_find(&line, "NPTS") == NULL || at2_find(&line, "DT") == NULL)
+			continue;
+		at2->line = line;
+		if (at2_numbers(&line, value) == 2 && value[0] >= 2 && value[0] < 1e9 && value[1] > 0) {
+			at2->points = (size_t)value[0];
+			at2->step_s = value[1];
+		}
+		return true;
+	}
+	return false;
+}
+
+bool at2_is(const struct source *source)
+{
+	struct at2 at2 = {.points = 0};
+
+	return at2_head(source, &at2);
+}
+
+int read_at2(struct table_data *table, const struct source *source, char message[READ_MESSAGE_MAX])
+{
+	struct at2 at2 = {.points = 0};
+	struct source_line line;
+	struct table_column *column;
+	struct cells cells;
+	size_t used = 0;
+
+	(void)at2_head(source, &at2);
+	table->format = "at2";
+	line = at2.line;
+	if (at2.points == 0 || at2.points > source->size)
+		return source_refuse(
+		        message, DT_E_FORMAT, source->file, line.number,
+		        "NPTS and DT without a count and a step, expected \"NPTS= 4000, DT= .005 SEC\"");
+	if (!at2.has_units)
+		return source_refuse(message, DT_E_FORMAT, source->file, 0,
+		                     "ground motion without UNITS OF G, expected an acceleration");
+	column = table_data_add(table, at2.points);
+	if (column == NULL)
+		return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
+	snprintf(column->name, sizeof(column->name), "acceleration");
+	snprintf(column->unit, sizeof(column->unit), "g");
+	column->rate_hz = 1 / at2.step_s;
+	while (source_next_line(source, &line)) {
+		cells_split((struct cells_style){' ', '.'}, line.text, line.length, &cells);
+		for (size_t i = 0; i < cells.count; i++, used++) {
+			if (i < CELLS_MAX && used < at2.points &&
+			    cells_number(&cells, i, &column->value[used]))
+				continue;
+			if (cells.count == 1 && cells.cell[0].length == 0) {
+				used--;
+				continue;
+			}
+			return source_refuse(
+			        message, DT_E_FORMAT, source->file, line.number,
+			        "\"%.*s\" as number %zu, expected %zu numbers",
+			        i < CELLS_MAX && cells.cell[i].length < 40 ? (int)cells.cell[i].length : 0,
+			        cells.cell[i < CELLS_MAX ? i : 0].text, used + 1, at2.points);
+		}
+	}
+	if (used == at2.points)
+		return 0;
+	return source_refuse(message, DT_E_FORMAT, source->file, 0,
+	                     "%zu numbers, expected NPTS = %zu: the file is cut", used, at2.points);
+}

@@ -1,0 +1,305 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/table_data.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/record/profile.h"
+#include "host/record/sniff.h"
+#include "host/record/timebase.h"
+
+/* A rate the user gives may be off the file's by this part. */
+static const double RATE_PART = 0.01;
+
+/* ---- numbers ---- */
+
+size_t bytes_size(enum bytes_kind kind)
+{
+	static const size_t sizes[] = {1, 1, 2, 2, 3, 4, 4, 8, 8, 4, 8};
+
+	return sizes[kind];
+}
+
+uint64_t bytes_whole(const char *at, size_t size, bool big)
+{
+	uint64_t value = 0;
+
+	for (size_t i = 0; i < size; i++)
+		value = value << 8 | (unsigned char)at[big ? i : size - 1 - i];
+	return value;
+}
+
+double bytes_value(const char *at, enum bytes_kind kind, bool big)
+{
+	uint64_t bits = bytes_whole(at, bytes_size(kind), big);
+	uint32_t low = (uint32_t)bits;
+	float single;
+	double value;
+
+	switch (kind) {
+	case BYTES_F32:
+		memcpy(&single, &low, sizeof(single));
+		return (double)single;
+	case BYTES_F64:
+		memcpy(&value, &bits, sizeof(value));
+		return value;
+	case BYTES_I8:
+		return (double)(int8_t)bits;
+	case BYTES_I16:
+		return (double)(int16_t)bits;
+	case BYTES_I24:
+		return (double)((int32_t)(low << 8) / 256);
+	case BYTES_I32:
+		return (double)(int32_t)low;
+	case BYTES_I64:
+		return (double)(int64_t)bits;
+	default:
+		return (double)bits;
+	}
+}
+
+/* ---- a table ---- */
+
+struct table_column *table_data_add(struct table_data *table, size_t count)
+{
+	struct table_column *more = realloc(table->column, (table->count + 1) * sizeof(*more));
+	struct table_column *column;
+
+	if (more == NULL)
+		return NULL;
+	table->column = more;
+	column = &more[table->count];
+	*column =
+	        (struct table_column){.count = count, .value = calloc(count > 0 ? count : 1, sizeof(double))};
+	if (column->value == NULL)
+		return NULL;
+	table->count++;
+	return column;
+}
+
+void table_data_free(struct table_data *table)
+{
+	for (size_t i = 0; i < table->count; i++)
+		free(table->column[i].value);
+	free(table->column);
+	*table = (struct table_data){.format = NULL};
+}
+
+/* ---- to a record ---- */
+
+struct making {
+	const struct table_data *table;
+	const struct source *source;
+	struct record *record;
+	struct columns columns;
+	struct timebase timebase;
+	size_t time; /* column; beyond the last: none */
+	char *message;
+};
+
+static int make_time(struct making *making)
+{
+	const struct column *spec = &making->columns.column[making->time];
+	const struct table_column *column = &making->table->column[making->time];
+	double *time_s = malloc((column->count > 0 ? column->count : 1) * sizeof(*time_s)), largest = 0;
+	struct timebase_fault fault;
+	int error = 0;
+
+	if (time_s == NULL)
+		return source_refuse(making->message, DT_E_MEMORY, making->source->file, 0, "%s",
+		                     error_text(DT_E_MEMORY));
+	for (size_t k = 0; k < column->count; k++) {
+		time_s[k] = column->value[k] / spec->divisor;
+		largest = fmax(largest, fabs(time_s[k]));
+		if (!isfinite(time_s[k]))
+			error = source_refuse(making->message, DT_E_FORMAT, making->source->file, 0,
+			                      "time of row %zu is no number", k + 1);
+	}
+	if (!error && column->count < 2)
+		error = source_refuse(making->message, DT_E_FORMAT, making->source->file, 0,
+		                      "%zu rows, expected more", column->count);
+	if (!error) {
+		error = timebase_find(time_s, column->count, largest * (double)FLT_EPSILON, 0,
+		                      &making->timebase, &fault);
+		if (error)
+			source_refuse(making->message, error, making->source->file, 0, "row %zu: %s",
+			              fault.row + 1, error == DT_E_MEMORY ? error_text(error) : fault.why);
+	}
+	free(time_s);
+	return error;
+}
+
+static int refuse_rate(const struct making *making, const struct table_column *column)
+{
+	return source_refuse(making->message, DT_E_FORMAT, making->source->file, 0,
+	                     "tells a rate of %.9g Hz, but --columns %.9g Hz, expected one", column->rate_hz,
+	                     making->columns.rate_hz);
+}
+
+static int make_channel(struct making *making, size_t i)
+{
+	const struct column *spec = &making->columns.column[i];
+	const struct table_column *column = &making->table->column[i];
+	bool timed = making->time < making->table->count;
+	double rate_hz = timed                         ? 1 / making->timebase.step_s
+	                 : making->columns.rate_hz > 0 ? making->columns.rate_hz
+	                                               : column->rate_hz;
+	struct channel *channel;
+
+	if (column->rate_hz > 0 && making->columns.rate_hz > 0 &&
+	    fabs(column->rate_hz / making->columns.rate_hz - 1) > RATE_PART)
+		return refuse_rate(making, column);
+	if (!(rate_hz > 0) || !isfinite(rate_hz))
+		return source_refuse(
+		        making->message, DT_E_ARGUMENT, making->source->file, 0,
+		        "tells no rate and has no time column, expected --columns \"%s:g@RATE_HZ\"",
+		        spec->name);
+	if (column->count < 2 || (timed && column->count != making->table->column[making->time].count))
+		return source_refuse(
+		        making->message, DT_E_FORMAT, making->source->file, 0,
+		        "%s has %zu samples, expected as many as there are times, and two or more",
+		        spec->name, column->count);
+	channel = record_add_channel(making->record, spec->name, rate_hz, column->count);
+	if (channel == NULL)
+		return source_refuse(making->message, DT_E_MEMORY, making->source->file, 0, "%s",
+		                     error_text(DT_E_MEMORY));
+	channel->start_s = timed ? 0 : column->start_s;
+	channel->flags = timed && making->timebase.uneven ? RECORD_FLAG_UNEVEN : 0;
+	for (size_t k = 0; k < column->count; k++) {
+		bool good = isfinite(column->value[k] / spec->divisor);
+
+		channel->value_g[k] = good ? column->value[k] / spec->divisor : NAN;
+		channel->sample[k] = good ? 0 : SAMPLE_BAD;
+	}
+	if (timed && timebase_spread(&making->timebase, channel) != 0)
+		return source_refuse(making->message, DT_E_MEMORY, making->source->file, 0, "%s",
+		                     error_text(DT_E_MEMORY));
+	return 0;
+}
+
+static int make_all(struct making *making)
+{
+	int error = 0;
+
+	making->time = making->table->count;
+	for (size_t i = 0; i < making->columns.count; i++)
+		if (making->columns.column[i].kind == COLUMN_TIME)
+			making->time = i;
+	if (making->time < making->table->count)
+		error = make_time(making);
+	for (size_t i = 0; i < making->columns.count && !error; i++)
+		if (making->columns.column[i].kind == COLUMN_CHANNEL)
+			error = make_channel(making, i);
+	timebase_free(&making->timebase);
+	return error;
+}
+
+/* What the table tells of itself. */
+static int make_sniffed(struct making *making)
+{
+	const struct table_data *table = making->table;
+	struct sniff *sniff = calloc(1, sizeof(*sniff));
+	struct piece *units = calloc(table->count + 1, sizeof(*units));
+	bool has_rate = true;
+	int error = sniff == NULL || units == NULL ? DT_E_MEMORY : 0;
+
+	for (size_t i = 0; i < table->count && !error; i++) {
+		sniff->name[i] = (struct piece){table->column[i].name, strlen(table->column[i].name)};
+		units[i] = (struct piece){table->column[i].unit, strlen(table->column[i].unit)};
+		has_rate &= table->column[i].rate_hz > 0;
+	}
+	if (!error)
+		error = sniff_names(sniff, table->count, units, has_rate, making->source->file,
+		                    making->message);
+	if (!error && sniff->time_unit_open)
+		error = source_refuse(making->message, DT_E_FORMAT, making->source->file, 0,
+		                      "the time column tells no unit, expected --columns");
+	if (!error) {
+		making->columns = sniff->columns;
+		sniff_tell(sniff, NULL, making->record->read_as, sizeof(making->record->read_as));
+		error = make_all(making);
+	}
+	free(sniff);
+	free(units);
+	return error;
+}
+
+static int make_named(struct making *making, const char *columns)
+{
+	int error = columns_parse(&making->columns, columns, making->message);
+
+	if (!error && making->columns.count != making->table->count)
+		error = source_refuse(making->message, DT_E_FORMAT, making->source->file, 0,
+		                      "%zu columns, expected %zu as --columns says", making->table->count,
+		                      making->columns.count);
+	return error ? error : make_all(making);
+}
+
+static int make_by(struct making *making, const char *columns)
+{
+	char path[4096];
+	struct profile *profile = NULL;
+	int error = 0;
+
+	if (columns == NULL ? profile_beside(making->source->file, path) : columns[0] == '@') {
+		profile = calloc(1, sizeof(*profile));
+		error = profile == NULL ? source_refuse(making->message, DT_E_MEMORY, making->source->file, 0,
+		                                        "%s", error_text(DT_E_MEMORY))
+		                        : profile_read(profile, columns != NULL ? columns + 1 : path,
+		                                       making->message);
+		columns = profile != NULL ? profile->columns : NULL;
+	}
+	if (!error)
+		error = columns != NULL ? make_named(making, columns) : make_sniffed(making);
+	if (!error && profile != NULL)
+		snprintf(making->record->read_as, sizeof(making->record->read_as),
+		         "profile %.100s says: %.250s", profile->path, profile->columns);
+	free(profile);
+	return error;
+}
+
+int table_data_record(const struct table_data *table, struct record *record, const struct source *source,
+                      const char *columns, char message[READ_MESSAGE_MAX])
+{
+	struct record filled;
+	struct making *making = calloc(1, sizeof(*making));
+	int error;
+
+	if (making == NULL)
+		return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
+	*making = (struct making){.table = table, .source = source, .record = &filled, .message = message};
+	record_init(&filled);
+	if (table->count == 0 || table->count > COLUMNS_MAX)
+		error = source_refuse(message, DT_E_FORMAT, source->file, 0, "%zu columns, expected 1 to %d",
+		                      table->count, COLUMNS_MAX);
+	else
+		error = make_by(making, columns);
+	free(making);
+	if (error) {
+		record_free(&filled);
+		return error;
+	}
+	strcpy(filled.format, table->format);
+	record_begin_at_zero(&filled);
+	record_finish(&filled);
+	*record = filled;
+	return 0;
+}
+
+table_reader *table_reader_of(const struct source *source)
+{
+	static const struct {
+		const char *magic;
+		size_t length;
+		table_reader *reader;
+	} readers[] = {{"\x93NUMPY", 6, read_npy}, {"RIFF", 4, read_wav}, {"TDSm", 4, read_tdms}};
+
+	for (size_t i = 0; i < sizeof(readers) / sizeof(readers[0]); i++)
+		if (source->size > readers[i].length &&
+		    memcmp(source->bytes, readers[i].magic, readers[i].length) == 0)
+			return readers[i].reader;
+	return at2_is(source) ? read_at2 : NULL;
+}
