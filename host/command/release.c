@@ -139,7 +139,10 @@ static int release_refused(struct release *release, int result)
 {
 	char difference[SESSION_MESSAGE_MAX];
 
-	command_error("the tower refuses: %s", error_text(result));
+	if (session_view(release->session)->two_towers)
+		command_error("two towers on this bus: their clocks disagree, expected one");
+	else
+		command_error("the tower refuses: %s", error_text(result));
 	if (result == DT_E_PARAMETERS && tower_setup_difference(release->session, difference))
 		command_error("  %s", difference);
 	tell_checks(release, session_view(release->session)->checks);
@@ -263,6 +266,8 @@ static int release_turn(struct release *release)
 		return release_stop(release, false);
 	if (result != 0)
 		return command_link_failed("waiting for the checks", result);
+	if (view->two_towers)
+		return release_refused(release, DT_E_STATE);
 	if (view->state == WIRE_STATE_FAULT_HELD)
 		return held(release);
 	follow_checks(release);
