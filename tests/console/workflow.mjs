@@ -42,7 +42,7 @@ async function alwaysVisible() {
 	await desk.untilText("#heartbeat", /^\d+\.\d s$/);
 	await desk.untilText("#bus", /^[1-9]\d* %$/);
 	/* a stall of the machine may cost some, which test_console does not forgive */
-	await desk.untilText("#lost", /^(none|[1-9]\d* blocks?)$/);
+	await desk.untilText("#lost", /^(none|[1-9]\d* blocks?.* since .+)$/);
 	if (await desk.text("#lost") !== "none")
 		note(`lost: ${await desk.text("#lost")}`);
 	await desk.untilText("#disk", /GB|MB/);

@@ -27,15 +27,17 @@ function align(series) {
 	return uPlot.join(series.map(({ x, y }) => [x, y]));
 }
 
-const plainNumber = (value) => (value == null ? "" : String(value).replace("-", "−"));
+/* No digits beyond what a scale has: those of a logarithmic one are no round numbers. */
+const plainNumber = (value, digits) =>
+	value == null ? "" : String(Number(value.toPrecision(digits))).replace("-", "−");
 
-function axes(unit, xUnit) {
+function axes(unit, xUnit, log) {
 	const common = {
 		stroke: colour("--ink"),
 		font: "14px sans-serif",
 		grid: { stroke: colour("--line"), width: 1 },
 		ticks: { stroke: colour("--line"), width: 1 },
-		values: (_, values) => values.map(plainNumber),
+		values: (_, values) => values.map((value) => plainNumber(value, log ? 3 : 9)),
 		labelSize: 20,
 		labelFont: "14px sans-serif",
 	};
@@ -160,19 +162,23 @@ export class Group {
 		const { title, unit = "g", height = 210, limit, log = false, xUnit = "ms", xDecimals = 3 } = options;
 		/* uPlot would go on to the next power of ten */
 		const fit = log ? { range: (_, min, max) => (min > 0 ? [min / 1.1, max * 1.1] : [1, 10]) } : {};
+		/* where the page has little room it says how high */
+		const size = () => ({
+			width: Math.max(280, host.clientWidth),
+			height: parseFloat(getComputedStyle(host).getPropertyValue("--chart-height")) || height,
+		});
 		host.replaceChildren();
 		const chart = new uPlot(
 			{
 				title,
-				height,
-				width: Math.max(280, host.clientWidth),
+				...size(),
 				cursor: {
 					sync: { key: this.#sync.key, scales: ["x", null] },
 					drag: { x: true, y: false },
 					points: { size: 7 },
 				},
 				scales: { x: { time: false, distr: log ? 3 : 1, ...fit }, y: { distr: log ? 3 : 1, ...fit } },
-				axes: axes(unit, xUnit),
+				axes: axes(unit, xUnit, log),
 				series: [
 					{
 						label: log ? "frequency" : "time",
@@ -193,9 +199,7 @@ export class Group {
 		host.setAttribute("role", "group");
 		host.setAttribute("aria-label", `${title}: arrow keys move the cursor`);
 		host.onkeydown = (event) => event.target === host && keyCursor(chart, event);
-		const sizes = new ResizeObserver(
-			() => host.clientWidth > 0 && chart.setSize({ width: host.clientWidth, height }),
-		);
+		const sizes = new ResizeObserver(() => host.clientWidth > 0 && chart.setSize(size()));
 		sizes.observe(host);
 		this.#charts.push({ chart, host, sizes });
 		if (this.#span) chart.setScale("x", this.#span);

@@ -3,7 +3,8 @@
 import * as abort from "./abort.js";
 import { keepToken, post, takeId, takeToken } from "./api.js";
 import * as arm from "./arm.js";
-import { resultOf, rowOf, traceOf } from "./drops.js";
+import { resultOf, rowsOf, traceOf } from "./drops.js";
+import * as decide from "./decide.js";
 import { attempt, byId, message, setData, show } from "./dom.js";
 import * as history from "./history.js";
 import { give, holding, retake, take } from "./hold.js";
@@ -15,7 +16,6 @@ import * as setup from "./setup.js";
 import * as simulation from "./simulation.js";
 import * as steps from "./steps.js";
 import { follow } from "./stream.js";
-import { decide, reasonButtons } from "./table.js";
 import { showDisconnected, showTop } from "./top.js";
 import * as traces from "./traces.js";
 import { clock } from "./words.js";
@@ -25,7 +25,6 @@ const root = document.documentElement;
 /* known: the archive has told the drops of the series, so that it is known whether one is undecided */
 const model = { state: null, connected: false, known: false, pending: "", setupOpen: false };
 const AGAIN_MS = 1000; /* until an archive that did not answer is asked again */
-const deferred = new Set(); /* drops to be decided later */
 const seen = { revision: -1, series: "", result: "", captureEnd: NaN, step: "" };
 let live = null;
 let drops = [];
@@ -77,16 +76,17 @@ async function openDrop(name) {
 			return null;
 		});
 		const trace = traceOf(name),
-			row = rowOf(name);
-		for (const asked of [trace, row]) asked.catch(() => {});
+			rows = rowsOf(name);
+		for (const asked of [trace, rows]) asked.catch(() => {});
 		const result = await found;
-		if (result) showResult(name, result, false);
-		else hideResult();
+		if (result) showResult(name, result);
+		else hideResult(name);
 		openView("drop");
 		openTab("traces");
 		await traces.showTraces(name, result);
-		if (result && (await row)?.simulated) showResult(name, result, true);
+		if (result) showResult(name, result, await rows);
 		setData(root, "result", name);
+		if (model.state) steps.render(model);
 	});
 }
 
@@ -102,12 +102,12 @@ async function newResult(name) {
 	if (!Number.isNaN(captureEnd)) setData(root, "resultMs", Math.round(performance.now() - captureEnd));
 }
 
+/* The oldest drop of the series that nobody has decided on. */
 function findPending() {
-	const last = drops.at(-1);
-	const name = last && `${last.series}/${last.number}`;
-	const open =
-		last && last.series === model.state?.series?.name && last.state === "recorded" && last.decision === "open";
-	model.pending = open && !deferred.has(name) ? name : "";
+	const isOpen = (drop) =>
+		drop.series === model.state?.series?.name && drop.state === "recorded" && drop.decision === "open";
+	const drop = drops.find(isOpen);
+	model.pending = drop ? `${drop.series}/${drop.number}` : "";
 }
 
 async function reload() {
@@ -198,32 +198,6 @@ function onConnected(is, why) {
 
 /* ---- what the operator does ---- */
 
-function listenDecide() {
-	const form = (open) => {
-		show(byId("reject-form"), open);
-		show(byId("decide"), !open);
-		show(byId("decide-later"), !open);
-		if (!open) return;
-		byId("reason").focus({ preventScroll: true });
-		byId("reject-form").scrollIntoView({ block: "nearest" });
-	};
-	byId("reasons").replaceChildren(...reasonButtons(byId("reason")));
-	byId("accept").addEventListener("click", () => attempt(() => decide(model.pending, "accepted")));
-	byId("reject").addEventListener("click", () => form(true));
-	byId("reject-cancel").addEventListener("click", () => form(false));
-	byId("reject-form").addEventListener("submit", async (event) => {
-		event.preventDefault();
-		if (!(await attempt(() => decide(model.pending, "rejected", byId("reason").value.trim())))) return;
-		byId("reason").value = "";
-		form(false);
-	});
-	byId("decide-later").addEventListener("click", () => {
-		deferred.add(model.pending);
-		findPending();
-		steps.render(model);
-	});
-}
-
 function openSetup(open) {
 	model.setupOpen = open;
 	steps.render(model);
@@ -241,7 +215,7 @@ function listen() {
 	history.listen(openDrop);
 	simulation.listen();
 	setup.listen(() => openSetup(false));
-	listenDecide();
+	decide.listen(() => model.pending, openDrop);
 	for (const tab of TABS) byId(`tab-${tab}`).addEventListener("click", () => openTab(tab));
 	byId("tab-live").parentElement.addEventListener("keydown", tabKeys);
 	for (const view of ["drop", "history"]) byId(`view-${view}`).addEventListener("click", () => openView(view));

@@ -46,11 +46,8 @@ export const modelOf = (drop) =>
 
 export const resultOf = async (drop) => (await get(`/api/drop/${path(drop)}`)).json();
 
-/* What the archive says of it. */
-export async function rowOf(drop) {
-	const [series, number] = drop.split("/");
-	return (await getJson("/api/drops", { series, number })).drops[0];
-}
+/* What the archive says of its series' drops. */
+export const rowsOf = async (drop) => (await getJson("/api/drops", { series: drop.split("/")[0] })).drops;
 
 export const spectrumOf = (drop, kind) =>
 	keep(`spectrum ${kind} ${drop}`, async () => (await get(`/api/spectrum/${path(drop)}`, { kind })).json());

@@ -1,7 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What came out of a drop, on one card. */
+/* What came out of a drop, on one card, with all that is needed to decide on it first. */
 import { byId, el, show } from "./dom.js";
 import { FLAGS, number, plain, statusWords, withSigma } from "./words.js";
+
+const OUTLIER_SD = 3;
+const LEAST = 3; /* drops: of fewer the SD says little */
+
+let shown = { name: "", doubts: [] };
 
 /* The value is what is read from afar. */
 function valueAndSigma(text) {
@@ -19,46 +24,76 @@ function cell(key, value, sigma, status, decimals = 1) {
 	);
 }
 
-function peaks(result) {
-	const channel = (name) => result.channels.find((c) => c.name === name)?.peak ?? {};
-	const resultant = (sensor) => result.resultants.find((r) => r.sensor === sensor) ?? {};
-	const rows = ["X", "Y", "Z"].map((axis) =>
-		el(
-			"tr",
-			{},
-			el("th", { scope: "row" }, axis),
-			...["S1", "S2"].map((sensor) => {
-				const peak = channel(sensor + axis);
-				return cell(`${sensor}_${axis}`.toLowerCase(), peak.value_g, peak.sigma_g, peak.status);
-			}),
-		),
+/* How many SDs the value is from the mean of the other accepted drops of its series; NaN of fewer than three. */
+function deviation(key, value, others) {
+	const values = others.filter((drop) => !drop.not_ok?.includes(key)).map((drop) => drop[`${key}_g`]);
+	const known = values.filter(Number.isFinite);
+	if (known.length < LEAST || !Number.isFinite(value)) return NaN;
+	const mean = known.reduce((sum, v) => sum + v, 0) / known.length;
+	return (value - mean) / Math.sqrt(known.reduce((sum, v) => sum + (v - mean) ** 2, 0) / (known.length - 1));
+}
+
+function deviationCell(key, value, others) {
+	const sds = deviation(key, value, others);
+	const level = Math.abs(sds) >= OUTLIER_SD ? "warn" : "soft";
+	const text = Number.isFinite(sds) ? `${sds > 0 ? "+" : ""}${number(sds, 1)}` : "–";
+	return el("td", { class: `number ${level}`, data: { key: `${key}_sd`, value: sds } }, text);
+}
+
+function row(head, cells) {
+	return el("tr", {}, el("th", { scope: "row" }, head), ...cells.flat());
+}
+
+/* JSON's null is no number, but times 1000 it is 0. */
+const milli = (seconds) => (Number.isFinite(seconds) ? 1000 * seconds : NaN);
+
+const SENSORS = ["S1", "S2"];
+
+function peakRow(axis, result, others) {
+	return row(
+		axis,
+		SENSORS.map((sensor) => {
+			const key = `${sensor}_${axis === "XY" ? "r" : axis}`.toLowerCase();
+			const of =
+				axis === "XY"
+					? result.resultants.find((r) => r.sensor === sensor)
+					: result.channels.find((c) => c.name === sensor + axis)?.peak;
+			const value = of?.peak_g ?? of?.value_g;
+			return [cell(key, value, of?.sigma_g, of?.status), deviationCell(key, value, others)];
+		}),
 	);
-	rows.push(
-		el(
-			"tr",
-			{ class: "strong" },
-			el("th", { scope: "row" }, "XY"),
-			...["S1", "S2"].map((sensor) => {
-				const r = resultant(sensor);
-				return cell(`${sensor}_r`.toLowerCase(), r.peak_g, r.sigma_g, r.status);
-			}),
-		),
+}
+
+function pulseRow(head, result, what) {
+	return row(
+		head,
+		SENSORS.map((sensor) => {
+			const pulse = result.channels.find((c) => c.name === `${sensor}X`)?.pulse ?? {};
+			return [what(sensor.toLowerCase(), pulse), el("td", {})];
+		}),
 	);
+}
+
+function numbers(result, others) {
+	const head = SENSORS.flatMap((sensor) => [
+		el("th", { class: sensor.toLowerCase(), scope: "col" }, sensor),
+		el("th", { class: "soft", scope: "col" }, el("abbr", { title: "from the mean of the other accepted drops" }, "SDs")),
+	]);
 	return el(
 		"table",
 		{ class: "peaks" },
+		el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "peak, g"), ...head)),
 		el(
-			"thead",
+			"tbody",
 			{},
-			el(
-				"tr",
-				{},
-				el("th", { class: "number" }, "peak, g"),
-				el("th", { class: "s1", scope: "col" }, "S1"),
-				el("th", { class: "s2", scope: "col" }, "S2"),
+			...["X", "Y", "Z", "XY"].map((axis) => peakRow(axis, result, others)),
+			pulseRow("pulse X, ms", result, (sensor, { duration_s: value, sigma_duration_s: sigma, status }) =>
+				cell(`${sensor}_duration`, milli(value), milli(sigma), status, 2),
+			),
+			pulseRow("ΔV X, m/s", result, (sensor, { velocity_change_m_s: value, sigma_velocity_m_s: sigma }) =>
+				cell(`${sensor}_velocity`, value, sigma, "", 2),
 			),
 		),
-		el("tbody", {}, ...rows),
 	);
 }
 
@@ -70,51 +105,37 @@ function withStatus(text, status) {
 	return !status || status === "ok" ? text : `${text} (${statusWords(status)})`;
 }
 
-/* JSON's null is no number, but times 1000 it is 0. */
-const milli = (seconds) => (Number.isFinite(seconds) ? 1000 * seconds : NaN);
-
 const inUnit = (text, unit) => (text === "–" ? text : `${text} ${unit}`);
 
-function velocity(result, sensor) {
-	const pulse = result.channels.find((c) => c.name === `${sensor}X`)?.pulse;
-	return fact(
-		`Velocity change, ${sensor} X`,
-		`${sensor.toLowerCase()}_velocity`,
-		pulse?.velocity_change_m_s,
-		inUnit(withSigma(pulse?.velocity_change_m_s, pulse?.sigma_velocity_m_s, 2), "m/s"),
-	);
+function plateFacts({ frequency_hz: hz, sigma_hz, damping_ratio: damping, sigma_damping, status }) {
+	return [
+		fact("Plate", "frequency", hz, withStatus(inUnit(withSigma(hz, sigma_hz, 1), "Hz"), status)),
+		fact("Damping ratio", "damping", damping, withSigma(damping, sigma_damping, 4)),
+	];
 }
 
-function facts(result) {
-	const { lag, plate, model } = result;
-	const items = [];
-	if (lag)
-		items.push(
-			fact(
-				"S1 after S2",
-				"lag_largest_peak",
-				lag.largest_peak_s,
-				withStatus(inUnit(withSigma(milli(lag.largest_peak_s), milli(lag.sigma_s), 3), "ms"), lag.status),
-			),
-		);
-	if (plate)
-		items.push(
-			fact(
-				"Plate",
-				"frequency",
-				plate.frequency_hz,
-				withStatus(inUnit(withSigma(plate.frequency_hz, plate.sigma_hz, 1), "Hz"), plate.status),
-			),
-			fact(
-				"Damping ratio",
-				"damping",
-				plate.damping_ratio,
-				withSigma(plate.damping_ratio, plate.sigma_damping, 4),
-			),
-		);
-	items.push(velocity(result, "S2"), velocity(result, "S1"));
-	if (model?.fidelity) items.push(fact("Model", "model", model.fidelity, difference(model)));
-	return el("dl", { class: "facts-list" }, ...items);
+function lagFact({ largest_peak_s: lag, sigma_s, status }) {
+	const text = withStatus(inUnit(withSigma(milli(lag), milli(sigma_s), 3), "ms"), status);
+	return fact("S1 after S2", "lag_largest_peak", lag, text);
+}
+
+function processing({ filter, cutoff_hz: cutoff, highpass_undone_s: undone }) {
+	const done = [
+		filter && `${plain(filter)}${cutoff ? ` ${number(cutoff, 0)} Hz` : ""}`,
+		undone && `high-pass of ${number(undone, 2)} s undone`,
+	].filter(Boolean);
+	return fact("Processing", "processing", done.length, done.join(", ") || "none");
+}
+
+function facts({ lag, plate, model, processing: done }) {
+	return el(
+		"dl",
+		{ class: "facts-list" },
+		lag ? lagFact(lag) : null,
+		...(plate ? plateFacts(plate) : []),
+		model?.fidelity ? fact("Model", "model", model.fidelity, difference(model)) : null,
+		done ? processing(done) : null,
+	);
 }
 
 function difference(model) {
@@ -129,45 +150,76 @@ function difference(model) {
 }
 
 /* Each flag once, with the channels that have it. */
-function flagLines(result) {
+function flagsOf(result) {
 	const of = new Map((result.flags ?? []).map((flag) => [flag, []]));
 	for (const channel of result.channels)
 		for (const flag of channel.flags ?? []) of.set(flag, [...(of.get(flag) ?? []), channel.name]);
-	return [...of].map(([flag, names]) =>
-		el(
-			"li",
-			{ data: { flag } },
-			el("b", {}, `⚠ ${plain(flag)}`),
-			names.length ? ` on ${names.join(", ")}: ` : ": ",
-			FLAGS[flag] ?? "",
-		),
-	);
+	return of;
 }
 
-function verdict(result) {
-	if (result.lost_samples > 0)
-		return el("p", { class: "warn" }, `⚠ ${result.lost_samples} samples are missing.`);
-	const whole = result.drop?.crc_agrees === true;
-	return el(
-		"p",
-		{ class: whole ? "fine" : "warn" },
-		whole ? "✓ Every sample arrived." : "⚠ Completeness is not proven.",
+const flagLine = ([flag, names]) =>
+	el(
+		"li",
+		{ data: { flag } },
+		el("b", {}, `⚠ ${plain(flag)}`),
+		names.length ? ` on ${names.join(", ")}: ` : ": ",
+		FLAGS[flag] ?? "",
 	);
+
+function completeness(result) {
+	if (result.lost_samples > 0) return `⚠ ${result.lost_samples} samples are missing.`;
+	return result.drop?.crc_agrees === true ? "✓ Every sample arrived." : "⚠ Completeness is not proven.";
 }
 
-export function showResult(name, result, simulated) {
-	const lines = flagLines(result);
+/* What speaks against taking the drop as it is, in words. */
+function doubtsOf(result, verdict) {
+	const complete = completeness(result);
+	return [
+		...flagsOf(result).keys(),
+		complete.startsWith("⚠") && complete.slice(2),
+		verdict && verdict !== "pass" && `limits: ${verdict}`,
+	].filter(Boolean);
+}
+
+const SIGN = { good: "✓", warn: "⚠", bad: "✗" };
+
+/* Of the limits when there are some; else of what was found in the record. */
+function verdictWords(verdict, doubts) {
+	if (verdict) return [verdict.includes("fail") ? "bad" : doubts.length ? "warn" : "good", verdict.toUpperCase()];
+	return doubts.length ? ["warn", "LOOK FIRST"] : ["good", "NO FLAGS"];
+}
+
+/* drops: the archive's of its series, which may not be known yet. */
+export function showResult(name, result, drops = []) {
+	const rowOf = (drop) => `${drop.series}/${drop.number}` === name;
+	const row = drops.find(rowOf);
+	const others = drops.filter((drop) => drop.decision === "accepted" && drop.state === "recorded" && !rowOf(drop));
+	const verdict = result.verdict?.decision ?? "";
+	const doubts = doubtsOf(result, verdict);
+	const [level, words] = verdictWords(verdict, doubts);
+	const lines = [...flagsOf(result)].map(flagLine);
+	const complete = completeness(result);
+	shown = { name, doubts };
 	byId("result").replaceChildren(
-		el("h2", {}, `Drop ${name}`),
-		...(simulated ? [el("p", { class: "soft", data: { key: "simulated" } }, "Simulated tower: no product fell.")] : []),
-		verdict(result),
-		peaks(result),
-		facts(result),
+		el("div", { class: "title" }, el("h2", {}, name), el("p", { id: "verdict", data: { level } }, `${SIGN[level]} ${words}`)),
+		el(
+			"p",
+			{},
+			el("span", { class: complete.startsWith("✓") ? "fine" : "warn" }, complete),
+			row?.simulated ? el("span", { class: "soft", data: { key: "simulated" } }, " Simulated tower: no product fell.") : null,
+		),
+		row?.note ? el("p", {}, `Note: ${row.note}`) : "",
 		el("ul", { id: "flags" }, ...(lines.length ? lines : [el("li", { class: "fine" }, "✓ no flags")])),
+		numbers(result, others),
+		facts(result),
 	);
 	show(byId("result"), true);
 }
 
-export function hideResult() {
+export function hideResult(name = "") {
+	shown = { name, doubts: ["no result"] };
 	show(byId("result"), false);
 }
+
+/* {name, doubts}: the drop on the card, and what speaks against it. */
+export const shownResult = () => shown;

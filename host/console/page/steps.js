@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The one thing to do now, the checks, and which controls may be used. */
 import * as arm from "./arm.js";
+import * as decide from "./decide.js";
 import { byId, el, setData, setText, show, sign } from "./dom.js";
 import { isBusy } from "./table.js";
-import { GREEN, plain } from "./words.js";
+import { GREEN, degrees, number, plain } from "./words.js";
 import { atRest, placeOf, stepOf } from "./workflow.js";
 
 const PANELS = ["setup", "checks", "fault", "arm", "release", "moving", "wait", "decide"];
@@ -11,7 +12,8 @@ const PANELS = ["setup", "checks", "fault", "arm", "release", "moving", "wait", 
 const DEAD_MS = 500; /* what takes another control's place is not pressed by the press that was meant for that one */
 
 let current = "";
-let changed = -Infinity; /* performance.now() at which the step began */
+let changed = -Infinity; /* performance.now() at which the step began, or what its controls mean changed */
+let means = ""; /* what the controls mean */
 let shown = null; /* the model drawn last */
 let watched = false; /* another console held the arm, and ours has not taken it since */
 
@@ -26,15 +28,18 @@ function mark(step) {
 
 /* What is scrolled to must not end up below what always stays on top, which is not always as high. */
 export function listen() {
+	const always = [byId("top"), byId("banners")];
 	const room = () => {
-		document.documentElement.style.scrollPaddingTop = `${byId("top").offsetHeight + 10}px`;
+		const height = always.reduce((sum, node) => sum + node.offsetHeight, 10);
+		document.documentElement.style.scrollPaddingTop = `${height}px`;
 	};
-	new ResizeObserver(room).observe(byId("top"));
+	const sizes = new ResizeObserver(room);
+	for (const node of always) sizes.observe(node);
 }
 
 /* What is to do now is at the top; where it all fits, the row of steps above it too. */
 function toNow() {
-	if (matchMedia("(max-width: 900px)").matches) byId("now").scrollIntoView({ block: "start" });
+	if (matchMedia("(max-width: 900px)").matches) byId(current === "decide" ? "result" : "now").scrollIntoView({ block: "start" });
 	else scrollTo(0, 0);
 }
 
@@ -44,8 +49,6 @@ function change(step) {
 	const hadFocus = panel.contains(document.activeElement) || document.activeElement === document.body;
 	for (const name of PANELS) show(byId(`step-${name}`), name === step);
 	current = step;
-	changed = performance.now();
-	setTimeout(() => shown.connected && enable(shown), DEAD_MS);
 	setData(document.documentElement, "step", step);
 	mark(step);
 	arm.forget();
@@ -100,6 +103,14 @@ function checks(list) {
 	byId("todo").replaceChildren(...red.map(item));
 }
 
+/* What is about to fall, where the eye is when it is let go. */
+function context(series, step) {
+	show(byId("context"), series !== null && ["checks", "arm", "release", "moving"].includes(step));
+	if (!series) return;
+	const { name, scene, angle_deg, height_m } = series;
+	setText(byId("context"), `${scene}, ${degrees(angle_deg)}°, ${number(height_m, 3)} m, series ${name}`);
+}
+
 function holdNotice({ mine, taken }) {
 	if (taken && !mine) watched = true;
 	if (mine) watched = false;
@@ -107,8 +118,8 @@ function holdNotice({ mine, taken }) {
 	setText(
 		byId("hold-text"),
 		taken
-			? "Another console holds the arm. This one watches; ABORT works here too."
-			: "The arm is free. Take it to work from here.",
+			? "The tower is operated from another console. This one watches; ABORT works here too."
+			: "Nobody operates the tower. Take it over to work from here.",
 	);
 	show(byId("hold-take"), !taken);
 	show(byId("hold-give"), mine);
@@ -124,6 +135,8 @@ function enable(model) {
 		model.connected && model.known && performance.now() >= changed + DEAD_MS && !(hold.taken && !hold.mine);
 	for (const button of document.querySelectorAll("[data-command]"))
 		setDisabled(button, !may || (button.id === "release" && arm.warns()));
+	if (!decide.isShown(model.pending))
+		for (const button of byId("step-decide").querySelectorAll("[data-command]")) setDisabled(button, true);
 	byId("hold-give").disabled = !model.connected;
 	for (const id of ["change-series", "next-series"]) byId(id).disabled = !model.connected || !atRest(tower);
 	for (const id of ["setup-go", "continue-go"]) byId(id).disabled = !may || !atRest(tower) || !tower.open;
@@ -146,15 +159,22 @@ export function render(model) {
 		setupOpen: model.setupOpen,
 	});
 	if (step !== current) change(step);
+	decide.render(model.pending);
+	const now = [step, model.pending, decide.isShown(model.pending), decide.needsReason()].join(" ");
+	if (now !== means) {
+		means = now;
+		changed = performance.now();
+		setTimeout(() => shown.connected && enable(shown), DEAD_MS);
+	}
 	checks(state.checks);
-	show(byId("checks-card"), atRest(state.tower) || state.tower.state === "ARMED");
+	show(byId("checks-card"), step !== "decide" && (atRest(state.tower) || state.tower.state === "ARMED"));
+	context(state.series, step);
 	moving(state.tower);
 	holdNotice(state.hold);
 	arm.showArm(state);
 	arm.follow(state);
 	setText(byId("fault-text"), state.tower.fault_text);
 	show(byId("todo"), step === "checks" || step === "fault" || step === "setup");
-	setText(byId("decide-drop"), model.pending);
 	show(byId("setup-back"), state.series !== null);
 	enable(model);
 	return step;

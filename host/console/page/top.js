@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* What is always visible: state, interlocks, heartbeat, bus, losses, disk, who may arm. */
 import { byId, el, setData, setText, show, sign } from "./dom.js";
-import { STATES, bytes, inputWords, number, plain } from "./words.js";
+import { STATES, bytes, clock, inputWords, number, plain } from "./words.js";
 import { atRest } from "./workflow.js";
 
 const SIGNS = {
@@ -37,15 +37,23 @@ function bus({ load_percent: load, classic }) {
 	fact("bus", `${number(load, 0)} %${classic ? ", classic" : ""}`, level);
 }
 
-function lost(losses) {
-	const parts = [
-		[losses.blocks, "blocks"],
-		[losses.link, "frames"],
-		[losses.errors, "bus errors"],
-	];
-	const some = parts.filter(([count]) => count > 0).map(([count, what]) => `${count} ${what}`);
-	fact("lost", some.length ? some.slice(0, 2).join(", ") : "none", some.length ? "warn" : "good");
-	byId("lost").title = [...some, `${losses.asked_again} blocks were asked for again`].join(", ");
+/* Losses count from the last ARM: what is long past says nothing of the next drop. All of them are in the details. */
+let counted = { base: {}, since: "the start", armed: false };
+
+function lost(losses, tower) {
+	const armed = tower.state === "ARMED";
+	const { base } = counted;
+	if (armed && !counted.armed) counted = { base: losses, since: clock(), armed };
+	else if (losses.blocks < base.blocks || losses.link < base.link || losses.errors < base.errors)
+		counted = { base: {}, since: "the start", armed };
+	else counted.armed = armed;
+	const some = Object.entries({ blocks: "blocks", link: "frames", errors: "bus errors" })
+		.map(([key, what]) => [losses[key] - (counted.base[key] ?? 0), what])
+		.filter(([count]) => count > 0)
+		.map(([count, what]) => `${count} ${what}`);
+	const text = some.length ? `${some.join(", ")} since ${counted.since}` : "none";
+	fact("lost", text, some.length ? "warn" : "good");
+	byId("lost").title = `${text}; ${losses.asked_again} blocks were asked for again`;
 }
 
 function disk({ free_bytes: free, drops_left: left, trouble }) {
@@ -122,7 +130,7 @@ function details(state) {
 		})),
 	);
 	byId("counters").replaceChildren(
-		...Object.entries(state.counters).map(([name, value]) =>
+		...Object.entries({ ...state.counters, blocks_lost: state.lost.blocks, frames_lost: state.lost.link }).map(([name, value]) =>
 			el("div", {}, el("dt", {}, plain(name)), el("dd", {}, String(value))),
 		),
 	);
@@ -132,7 +140,7 @@ export function showTop(state) {
 	stateTile(state.tower);
 	heartbeat(state.tower);
 	bus(state.bus);
-	lost(state.lost);
+	lost(state.lost, state.tower);
 	disk(state.disk);
 	hold(state.hold);
 	fact("kind", state.simulation ? "simulated" : "real");

@@ -11,6 +11,9 @@ const group = new Group();
 const spectrumGroup = new Group();
 let shown = { drop: "", trace: null, model: null, ranges: {} };
 
+/* Told apart without colour: S1 solid, S2 dashed, Z dotted. */
+const DASH = { S1Z: [2, 3], S2Z: [9, 3, 2, 3] };
+
 const line = (name) => ({ stroke: colour(name.startsWith("S1") ? "--s1" : "--s2") });
 const label = (name) => (name.endsWith("R") ? `${name.slice(0, 2)} XY` : `${name.slice(0, 2)} ${name[2]}`);
 
@@ -24,7 +27,7 @@ function measured(name) {
 			y: gaps(channel.samples),
 			measured: true,
 			...line(name),
-			dash: name.endsWith("Z") ? [3, 3] : undefined,
+			dash: DASH[name] ?? (name.startsWith("S2") ? [9, 3] : undefined),
 		},
 	];
 }
@@ -89,21 +92,22 @@ export async function drawSpectrum() {
 	if (!drop) return;
 	const spectrum = await spectrumOf(drop, byId("spectrum-kind").value).catch((error) => message(error.message));
 	if (!spectrum || drop !== shown.drop) return;
+	const [unit, scale] = spectrum.unit === "m" ? ["mm", 1000] : [spectrum.unit, 1];
 	spectrumGroup.clear();
 	spectrumGroup.add(
 		byId("spectrum"),
 		spectrum.channels.map(({ name, value }) => ({
 			label: label(name),
 			x: spectrum.frequency_hz,
-			y: value.map((v) => (v > 0 ? v : null)),
+			y: value.map((v) => (v > 0 ? scale * v : null)),
 			...line(name),
-			unit: spectrum.unit,
-			decimals: spectrum.unit === "g" ? 1 : 4,
+			unit,
+			decimals: unit === "g" ? 1 : 4,
 			dash: { Y: [8, 4], Z: [3, 3], R: [1, 2] }[name[2]],
 		})),
 		{
 			title: `Drop ${brief(drop)}, Q ${spectrum.q}`,
-			unit: spectrum.unit,
+			unit,
 			height: 420,
 			log: true,
 			xUnit: "Hz",
