@@ -66,6 +66,13 @@ struct log_place {
 	uint32_t tick_ms; /* newest block before it */
 };
 
+/* A bus that the tower was heard on last, of a log that names it. */
+enum { LOG_BUS_MAX = 16 };
+struct log_bus {
+	char name[LOG_BUS_MAX];
+	int64_t time_us;
+};
+
 struct log_walk {
 	struct log_visitor *visitor;
 	struct log_contents *contents;
@@ -107,6 +114,7 @@ struct log_walk {
 	unsigned number;
 
 	struct log_event heartbeats;
+	struct log_bus bus, bus_before;
 	struct log_capture_parameters parameters;
 	struct wire_sdo request;
 };

@@ -2,8 +2,13 @@
  *
  * candump text: every line through the walk, as if the frames came now.
  */
+#include <string.h>
+
 #include "common/link/candump.h"
 #include "host/record/log_walk.h"
+#include "host/record/source.h"
+
+enum { BUS_CHANGE_US = 1000000 }; /* an adapter that was plugged in again takes longer */
 
 /* The first line that says something begins with '('. */
 bool candump_is(struct log_file *log)
@@ -15,6 +20,43 @@ bool candump_is(struct log_file *log)
 		if (line.length > 0 && line.text[0] != '#')
 			return line.text[0] == '(';
 	return false;
+}
+
+static bool is_of_tower(const struct frame *frame)
+{
+	return (frame->id == WIRE_ID_BLOCK_S1 && frame->length == WIRE_LENGTH_block) ||
+	       (frame->id == WIRE_ID_HEARTBEAT_TOWER && frame->length == WIRE_LENGTH_heartbeat);
+}
+
+/* Behind the time; the line has been parsed. */
+static void take_bus(const struct log_line *line, char name[LOG_BUS_MAX])
+{
+	const char *end = line->text + line->length, *at = memchr(line->text, ')', line->length);
+	size_t length = 0;
+
+	while (++at < end && (*at == ' ' || *at == '\t'))
+		continue;
+	for (; at < end && *at != ' ' && *at != '\t' && length < LOG_BUS_MAX - 1; at++)
+		name[length++] = *at;
+	name[length] = '\0';
+}
+
+/* Two towers, each on a bus of its own, would be taken for one that sends everything twice. */
+static void check_bus(struct log_walk *walk, const struct log_line *line)
+{
+	struct log_bus now = {.time_us = walk->time_us};
+
+	take_bus(line, now.name);
+	if (strcmp(now.name, walk->bus.name) != 0) {
+		if (strcmp(now.name, walk->bus_before.name) == 0 &&
+		    now.time_us - walk->bus_before.time_us < BUS_CHANGE_US)
+			walk->result = source_refuse(walk->message, DT_E_FORMAT, walk->file, line->number,
+			                             "a tower on %s beside that on %s, expected the frames "
+			                             "of one bus",
+			                             now.name, walk->bus.name);
+		walk->bus_before = walk->bus;
+	}
+	walk->bus = now;
 }
 
 void read_candump(struct log_walk *walk, struct log_file *log, uint64_t from, uint64_t to)
@@ -38,6 +80,8 @@ void read_candump(struct log_walk *walk, struct log_file *log, uint64_t from, ui
 			continue;
 		contents->frames++;
 		walk->time_us = frame.time_us;
+		if (is_of_tower(&frame))
+			check_bus(walk, &line);
 		log_walk_frame(walk, &frame);
 	}
 }
