@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+#
+# The board's image on an emulated processor: $(BUILD)/droptower-firmware-board, where libunicorn is. It is a program of
+# its own under GPL-2.0-or-later, as that library is, and not installed.
+
+PACKAGES_TEST += libunicorn-dev
+
+BOARD_C = $(wildcard hil/board/*.c)
+BOARD_O = $(call obj,$(BOARD_C) common/sensorbus.c)
+BOARD = $(if $(wildcard /usr/include/unicorn/unicorn.h),$(BUILD)/droptower-firmware-board)
+
+$(call obj,$(BOARD_C)): CPPFLAGS += $(LINUX)
+
+.PHONY: board
+board: $(BOARD) stm32g474 ## build the program that runs the board's image, if libunicorn is there
+ifndef SANITIZE
+tests: $(BOARD)
+endif
+
+$(BUILD)/droptower-firmware-board: $(BOARD_O)
+	$(call say,LINK,$@)
+	$(Q)mkdir -p $(@D)
+	$(Q)$(CC) $(LDFLAGS) $^ -lunicorn -lm -o $@
+
+-include $(BOARD_O:.o=.d)

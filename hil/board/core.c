@@ -1,0 +1,529 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include <stdio.h>
+#include <string.h>
+#include <unicorn/unicorn.h>
+
+#include "hil/board/chip.h"
+
+enum {
+	ENTRY_CLOCKS = 12,
+	TAIL_CLOCKS = 6,
+	FRAME_BYTES = 32,
+	DEPTH_MAX = 8,
+	LOWEST = 256, /* below every priority */
+	UNICORN_EXCEPTION_EXIT = 8,
+	POLL = 0, /* tallies: an exception's, or main's */
+};
+
+#define RETURN_THREAD 0xFFFFFFF9u
+#define RETURN_HANDLER 0xFFFFFFF1u
+#define RETURN_MASK 0xFFFFFFE0u
+
+struct tally {
+	uint64_t calls, sum;
+	uint32_t least, most;
+};
+
+static struct {
+	uc_engine *uc;
+	int64_t limit; /* a block that begins then or later waits */
+	uint64_t lines, pending, enabled;
+	unsigned depth; /* 0: main */
+	struct level {
+		unsigned exception, priority;
+		uint32_t instructions; /* its own, what interrupted it not counted */
+	} level[DEPTH_MAX];
+	bool returning, failed;
+	unsigned halves; /* of a clock that are left over */
+	uint32_t lowest_stack;
+	/* the main loop */
+	uint32_t idle; /* the address behind its call of app_poll; 0: not yet known */
+	bool at_idle, pass_idle, waiting, interrupted;
+	uint8_t before[BOARD_SRAM_BYTES]; /* the memory when the poll before ended */
+	struct tally tally[BOARD_EXCEPTIONS];
+	uint8_t block_instructions[BOARD_FLASH_BYTES / 2];
+	uint8_t block_halfwords[BOARD_FLASH_BYTES / 2];
+} core;
+
+static uint32_t get(int name)
+{
+	uint32_t value = 0;
+
+	uc_reg_read(core.uc, name, &value);
+	return value;
+}
+
+static void set(int name, uint32_t value)
+{
+	uc_reg_write(core.uc, name, &value);
+}
+
+uint32_t core_pc(void)
+{
+	return core.uc != NULL ? get(UC_ARM_REG_PC) : 0;
+}
+
+/* ---- exceptions: who waits, who may ---- */
+
+static unsigned priority_of(unsigned exception)
+{
+	if (exception == BOARD_PENDSV)
+		return *registers_at(SCB_SHPR3) >> 16 & 0xF0;
+	return *registers_at(NVIC_IPR + (exception - 16) / 4 * 4) >> (8 * (exception % 4)) & 0xF0;
+}
+
+void core_line(unsigned exception, bool high)
+{
+	uint64_t bit = 1ull << exception;
+
+	if (high && !(core.lines & bit))
+		core.pending |= bit;
+	core.lines = high ? core.lines | bit : core.lines & ~bit;
+}
+
+void core_pend(unsigned exception)
+{
+	core.pending |= 1ull << exception;
+}
+
+/* The exception that is to be taken now, 0: none. Of equal ones the lowest number. */
+static unsigned next_exception(void)
+{
+	uint64_t ready = core.pending & core.enabled;
+	unsigned best = 0, best_priority = core.depth ? core.level[core.depth].priority : LOWEST, base;
+
+	for (; ready != 0; ready &= ready - 1) {
+		unsigned exception = (unsigned)__builtin_ctzll(ready), priority = priority_of(exception);
+
+		if (priority < best_priority) {
+			best = exception;
+			best_priority = priority;
+		}
+	}
+	if (best == 0 || get(UC_ARM_REG_PRIMASK) & 1)
+		return 0;
+	base = get(UC_ARM_REG_BASEPRI) & 0xF0;
+	return base != 0 && best_priority >= base ? 0 : best;
+}
+
+static uint32_t *stack_at(uint32_t address)
+{
+	if (address - BOARD_CCM >= 4096)
+		board_fail("the stack is at 0x%08X", address);
+	return (uint32_t *)(void *)(board.ccm + (address - BOARD_CCM));
+}
+
+static const int stacked[] = {UC_ARM_REG_R0,  UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3,
+                              UC_ARM_REG_R12, UC_ARM_REG_LR, UC_ARM_REG_PC};
+
+static void push_frame(void)
+{
+	uint32_t sp = get(UC_ARM_REG_SP), place = (sp - FRAME_BYTES) & ~7u, *frame = stack_at(place);
+
+	for (unsigned i = 0; i < 7; i++)
+		frame[i] = get(stacked[i]);
+	frame[7] = get(UC_ARM_REG_XPSR) | 1u << 24;
+	if (sp & 4)
+		frame[7] |= 1u << 9;
+	else
+		frame[7] &= ~(1u << 9);
+	set(UC_ARM_REG_SP, place);
+	if (place < core.lowest_stack)
+		core.lowest_stack = place;
+}
+
+static void pop_frame(void)
+{
+	uint32_t sp = get(UC_ARM_REG_SP), frame[8];
+
+	memcpy(frame, stack_at(sp), sizeof(frame));
+	set(UC_ARM_REG_SP, sp + FRAME_BYTES + (frame[7] >> 9 & 1) * 4);
+	for (unsigned i = 0; i < 6; i++)
+		set(stacked[i], frame[i]);
+	set(UC_ARM_REG_XPSR, frame[7] & ~(1u << 9));
+	set(UC_ARM_REG_PC, frame[6] | 1);
+}
+
+/* The handler's first instruction is next; its frame is on the stack. */
+static void enter_handler(unsigned exception)
+{
+	uint32_t vector;
+
+	memcpy(&vector, board.flash + (*registers_at(SCB_VTOR) - BOARD_FLASH) + 4 * exception, 4);
+	if (!(vector & 1) || core.depth + 1 == DEPTH_MAX)
+		board_fail("exception %u has the vector 0x%08X, %u deep", exception, vector, core.depth);
+	core.pending &= ~(1ull << exception);
+	set(UC_ARM_REG_LR, core.depth ? RETURN_HANDLER : RETURN_THREAD);
+	set(UC_ARM_REG_XPSR, (get(UC_ARM_REG_XPSR) & 0xF80F0000) | 1u << 24 | exception);
+	set(UC_ARM_REG_PC, vector);
+	core.level[++core.depth] = (struct level){exception, priority_of(exception), 0};
+	core.interrupted = true;
+	if (exception != BOARD_TIM1 && exception != BOARD_TIM3 && exception != BOARD_TIM4)
+		board.woken =
+		        true; /* main gets what control, gates and CAN bring, from the samples nothing */
+}
+
+static void add_tally(unsigned which, uint32_t instructions)
+{
+	struct tally *tally = &core.tally[which];
+
+	tally->least = tally->calls == 0 || instructions < tally->least ? instructions : tally->least;
+	tally->most = instructions > tally->most ? instructions : tally->most;
+	tally->sum += instructions;
+	tally->calls++;
+}
+
+static void leave_handler(void)
+{
+	const struct level *level = &core.level[core.depth];
+	uint32_t pc = get(UC_ARM_REG_PC) | 1, expected = core.depth > 1 ? RETURN_HANDLER : RETURN_THREAD;
+	unsigned next;
+
+	if (core.depth == 0 || pc != expected)
+		board_fail("a return with 0x%08X, %u deep", pc, core.depth);
+	add_tally(level->exception, level->instructions);
+	if (core.lines >> level->exception & 1)
+		core.pending |= 1ull << level->exception;
+	core.depth--;
+	next = next_exception();
+	if (next != 0) {
+		board.now += TAIL_CLOCKS;
+		enter_handler(next);
+		return;
+	}
+	board.now += ENTRY_CLOCKS;
+	pop_frame();
+}
+
+static void take_exceptions(void)
+{
+	unsigned next = next_exception();
+
+	if (next == 0)
+		return;
+	board.now += ENTRY_CLOCKS;
+	push_frame();
+	enter_handler(next);
+}
+
+/* ---- what the processor tells ---- */
+
+static unsigned instructions_in(uint32_t address, uint32_t size)
+{
+	uint32_t place = (address - BOARD_FLASH) / 2;
+	unsigned count = 0;
+
+	if (core.block_halfwords[place] * 2u == size)
+		return core.block_instructions[place];
+	for (uint32_t i = 0; i < size; count++) {
+		uint16_t first;
+
+		memcpy(&first, board.flash + (address - BOARD_FLASH) + i, 2);
+		i += first >> 11 >= 0x1D ? 4 : 2;
+	}
+	if (size / 2 <= UINT8_MAX) {
+		core.block_halfwords[place] = (uint8_t)(size / 2);
+		core.block_instructions[place] = (uint8_t)count;
+	}
+	return count;
+}
+
+static void spend(unsigned instructions)
+{
+	unsigned halves = instructions * board.options.half_clocks + core.halves;
+
+	board.now += halves / 2;
+	core.halves = halves % 2;
+	core.level[core.depth].instructions += instructions;
+}
+
+static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *unused)
+{
+	uint32_t address = (uint32_t)address64;
+
+	(void)unused;
+	if (address - BOARD_FLASH >= BOARD_FLASH_BYTES) /* a return, which the processor reports next */
+		return;
+	if (core.depth == 0 && address == board.app_poll && core.idle == 0)
+		core.idle = get(UC_ARM_REG_LR) & ~1u;
+	if (core.depth == 0 && address == core.idle && !core.pass_idle) {
+		core.at_idle = true;
+		uc_emu_stop(uc);
+		return;
+	}
+	if (board.now >= core.limit || (core.pending & core.enabled && next_exception() != 0)) {
+		uc_emu_stop(uc);
+		return;
+	}
+	core.pass_idle = false;
+	spend(instructions_in(address, size));
+}
+
+static void on_interrupt(uc_engine *uc, uint32_t number, void *unused)
+{
+	(void)unused;
+	if (number == UNICORN_EXCEPTION_EXIT && core.depth > 0 &&
+	    (get(UC_ARM_REG_PC) & RETURN_MASK) == RETURN_MASK)
+		core.returning = true;
+	else
+		board_fail("exception %u of the processor", number);
+	uc_emu_stop(uc);
+}
+
+static int64_t earlier(int64_t a, int64_t b)
+{
+	return a < b ? a : b;
+}
+
+static int64_t next_event(void)
+{
+	return earlier(earlier(timer_next(), plant_next()), earlier(sampling_next(), system_next()));
+}
+
+static uint64_t on_read(uc_engine *uc, uint64_t offset, unsigned size, void *base)
+{
+	uint32_t address = (uint32_t)(uintptr_t)base + (uint32_t)offset;
+
+	(void)uc;
+	if (size != 4)
+		board_fail("0x%08X is read with %u bytes", address, size);
+	if (address >= 0xE000E000u)
+		return *registers_at(address);
+	return registers_read(address);
+}
+
+static void write_core(uint32_t address, uint32_t value)
+{
+	registers_check_write(address, value);
+	board.wrote = true;
+	if (address == NVIC_ISER)
+		core.enabled |= (uint64_t)value << 16;
+	if (address == SCB_ICSR) {
+		core_pend(BOARD_PENDSV);
+		return;
+	}
+	if (address == SCB_AIRCR && value == 0x05FA0004) {
+		board.reset_wanted = true;
+		board.reset_cause = BOARD_COMMAND;
+		core.limit = 0;
+	}
+	*registers_at(address) = value;
+}
+
+static void on_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, void *base)
+{
+	uint32_t address = (uint32_t)(uintptr_t)base + (uint32_t)offset;
+
+	(void)uc;
+	if (size != 4)
+		board_fail("0x%08X is written with %u bytes", address, size);
+	if (address >= 0xE000E000u)
+		write_core(address, (uint32_t)value);
+	else
+		registers_write(address, (uint32_t)value);
+	if (address < 0x40020000) /* a timer: what comes next may have changed */
+		core.limit = earlier(core.limit, next_event());
+}
+
+/* ---- set-up ---- */
+
+static void must(uc_err error, const char *what)
+{
+	if (error != UC_ERR_OK)
+		board_fail("%s: %s", what, uc_strerror(error));
+}
+
+static void map_registers(uint32_t base, size_t size)
+{
+	void *user = (void *)(uintptr_t)base;
+
+	must(uc_mmio_map(core.uc, base, size, on_read, user, on_write, user), "registers");
+}
+
+static void hook(int type, void *function)
+{
+	uc_hook handle;
+
+	must(uc_hook_add(core.uc, &handle, type, function, NULL, 1, 0), "hook");
+}
+
+void core_open(void)
+{
+	static _Alignas(4096) uint8_t flash[BOARD_FLASH_BYTES], sram[BOARD_SRAM_BYTES], ccm[BOARD_CCM_BYTES];
+
+	board.flash = memset(flash, 0xFF, sizeof(flash));
+	board.sram = sram;
+	board.ccm = ccm;
+	must(uc_open(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS, &core.uc), "emulator");
+	must(uc_ctl_set_cpu_model(core.uc, UC_CPU_ARM_CORTEX_M4), "processor");
+	must(uc_mem_map_ptr(core.uc, BOARD_FLASH, sizeof(flash), UC_PROT_READ | UC_PROT_EXEC, flash),
+	     "flash");
+	must(uc_mem_map_ptr(core.uc, BOARD_SRAM, sizeof(sram), UC_PROT_READ | UC_PROT_WRITE, sram), "SRAM");
+	must(uc_mem_map_ptr(core.uc, BOARD_CCM, 4096, UC_PROT_READ | UC_PROT_WRITE, ccm), "stack");
+	map_registers(0x40000000, 0x31000);
+	map_registers(0x48000000, 0x2000);
+	map_registers(0x50000000, 0x1000);
+	map_registers(0x50060000, 0x1000);
+	map_registers(0xE000E000u, 0x1000);
+	hook(UC_HOOK_BLOCK, (void *)(uintptr_t)on_block);
+	hook(UC_HOOK_INTR, (void *)(uintptr_t)on_interrupt);
+	core.lowest_stack = BOARD_CCM + 4096;
+}
+
+static void core_reset(void)
+{
+	static const int others[] = {
+	        UC_ARM_REG_R0,  UC_ARM_REG_R1,      UC_ARM_REG_R2,      UC_ARM_REG_R3,
+	        UC_ARM_REG_R4,  UC_ARM_REG_R5,      UC_ARM_REG_R6,      UC_ARM_REG_R7,
+	        UC_ARM_REG_R8,  UC_ARM_REG_R9,      UC_ARM_REG_R10,     UC_ARM_REG_R11,
+	        UC_ARM_REG_R12, UC_ARM_REG_PRIMASK, UC_ARM_REG_BASEPRI, UC_ARM_REG_CONTROL};
+	uint32_t vector[2];
+
+	memcpy(vector, board.flash, sizeof(vector));
+	for (unsigned i = 0; i < sizeof(others) / sizeof(others[0]); i++)
+		set(others[i], 0);
+	set(UC_ARM_REG_XPSR, 1u << 24);
+	set(UC_ARM_REG_LR, 0xFFFFFFFFu);
+	set(UC_ARM_REG_SP, vector[0]);
+	set(UC_ARM_REG_PC, vector[1]);
+	core.lines = core.pending = 0;
+	core.enabled = 1u << BOARD_PENDSV;
+	core.depth = 0;
+	core.level[0] = (struct level){0};
+	core.at_idle = core.pass_idle = core.waiting = false;
+}
+
+static void set_mark(enum board_reset cause)
+{
+	uint8_t kept = (uint8_t)board.options.kept;
+	uint32_t mark[3] = {0x52554E21u, ~0x52554E21u, 0xC35A0000u | (uint32_t)(uint8_t)~kept << 8 | kept};
+
+	if (cause != BOARD_POWER_ON)
+		memcpy(board.sram + (board.mark - BOARD_SRAM), mark, sizeof(mark));
+}
+
+static void boot(enum board_reset cause)
+{
+	board.reset_wanted = board.hung = false;
+	registers_reset();
+	timer_reset();
+	system_reset(cause);
+	sampling_reset();
+	can_reset();
+	plant_reset();
+	core_reset();
+}
+
+/* ---- running ---- */
+
+/* All that is due, in the order of the times. */
+static void run_events(void)
+{
+	while (!board.over && !board.reset_wanted && next_event() <= board.now) {
+		if (plant_next() <= board.now)
+			plant_event();
+		timer_event();
+		if (sampling_next() <= board.now)
+			sampling_event();
+		system_event();
+	}
+}
+
+/* A poll is over: one that was not interrupted, wrote no register and left the memory as it found it would do
+ * the same again until something comes. */
+static bool was_idle(void)
+{
+	bool quiet = !core.interrupted && !board.wrote, same;
+
+	add_tally(POLL, core.level[0].instructions);
+	if (!quiet)
+		return false;
+	same = memcmp(core.before, board.sram, sizeof(core.before)) == 0;
+	if (!same)
+		memcpy(core.before, board.sram, sizeof(core.before));
+	return same;
+}
+
+bool core_waits(void)
+{
+	return core.waiting && core.depth == 0;
+}
+
+static void begin_poll(void)
+{
+	core.level[0].instructions = 0;
+	core.interrupted = board.wrote = board.woken = core.waiting = false;
+	core.pass_idle = true;
+}
+
+/* The main loop is between two polls. Time goes on to what comes next, where nothing else can happen; the
+ * memory that the samples' interrupts write is none that main reads. */
+static void idle(void)
+{
+	core.at_idle = false;
+	if (!board.hung && (core.waiting ? board.woken : !was_idle())) {
+		begin_poll();
+		return;
+	}
+	if (!core.waiting)
+		board.woken = false;
+	core.waiting = true;
+	while (!board.over && !board.reset_wanted && (board.hung || !board.woken) && next_exception() == 0) {
+		board.now = next_event();
+		run_events();
+	}
+}
+
+static void run_processor(void)
+{
+	uc_err error;
+
+	core.limit = next_event();
+	error = uc_emu_start(core.uc, get(UC_ARM_REG_PC) | 1, 0xFFFFFFFE, 0, 0);
+	if (error != UC_ERR_OK && !core.returning)
+		board_fail("%s", uc_strerror(error));
+}
+
+void core_run(void)
+{
+	enum board_reset cause = board.options.cause;
+
+	set_mark(cause);
+	boot(cause);
+	while (!board.over) {
+		run_events();
+		if (board.reset_wanted) {
+			boot(board.reset_cause);
+			continue;
+		}
+		take_exceptions();
+		run_processor();
+		if (core.returning) {
+			core.returning = false;
+			leave_handler();
+		} else if (core.at_idle) {
+			idle();
+		}
+	}
+}
+
+void core_report(const char *path)
+{
+	static const char *const names[BOARD_EXCEPTIONS] = {
+	        [POLL] = "poll",       [BOARD_PENDSV] = "control", [BOARD_FDCAN] = "can",
+	        [BOARD_TIM1] = "turn", [BOARD_TIM2] = "gate",      [BOARD_TIM3] = "yz",
+	        [BOARD_TIM4] = "x",
+	};
+	FILE *file = fopen(path, "ae");
+
+	if (file == NULL)
+		board_fail("%s cannot be written", path);
+	for (unsigned i = 0; i < BOARD_EXCEPTIONS; i++)
+		if (names[i] != NULL)
+			fprintf(file, "%s %llu %u %u %llu\n", names[i],
+			        (unsigned long long)core.tally[i].calls, core.tally[i].least,
+			        core.tally[i].most, (unsigned long long)core.tally[i].sum);
+	fprintf(file, "stack 1 %u %u 0\n", BOARD_CCM + 4096 - core.lowest_stack,
+	        BOARD_CCM + 4096 - core.lowest_stack);
+	fclose(file);
+}

@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+#
+# awk -v name=SCENARIO -f differences.awk differences SCENARIO.ini: the scenario with what is expected of the board.
+FNR == NR {
+	split($0, column, "\t")
+	if (column[1] == "*" || column[1] == name) limits[column[2]] = column[3]
+	next
+}
+/^\[/ { section = $1 }
+{
+	key = $1
+	if ((section == "[expect]" || section == "[counters]") && (key in limits) && $2 == "=") {
+		print key " = " limits[key]
+		delete limits[key]
+	} else
+		print
+}

@@ -1,0 +1,226 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "hil/board/board.h"
+
+enum {
+	X_PER_MS = 7,
+	YZ_PER_MS = 10,
+	X_CLOCKS = BOARD_CLOCKS_PER_MS / X_PER_MS,
+	YZ_CLOCKS = BOARD_CLOCKS_PER_MS / YZ_PER_MS,
+	LEAD_CLOCKS = 172 * 7, /* from the start of the timers to the first tick, by the port's own README */
+	LATCH_OPEN = 1 << 0,
+	DAMPERS_RELIEVE = 1 << 2,
+	ROOM = 8, /* frames in a request that leaves room for those of the instants ahead */
+};
+
+static struct {
+	int request_fd, answer_fd;
+	int64_t next;  /* clocks of the next exchange since tick 0 */
+	uint8_t edges; /* since the exchange before */
+	uint32_t edge_us[SENSORBUS_OUTPUTS];
+	bool first;
+	uint32_t random;
+	unsigned frames, behind; /* answers ahead that were taken since the request */
+	bool more;               /* the next answer comes without a request */
+	size_t come, taken;      /* bytes of input[] */
+	uint8_t input[SENSORBUS_MESSAGE_MAX];
+	size_t bytes;
+	uint8_t request[SENSORBUS_REQUEST_BYTES + SENSORBUS_FRAMES_MAX * SENSORBUS_FRAME_BYTES_MAX];
+} plant;
+
+static int plant_open_one(const char *prefix, const char *suffix, int flags)
+{
+	char path[4096];
+	int fd;
+
+	snprintf(path, sizeof(path), "%s.%s", prefix, suffix);
+	fd = open(path, flags | O_CLOEXEC);
+	if (fd < 0) {
+		fprintf(stderr, "droptower-firmware-board: %s: %s\n", path, strerror(errno));
+		exit(BOARD_EXIT_LINK);
+	}
+	return fd;
+}
+
+void plant_open(const char *prefix)
+{
+	plant.request_fd = plant_open_one(prefix, "request", O_WRONLY);
+	plant.answer_fd = plant_open_one(prefix, "answer", O_RDONLY);
+}
+
+void plant_reset(void)
+{
+	plant.next = 0;
+	plant.edges = 0;
+	plant.first = true;
+	plant.more = false;
+	plant.behind = 0;
+	plant.come = plant.taken = 0;
+	plant.frames = 0;
+	plant.bytes = SENSORBUS_REQUEST_BYTES;
+}
+
+void plant_edge(unsigned output, uint32_t time_us)
+{
+	plant.edges |= (uint8_t)(1u << output);
+	plant.edge_us[output] = time_us;
+}
+
+bool plant_send(const struct frame *frame)
+{
+	if (plant.frames == SENSORBUS_FRAMES_MAX)
+		return false;
+	plant.bytes += sensorbus_put_frame(plant.request + plant.bytes, frame, plant.behind);
+	plant.frames++;
+	return true;
+}
+
+uint32_t plant_random(void)
+{
+	return plant.random;
+}
+
+int64_t plant_next(void)
+{
+	int64_t start = timer_start_time();
+
+	return start < 0 ? BOARD_NEVER : start + LEAD_CLOCKS + plant.next;
+}
+
+/* ---- one exchange ---- */
+
+static void plant_write(const uint8_t *bytes, size_t count)
+{
+	while (count > 0 && !board.over) {
+		ssize_t done = write(plant.request_fd, bytes, count);
+
+		if (done < 0 && errno != EINTR)
+			board.over = true;
+		if (done > 0) {
+			bytes += done;
+			count -= (size_t)done;
+		}
+	}
+}
+
+/* The next bytes of what was answered, read as far as they are not here. */
+static void plant_read(uint8_t *bytes, size_t count)
+{
+	while (plant.come - plant.taken < count && !board.over) {
+		ssize_t done =
+		        read(plant.answer_fd, plant.input + plant.come, sizeof(plant.input) - plant.come);
+
+		if (done == 0 || (done < 0 && errno != EINTR))
+			board.over = true;
+		plant.come += done > 0 ? (size_t)done : 0;
+	}
+	if (board.over)
+		return;
+	memcpy(bytes, plant.input + plant.taken, count);
+	plant.taken += count;
+}
+
+static uint8_t plant_kept(void)
+{
+	uint32_t kept;
+
+	memcpy(&kept, board.sram + (board.mark - BOARD_SRAM) + 8, sizeof(kept));
+	return (uint8_t)kept;
+}
+
+/* Nothing that the firmware could do before the next tick changes an output, whatever the samples are; the
+ * emergency stop ends pulses by itself. */
+static bool ahead_is_welcome(int64_t of_ms)
+{
+	int64_t next_tick = board.now + BOARD_CLOCKS_PER_MS - of_ms;
+
+	return of_ms != 0 && core_waits() && (system_outputs() & (LATCH_OPEN | DAMPERS_RELIEVE)) == 0 &&
+	       timer_next_edge() > next_tick && plant.frames < ROOM;
+}
+
+static void plant_ask(uint8_t group, int64_t of_ms)
+{
+	struct sensorbus_request request = {
+	        .tick_ms = (uint32_t)(plant.next / BOARD_CLOCKS_PER_MS),
+	        .group = group,
+	        .index = (uint8_t)(of_ms / (group & SENSORBUS_X ? X_CLOCKS : YZ_CLOCKS)),
+	        .outputs = system_outputs(),
+	        .edges = plant.edges,
+	        .frames = (uint8_t)plant.frames,
+	        .reset = plant.first,
+	        .ahead = ahead_is_welcome(of_ms),
+	        .kept = plant_kept(),
+	};
+
+	memcpy(request.edge_us, plant.edge_us, sizeof(request.edge_us));
+	(void)sensorbus_put_request(plant.request, &request);
+	plant_write(plant.request, plant.bytes);
+	plant.edges = 0;
+	plant.first = false;
+	plant.frames = plant.behind = 0;
+	plant.bytes = SENSORBUS_REQUEST_BYTES;
+	plant.come = plant.taken = 0;
+}
+
+static void plant_take_frames(unsigned count)
+{
+	for (unsigned i = 0; i < count && !board.over; i++) {
+		struct frame frame = {0};
+		uint8_t head[4];
+		unsigned behind;
+		int length;
+
+		plant_read(head, sizeof(head));
+		length = sensorbus_frame_head(head, &frame, &behind);
+		if (length < 0)
+			board.over = true;
+		else
+			plant_read(frame.data, (size_t)length);
+		if (!board.over)
+			can_receive(&frame);
+	}
+}
+
+static void plant_take(uint8_t group)
+{
+	uint8_t bytes[SENSORBUS_ANSWER_BYTES];
+	struct sensorbus_answer answer;
+
+	plant_read(bytes, sizeof(bytes));
+	if (board.over)
+		return;
+	sensorbus_get_answer(bytes, &answer);
+	plant.random = answer.random;
+	board.hung |= answer.hang != 0;
+	system_inputs(answer.inputs);
+	for (unsigned i = 0; i < SENSORBUS_CAPTURES; i++)
+		if (answer.captures & 1u << i)
+			timer_capture(i, answer.capture_us[i]);
+	sampling_answer(group, &answer);
+	can_answer(&answer);
+	plant_take_frames(answer.frames);
+	board.over |= answer.then == SENSORBUS_STOP;
+	plant.more = answer.then == SENSORBUS_MORE;
+}
+
+void plant_event(void)
+{
+	int64_t of_ms = plant.next % BOARD_CLOCKS_PER_MS, x = (plant.next / X_CLOCKS + 1) * X_CLOCKS,
+	        yz = (plant.next / YZ_CLOCKS + 1) * YZ_CLOCKS;
+	uint8_t group = (uint8_t)((of_ms % X_CLOCKS == 0 ? SENSORBUS_X : 0) |
+	                          (of_ms % YZ_CLOCKS == 0 ? SENSORBUS_YZ : 0));
+
+	if (plant.more)
+		plant.behind++;
+	else
+		plant_ask(group, of_ms);
+	if (!board.over)
+		plant_take(group);
+	plant.next = x < yz ? x : yz;
+}
