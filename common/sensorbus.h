@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* SPDX-License-Identifier: GPL-2.0-or-later */
 #ifndef DT_COMMON_SENSORBUS_H
 #define DT_COMMON_SENSORBUS_H
 /*

@@ -125,6 +125,21 @@ void app_on_yz(int16_t s1y, int16_t s1z, int16_t s2y, int16_t s2z, bool ready)
 
 /* ---- main ---- */
 
+/* What main looks at in every poll. */
+struct glance {
+	uint8_t state, fault;
+};
+
+static struct glance take_glance(void)
+{
+	struct glance now;
+
+	port_lock();
+	now = (struct glance){(uint8_t)app.sequence.state, (uint8_t)app.sequence.fault};
+	port_unlock();
+	return now;
+}
+
 static struct sequence snapshot(void)
 {
 	struct sequence now;
@@ -147,9 +162,10 @@ static void send_heartbeat(void)
 	stream_send(&app.stream, &frame);
 }
 
-static void send_status(const struct sequence *now)
+static void send_status(void)
 {
-	struct wire_status status = {.state = now->state, .fault = now->fault};
+	struct sequence now = snapshot();
+	struct wire_status status = {.state = now.state, .fault = now.fault};
 	struct sequence_view view;
 	struct wire_counter counter = {.index = app.next_counter};
 	struct frame frame;
@@ -158,7 +174,7 @@ static void send_status(const struct sequence *now)
 	view = view_now();
 	port_unlock();
 	status.io = view.io;
-	status.checks = sequence_checks(now, view.checks);
+	status.checks = sequence_checks(&now, view.checks);
 	wire_pack_status(&frame, WIRE_ID_STATUS, &status);
 	stream_send(&app.stream, &frame);
 	counter.value = app.counters[app.next_counter]; /* now: frames_sent counts all before this one */
@@ -324,7 +340,7 @@ static void disarm(void)
 }
 
 /* Off the bus is told once it is back, error-passive at once: that can still be sent. */
-static void watch_bus(const struct sequence *now)
+static void watch_bus(const struct glance *now)
 {
 	enum port_bus bus, before = app.bus;
 
@@ -344,7 +360,7 @@ static void watch_bus(const struct sequence *now)
 	}
 }
 
-static void watch_fault(const struct sequence *now)
+static void watch_fault(const struct glance *now)
 {
 	if (now->fault == app.fault_reported)
 		return;
@@ -359,7 +375,7 @@ static bool due(uint32_t tick_ms, uint32_t phase_ms, uint32_t period_ms)
 }
 
 /* What is due in the tick that has just begun. */
-static void beat(const struct sequence *now, uint32_t tick_ms)
+static void beat(const struct glance *now, uint32_t tick_ms)
 {
 	port_watchdog_kick();
 	app.counters[WIRE_COUNTER_ticks_late] += tick_ms - app.seen_ms - 1;
@@ -368,7 +384,7 @@ static void beat(const struct sequence *now, uint32_t tick_ms)
 	if (due(tick_ms, 0, BEAT_MS))
 		send_heartbeat();
 	if (due(tick_ms, STATUS_PHASE_MS, BEAT_MS))
-		send_status(now);
+		send_status();
 	app.seen_ms = tick_ms;
 	if (!app.bus_ready && !sequence_moving(now->state))
 		start_bus();
@@ -379,13 +395,13 @@ static void beat(const struct sequence *now, uint32_t tick_ms)
 
 void app_poll(void)
 {
-	struct sequence now;
+	struct glance now;
 	uint32_t tick_ms;
 
 	stream_flush(&app.stream);
+	receive(); /* first, so that a RELEASE does not wait for two blocks to be packed */
 	take_ticks();
-	receive();
-	now = snapshot();
+	now = take_glance();
 	watch_bus(&now);
 	watch_fault(&now);
 	tick_ms = app.tick_ms;

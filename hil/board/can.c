@@ -195,8 +195,8 @@ static void write_cccr(uint32_t value)
 
 	if (value & CCE && !(before & INIT))
 		board_fail("CCE is set without INIT");
-	if ((value ^ before) & (FDOE | BRSE) && !(before & CCE))
-		board_fail("FD operation is changed without CCE");
+	if (!(before & CCE)) /* a write to what CCE protects is not heeded */
+		value = (value & ~(uint32_t)(FDOE | BRSE)) | (before & (FDOE | BRSE));
 	if (!(value & INIT))
 		value &= ~(uint32_t)CCE;
 	*at(CCCR) = value;

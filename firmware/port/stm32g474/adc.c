@@ -170,22 +170,23 @@ static unsigned scans_done(const struct pair *pair)
 	return ((uint32_t)pair->scans * pair->scan_words - left) / pair->scan_words;
 }
 
-static int16_t to_code(uint32_t sum, const struct calibration *channel)
+/* Rounded to nearest. 32 bits hold it as long as |sum - offset| gain is below 2^31. */
+static inline int16_t to_code(uint32_t sum, const struct calibration *channel)
 {
-	int32_t code;
+	int32_t code = (((int32_t)sum - channel->offset) * channel->gain + 0x8000) >> 16;
 
-	if (sum == 0 || sum >= SUM_MAX)
+	if (sum - 1 >= SUM_MAX - 1)
 		return sum == 0 ? -WIRE_SAMPLE_FULL_SCALE : WIRE_SAMPLE_FULL_SCALE;
-	/* 64 bits: 65520 x gain may pass 32; rounded to nearest */
-	code = (int32_t)((((int64_t)sum - channel->offset) * channel->gain + 0x8000) >> 16);
-	if (code > WIRE_SAMPLE_FULL_SCALE)
-		return WIRE_SAMPLE_FULL_SCALE;
-	return code < -WIRE_SAMPLE_FULL_SCALE ? -WIRE_SAMPLE_FULL_SCALE : (int16_t)code;
+	if (code != (int16_t)code)
+		return code < 0 ? -WIRE_SAMPLE_FULL_SCALE : WIRE_SAMPLE_FULL_SCALE;
+	return (int16_t)code;
 }
 
-static int16_t code_of(uint32_t word, unsigned sensor, enum axis axis)
+/* Both sensors' code of one word. */
+static inline void read_word(uint32_t word, enum axis axis, int16_t *s1, int16_t *s2)
 {
-	return to_code(sensor == 0 ? word & 0xFFFFu : word >> 16, &calibration[sensor][axis]);
+	*s1 = to_code(word & 0xFFFFu, &calibration[0][axis]);
+	*s2 = to_code(word >> 16, &calibration[1][axis]);
 }
 
 /* Of the first scan, this millisecond's or the last one's. */
@@ -195,7 +196,9 @@ void adc_judge_bias(void)
 	static const uint16_t bits[SENSORS] = {WIRE_IO_IEPE_S1, WIRE_IO_IEPE_S2};
 	uint16_t good = WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2, high = 0;
 
+#pragma GCC unroll 3
 	for (unsigned axis = 0; axis < AXES; axis++)
+#pragma GCC unroll 2
 		for (unsigned sensor = 0; sensor < SENSORS; sensor++) {
 			uint32_t sum = words[axis] >> (16 * sensor) & 0xFFFFu;
 
@@ -218,13 +221,12 @@ bool adc_read(enum adc_group group, unsigned index, int16_t code[ADC_CODES])
 			code[i] = 0;
 		return false;
 	}
-	for (unsigned sensor = 0; sensor < SENSORS; sensor++)
-		if (group == ADC_GROUP_X) {
-			code[sensor] = code_of(words[0], sensor, X);
-		} else {
-			code[2 * sensor] = code_of(words[0], sensor, Y);
-			code[2 * sensor + 1] = code_of(words[1], sensor, Z);
-		}
+	if (group == ADC_GROUP_X) {
+		read_word(words[0], X, &code[0], &code[1]);
+	} else {
+		read_word(words[0], Y, &code[0], &code[2]);
+		read_word(words[1], Z, &code[1], &code[3]);
+	}
 	return true;
 }
 

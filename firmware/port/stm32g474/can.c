@@ -124,6 +124,7 @@ static void put_element(uint32_t element, const struct frame *frame)
 {
 	uint32_t t0 = frame->flags & FRAME_EXTENDED ? FDCAN_ELEMENT_XTD | frame->id : frame->id << 18;
 	uint32_t t1 = code_of_length(frame->length) << 16;
+	unsigned words = (frame->length < FRAME_DATA_MAX ? frame->length + 3u : FRAME_DATA_MAX) / 4u;
 
 	if (frame->flags & FRAME_REMOTE)
 		t0 |= FDCAN_ELEMENT_RTR;
@@ -133,10 +134,12 @@ static void put_element(uint32_t element, const struct frame *frame)
 		t1 |= FDCAN_ELEMENT_BRS;
 	WR(element, t0);
 	WR(element + 4, t1);
-	for (unsigned i = 0; i < frame->length && i < FRAME_DATA_MAX; i += 4)
-		WR(element + 8 + i, (uint32_t)frame->data[i] | (uint32_t)frame->data[i + 1] << 8 |
-		                            (uint32_t)frame->data[i + 2] << 16 |
-		                            (uint32_t)frame->data[i + 3] << 24);
+	for (unsigned i = 0; i < words; i++) {
+		uint32_t word; /* the processor and the message RAM are little endian */
+
+		__builtin_memcpy(&word, frame->data + 4 * i, sizeof(word));
+		WR(element + 8 + 4 * i, word);
+	}
 }
 
 int can_send(const struct frame *frame)

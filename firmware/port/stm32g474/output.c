@@ -69,6 +69,7 @@ void output_set(uint16_t on, uint16_t off)
 {
 	uint32_t held = register_hold();
 
+#pragma GCC unroll 4
 	for (unsigned i = 0; i < CHANNELS; i++)
 		if (on & channels[i].output)
 			set_on(&channels[i]);
@@ -82,6 +83,7 @@ int output_off_at(uint16_t output, uint32_t time_us)
 	uint32_t held = register_hold();
 	int result = 0;
 
+#pragma GCC unroll 4
 	for (unsigned i = 0; i < CHANNELS; i++)
 		if ((output & channels[i].output) && channels[i].timer == TIM2)
 			result = off_at(&channels[i], time_us);
@@ -93,6 +95,7 @@ void output_off_cancel(uint16_t output)
 {
 	uint32_t held = register_hold();
 
+#pragma GCC unroll 4
 	for (unsigned i = 0; i < CHANNELS; i++)
 		if ((output & channels[i].output) && channels[i].timer == TIM2)
 			set_mode(&channels[i], TIM_CCMR_MODE_FROZEN);
