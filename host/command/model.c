@@ -182,7 +182,8 @@ static const struct option_row rows[] = {
         OPTION_TAKEN("sweep", "KEY=FROM:TO:STEP", struct model_arguments, ensemble, take_sweep,
                      "a row for each value; several make a grid"),
         OPTION_UNSIGNED("monte-carlo", "N", struct model_arguments, draws, 2, 1e6,
-                        "N drops with the inputs of --vary at random: mean, SD, 95 % bands"),
+                        "N drops with the inputs of --vary, and what [fit] of the scene says of its "
+                        "parameters, at random: mean, SD, 95 % bands"),
         OPTION_TEXT("vary", "KEY=SD,...", struct model_arguments, vary,
                     "their standard deviations; SD% is percent of the scene's value"),
         OPTION_UINT64("seed", "S", struct model_arguments, seed, 0, 1e9,
@@ -224,8 +225,8 @@ static int model_check(struct model_arguments *a)
 	if (a->ensemble.axes > 0 && ensemble_points(&a->ensemble) == 0)
 		return command_usage("model", "--sweep makes too many points, expected %d at most",
 		                     ENSEMBLE_POINTS_MAX);
-	if ((a->draws > 0) != (a->vary != NULL))
-		return command_usage("model", "--monte-carlo and --vary need each other");
+	if (a->vary && a->draws == 0)
+		return command_usage("model", "--vary needs --monte-carlo N");
 	if (a->seed != NO_SEED && a->draws == 0)
 		return command_usage("model", "--seed needs --monte-carlo N");
 	a->step_us = a->step_us > 0 ? a->step_us : 10;
@@ -257,5 +258,7 @@ int command_model(int argc, char **argv)
 	a.ensemble.seed = a.seed != NO_SEED ? a.seed : 1;
 	if (a.vary)
 		code = parse_vary(&a.ensemble, a.vary);
+	else if (a.draws > 0 && !ensemble_fitted(&scene))
+		code = command_usage("model", "--monte-carlo needs --vary, or a scene with [fit]");
 	return code == COMMAND_DONE ? model_answer(&a) : code;
 }

@@ -69,6 +69,7 @@ static int one(const struct model_arguments *a)
 	const struct ensemble *e = &a->ensemble;
 	char message[MODEL_MESSAGE_MAX];
 	struct model_prediction prediction, next;
+	double u[ENSEMBLE_OUTPUTS];
 	struct forecast forecast = {
 	        .scene = e->scene, .asked = e->options.asked, .prediction = &prediction, .next = &next};
 
@@ -76,6 +77,8 @@ static int one(const struct model_arguments *a)
 		return no_drop(a, message);
 	if (!solve_next(e, prediction.rung, &next))
 		forecast.next = NULL;
+	if (ensemble_bars(e, u))
+		forecast.u = u;
 	forecast.cost_us = cost_of(e);
 	return (a->json ? forecast_json(&forecast, stdout) : forecast_text(&forecast, stdout)) == 0
 	               ? COMMAND_DONE
@@ -161,7 +164,7 @@ static int sensitivity(const struct model_arguments *a)
 
 int model_answer(const struct model_arguments *a)
 {
-	if (a->ensemble.axes > 0)
+	if (a->ensemble.axes > 0 || a->draws > 0)
 		return many(a);
 	if (a->sensitivity)
 		return sensitivity(a);

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "common/units.h"
+#include "host/estimate/cholesky.h"
 
 /* A draw outside a key's range is drawn again so many times, then put at the limit. */
 #define DRAWS_MAX 20
@@ -92,11 +93,46 @@ static double ensemble_normal(uint64_t *state)
 	return radius * cos(2.0 * UNITS_PI * uniform(state));
 }
 
+bool ensemble_fitted(const struct scene *scene)
+{
+	for (int i = 0; i < SCENE_FITTED; i++)
+		if (scene->fitted_u[i] > 0.0)
+			return true;
+	return false;
+}
+
+/* The digits of a scene file may leave correlations that no draws have, by so much. */
+#define CORRELATION_DIGITS 1e-5
+
+static void draw_fitted(struct scene *scene, uint64_t *state)
+{
+	double a[CHOLESKY_MAX][CHOLESKY_MAX], move[SCENE_FITTED] = {0.0}, z[SCENE_FITTED];
+	struct cholesky factor;
+
+	for (int i = 0; i < SCENE_FITTED; i++) {
+		for (int j = 0; j < i; j++)
+			a[i][j] = scene->fitted_correlation[i][j];
+		a[i][i] = 1.0 + CORRELATION_DIGITS;
+	}
+	if (!cholesky_factor(&factor, SCENE_FITTED, a))
+		return;
+	for (int i = 0; i < SCENE_FITTED; i++) {
+		z[i] = ensemble_normal(state) / sqrt(factor.inverse[i]);
+		move[i] = z[i];
+		for (int j = 0; j < i; j++)
+			move[i] += factor.lower[i][j] * z[j];
+		move[i] *= scene->fitted_u[i];
+	}
+	vary_fitted(scene, move);
+}
+
 void ensemble_random_scene(const struct ensemble *e, size_t point, struct scene *scene, double value[])
 {
 	uint64_t state = (uint64_t)e->seed * 0xd1342543de82ef95u + (uint64_t)point * 0x2545f4914f6cdd1du;
 
 	*scene = *e->scene;
+	if (ensemble_fitted(scene))
+		draw_fitted(scene, &state);
 	for (size_t i = 0; i < e->axes; i++) {
 		const struct ensemble_axis *axis = &e->axis[i];
 		double middle = vary_get(e->scene, &axis->key);
@@ -256,6 +292,73 @@ int ensemble_monte_carlo(const struct ensemble *e, size_t draws,
 	free(d.value);
 	*failed = draws - most;
 	return !error && most < 2 ? DT_E_EMPTY : error;
+}
+
+/* ---- what the uncertainty of the parameters makes ---- */
+
+/* Half of what an output changes from one scene to another. */
+static void bar_slope(const struct ensemble *e, const struct scene *less, const struct scene *more,
+                      double slope[ENSEMBLE_OUTPUTS])
+{
+	struct model_prediction below, above;
+	bool drops = model_solve(less, e->fidelity, &e->options, &below, NULL) == 0 &&
+	             model_solve(more, e->fidelity, &e->options, &above, NULL) == 0;
+
+	for (int k = 0; k < ENSEMBLE_OUTPUTS; k++)
+		slope[k] = drops ? 0.5 * (ensemble_value(&above, &ensemble_outputs[k]) -
+		                          ensemble_value(&below, &ensemble_outputs[k]))
+		                 : (double)NAN;
+}
+
+/* One standard deviation of what was fitted, or of an axis, to each side. */
+static void bar_fitted(const struct ensemble *e, int parameter, double slope[ENSEMBLE_OUTPUTS])
+{
+	struct scene less = *e->scene, more = *e->scene;
+	double move[SCENE_FITTED] = {0.0};
+
+	move[parameter] = e->scene->fitted_u[parameter];
+	if (!(move[parameter] > 0.0))
+		return;
+	vary_fitted(&more, move);
+	move[parameter] = -move[parameter];
+	vary_fitted(&less, move);
+	bar_slope(e, &less, &more, slope);
+}
+
+static void bar_axis(const struct ensemble *e, const struct ensemble_axis *axis,
+                     double slope[ENSEMBLE_OUTPUTS])
+{
+	struct scene less = *e->scene, more = *e->scene;
+	double middle = vary_get(e->scene, &axis->key);
+
+	vary_set(&less, &axis->key, middle - axis->sd);
+	vary_set(&more, &axis->key, middle + axis->sd);
+	bar_slope(e, &less, &more, slope);
+}
+
+bool ensemble_bars(const struct ensemble *e, double u[ENSEMBLE_OUTPUTS])
+{
+	const struct scene *scene = e->scene;
+	double slope[SCENE_FITTED][ENSEMBLE_OUTPUTS] = {{0.0}}, own[ENSEMBLE_KEYS_MAX][ENSEMBLE_OUTPUTS];
+
+	if (!ensemble_fitted(scene))
+		return false;
+	for (int i = 0; i < SCENE_FITTED; i++)
+		bar_fitted(e, i, slope[i]);
+	for (size_t i = 0; i < e->axes; i++)
+		bar_axis(e, &e->axis[i], own[i]);
+	for (int k = 0; k < ENSEMBLE_OUTPUTS; k++) {
+		double variance = 0.0;
+
+		for (int i = 0; i < SCENE_FITTED; i++)
+			for (int j = 0; j < SCENE_FITTED; j++)
+				variance += (i == j ? 1.0 : scene->fitted_correlation[i][j]) * slope[i][k] *
+				            slope[j][k];
+		for (size_t i = 0; i < e->axes; i++)
+			variance += own[i][k] * own[i][k];
+		u[k] = variance < 0.0 ? 0.0 : sqrt(variance);
+	}
+	return true;
 }
 
 /* ---- sensitivities ---- */

@@ -49,6 +49,7 @@ size_t ensemble_points(const struct ensemble *ensemble);
 
 /* The scene of a point of the grid, or of a random draw, with the varied values in value[axes]. */
 void ensemble_grid_scene(const struct ensemble *ensemble, size_t point, struct scene *scene, double value[]);
+/* (a scene with [fit]: its parameters are drawn from their covariance first) */
 void ensemble_random_scene(const struct ensemble *ensemble, size_t point, struct scene *scene,
                            double value[]);
 
@@ -70,6 +71,11 @@ struct ensemble_spread {
  * DT_E_MEMORY, or DT_E_EMPTY when fewer than two are left. */
 DT_MUST_USE int ensemble_monte_carlo(const struct ensemble *ensemble, size_t draws,
                                      struct ensemble_spread spread[ENSEMBLE_OUTPUTS], size_t *failed);
+
+/* Standard uncertainty of each of ensemble_outputs by what [fit] of the scene says of its parameters and by
+ * the axes' SD, to the first order; NAN where a side makes no drop. False: the scene has no [fit]. */
+bool ensemble_bars(const struct ensemble *ensemble, double u[ENSEMBLE_OUTPUTS]);
+bool ensemble_fitted(const struct scene *scene);
 
 /* Percent of each output per percent of a key (per degree of an angle), by central differences; NAN where a
  * side makes no drop. False: the scene's value is 0, or nothing depends on the key. */

@@ -81,3 +81,21 @@ void vary_set(struct scene *scene, const struct vary_key *key, double value)
 		scene->mount_damping_n_s_m *= times;
 	}
 }
+
+/* In the order of scene_fitted. */
+void vary_fitted(struct scene *s, const double move[SCENE_FITTED])
+{
+	double *const relative[SCENE_FITTED] = {
+	        [0] = &s->contact_stiffness_n_m15, [3] = &s->contact_tangential_ratio,
+	        [4] = &s->mount_stiffness_n_m,     [6] = &s->mount_softening_strain,
+	        [7] = &s->mount_damping_n_s_m,
+	};
+
+	for (int i = 0; i < SCENE_FITTED; i++)
+		if (relative[i])
+			*relative[i] *= exp(move[i]);
+	s->contact_restitution = 1.0 / (1.0 + (1.0 / s->contact_restitution - 1.0) * exp(-move[1]));
+	s->product_balance_angle_deg += move[2];
+	s->mount_softening = fmax(s->mount_softening + move[5], 0.0);
+	s->sensor_s1_yaw_deg += move[8];
+}

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/fit/fit.h"
+#include "host/model/ensemble.h"
 #include "host/report/facts.h"
 
 #include <inttypes.h>
@@ -491,12 +493,50 @@ static size_t facts_compare(const struct report *report, struct report_row rows[
 	return count;
 }
 
+static const char *verdict_of(const struct report_row *row)
+{
+	double apart = fabs(row->predicted - row->measured) / hypot(row->predicted_u, row->sigma);
+
+	if (!isfinite(apart))
+		return "";
+	return apart <= 2.0 ? "agrees" : apart <= 4.0 ? "2 sigma" : "not possible";
+}
+
+/* What one drop may show of a prediction: [fit] of the scene, angle and speed about what was set, gains. */
+static void facts_judge(const struct report *report, struct report_row rows[], size_t count)
+{
+	struct ensemble e = {.scene = report->scene, .options = model_defaults, .axes = 2};
+	struct fit_options usual;
+	double u[ENSEMBLE_OUTPUTS];
+	bool known = false;
+
+	if (count > 0 && report->scene && ensemble_fitted(report->scene)) {
+		usual = fit_options_usual(report->scene);
+		e.fidelity = report->prediction->rung;
+		e.axis[0].sd = usual.angle_sd_deg;
+		e.axis[1].sd = 2.0 * usual.speed_sd * report->scene->drop_height_m;
+		known = vary_find("angle", &e.axis[0].key) == 0 && vary_find("height", &e.axis[1].key) == 0 &&
+		        ensemble_bars(&e, u);
+	}
+	for (size_t i = 0; i < count; i++) {
+		rows[i].predicted_u = (double)NAN;
+		for (int k = 0; k < ENSEMBLE_OUTPUTS && known; k++)
+			if (strcmp(rows[i].key, ensemble_outputs[k].key) == 0)
+				rows[i].predicted_u = u[k];
+		if (known && strcmp(rows[i].unit, "g") == 0)
+			rows[i].predicted_u = hypot(rows[i].predicted_u,
+			                            usual.gain_sd[rows[i].key[1] - '1'] * rows[i].predicted);
+		rows[i].verdict = verdict_of(&rows[i]);
+	}
+}
+
 size_t report_compare(const struct report *report, struct report_row rows[REPORT_ROWS_MAX])
 {
 	struct report_row below[REPORT_ROWS_MAX];
 	struct report lower = *report;
 	size_t count = facts_compare(report, rows);
 
+	facts_judge(report, rows, count);
 	lower.prediction = report->prediction ? report->below : NULL;
 	for (size_t i = 0; i < count; i++)
 		rows[i].rungs_apart = (double)NAN;

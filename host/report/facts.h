@@ -84,7 +84,11 @@ struct report_row {
 	int decimals;      /* in unit */
 	double predicted, measured;
 	double rungs_apart; /* the rung below from predicted: how much the model itself may be off; or NAN */
-	double sigma;       /* standard uncertainty of measured; NAN where there is none */
+	double predicted_u; /* standard uncertainty of what one drop may show of it, of a scene with [fit]; or
+	                       NAN */
+	const char *verdict; /* "agrees", "2 sigma", "not possible": beyond 2 and beyond 4 of both together;
+	                        or "" */
+	double sigma;        /* standard uncertainty of measured; NAN where there is none */
 	double difference_percent; /* (predicted - measured)/measured */
 };
 

@@ -32,11 +32,13 @@ static double next_change(const struct forecast *f)
 	               : (double)NAN;
 }
 
-static void text_row(FILE *out, const char *name, double value, double next)
+static void text_row(FILE *out, const char *name, double value, double u, double next)
 {
 	if (isnan(value))
 		return;
 	fprintf(out, "%-22s %12.6g", name, value);
+	if (isfinite(u))
+		fprintf(out, " +- %-8.2g", u);
 	if (isfinite(next))
 		fprintf(out, " %12.6g %+8.2f %%", next, 100.0 * (next - value) / value);
 	fputc('\n', out);
@@ -47,6 +49,7 @@ int forecast_text(const struct forecast *f, FILE *out)
 	const struct model_prediction *p = f->prediction;
 	const struct ensemble_output *outputs[ENSEMBLE_OUTPUTS];
 	size_t count = ensemble_select(f->asked, outputs);
+	const double none = (double)NAN;
 
 	fprintf(out, "%s: %s, %.6g m, %.6g deg\n", f->scene->name, f->scene->title, f->scene->drop_height_m,
 	        f->scene->drop_angle_deg);
@@ -56,17 +59,20 @@ int forecast_text(const struct forecast *f, FILE *out)
 	if (f->next)
 		fprintf(out, " %12s %10s", f->next->fidelity, "change");
 	fputc('\n', out);
-	text_row(out, "impact_speed_m_s", p->impact_speed_m_s, (double)NAN);
-	text_row(out, "velocity_change_m_s", p->velocity_change_m_s, (double)NAN);
-	text_row(out, "contact_time_s", p->contact_time_s, (double)NAN);
-	text_row(out, "restitution", p->restitution, (double)NAN);
-	text_row(out, "dent_m", p->dent_m, (double)NAN);
-	text_row(out, "plate_travel_m", p->has_plate ? p->plate_travel_m : (double)NAN, (double)NAN);
-	text_row(out, "plate_damping_ratio", p->has_plate ? p->plate_damping_ratio : (double)NAN,
-	         (double)NAN);
+	text_row(out, "impact_speed_m_s", p->impact_speed_m_s, none, none);
+	text_row(out, "velocity_change_m_s", p->velocity_change_m_s, none, none);
+	text_row(out, "contact_time_s", p->contact_time_s, none, none);
+	text_row(out, "restitution", p->restitution, none, none);
+	text_row(out, "dent_m", p->dent_m, none, none);
+	text_row(out, "plate_travel_m", p->has_plate ? p->plate_travel_m : none, none, none);
+	text_row(out, "plate_damping_ratio", p->has_plate ? p->plate_damping_ratio : none, none, none);
 	for (size_t i = 0; i < count; i++)
 		text_row(out, outputs[i]->key, ensemble_value(p, outputs[i]),
-		         f->next ? ensemble_value(f->next, outputs[i]) : (double)NAN);
+		         f->u ? f->u[outputs[i] - ensemble_outputs] : none,
+		         f->next ? ensemble_value(f->next, outputs[i]) : none);
+	if (f->u)
+		fputs("\n+-: standard uncertainty by [fit] of the scene; the law's own error is not in it\n",
+		      out);
 	if (p->notes & MODEL_NOTE_DEEP)
 		fprintf(out, "\nnote: the dent is %.0f %% of the mat: its floor begins to be felt\n",
 		        100.0 * p->dent_share);
@@ -109,6 +115,12 @@ int forecast_json(const struct forecast *f, FILE *out)
 	put_number(&b, predicted, "plate_damping_ratio", p->plate_damping_ratio);
 	for (size_t i = 0; i < count; i++)
 		put_number(&b, predicted, outputs[i]->key, ensemble_value(p, outputs[i]));
+	if (f->u) {
+		cJSON *u = put_object(&b, root, "standard_uncertainty");
+
+		for (size_t i = 0; i < count; i++)
+			put_number(&b, u, outputs[i]->key, f->u[outputs[i] - ensemble_outputs]);
+	}
 	if (!f->next) {
 		put_item(&b, root, "next_rung", cJSON_CreateNull());
 		return put_out(&b, root, out);

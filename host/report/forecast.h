@@ -16,6 +16,7 @@ struct forecast {
 	unsigned asked; /* MODEL_ASK_*; 0: everything */
 	const struct model_prediction *prediction;
 	const struct model_prediction *next; /* by the rung above; NULL: none */
+	const double *u; /* of each of ensemble_outputs, by the parameters' uncertainty; NULL: not known */
 	double cost_us;
 };
 

@@ -5,6 +5,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "host/model/ensemble.h"
 #include "host/estimate/cfc.h"
 #include "host/report/facts.h"
 #include "host/base/put.h"
@@ -213,6 +214,15 @@ static void put_model(struct builder *b, cJSON *root, const struct report *repor
 	difference = put_object(b, model, "difference_percent");
 	for (size_t i = 0; i < count; i++)
 		put_number(b, difference, rows[i].key, rows[i].difference_percent);
+	if (ensemble_fitted(report->scene)) {
+		cJSON *u = put_object(b, model, "standard_uncertainty"),
+		      *verdict = put_object(b, model, "verdict");
+
+		for (size_t i = 0; i < count; i++) {
+			put_number(b, u, rows[i].key, rows[i].predicted_u);
+			put_text(b, verdict, rows[i].key, rows[i].verdict);
+		}
+	}
 	if (!report->below)
 		return;
 	put_text(b, model, "rung_below", report->below->fidelity);

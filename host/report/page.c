@@ -12,7 +12,8 @@
 void page_begin_compared(FILE *out, const struct report_row *row)
 {
 	fprintf(out, "<tr><td>%s%s%s</td><td>", row->label, row->unit[0] ? ", " : "", row->unit);
-	html_with_sigma(out, row->decimals, row->predicted * row->scale, row->rungs_apart * row->scale);
+	html_with_sigma(out, row->decimals, row->predicted * row->scale,
+	                (isnan(row->predicted_u) ? row->rungs_apart : row->predicted_u) * row->scale);
 	fputs("</td><td>", out);
 }
 
@@ -20,7 +21,10 @@ void page_end_compared(FILE *out, const struct report_row *row)
 {
 	fprintf(out, "</td><td>%s", row->difference_percent > 0.0 ? "+" : "");
 	html_number(out, 1, row->difference_percent);
-	fputs(isfinite(row->difference_percent) ? " %</td></tr>\n" : "</td></tr>\n", out);
+	fputs(isfinite(row->difference_percent) ? " %" : "", out);
+	if (row->verdict[0])
+		fprintf(out, ", %s", row->verdict);
+	fputs("</td></tr>\n", out);
 }
 
 void page_channel_name(FILE *out, const char *name)

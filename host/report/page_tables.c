@@ -2,6 +2,7 @@
 #include <inttypes.h>
 #include <math.h>
 
+#include "host/model/ensemble.h"
 #include "host/report/page.h"
 #include "host/result/quantity.h"
 
@@ -126,7 +127,16 @@ static void model(struct page *page)
 	fputs("</table></div>\n<p class=\"note\">Difference: model less measured, over measured. A dash: not "
 	      "known well enough to compare.",
 	      out);
-	if (page->report->below)
+	if (ensemble_fitted(page->report->scene))
+		fputs(" Behind the model's value, &plusmn;: the standard uncertainty of what one drop may "
+		      "show, by the "
+		      "fit of the scene, angle and speed about what was set and the sensors' gains; the "
+		      "law's own "
+		      "error is not in it. Agrees: within twice both uncertainties; 2 sigma: beyond; not "
+		      "possible: "
+		      "beyond four times.",
+		      out);
+	else if (page->report->below)
 		fprintf(out,
 		        " Behind the model's value, &plusmn;: how far the next simpler model, %s, is from "
 		        "it.",

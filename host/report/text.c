@@ -250,9 +250,13 @@ static void text_write_model(const struct report *report, FILE *out)
 		text_cell(out, 10, rows[i].decimals, rows[i].measured * rows[i].scale);
 		text_cell(out, 8, rows[i].decimals, rows[i].sigma * rows[i].scale);
 		if (isfinite(rows[i].difference_percent))
-			fprintf(out, " %+10.1f %%\n", rows[i].difference_percent);
+			fprintf(out, " %+10.1f %%", rows[i].difference_percent);
 		else
-			fprintf(out, " %10s\n", "-");
+			fprintf(out, " %10s", "-");
+		if (isfinite(rows[i].predicted_u))
+			fprintf(out, "  %s%smodel +- %.*f", rows[i].verdict, rows[i].verdict[0] ? ", " : "",
+			        rows[i].decimals, rows[i].predicted_u * rows[i].scale);
+		fputc('\n', out);
 	}
 	if (!compared)
 		fputs("Nothing to compare: the model speaks of S1 and S2 of the tower, which has not "
