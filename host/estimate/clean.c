@@ -2,6 +2,7 @@
 #include "host/estimate/clean.h"
 
 #include "host/estimate/clip.h"
+#include "host/estimate/doubt.h"
 #include "host/estimate/dropout.h"
 #include "host/estimate/settle.h"
 #include "host/estimate/spike.h"
@@ -24,4 +25,5 @@ void clean_find(struct trace *trace, double *scratch, struct estimate_baseline *
 	baseline->doubtful |= settle.extrapolated || settle.inexact;
 	baseline->unsettled |= settle.inexact;
 	clip_judge_twins(trace, baseline->noise_g);
+	doubt_plateau(trace, baseline->noise_g);
 }

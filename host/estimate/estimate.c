@@ -8,6 +8,7 @@
 #include "common/units.h"
 #include "host/estimate/cfc.h"
 #include "host/estimate/clean.h"
+#include "host/estimate/doubt.h"
 #include "host/estimate/estimate_private.h"
 #include "host/estimate/filter.h"
 #include "host/estimate/iepe.h"
@@ -44,6 +45,7 @@ static void analyse_channel(const struct desk *desk, size_t i, struct estimate_c
 	if (out->baseline.unsettled && work->peak.result.how.status == ESTIMATE_OK)
 		work->peak.result.how.status = ESTIMATE_AMBIGUOUS;
 	pulse_measure(&work->trace, &work->peak, &out->baseline, desk->options->family, &out->pulse);
+	doubt_channel(&work->trace, &out->baseline, &work->peak, &out->pulse);
 	if (out->baseline.unsettled && out->pulse.status == ESTIMATE_OK)
 		out->pulse.status = ESTIMATE_AMBIGUOUS;
 	out->peak = work->peak.result;

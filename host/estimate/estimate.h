@@ -41,6 +41,8 @@ enum {
 	ESTIMATE_FLAG_NOT_SEPARABLE = 1u << 9, /* "not_separable": two modes nearer than their width */
 	ESTIMATE_FLAG_ZERO = 1u << 10,         /* "zero_unsure": the baseline is doubtful */
 	ESTIMATE_FLAG_RIVAL = 1u << 11, /* "rival": another extreme is as high, as far as noise lets tell */
+	ESTIMATE_FLAG_STEP = 1u << 12,  /* "step": the pulse ends within one sample, as no sensor does */
+	ESTIMATE_FLAG_TAIL = 1u << 13,  /* "tail": more than noise follows the pulse; sigma is widened */
 };
 
 /* Name of the lowest flag bit in flags; "" for 0. */

@@ -32,7 +32,9 @@ const char *estimate_flag_name(unsigned flags)
 	                                    "weak_axis",
 	                                    "not_separable",
 	                                    "zero_unsure",
-	                                    "rival"};
+	                                    "rival",
+	                                    "step",
+	                                    "tail"};
 
 	for (unsigned i = 0; i < sizeof(names) / sizeof(names[0]); i++)
 		if (flags & 1u << i)

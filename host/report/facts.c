@@ -283,6 +283,10 @@ const char *report_note_words(unsigned flag)
 		return "nothing quiet before the pulse, or more than noise: it hangs on an unsure zero";
 	case ESTIMATE_FLAG_RIVAL:
 		return "another extreme is as high, as far as noise lets tell";
+	case ESTIMATE_FLAG_STEP:
+		return "it ends within one sample, as no sensor does: look for a broken cable";
+	case ESTIMATE_FLAG_TAIL:
+		return "more than noise follows the pulse; the uncertainty holds it";
 	default:
 		return estimate_flag_name(flag);
 	}

@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_ESTIMATE_DOUBT_H
+#define DT_HOST_ESTIMATE_DOUBT_H
+/*
+ * What a record itself says against the numbers that are taken from it. Each check looks at one thing that no
+ * intact sensor on a shock does; what it touches is clipped, flagged or widened.
+ *
+ *   doubt_plateau   a top that falls off on both sides and trembles less than the noise: a cut of unknown
+ * range doubt_channel   a fall to rest within one sample: "step" a zero after the pulse that is not the one
+ * before: "tail", peak and velocity change are widened by it; a force that fades on: "tail", the velocity
+ * change is a pulse of fewer than eight samples: its width is widened
+ */
+#include "host/estimate/estimate.h"
+#include "host/estimate/peak.h"
+#include "host/estimate/trace.h"
+
+/* Marks the samples of a cut top as at the limit. Zero is not taken off yet; noise_g is per sample. */
+void doubt_plateau(struct trace *trace, double noise_g);
+
+/* After pulse_measure: the channel's peak and pulse. */
+void doubt_channel(const struct trace *trace, const struct estimate_baseline *baseline, struct peak *peak,
+                   struct estimate_pulse *pulse);
+
+#endif

@@ -1,0 +1,243 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Drops of one axis with known truth on a grid of 1 us, of pulses that the estimators have no family for,
+ * whole and spoilt. A value is silently wrong that is off by more than three of its own uncertainty and by 2
+ * %, status ok, no flag. Drops are DOUBT_DROPS a class; the seed is the class' number.
+ */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <cmocka.h>
+
+#include "host/estimate/estimate.h"
+#include "tests/unit/near.h"
+#include "tests/unit/synth.h"
+
+#ifndef DOUBT_DROPS
+#define DOUBT_DROPS 60
+#endif
+
+#define RATE_HZ 7000.0
+#define CODE_G (1.0 / 32)
+#define ONSET_S 0.1
+#define G_M_S2 9.80665
+#define FINE_S 1e-6
+
+enum { SAMPLES = 1400, PLAIN_FLAGS = ESTIMATE_FLAG_TOLERANCE };
+
+enum form { HALF_SINE, HAVERSINE, GAMMA, STEEP_GAMMA, TRAPEZOID, TWO_HUMPS, RING, BELL, SAWTOOTH, FORMS };
+enum spoil { WHOLE, CUT_FINE, CUT, CABLE, SHIFT, TAIL, SPOILS };
+
+static const char *const form_names[FORMS] = {"half-sine", "haversine", "gamma 2", "gamma 1.2", "trapezoid",
+                                              "two humps", "800 Hz",    "bell",    "sawtooth"};
+static const char *const spoil_names[SPOILS] = {"whole", "cut 0.02 g", "cut 0.05 g",
+                                                "cable", "shift",      "tail"};
+
+struct drop {
+	enum form form;
+	enum spoil spoil;
+	double height_g, base_s, noise_g, onset_s, cut, part, fails_s;
+};
+
+static double smooth(double x)
+{
+	x = fmin(fmax(x, 0), 1);
+	return x * x * (3 - 2 * x);
+}
+
+/* Of base 1, height about 1. */
+static double pulse_form(enum form form, double x)
+{
+	static const double pi = 3.14159265358979;
+
+	if (x <= 0 || (x >= 1 && form != GAMMA && form != STEEP_GAMMA && form != BELL))
+		return 0;
+	switch (form) {
+	case HALF_SINE:
+		return sin(pi * x);
+	case HAVERSINE:
+		return pow(sin(pi * x), 2);
+	case GAMMA:
+		return pow(x / 0.25 * exp(1 - x / 0.25), 2);
+	case STEEP_GAMMA:
+		return pow(x / 0.25 * exp(1 - x / 0.25), 1.2);
+	case TRAPEZOID:
+		return smooth(x / 0.35) * smooth((1 - x) / 0.35) * (1 - 0.03 * x);
+	case TWO_HUMPS:
+		return sin(pi * x) * (1 + 0.5 * cos(4 * pi * x)) / 1.2;
+	case RING:
+		return sin(pi * x);
+	case BELL:
+		return exp(-pow((x - 0.5) / 0.18, 2));
+	default:
+		return smooth(x / 0.8) * smooth((1 - x) / 0.2);
+	}
+}
+
+/* The shock itself, t after its onset, with what belongs to it. */
+static double shock(const struct drop *d, double t)
+{
+	double value = d->height_g * pulse_form(d->form, t / d->base_s);
+
+	if (d->form == RING && t > 0)
+		value += 0.05 * d->height_g * exp(-t / 4e-3) * sin(6.283185307 * 800 * t);
+	if (d->spoil == TAIL && t > 0)
+		value += d->part * d->height_g * smooth(t / d->base_s) *
+		         exp(-fmax(t - d->base_s, 0) / d->base_s);
+	return value;
+}
+
+struct truth {
+	double peak_g, velocity_m_s, width_s;
+};
+
+/* The velocity change ends where a twelfth of a thousandth is left, or after the tail. */
+static struct truth truth_of(const struct drop *d)
+{
+	struct truth truth = {0, 0, 0};
+	double from = NAN, until = NAN;
+	size_t n = (size_t)(8 * d->base_s / FINE_S);
+
+	for (size_t i = 0; i < n; i++) {
+		double v = shock(d, (double)i * FINE_S);
+
+		truth.peak_g = fmax(truth.peak_g, v);
+		truth.velocity_m_s += v * FINE_S * G_M_S2;
+	}
+	for (size_t i = 0; i < n; i++) {
+		if (shock(d, (double)i * FINE_S) < 0.1 * truth.peak_g)
+			continue;
+		if (isnan(from))
+			from = (double)i * FINE_S;
+		if (isnan(until) || (double)i * FINE_S - until < 2 * FINE_S)
+			until = (double)i * FINE_S;
+	}
+	truth.width_s = until - from;
+	return truth;
+}
+
+static double reading(const struct drop *d, double t, struct synth_random *random)
+{
+	double value = shock(d, t), after = d->noise_g;
+
+	if (d->spoil == SHIFT && t > 0)
+		value += d->part * d->height_g * smooth(t / d->base_s);
+	if (d->spoil == CABLE && t > d->fails_s)
+		value = 0;
+	value += after * synth_normal(random);
+	if (d->spoil >= CUT_FINE && d->spoil <= CUT && value > d->cut * d->height_g) {
+		static const double trembles_g[] = {0.02, 0.05};
+
+		value = d->cut * d->height_g + trembles_g[d->spoil - CUT_FINE] * synth_normal(random);
+	}
+	return CODE_G * round(value / CODE_G);
+}
+
+static struct drop draw(enum form form, enum spoil spoil, struct synth_random *random)
+{
+	struct drop d = {.form = form, .spoil = spoil};
+
+	d.height_g = 100 * pow(8, synth_uniform(random));
+	d.base_s = 1.5e-3 * pow(4, synth_uniform(random));
+	d.noise_g = fmin(0.3 * pow(10, synth_uniform(random)), d.height_g / 100);
+	d.onset_s = ONSET_S + synth_uniform(random) / RATE_HZ;
+	d.cut = 0.6 + 0.25 * synth_uniform(random);
+	d.part = 0.03 + 0.07 * synth_uniform(random);
+	d.fails_s = d.base_s * (0.5 + 0.2 * synth_uniform(random));
+	if (form == GAMMA || form == STEEP_GAMMA)
+		d.fails_s = d.base_s * (0.3 + 0.2 * synth_uniform(random));
+	return d;
+}
+
+struct count {
+	unsigned peak, velocity, width; /* silently wrong */
+	unsigned clipped, step, tail;
+};
+
+static unsigned wrong(double value, double truth, double sigma, unsigned flags, enum estimate_status status)
+{
+	return status == ESTIMATE_OK && !(flags & ~(unsigned)PLAIN_FLAGS) && isfinite(value) &&
+	       fabs(value - truth) > 3 * sigma && fabs(value - truth) > 0.02 * fabs(truth);
+}
+
+static struct count repeat(enum form form, enum spoil spoil, unsigned drops)
+{
+	struct synth_random random = {1 + (uint64_t)(form * SPOILS + spoil)};
+	struct channel channel = synth_channel("a", RATE_HZ, 0, SAMPLES);
+	const struct record record = {.channels = &channel, .channel_count = 1};
+	struct count count = {0};
+
+	for (unsigned i = 0; i < drops; i++) {
+		const struct estimate_options options = {0};
+		const struct drop d = draw(form, spoil, &random);
+		const struct truth truth = truth_of(&d);
+		const struct estimate_channel *c;
+		struct analysis analysis;
+
+		for (size_t k = 0; k < SAMPLES; k++)
+			channel.value_g[k] = reading(&d, (double)k / RATE_HZ - d.onset_s, &random);
+		assert_int_equal(estimate_record(&record, &options, &analysis), 0);
+		c = &analysis.channels[0];
+		count.peak += wrong(c->peak.value_g, truth.peak_g, c->peak.sigma_g, c->peak.how.flags,
+		                    c->peak.how.status);
+		count.velocity += wrong(c->pulse.velocity_change_m_s, truth.velocity_m_s,
+		                        c->pulse.sigma_velocity_m_s, c->pulse.flags, c->pulse.status);
+		count.width += wrong(c->pulse.duration_s, truth.width_s, c->pulse.sigma_duration_s,
+		                     c->pulse.flags, c->pulse.status);
+		count.clipped += (c->flags & RECORD_FLAG_CLIPPED) != 0;
+		count.step += (c->pulse.flags & ESTIMATE_FLAG_STEP) != 0;
+		count.tail += (c->pulse.flags & ESTIMATE_FLAG_TAIL) != 0;
+		estimate_free(&analysis);
+	}
+	synth_free(&channel);
+	return count;
+}
+
+static void print_count(enum form form, enum spoil spoil, const struct count *c)
+{
+	printf("%-10s %-10s of %u: silent peak %u dv %u width %u; clipped %u step %u tail %u\n",
+	       spoil_names[spoil], form_names[form], DOUBT_DROPS, c->peak, c->velocity, c->width, c->clipped,
+	       c->step, c->tail);
+}
+
+/* Nothing is said against a whole record. */
+static void whole(void **state)
+{
+	unsigned alarms = 0;
+
+	(void)state;
+	for (int f = 0; f < FORMS; f++) {
+		struct count c = repeat((enum form)f, WHOLE, DOUBT_DROPS);
+
+		print_count((enum form)f, WHOLE, &c);
+		alarms += c.clipped + c.step + c.tail;
+	}
+	assert_in_range(alarms, 0, 1);
+}
+
+static void spoilt(void **state)
+{
+	/* Parts of the drops in which it must be seen: least of all forms. */
+	static const double seen[SPOILS] = {
+	        [CUT_FINE] = 0.75, [CUT] = 0.45, [CABLE] = 0.45, [SHIFT] = 0.95, [TAIL] = 0.5};
+
+	(void)state;
+	for (int s = WHOLE + 1; s < SPOILS; s++)
+		for (int f = 0; f < FORMS; f++) {
+			struct count c = repeat((enum form)f, (enum spoil)s, DOUBT_DROPS);
+			unsigned n = s == CABLE ? c.step : s >= SHIFT ? c.tail : c.clipped;
+
+			print_count((enum form)f, (enum spoil)s, &c);
+			assert_true(n >= seen[s] * DOUBT_DROPS);
+		}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(whole), cmocka_unit_test(spoilt)};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
