@@ -2,23 +2,28 @@
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "common/base/number.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
 #include "host/command/files.h"
 #include "host/command/list.h"
+#include "host/command/repeats.h"
 #include "host/estimate/cfc.h"
 #include "host/record/log_capture.h"
 #include "host/record/profile.h"
 #include "host/record/read.h"
+#include "host/shock/window.h"
 
 struct arguments {
 	const char *columns, *profile, *save_profile, *scene_file, *band_file;
 	char profile_as_columns[4096];
 	double angle_deg;
 	unsigned drop; /* of the log; 0: all */
-	bool list;
+	bool list, every_shock, repeats;
+	unsigned shock; /* of a long record; 0: none by its number */
+	double window_s[2];
 	struct evaluate_options evaluate;
 };
 
@@ -41,12 +46,39 @@ static int take_family(const struct option_table *table, const char *name, const
 	                    text);
 }
 
+static int take_window(const struct option_table *table, const char *name, const char *text, void *window)
+{
+	double *window_s = window, from, to;
+	char head[NUMBER_CHARS + 8];
+	const char *colon = strchr(text, ':');
+
+	if (colon != NULL && colon - text < (int)sizeof(head)) {
+		snprintf(head, sizeof(head), "%.*s", (int)(colon - text), text);
+		if (number_read(head, -1e9, 1e9, &from) && number_read(colon + 1, -1e9, 1e9, &to) &&
+		    from < to) {
+			window_s[0] = from;
+			window_s[1] = to;
+			return OPTIONS_READ;
+		}
+	}
+	return option_wrong(table, "--%s is '%s', expected FROM:TO in seconds", name, text);
+}
+
 static const struct option_row rows[] = {
         OPTION_FLAG("list", struct arguments, list,
                     "what drops a log holds, without analysing them; of a large log an index is kept as "
                     "FILE.index"),
         OPTION_UNSIGNED("drop", "N", struct arguments, drop, 1, 1e9,
                         "only the N-th drop of the log, counted from 1 (one FILE only)"),
+        OPTION_UNSIGNED("shock", "N", struct arguments, shock, 1, 1e9,
+                        "only the stretch about the N-th shock of a long record, in the order of time"),
+        OPTION_FLAG("every-shock", struct arguments, every_shock, "a result for each shock of a long record"),
+        OPTION_TAKEN("window", "FROM:TO", struct arguments, window_s, take_window,
+                     "only so much of the record, s"),
+        OPTION_FLAG("repeats", struct arguments, repeats,
+                    "instead of a result each: one table over all FILEs, drops or shocks as repeats of one "
+                    "thing, "
+                    "with mean, SD, trend and change"),
         OPTION_TEXT(
                 "columns", "SPEC", struct arguments, columns,
                 "what the columns of foreign text are, where it does not tell or tells wrong: one name:unit "
@@ -110,6 +142,67 @@ static const struct option_table known_options = {
         .words = true,
 };
 
+/* ---- one record ---- */
+
+static int analyze_cut(const struct record *record, double from_s, double to_s, unsigned shock,
+                       unsigned shocks, const struct evaluate_options *options)
+{
+	struct record cut;
+	int code, result = shock_window_cut(record, from_s, to_s, &cut);
+
+	if (result != 0) {
+		command_error("%s: %g s to %g s: %s", record->file, from_s, to_s,
+		              result == DT_E_EMPTY ? "no samples there" : error_text(result));
+		return COMMAND_INPUT;
+	}
+	cut.shock = shock;
+	cut.shocks = shocks;
+	code = evaluate(&cut, options);
+	record_free(&cut);
+	return code;
+}
+
+static int analyze_shocks(const struct record *record, const struct arguments *arguments)
+{
+	const struct evaluate_options *options = &arguments->evaluate;
+	struct shock_windows windows;
+	int code = COMMAND_DONE;
+
+	if (shock_windows_find(record, &options->events, &windows) != 0) {
+		command_error("%s: %s", record->file, error_text(DT_E_MEMORY));
+		return COMMAND_INPUT;
+	}
+	if (windows.count == 0 || arguments->shock > windows.count) {
+		command_error("%s: no shock %u, %zu are there", record->file, arguments->shock,
+		              windows.count);
+		code = COMMAND_INPUT;
+	}
+	for (size_t i = 0; i < windows.count && !interrupt_came(); i++) {
+		const struct shock_window *w = &windows.window[i];
+		int one;
+
+		if (arguments->shock > 0 && arguments->shock != i + 1)
+			continue;
+		if (i > 0 && arguments->shock == 0 && !options->json && options->repeats == NULL)
+			putchar('\n');
+		one = analyze_cut(record, w->from_s, w->to_s, (unsigned)i + 1, (unsigned)windows.count,
+		                  options);
+		code = one != COMMAND_DONE ? one : code;
+	}
+	shock_windows_free(&windows);
+	return code;
+}
+
+static int analyze_record(struct record *record, const struct arguments *arguments)
+{
+	if (arguments->every_shock || arguments->shock > 0)
+		return analyze_shocks(record, arguments);
+	if (!isnan(arguments->window_s[0]))
+		return analyze_cut(record, arguments->window_s[0], arguments->window_s[1], 0, 0,
+		                   &arguments->evaluate);
+	return evaluate(record, &arguments->evaluate);
+}
+
 static int analyze_one(const char *file, const struct arguments *arguments)
 {
 	char message[READ_MESSAGE_MAX];
@@ -120,7 +213,7 @@ static int analyze_one(const char *file, const struct arguments *arguments)
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}
-	code = evaluate(&record, &arguments->evaluate);
+	code = analyze_record(&record, arguments);
 	record_free(&record);
 	return code;
 }
@@ -141,9 +234,9 @@ static int analyze_drop(void *context, const struct log_capture *capture, struct
 	if (record == NULL) {
 		command_error("%s: drop %u of the log: no block of it", analysing->file, capture->number);
 	} else {
-		if (analysing->count++ > 0 && !options->json)
+		if (analysing->count++ > 0 && !options->json && options->repeats == NULL)
 			putchar('\n');
-		code = evaluate(record, options);
+		code = analyze_record(record, analysing->arguments);
 		record_free(record);
 	}
 	if (code != COMMAND_DONE)
@@ -178,6 +271,10 @@ static int analyze_check(const struct arguments *arguments, int argc, char **arg
 		return command_usage("analyze", "--html takes one FILE, %d are given", argc - optind);
 	if (arguments->drop != 0 && optind + 1 != argc)
 		return command_usage("analyze", "--drop takes one FILE, %d are given", argc - optind);
+	if (arguments->every_shock + (arguments->shock > 0) + !isnan(arguments->window_s[0]) > 1)
+		return command_usage("analyze", "expected one of --shock, --every-shock and --window");
+	if (arguments->evaluate.html != NULL && (arguments->every_shock || arguments->repeats))
+		return command_usage("analyze", "--html goes without --every-shock and --repeats");
 	if (arguments->profile != NULL && (arguments->columns != NULL || arguments->save_profile != NULL))
 		return command_usage("analyze", "--profile goes without --columns and --save-profile");
 	if (arguments->list && (arguments->drop != 0 || arguments->evaluate.html != NULL))
@@ -229,6 +326,11 @@ static int analyze_words(char **words, int count, const struct arguments *argume
 	if (code != COMMAND_DONE)
 		return code;
 	code = analyze_files(&files, arguments);
+	if (arguments->evaluate.repeats != NULL) {
+		repeats_close(arguments->evaluate.repeats);
+		if (repeats_print(arguments->evaluate.repeats, arguments->evaluate.json) != 0)
+			code = COMMAND_INPUT;
+	}
 	if (arguments->save_profile != NULL &&
 	    profile_save(arguments->save_profile, files.file[0],
 	                 arguments->profile == NULL ? arguments->columns : NULL, message) != 0) {
@@ -241,14 +343,18 @@ static int analyze_words(char **words, int count, const struct arguments *argume
 
 int command_analyze(int argc, char **argv)
 {
-	struct arguments arguments = {.angle_deg = NAN, .evaluate = {.iepe_time_constant_s = NAN}};
+	struct arguments arguments = {
+	        .angle_deg = NAN, .window_s = {NAN, NAN}, .evaluate = {.iepe_time_constant_s = NAN}};
 	struct limit_curve band = {0};
+	struct repeats repeats = {.row = NULL};
 	struct scene scene;
 	int code = option_read(&known_options, &arguments, argc, argv);
 
 	if (code != OPTIONS_READ)
 		return code;
 	code = analyze_check(&arguments, argc, argv);
+	if (arguments.repeats)
+		arguments.evaluate.repeats = &repeats;
 	if (arguments.profile != NULL) {
 		snprintf(arguments.profile_as_columns, sizeof(arguments.profile_as_columns), "@%s",
 		         arguments.profile);
@@ -264,6 +370,7 @@ int command_analyze(int argc, char **argv)
 	}
 	if (code == COMMAND_DONE)
 		code = analyze_words(argv + optind, argc - optind, &arguments);
+	repeats_free(&repeats);
 	limit_free(&band);
 	return code;
 }

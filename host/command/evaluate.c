@@ -186,7 +186,18 @@ void evaluate_close(struct evaluated *e)
 	estimate_free(&e->analysis);
 }
 
-int evaluate(const struct record *record, const struct evaluate_options *options)
+static int evaluate_repeat(struct evaluated *e, struct record *record, const struct evaluate_options *options)
+{
+	struct estimate_options estimate = e->report.options;
+	struct result said = result_of(record, &e->analysis, &estimate);
+
+	if (repeats_add(options->repeats, &said) == 0)
+		return COMMAND_DONE;
+	command_error("%s: %s", record->file, error_text(DT_E_MEMORY));
+	return COMMAND_INPUT;
+}
+
+int evaluate(struct record *record, const struct evaluate_options *options)
 {
 	struct evaluated e;
 	int code, result = evaluate_open(&e, record, options);
@@ -198,7 +209,8 @@ int evaluate(const struct record *record, const struct evaluate_options *options
 		              result == DT_E_EMPTY ? "no good sample in any channel" : error_text(result));
 		return COMMAND_INPUT;
 	}
-	code = evaluate_write_out(&e.report, options);
+	code = options->repeats != NULL ? evaluate_repeat(&e, record, options)
+	                                : evaluate_write_out(&e.report, options);
 	if (code == COMMAND_DONE && options->strict && e.report.band != NULL && !e.band.verdict.pass) {
 		command_error("%s: outside its band, and --strict was asked for", record->file);
 		code = COMMAND_INPUT;

@@ -11,6 +11,7 @@
 #include "host/estimate/estimate.h"
 #include "host/record/record.h"
 #include "host/report/report.h"
+#include "host/result/repeats.h"
 
 struct evaluate_options {
 	const struct scene *scene;   /* NULL: no model */
@@ -28,6 +29,7 @@ struct evaluate_options {
 	bool strict;                  /* a flag is a failure */
 	bool simulated;               /* the page says so */
 	bool unattended;              /* JSON says so */
+	struct repeats *repeats;      /* what is found goes there, and nothing is printed; NULL: printed */
 };
 
 /* A record with all that is found of it. */
@@ -49,7 +51,7 @@ DT_MUST_USE int evaluate_open(struct evaluated *e, const struct record *record,
 void evaluate_close(struct evaluated *e);
 
 /* Prints and writes what was asked for. Returns a COMMAND_* exit code; errors were printed. */
-int evaluate(const struct record *record, const struct evaluate_options *options);
+int evaluate(struct record *record, const struct evaluate_options *options);
 
 /* The JSON of a record as `analyze --scene` gives it, to be freed, with e open; NULL if it cannot be
  * analysed. scene may be NULL. */

@@ -54,7 +54,7 @@ static bool files_wants(const char *path, const char *name, const char *pattern)
 static bool files_of_folder(struct files *files, const char *folder, const char *pattern)
 {
 	struct dirent **entry;
-	int count = scandir(folder, &entry, NULL, alphasort);
+	int count = scandir(folder, &entry, NULL, versionsort);
 	bool whole = true;
 
 	if (count < 0)

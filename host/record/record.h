@@ -98,10 +98,11 @@ struct record_counters {
 };
 
 struct record {
-	char file[4096];   /* as given on the command line, or the link's URL */
-	char format[16];   /* "live" "candump" "lcm" "csv" "uff58" "hdf5" "delimited" "lvm" ... */
-	char read_as[400]; /* of a foreign file, what was understood of it without --columns; else "" */
-	bool file_sealed;  /* the file says its own SHA-256, and that is so */
+	char file[4096];        /* as given on the command line, or the link's URL */
+	char format[16];        /* "live" "candump" "lcm" "csv" "uff58" "hdf5" "delimited" "lvm" ... */
+	char read_as[400];      /* of a foreign file, what was understood of it without --columns; else "" */
+	unsigned shock, shocks; /* of a long record: which of its shocks this is a stretch about; else 0 */
+	bool file_sealed;       /* the file says its own SHA-256, and that is so */
 	struct channel *channels;
 	size_t channel_count;
 

@@ -242,6 +242,12 @@ static cJSON *build(struct builder *b, const struct report *report)
 	put_text(b, root, "format", r->format);
 	if (r->read_as[0] != '\0')
 		put_text(b, root, "read_as", r->read_as);
+	if (r->shock > 0) {
+		cJSON *shock = put_object(b, root, "shock");
+
+		put_number(b, shock, "number", r->shock);
+		put_number(b, shock, "of", r->shocks);
+	}
 	put_text(b, root, "quantities", quantity_version());
 	if (record_lacks_seal(r)) /* by an older version or another program */
 		put_item(b, root, "sealed", cJSON_CreateFalse());

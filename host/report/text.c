@@ -75,6 +75,8 @@ static void write_head(const struct report *report, FILE *out)
 		fprintf(out, ", drop %u", (unsigned)r->drop_id);
 	if (r->log_number > 0)
 		fprintf(out, ", number %u in the log", r->log_number);
+	if (r->shock > 0)
+		fprintf(out, ", shock %u of %u", r->shock, r->shocks);
 	if (r->is_drop && isfinite(r->frame_speed_m_s))
 		fprintf(out, ", frame %.3f m/s between the gates", r->frame_speed_m_s);
 	fputc('\n', out);

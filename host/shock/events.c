@@ -20,6 +20,7 @@ struct source {
 	struct axes axes;
 	double rest_g[AXES_MAX];
 	double level_g, hold_off_s;
+	struct event_list *all;
 };
 
 /* A shock that is not over yet. */
@@ -203,6 +204,21 @@ static void events_keep(struct events *events, const struct event *event)
 	events->event[place] = *event;
 }
 
+static void events_list(struct event_list *list, const struct event *event)
+{
+	if (list->count == list->room) {
+		size_t room = list->room > 0 ? 2 * list->room : 64;
+		struct event *more = realloc(list->event, room * sizeof(*more));
+
+		list->failed |= more == NULL;
+		if (more == NULL)
+			return;
+		list->event = more;
+		list->room = room;
+	}
+	list->event[list->count++] = *event;
+}
+
 static void events_finish(const struct source *source, struct shock *shock, struct events *events)
 {
 	struct event event = {.sensor = source->axes.count > 1};
@@ -219,6 +235,8 @@ static void events_finish(const struct source *source, struct shock *shock, stru
 	event.duration_s = to - from;
 	event.velocity_change_m_s = events_velocity(source, first, last);
 	events_keep(events, &event);
+	if (source->all != NULL)
+		events_list(source->all, &event);
 }
 
 /* ---- all of them ---- */
@@ -272,11 +290,11 @@ int events_find(const struct record *record, const struct events_options *option
 	memset(events, 0, sizeof(*events));
 	count = axes_find(record, axes);
 	for (size_t i = 0; i < count; i++) {
-		struct source source = {.axes = axes[i]};
+		struct source source = {.axes = axes[i], .all = options->all};
 
 		set_level(&source, options);
 		events_scan(&source, events);
 	}
 	free(axes);
-	return 0;
+	return options->all != NULL && options->all->failed ? DT_E_MEMORY : 0;
 }

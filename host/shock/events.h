@@ -35,9 +35,17 @@ struct events {
 	size_t found; /* count and those that were smaller */
 };
 
-/* level_g 0: as said above; hold_off_s 0: EVENTS_HOLD_OFF_S. */
+/* Every one, in the order in which they end, channel by channel; to be freed by who asks for it. */
+struct event_list {
+	struct event *event;
+	size_t count, room;
+	bool failed; /* for want of memory */
+};
+
+/* level_g 0: as said above; hold_off_s 0: EVENTS_HOLD_OFF_S; all NULL: the largest are enough. */
 struct events_options {
 	double level_g, hold_off_s;
+	struct event_list *all;
 };
 
 /* 0 or DT_E_MEMORY. */

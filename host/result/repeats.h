@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RESULT_REPEATS_H
+#define DT_HOST_RESULT_REPEATS_H
+/*
+ * Repeats of one thing, in their order: of each value of each channel mean, standard deviation, a straight
+ * line with its uncertainty, and the place where it changes, if it does. Only values whose status is ok
+ * count; how many there were without is told.
+ *
+ * Trend: least squares over the number of the repeat; its standard uncertainty from the residuals, n - 2
+ * degrees of freedom. "Moves" where a trend as large came by chance in 0.27 % of cases (Student's t). Change:
+ * the largest cumulative sum against the scatter between neighbours, which no slow trend widens; told beyond
+ * the 1 % limit of Kolmogorov (1.63), from eight values on, and where a step leaves less behind than the line
+ * does.
+ */
+#include "host/result/quantity.h"
+
+struct repeats_row {
+	char channel[32];
+	const struct quantity *quantity;
+	size_t count, room, left_out;
+	double *value, *number; /* [count]: and which repeat each is of, from 1 */
+
+	/* by repeats_close */
+	double mean, sd;             /* NAN below 1 and 2 values */
+	double trend, sigma_trend;   /* of the value a repeat; NAN below 3 */
+	double change, sigma_change; /* first to last by the line, of the value at the first */
+	unsigned change_at;          /* repeat from which on it is another; 0: none */
+	bool moves;
+};
+
+struct repeats {
+	struct repeats_row *row;
+	size_t rows, repeats;
+};
+
+/* Another repeat. 0 or DT_E_MEMORY. */
+DT_MUST_USE int repeats_add(struct repeats *repeats, struct result *result);
+void repeats_close(struct repeats *repeats);
+void repeats_free(struct repeats *repeats);
+
+#endif
