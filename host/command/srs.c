@@ -4,15 +4,20 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/base/number.h"
 #include "host/command/command.h"
+#include "host/command/files.h"
 #include "host/record/read.h"
 #include "host/base/whole.h"
 #include "host/report/spectrum.h"
 #include "host/shock/signal.h"
 
+enum { FREQUENCIES_MOST = 1000 };
+
 struct arguments {
 	const char *columns, *limit_file, *csv, *svg;
-	unsigned drop; /* of a log of several; 0: the only one */
+	double frequency_hz[FREQUENCIES_MOST]; /* asked for one by one */
+	unsigned drop;                         /* of a log of several; 0: the only one */
 	double q;
 	struct spectrum_options spectrum;
 	bool json, strict;
@@ -44,6 +49,33 @@ static int take_offset(const struct option_table *table, const char *name, const
 	                                 : option_wrong(table, "--%s is '%s', expected keep", name, text);
 }
 
+/* "10,20,50.5", rising. */
+static int take_frequencies(const struct option_table *table, const char *name, const char *text, void *into)
+{
+	struct arguments *arguments = into;
+	size_t count = 0;
+
+	for (const char *at = text; at != NULL && count < FREQUENCIES_MOST; count++) {
+		const char *end = strchr(at, ',');
+		size_t length = end != NULL ? (size_t)(end - at) : strlen(at);
+		double value;
+
+		if (!number_parse(at, length, '.', &value) || value < 1e-6 || value > 1e9 ||
+		    (count > 0 && value <= arguments->frequency_hz[count - 1]))
+			return option_wrong(table,
+			                    "--%s is '%s', expected rising frequencies in Hz between commas",
+			                    name, text);
+		arguments->frequency_hz[count] = value;
+		at = end != NULL ? end + 1 : NULL;
+		if (at != NULL && count + 1 == FREQUENCIES_MOST)
+			return option_wrong(table, "--%s has more than %d frequencies", name,
+			                    FREQUENCIES_MOST);
+	}
+	arguments->spectrum.frequency_hz = arguments->frequency_hz;
+	arguments->spectrum.frequencies = count;
+	return OPTIONS_READ;
+}
+
 static const struct option_row rows[] = {
         OPTION_TEXT("columns", "SPEC", struct arguments, columns,
                     "for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\""),
@@ -57,6 +89,8 @@ static const struct option_row rows[] = {
         OPTION_NUMBER("from", "HZ", struct arguments, spectrum.from_hz, 1e-6, 1e9, "lowest frequency (5)"),
         OPTION_NUMBER("to", "HZ", struct arguments, spectrum.to_hz, 1e-6, 1e9,
                       "highest (2000, or a quarter of the slowest rate); none above half a channel's rate"),
+        OPTION_TAKEN_BY("frequencies", "LIST", take_frequencies,
+                        "these frequencies, Hz between commas, instead of --per-octave, --from and --to"),
         OPTION_TAKEN_BY("quantity", "NAME", srs_take_choice,
                         "acceleration (absolute, g), velocity (pseudo, m/s) or displacement (relative, m)"),
         OPTION_TAKEN_BY("side", "NAME", srs_take_choice, "positive, negative or maximax (maximax)"),
@@ -77,12 +111,12 @@ static const struct option_row rows[] = {
 static const struct option_table known_options = {
         .program = "droptower",
         .command = "srs",
-        .head = "usage: droptower srs FILE [OPTIONS]\n"
+        .head = "usage: droptower srs FILE|FOLDER|PATTERN... [OPTIONS]\n"
                 "\n"
                 "Shock response spectrum of every channel (ramp-invariant, ISO 18431-4), one table on "
                 "standard "
                 "output.\n"
-                "FILE and --columns are those of 'droptower analyze'; a sensor's high-pass is not undone.\n"
+                "Files and --columns are those of 'droptower analyze'; a sensor's high-pass is not undone.\n"
                 "\n",
         OPTION_ROWS(rows),
         .words = true,
@@ -90,8 +124,14 @@ static const struct option_table known_options = {
 
 static int srs_check(struct arguments *arguments, int argc, char **argv)
 {
-	if (optind + 1 != argc)
-		return command_usage("srs", "expected one FILE, %d given", argc - optind);
+	if (optind == argc)
+		return command_usage("srs", "no FILE given");
+	if ((arguments->csv != NULL || arguments->svg != NULL || arguments->drop > 0) && optind + 1 != argc)
+		return command_usage("srs", "--csv, --svg and --drop take one FILE, %d are given",
+		                     argc - optind);
+	if (arguments->spectrum.frequency_hz != NULL &&
+	    (arguments->spectrum.from_hz > 0 || arguments->spectrum.to_hz > 0))
+		return command_usage("srs", "--frequencies goes without --from and --to");
 	if (command_is_input("srs", arguments->csv, argv[optind]) ||
 	    command_is_input("srs", arguments->svg, argv[optind]))
 		return COMMAND_USAGE;
@@ -181,6 +221,11 @@ static int check_reach(const struct record *record, const struct spectrum_option
 	for (size_t i = 0; i < record->channel_count; i++)
 		if (record->channels[i].rate_hz > most)
 			most = record->channels[i].rate_hz;
+	if (options->frequencies > 0 && options->frequency_hz[0] > most / 2) {
+		command_error("%s: all --frequencies are above half of every rate, expected %g Hz at most",
+		              record->file, most / 2);
+		return COMMAND_INPUT;
+	}
 	if (!(options->to_hz > most / 2))
 		return COMMAND_DONE;
 	command_error("%s: --to %g Hz is above half of every rate, expected %g Hz at most", record->file,
@@ -206,6 +251,37 @@ static int spectrum_of(const struct record *record, const struct arguments *argu
 	return code;
 }
 
+static int srs_file(const char *file, const struct arguments *arguments)
+{
+	char message[READ_MESSAGE_MAX];
+	struct record record;
+	int code;
+
+	if (read_nth(&record, file, arguments->columns, arguments->drop, message) != 0) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	code = spectrum_of(&record, arguments);
+	record_free(&record);
+	return code;
+}
+
+static int srs_files(char **words, int count, const struct arguments *arguments)
+{
+	struct files files;
+	int code = files_expand(&files, words, count);
+
+	for (size_t i = 0; code != COMMAND_USAGE && i < files.count; i++) {
+		int one = srs_file(files.file[i], arguments);
+
+		if (i + 1 < files.count && !arguments->json)
+			putchar('\n');
+		code = one != COMMAND_DONE ? one : code; /* the other files still have theirs */
+	}
+	files_free(&files);
+	return code;
+}
+
 int command_srs(int argc, char **argv)
 {
 	struct arguments arguments = {
@@ -213,7 +289,6 @@ int command_srs(int argc, char **argv)
 	                .srs = {.damping = -1}, .side = SRS_MAXIMAX, .part = SRS_TOTAL, .per_octave = 12}};
 	struct limit_curve limit = {0};
 	char message[READ_MESSAGE_MAX];
-	struct record record;
 	int code = option_read(&known_options, &arguments, argc, argv);
 
 	if (code != OPTIONS_READ)
@@ -230,13 +305,7 @@ int command_srs(int argc, char **argv)
 	}
 	if (arguments.limit_file)
 		arguments.spectrum.limit = &limit;
-	if (read_nth(&record, argv[optind], arguments.columns, arguments.drop, message) == 0) {
-		code = spectrum_of(&record, &arguments);
-		record_free(&record);
-	} else {
-		command_error("%s", message);
-		code = COMMAND_INPUT;
-	}
+	code = srs_files(argv + optind, argc - optind, &arguments);
 	limit_free(&limit);
 	return code;
 }

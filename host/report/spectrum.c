@@ -138,7 +138,7 @@ int spectrum_json(const struct spectrum_report *report, FILE *out)
 	put_text(&b, root, "part", srs_part_names[o->part]);
 	put_number(&b, root, "q", o->srs.damping > 0 ? 0.5 / o->srs.damping : (double)INFINITY);
 	put_number(&b, root, "damping_ratio", o->srs.damping);
-	put_number(&b, root, "per_octave", o->per_octave);
+	put_number(&b, root, "per_octave", o->frequency_hz != NULL ? NAN : o->per_octave);
 	put_bool(&b, root, "upsampled", !o->srs.keep_rate);
 	if (o->limit)
 		put_bool(&b, root, "pass", spectrum_passes(report->spectrum));

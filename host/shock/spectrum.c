@@ -127,8 +127,8 @@ int spectrum_compute(const struct record *record, const struct spectrum_options 
                      struct spectrum *spectrum)
 {
 	struct spectrum computed = {0};
-	double from_hz;
-	size_t count = grid(record, options, &from_hz);
+	double from_hz = 0;
+	size_t count = options->frequency_hz != NULL ? options->frequencies : grid(record, options, &from_hz);
 	int result;
 
 	if (count == 0)
@@ -136,7 +136,9 @@ int spectrum_compute(const struct record *record, const struct spectrum_options 
 	result = spectrum_allocate(&computed, record, count);
 	if (result == 0) {
 		for (size_t i = 0; i < count; i++)
-			computed.frequency_hz[i] = from_hz * exp2((double)i / options->per_octave);
+			computed.frequency_hz[i] = options->frequency_hz != NULL
+			                                   ? options->frequency_hz[i]
+			                                   : from_hz * exp2((double)i / options->per_octave);
 		result = compute(&computed, record, options);
 	}
 	if (result != 0)

@@ -19,7 +19,9 @@ struct spectrum_options {
 	enum srs_side side;
 	enum srs_part part;
 	double per_octave;
-	double from_hz, to_hz; /* 0: 5 Hz, and 2 000 Hz or a quarter of the slowest channel's rate */
+	double from_hz, to_hz;      /* 0: 5 Hz, and 2 000 Hz or a quarter of the slowest channel's rate */
+	const double *frequency_hz; /* those instead of a grid; NULL: none */
+	size_t frequencies;
 	bool keep_offset;
 	const struct limit_curve *limit; /* NULL: none */
 };
