@@ -136,12 +136,14 @@ static double table_scale_of(const struct table *t, const struct table_column *c
 	return t->format == TABLE_CSV || t->of == TABLE_COUNTS || !(fabs(c->scale) > 0.0) ? 1.0 : c->scale;
 }
 
-/* Quoted where it must be (RFC 4180). */
+/* Quoted where it must be (RFC 4180); words that a spreadsheet would compute are words by an apostrophe. */
 static void csv_words(FILE *out, const char *words)
 {
 	const char *quote = strpbrk(words, ",;\"\n\r") != NULL ? "\"" : "";
 
 	fputs(quote, out);
+	if (words[0] != '\0' && strchr("=+-@\t\r", words[0]) != NULL)
+		fputc('\'', out);
 	for (; *words != '\0'; words++)
 		fprintf(out, *words == '"' ? "\"\"" : "%c", *words);
 	fputs(quote, out);

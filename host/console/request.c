@@ -112,7 +112,7 @@ static enum MHD_Result request_answer(struct request *request)
 static enum MHD_Result send_part(struct http *http, struct MHD_Connection *connection, const char *method,
                                  const char *path)
 {
-	const char *name = path[0] == '\0' ? "index.html" : path;
+	const char *name = path[0] == '\0' || strcmp(path, "wall") == 0 ? "index.html" : path;
 
 	for (size_t i = 0; i < http->part_count; i++) {
 		const struct page_part *part = &http->parts[i];

@@ -169,7 +169,7 @@ export class Desk {
 	 * tower holds a fault, as it must. */
 	async ready() {
 		const asked = this.page.locator("#acknowledge:enabled:visible, #clear:enabled:visible");
-		const armable = this.page.locator('html[data-step="arm"][data-state="READY"] :is(#arm, #arm-confirm):enabled:visible');
+		const armable = this.page.locator('html[data-step="arm"][data-state="READY"] #arm:enabled:visible');
 		for (let asks = 0; asks < 10; asks++) {
 			await asked.or(armable).waitFor();
 			if (await armable.count())
@@ -181,15 +181,33 @@ export class Desk {
 		throw new Error("the tower asks again and again to be acknowledged or cleared");
 	}
 
+	/* ARM is held down, until something comes of it. */
+	async hold(down, up) {
+		await this.page.hover("#arm", SOON);
+		await down();
+		await this.page.waitForSelector('#arm[data-held="yes"]', SOON);
+		await this.page.waitForSelector('#arm[data-held="no"]', { state: "attached", ...SOON });
+		await up();
+	}
+
 	async arm() {
 		await this.again(async () => {
 			await this.ready();
-			if (await this.page.locator("#arm-cancel").isVisible()) // an attempt before got as far as that
-				await this.click("#arm-cancel", SOON);
-			await this.click("#arm", SOON);
-			await this.click("#arm-confirm", SOON);
+			await this.hold(() => this.page.mouse.down(), () => this.page.mouse.up());
 			await this.until({ step: "release", state: "ARMED" }, SOON.timeout);
 		});
+	}
+
+	/* Once it can be: not while horn and lamp warn. A tower that lags behind refuses a press, which is then made again. */
+	async pressRelease(underWay) {
+		for (let presses = 0; presses < 8; presses++) {
+			await this.click("#release", SOON);
+			await this.until({ step: [...underWay, "arm", "checks"] }, 1000).catch(() => {});
+			if (await this.data("step") !== "release")
+				break;
+			this.forgive("release");
+		}
+		await this.until({ step: underWay }, SOON.timeout);
 	}
 
 	async release() {
@@ -198,8 +216,7 @@ export class Desk {
 			if (tries > 1 && underWay.includes(await this.data("step")))
 				return; // it was only slow to show
 			await this.arm();
-			await this.click("#release"); // once it can be: not while horn and lamp warn
-			await this.until({ step: underWay }, SOON.timeout);
+			await this.pressRelease(underWay);
 		});
 	}
 

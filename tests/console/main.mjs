@@ -3,13 +3,14 @@
 // main.mjs BUILD SANITIZED: the browser tests, as TAP; with PICTURES=1 pictures of every step
 // go into BUILD/tests/console. Ends at once, with 3, when a tab of Chromium crashes.
 import assert from "node:assert/strict";
+import bench from "./bench.mjs";
 import { found } from "./looks.mjs";
 import restart from "./restart.mjs";
 import tabs from "./tabs.mjs";
 import { run } from "./tap.mjs";
 import workflow from "./workflow.mjs";
 
-const VIEWS = 14; // so many were looked at
+const VIEWS = 16; // so many were looked at
 
 const looks = {
 	name: "looks", apart: true,
@@ -20,4 +21,4 @@ const looks = {
 	],
 };
 
-process.exit(await run([workflow, tabs, restart, looks]));
+process.exit(await run([workflow, bench, tabs, restart, looks]));

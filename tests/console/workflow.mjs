@@ -75,10 +75,7 @@ async function setUpByKey() {
 async function armByKey() {
 	await desk.again(async () => {
 		await desk.ready();
-		await desk.key("Shift+A");
-		await desk.page.waitForSelector("#arm-dialog");
-		assert.notEqual(await desk.data("state"), "ARMED", "asking arms nothing");
-		await desk.key("Shift+Y");
+		await desk.hold(() => desk.page.keyboard.down("Shift+A"), () => desk.page.keyboard.up("Shift+A"));
 		await desk.until({ step: "release", state: "ARMED" }, 4000);
 	});
 	await desk.untilText("#countdown", /^\d+$/);
@@ -143,7 +140,6 @@ async function unknownDrops() {
 	const enabled = await desk.page.locator("#now [data-command]:enabled:visible").evaluateAll((found) => found.map(({ id }) => id));
 	assert.ok(!answered, "the archive answered before the page was there");
 	assert.deepEqual(enabled, [], "commands before the archive has answered");
-	assert.ok(!await desk.page.locator("#arm-dialog").isVisible(), "ARM's key before the archive has answered");
 	await desk.until({ step: "decide" });
 	await desk.page.unroute(/\/api\/drops\?/);
 	await desk.page.waitForSelector("#accept:enabled");
@@ -152,8 +148,9 @@ async function unknownDrops() {
 async function dropByKey() {
 	await desk.until({ step: "arm", state: "READY" });
 	await look(desk, "3-arm");
-	await desk.command("Shift+A", "arm");
-	await look(desk, "4-confirm");
+	await desk.command("Shift+A", "arm"); // not held
+	await new Promise((settle) => setTimeout(settle, 1500));
+	assert.notEqual(await desk.data("state"), "ARMED", "a key that was not held arms");
 	await warningByKey();
 	await look(desk, "5-release");
 	await desk.key("Escape");
@@ -226,12 +223,16 @@ async function abortAtRest() {
 	await desk.until({ step: "arm", state: "READY" });
 }
 
-async function abortTheQuestion() {
-	await desk.click("#arm");
+async function abortTheHold() {
+	await desk.ready();
+	await desk.page.hover("#arm");
 	await desk.states();
-	await desk.abort("the question is open");
-	await desk.page.waitForSelector("#arm-dialog", { state: "hidden" });
-	await new Promise((settle) => setTimeout(settle, 500));
+	await desk.page.mouse.down();
+	await desk.page.waitForSelector('#arm[data-held="yes"]');
+	await desk.abort("ARM is held");
+	await desk.page.waitForSelector('#arm[data-held="no"]');
+	await new Promise((settle) => setTimeout(settle, 1500));
+	await desk.page.mouse.up();
 	assert.ok(!(await desk.states()).includes("ARMED"));
 }
 
@@ -267,8 +268,9 @@ async function openWatcher() {
 	await watcher.page.goto(address);
 	await watcher.until({ connected: "yes", state: "READY", hold: "other" });
 	assert.ok(!await watcher.page.locator("#arm:enabled:visible").count(), "the second console has nothing to arm with");
-	await watcher.key("Shift+A");
-	await watcher.key("Shift+Y");
+	await watcher.page.keyboard.down("Shift+A");
+	await new Promise((settle) => setTimeout(settle, 1200));
+	await watcher.page.keyboard.up("Shift+A");
 	const stranger = "0123456789abcdefStranger";
 	for (const [path, body] of [["/api/arm", {}], ["/api/release", { token: 1 }], ["/api/select", { series: SERIES }]])
 		assert.equal((await ask(path, stranger, body)).status, 423, path);
@@ -591,7 +593,7 @@ export default {
 		["a drop by keyboard", dropByKey],
 		["each fault of the panel turns its check red, with words, and green again", faultPanel],
 		["ABORT by key in SAFE and READY", abortAtRest],
-		["ABORT by key while the page asks whether to arm", abortTheQuestion],
+		["ABORT by key while ARM is held", abortTheHold],
 		["ABORT by key in ARMED", abortArmed],
 		["ABORT by key from a text field, and by its button; nothing arms itself again", abortFromAField],
 		["a second console watches and cannot arm", openWatcher],

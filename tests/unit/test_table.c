@@ -96,6 +96,28 @@ static void test_csv_quotes_and_leaves_empty(void **state)
 	   ",,,,,0,\n");
 }
 
+static void test_csv_has_no_formulas(void **state)
+{
+	static const char *const words[] = {"=1+1", "+1", "-1", "@sum", "a=1", "=\"b\""};
+	struct row row = {.name = NULL};
+	struct table table = {.format = TABLE_CSV};
+	char *text = NULL;
+	size_t size;
+
+	(void)state;
+	table.out = open_memstream(&text, &size);
+	assert_non_null(table.out);
+	table_begin(&table, columns, 1);
+	for (size_t i = 0; i < TABLE_COUNT(words); i++) {
+		row.name = words[i];
+		table_row(&table, &row);
+	}
+	assert_int_equal(table_end(&table), 0);
+	fclose(table.out);
+	assert_string_equal(text, "drop\n'=1+1\n'+1\n'-1\n'@sum\na=1\n\"'=\"\"b\"\"\"\n");
+	free(text);
+}
+
 static void test_html_escapes(void **state)
 {
 	(void)state;
@@ -115,6 +137,7 @@ int main(void)
 	        cmocka_unit_test(test_text_has_its_head_with_the_first_row),
 	        cmocka_unit_test(test_json_has_groups_and_null_for_what_is_not_known),
 	        cmocka_unit_test(test_csv_quotes_and_leaves_empty),
+	        cmocka_unit_test(test_csv_has_no_formulas),
 	        cmocka_unit_test(test_html_escapes),
 	};
 

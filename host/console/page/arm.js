@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Arming, the countdown, releasing. Arming is asked for twice, at two places; the token that releases lives in this
- * page only, is used once, and is gone when the page is loaded again. */
+/* Arming, the countdown, releasing. ARM is held, so that no slip arms; the token that releases lives in this page only,
+ * is used once, and is gone when the page is loaded again. */
 import { post } from "./api.js";
 import { attempt, byId, message, setData, setText, show } from "./dom.js";
 import { holding } from "./hold.js";
-import { degrees, number } from "./words.js";
 import { atRest } from "./workflow.js";
 
 const EARLY = 425;
@@ -17,28 +16,10 @@ let warned = 0; /* performance.now() at which horn and lamp have warned for long
 
 export const warns = () => performance.now() < warned;
 
-const under = (node, { clientX: x, clientY: y }) => {
-	const { left, right, top, bottom } = node.getBoundingClientRect();
-	return x >= left && x <= right && y >= top && y <= bottom;
-};
-
-function ask(open) {
-	show(byId("arm-dialog"), open);
-	show(byId("arm"), !open);
-}
-
-/* All of the question can be seen; where ARM was pressed is never "Yes". */
-function open(press) {
-	const answers = byId("arm-dialog").querySelector(".answers");
-	answers.classList.remove("turned");
-	ask(true);
-	byId("arm-cancel").focus({ preventScroll: true });
-	byId("arm-dialog").scrollIntoView({ block: "nearest" });
-	answers.classList.toggle("turned", under(byId("arm-confirm"), press));
-}
+const HOLD_MS = 800;
+let held = 0; /* timer of an ARM that is held down */
 
 async function arm() {
-	ask(false);
 	await attempt(async () => {
 		const answer = await holding(() => post("/api/arm"));
 		aborted = false;
@@ -50,6 +31,24 @@ async function arm() {
 		warned = performance.now() + 1000 * answer.warning_s;
 	});
 }
+
+/* What is let go, left or taken away before the time is over has armed nothing. */
+function endHold() {
+	clearTimeout(held);
+	setData(byId("arm"), "held", "no");
+}
+
+function beginHold(button) {
+	if (button.disabled) return;
+	endHold();
+	setData(button, "held", "yes");
+	held = setTimeout(() => {
+		endHold();
+		if (!button.disabled && button.offsetParent !== null && !document.hidden) arm();
+	}, HOLD_MS);
+}
+
+export const hold = { begin: beginHold, end: endHold };
 
 async function release() {
 	const used = token;
@@ -67,7 +66,7 @@ async function release() {
 
 function releaseWords() {
 	if (byId("release").hidden)
-		return "Another page armed the tower, or this one was loaded again. It disarms by itself; ABORT disarms now.";
+		return "Armed from another page, or before this one was loaded again. It disarms by itself; ABORT disarms now.";
 	return warns()
 		? `Horn and lamp warn: ${Math.ceil((warned - performance.now()) / 1000)} s. Nobody near the tower?`
 		: "Nobody near the tower? Then release. Without a release the tower disarms by itself.";
@@ -107,11 +106,6 @@ export function follow(state) {
 	tick();
 }
 
-/* Of the step before: a question that was open is not open any more. */
-export function forget() {
-	ask(false);
-}
-
 export function showArm(state) {
 	const { series, tower } = state;
 	if (!series) return;
@@ -120,30 +114,22 @@ export function showArm(state) {
 		byId("arm-say"),
 		done
 			? `All ${series.planned} drops are accepted. Go on with the next series, or make one more drop of this one.`
-			: `Drop ${series.accepted + 1} of ${series.planned}. ${tower.blocked ? `Not now: ${tower.trouble}` : "All checks are green"}.`,
+			: `Drop ${series.accepted + 1} of ${series.planned}. ${tower.blocked ? `Not now: ${tower.trouble}.` : "Nobody in the tower? Hold ARM for a second."}`,
 	);
 	setText(byId("arm-head"), done ? "Series complete" : "Arm");
 	show(byId("next-series"), done);
 	byId("arm").classList.toggle("primary", !done);
-	setText(
-		byId("arm-what"),
-		`Frame and product are at ${number(series.height_m, 3)} m, ${degrees(series.angle_deg)}°. ` +
-			"Horn and lamp warn first, then there are some seconds to release. Keep hands and heads out of the tower.",
-	);
-	byId("arm-confirm").dataset.tower = tower.url;
 }
 
 export function listen() {
-	byId("arm").addEventListener("click", open);
-	byId("arm-cancel").addEventListener("click", () => {
-		ask(false);
-		byId("arm").focus();
-	});
-	byId("arm-confirm").addEventListener("click", arm);
-	/* An ABORT takes the question back as well. */
+	const button = byId("arm");
+	button.addEventListener("pointerdown", (event) => event.button === 0 && beginHold(button));
+	for (const end of ["pointerup", "pointerleave", "pointercancel"]) button.addEventListener(end, endHold);
+	button.addEventListener("contextmenu", (event) => event.preventDefault());
+	/* an ABORT takes that back as well */
 	document.addEventListener("aborted", () => {
 		aborted = true;
-		forget();
+		endHold();
 	});
 	byId("release").addEventListener("click", release);
 	setInterval(tick, 100);

@@ -10,18 +10,21 @@ import * as history from "./history.js";
 import { give, holding, retake, take } from "./hold.js";
 import * as keys from "./keys.js";
 import { Live } from "./live.js";
-import { hideResult, showResult } from "./result.js";
+import { hideResult, showResult, shownResult } from "./result.js";
 import * as series from "./series.js";
+import * as serial from "./serial.js";
 import * as setup from "./setup.js";
 import * as simulation from "./simulation.js";
 import * as steps from "./steps.js";
 import { follow } from "./stream.js";
 import { showDisconnected, showTop } from "./top.js";
+import * as tones from "./tones.js";
 import * as traces from "./traces.js";
 import { clock } from "./words.js";
 import { MOVING } from "./workflow.js";
 
 const root = document.documentElement;
+const isWall = location.pathname === "/wall"; /* read only, and big */
 /* known: the archive has told the drops of the series, so that it is known whether one is undecided */
 const model = { state: null, connected: false, known: false, pending: "", setupOpen: false };
 const AGAIN_MS = 1000; /* until an archive that did not answer is asked again */
@@ -86,7 +89,7 @@ async function openDrop(name) {
 		await traces.showTraces(name, result);
 		if (result) showResult(name, result, await rows);
 		setData(root, "result", name);
-		if (model.state) steps.render(model);
+		steps.render(model);
 	});
 }
 
@@ -100,12 +103,14 @@ async function newResult(name) {
 	seen.captureEnd = NaN;
 	await openDrop(name);
 	if (!Number.isNaN(captureEnd)) setData(root, "resultMs", Math.round(performance.now() - captureEnd));
+	tones.tone(shownResult().doubts.length ? "flagged" : "good");
 }
+
+const isOpen = (drop) =>
+	drop.series === model.state?.series?.name && drop.state === "recorded" && drop.decision === "open";
 
 /* The oldest drop of the series that nobody has decided on. */
 function findPending() {
-	const isOpen = (drop) =>
-		drop.series === model.state?.series?.name && drop.state === "recorded" && drop.decision === "open";
 	const drop = drops.find(isOpen);
 	model.pending = drop ? `${drop.series}/${drop.number}` : "";
 }
@@ -121,6 +126,8 @@ async function reload() {
 	findPending();
 	if (!model.state || !model.connected) return;
 	steps.render(model);
+	if (model.pending && model.state.hold.mine)
+		serial.bind(model.pending, drops.find(isOpen)).catch((error) => message(error.message));
 	/* Nobody is asked about a drop without seeing it; one that has just come is on its way already. */
 	const { pending } = model;
 	if (pending && pending !== root.dataset.result && pending !== seen.result && follows()) openDrop(pending);
@@ -167,6 +174,8 @@ function onState(state) {
 	followDrop(before, state);
 	const changed = followArchive(state);
 	findPending();
+	if (before && state.tower.state !== before.tower.state)
+		tones.tone({ ARMED: "armed", FALLING: "released" }[state.tower.state] ?? "");
 	const step = steps.render(model);
 	if (step === "release" && seen.step !== "release" && follows()) openTab("live");
 	if (step === "setup" && seen.step !== "setup") setup.fill().catch((error) => message(error.message));
@@ -208,7 +217,9 @@ function openSetup(open) {
 function listen() {
 	abort.listen();
 	arm.listen();
-	keys.listen();
+	keys.listen(arm.hold, serial.scanned);
+	serial.listen();
+	tones.listen();
 	steps.listen();
 	traces.listen();
 	series.listen(openDrop);
@@ -239,6 +250,7 @@ function askToken() {
 
 async function start() {
 	listen();
+	setData(root, "view", isWall ? "wall" : "desk");
 	addEventListener("hashchange", () => takeToken() && location.reload());
 	addEventListener("pageshow", (event) => event.persisted && location.reload());
 	document.addEventListener("unauthorised", askToken);
@@ -252,7 +264,7 @@ async function start() {
 	show(byId("main"), true);
 	openTab("live");
 	live = new Live(byId("live"));
-	retake();
+	if (!isWall) retake();
 	follow(onEvent, onConnected);
 }
 

@@ -43,6 +43,9 @@ export async function holding(action) {
 	return action();
 }
 
+/* A browser lets the timers of a tab that is hidden sleep: what is looked at again says so at once. */
+document.addEventListener("visibilitychange", () => timer && !document.hidden && renew());
+
 addEventListener("pagehide", () => {
 	if (!timer) return;
 	clearInterval(timer);

@@ -3,6 +3,7 @@
 import * as arm from "./arm.js";
 import * as decide from "./decide.js";
 import { byId, el, setData, setText, show, sign } from "./dom.js";
+import { serial } from "./serial.js";
 import { isBusy } from "./table.js";
 import { GREEN, degrees, number, plain } from "./words.js";
 import { atRest, placeOf, stepOf } from "./workflow.js";
@@ -51,7 +52,7 @@ function change(step) {
 	current = step;
 	setData(document.documentElement, "step", step);
 	mark(step);
-	arm.forget();
+	arm.hold.end();
 	if (!byId("drop").hidden && !isBusy(byId("series-table"))) toNow();
 	if (!hadFocus) return;
 	const title = byId(`step-${step}`).querySelector("h2");
@@ -108,7 +109,7 @@ function context(series, step) {
 	show(byId("context"), series !== null && ["checks", "arm", "release", "moving"].includes(step));
 	if (!series) return;
 	const { name, scene, angle_deg, height_m } = series;
-	setText(byId("context"), `${scene}, ${degrees(angle_deg)}°, ${number(height_m, 3)} m, series ${name}`);
+	setText(byId("context"), `${scene}, ${degrees(angle_deg)}°, ${number(height_m, 3)} m, series ${name}${serial() ? `, serial ${serial()}` : ""}`);
 }
 
 function holdNotice({ mine, taken }) {
