@@ -190,6 +190,12 @@ export class Desk {
 		await up();
 	}
 
+	async shifted(way, key) {
+		const keys = way === "down" ? ["Shift", key] : [key, "Shift"];
+		for (const name of keys)
+			await this.page.keyboard[way](name);
+	}
+
 	async arm() {
 		await this.again(async () => {
 			await this.ready();

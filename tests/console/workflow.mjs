@@ -75,7 +75,7 @@ async function setUpByKey() {
 async function armByKey() {
 	await desk.again(async () => {
 		await desk.ready();
-		await desk.hold(() => desk.page.keyboard.down("Shift+A"), () => desk.page.keyboard.up("Shift+A"));
+		await desk.hold(() => desk.shifted("down", "A"), () => desk.shifted("up", "A"));
 		await desk.until({ step: "release", state: "ARMED" }, 4000);
 	});
 	await desk.untilText("#countdown", /^\d+$/);
@@ -268,9 +268,9 @@ async function openWatcher() {
 	await watcher.page.goto(address);
 	await watcher.until({ connected: "yes", state: "READY", hold: "other" });
 	assert.ok(!await watcher.page.locator("#arm:enabled:visible").count(), "the second console has nothing to arm with");
-	await watcher.page.keyboard.down("Shift+A");
+	await watcher.shifted("down", "A");
 	await new Promise((settle) => setTimeout(settle, 1200));
-	await watcher.page.keyboard.up("Shift+A");
+	await watcher.shifted("up", "A");
 	const stranger = "0123456789abcdefStranger";
 	for (const [path, body] of [["/api/arm", {}], ["/api/release", { token: 1 }], ["/api/select", { series: SERIES }]])
 		assert.equal((await ask(path, stranger, body)).status, 423, path);

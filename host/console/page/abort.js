@@ -3,10 +3,15 @@
 import { request } from "./api.js";
 import { byId, setText } from "./dom.js";
 import { clock } from "./words.js";
+import { MOVING } from "./workflow.js";
 
 const ANSWER_MS = 1000; /* an attempt may take so long */
 const PAUSE_MS = 250;
 const SHOWN_MS = 20000; /* what went well is not news for ever */
+
+/* What it ended, as the page knew it. */
+const ENDED = { READY: "nothing was armed", SAFE: "nothing was armed", ARMED: "the tower was armed" };
+const MOVED = "the tower was in motion";
 
 let round = 0; /* the newest press; older ones end */
 
@@ -34,6 +39,8 @@ async function send() {
 
 export async function abort() {
 	const mine = ++round;
+	const { state } = document.documentElement.dataset;
+	const ended = ENDED[state] ?? (MOVING.has(state) ? MOVED : "the tower has it");
 	document.dispatchEvent(new Event("aborted"));
 	tell("ABORT: sending …", "warn");
 	for (let tries = 1; mine === round; tries++) {
@@ -46,7 +53,7 @@ export async function abort() {
 		if (mine !== round) return;
 		if (outcome.done) {
 			if (outcome.refused) tell(`${clock()} ABORT refused: ${outcome.text}`, "bad");
-			else tell(`${clock()} ABORT done: the tower has it`, "good");
+			else tell(`${clock()} ABORT done: ${ended}`, "good");
 			setTimeout(() => mine === round && tell("", "good"), SHOWN_MS);
 			return;
 		}
