@@ -77,7 +77,7 @@ static struct {
 	const char *bus;
 	enum port_reset cause;
 	uint8_t kept;
-	bool preempt, report, classic;
+	bool timers, preempt, report, classic; /* preempt: with timers */
 } options;
 
 static volatile bool poll_due;
@@ -250,7 +250,8 @@ static void begin_tick(void)
 	start_timer(TIMER_X, CYCLES_X, gone > 0 ? (uint32_t)gone % CYCLES_X : 0);
 }
 
-/* Whether the next sample's time has come; the first of all is due with its interrupt. */
+/* Whether the next sample's time has come; the first of all is due with its interrupt, and without timers
+ * each. */
 static bool is_due(void)
 {
 	uint32_t due =
@@ -284,7 +285,7 @@ static void sample(void)
 		unsigned instant = next_instant;
 		int result;
 
-		if (instant == 0)
+		if (instant == 0 && options.timers)
 			begin_tick();
 		next_instant = (instant + 1) % LOCKSTEP_INSTANTS;
 		result = lockstep_exchange(instant);
@@ -385,8 +386,10 @@ static void read_options(void)
 			take_cause(next_word(&rest));
 		else if (equal(word, "--kept"))
 			take_kept(next_word(&rest));
+		else if (equal(word, "--timers"))
+			options.timers = true;
 		else if (equal(word, "--preempt"))
-			options.preempt = true;
+			options.timers = options.preempt = true;
 		else if (equal(word, "--report"))
 			options.report = true;
 		else if (equal(word, "--classic"))
@@ -407,7 +410,10 @@ static void start_clocks(void)
 	NVIC_PRIORITY[IRQ_YZ] = PRIORITY_SAMPLES;
 	SHPR3 = (uint32_t)PRIORITY_CONTROL << SHPR3_PENDSV;
 	NVIC_ENABLE = IRQS;
-	start_timer(TIMER_YZ, CYCLES_YZ, 0);
+	if (options.timers)
+		start_timer(TIMER_YZ, CYCLES_YZ, 0);
+	else
+		NVIC_PEND = 1 << IRQ_YZ;
 }
 
 static _Noreturn void restart(enum port_reset cause)
