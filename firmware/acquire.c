@@ -101,8 +101,8 @@ static void mark(struct acquire *acquire, unsigned sensor, uint8_t clip_bit, int
 }
 
 /* One channel, sample by sample. */
-static void judge(struct acquire *acquire, unsigned sensor, uint8_t clip_bit, const int16_t *code,
-                  unsigned places, int32_t good)
+static void judge_clipping(struct acquire *acquire, unsigned sensor, uint8_t clip_bit, const int16_t *code,
+                           unsigned places, int32_t good)
 {
 	int32_t range = (int32_t)acquire->parameters->value[WIRE_PARAMETER_range_counts];
 
@@ -157,12 +157,12 @@ static void judge_sensor(struct acquire *acquire, unsigned sensor, const struct 
 	fill(samples->x, page->x_count, WIRE_X_PER_TICK);
 	fill(samples->y, page->yz_count, WIRE_YZ_PER_TICK);
 	fill(samples->z, page->yz_count, WIRE_YZ_PER_TICK);
-	judge(acquire, sensor, WIRE_STATUS_CLIP_X, samples->x, WIRE_X_PER_TICK, good);
-	judge(acquire, sensor, WIRE_STATUS_CLIP_Y, samples->y, WIRE_YZ_PER_TICK, good);
-	judge(acquire, sensor, WIRE_STATUS_CLIP_Z, samples->z, WIRE_YZ_PER_TICK, good);
+	judge_clipping(acquire, sensor, WIRE_STATUS_CLIP_X, samples->x, WIRE_X_PER_TICK, good);
+	judge_clipping(acquire, sensor, WIRE_STATUS_CLIP_Y, samples->y, WIRE_YZ_PER_TICK, good);
+	judge_clipping(acquire, sensor, WIRE_STATUS_CLIP_Z, samples->z, WIRE_YZ_PER_TICK, good);
 }
 
-static void finish(struct acquire *acquire, const struct acquire_page *page)
+static void finish_page(struct acquire *acquire, const struct acquire_page *page)
 {
 	struct acquire_tick *tick = &acquire->tick;
 
@@ -180,7 +180,7 @@ uint32_t acquire_close(struct acquire *acquire)
 	acquire->turns_seen = turns;
 	if (atomic_load_explicit(&acquire->waiting, memory_order_acquire)) {
 		if (acquire->open)
-			finish(acquire, &acquire->page[!acquire->filling]);
+			finish_page(acquire, &acquire->page[!acquire->filling]);
 		lost--;
 		atomic_store_explicit(&acquire->waiting, false, memory_order_release);
 	}

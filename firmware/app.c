@@ -258,7 +258,7 @@ static void send_capture(void)
 }
 
 /* The window is complete: what the drop says of its tower. */
-static void measure(const struct sequence *now)
+static void app_measure(const struct sequence *now)
 {
 	app.measured.drop_id = now->drop_id;
 	port_lock();
@@ -283,7 +283,7 @@ static void finish_capture(void)
 	}
 	if (capture_zero_shift(&app.capture, app.health.zero, limit))
 		app.capture.marks |= WIRE_MARK_ZERO_SHIFT;
-	measure(&now);
+	app_measure(&now);
 	send_capture();
 	stream_upload(&app.stream, &app.capture);
 }

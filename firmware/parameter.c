@@ -17,7 +17,7 @@ void parameters_init(struct parameters *parameters)
 		parameters->value[i] = table[i].initial;
 }
 
-static unsigned find(uint16_t index)
+static unsigned parameter_find(uint16_t index)
 {
 	unsigned i = 0;
 
@@ -44,7 +44,7 @@ static bool agree(const uint32_t *value)
 
 uint32_t parameters_get(const struct parameters *parameters, uint16_t index, uint32_t *value)
 {
-	unsigned i = find(index);
+	unsigned i = parameter_find(index);
 
 	if (i == WIRE_PARAMETERS)
 		return PARAMETER_NO_OBJECT;
@@ -55,7 +55,7 @@ uint32_t parameters_get(const struct parameters *parameters, uint16_t index, uin
 uint32_t parameters_set(struct parameters *parameters, uint16_t index, uint32_t value)
 {
 	struct parameters wanted = *parameters;
-	unsigned i = find(index);
+	unsigned i = parameter_find(index);
 
 	if (i == WIRE_PARAMETERS)
 		return PARAMETER_NO_OBJECT;

@@ -15,14 +15,14 @@ struct forces {
 	double normal, lever_across, mount_across, mount_up;
 };
 
-size_t motion_states(const struct motion *m)
+static size_t model_motion_states(const struct motion *m)
 {
 	return m->planar ? PLANAR_STATES : COUPLED_STATES;
 }
 
 void motion_start(const struct motion *m, double y[])
 {
-	memset(y, 0, motion_states(m) * sizeof(*y));
+	memset(y, 0, model_motion_states(m) * sizeof(*y));
 	if (m->planar)
 		y[PLACES + UP] = y[PLACES + PLATE_UP] = -m->speed_m_s;
 	else
@@ -75,7 +75,7 @@ static double over_plate(const struct motion *m, double force)
 	return m->plate_kg > 0 ? -force / m->plate_kg : 0;
 }
 
-void motion_rates(const struct motion *m, const double y[], double rate[])
+static void model_motion_rates(const struct motion *m, const double y[], double rate[])
 {
 	const struct forces f = forces_of(m, y);
 	double up = (f.normal + f.mount_up) / m->box_kg - m->gravity_m_s2;
@@ -115,12 +115,12 @@ void motion_rk4(const struct motion *m, double h, double y[])
 {
 	static const double place[] = {0, 0.5, 0.5, 1}, weight[] = {1, 2, 2, 1};
 	double rate[MOTION_STATES_MAX] = {0}, at[MOTION_STATES_MAX], sum[MOTION_STATES_MAX] = {0};
-	size_t states = motion_states(m);
+	size_t states = model_motion_states(m);
 
 	for (int stage = 0; stage < 4; stage++) {
 		for (size_t i = 0; i < states; i++)
 			at[i] = y[i] + place[stage] * h * rate[i];
-		motion_rates(m, at, rate);
+		model_motion_rates(m, at, rate);
 		for (size_t i = 0; i < states; i++)
 			sum[i] += weight[stage] * rate[i];
 	}
@@ -147,7 +147,7 @@ static int gsl_rates(double t, const double y[], double rate[], void *context)
 	const struct motion *m = context;
 
 	(void)t;
-	motion_rates(m, y, rate);
+	model_motion_rates(m, y, rate);
 	return isfinite(rate[1]) ? GSL_SUCCESS : GSL_EBADFUNC;
 }
 
@@ -166,7 +166,7 @@ int motion_by_gsl(const struct motion *m, const char *method, double tolerance, 
 	/* what counts as much in each state: a dent of millimetres, the speed of impact, both over a reach */
 	double scale[MOTION_STATES_MAX], now[MOTION_STATES_MAX] = {0}, t = 0, dent = 1e-3 * m->speed_m_s;
 	struct motion copy = *m;
-	size_t states = motion_states(m);
+	size_t states = model_motion_states(m);
 	gsl_odeiv2_system system = {gsl_rates, NULL, states, &copy};
 	gsl_odeiv2_driver *driver;
 	int status = GSL_SUCCESS;

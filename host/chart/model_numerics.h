@@ -48,9 +48,7 @@ struct motion {
 	double mount_n_m, mount_damping_n_s_m;
 };
 
-size_t motion_states(const struct motion *motion);
 void motion_start(const struct motion *motion, double y[]);
-void motion_rates(const struct motion *motion, const double y[], double rate[]);
 
 /* Readings: magnitude at the box's centre of gravity and of the plate, m/s^2. */
 double motion_box(const struct motion *motion, const double y[]);

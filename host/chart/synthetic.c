@@ -241,7 +241,7 @@ double synthetic_resultant(const struct synthetic_signal signal[2], double *at)
 	return box_magnitude(signal, *at);
 }
 
-double synthetic_plate_resultant(const struct synthetic_signal signal[2], double *at)
+static double synthetic_plate_resultant(const struct synthetic_signal signal[2], double *at)
 {
 	double x = synthetic_plate_summit(&signal[0]), y = synthetic_plate_summit(&signal[1]);
 

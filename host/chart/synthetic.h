@@ -133,9 +133,8 @@ double synthetic_plate(const struct synthetic_signal *signal, double time_s);
 double synthetic_plate_summit(const struct synthetic_signal *signal);
 double synthetic_lag(const struct synthetic_signal *signal);
 
-/* The largest hypot of the two axes' pulses, or plates, and when. */
+/* The largest hypot of the two axes' pulses, and when. */
 double synthetic_resultant(const struct synthetic_signal signal[2], double *at);
-double synthetic_plate_resultant(const struct synthetic_signal signal[2], double *at);
 
 /* Pulse of base 1 and height 1; 0 outside. */
 double synthetic_pulse(enum synthetic_family family, double s);

@@ -31,7 +31,8 @@ static const struct route routes[] = {
 };
 enum { ROUTES = sizeof(routes) / sizeof(routes[0]) };
 
-bool route_series_valid(const char *name, unsigned long length)
+/* A series' name by the archive's rule, so that nothing else goes any further. */
+static bool route_series_valid(const char *name, unsigned long length)
 {
 	static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789";
 

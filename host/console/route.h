@@ -34,7 +34,4 @@ struct route {
  * name that is allowed; lives as long as path. */
 const struct route *route_find(const char *method, const char *path, const char **rest, bool *other_method);
 
-/* A series' name by the archive's rule, so that nothing else goes any further. */
-bool route_series_valid(const char *name, unsigned long length);
-
 #endif

@@ -205,7 +205,8 @@ static bool take_crest(const struct trace *trace, struct peak *peak)
 }
 
 /* Without any model: it says so in its uncertainty. */
-void peak_take_samples(const struct trace *trace, struct peak *peak)
+/* A value without any model: it says so in its uncertainty. */
+static void peak_take_samples(const struct trace *trace, struct peak *peak)
 {
 	struct estimate_how *how = &peak->result.how;
 
@@ -243,7 +244,8 @@ void peak_take_shape(struct peak *peak)
 	peak->model = PEAK_MODEL_SHAPE;
 }
 
-bool peak_meets(const struct peak *peak, const struct estimate_options *options)
+/* Whether the tolerance is met. */
+static bool peak_meets(const struct peak *peak, const struct estimate_options *options)
 {
 	double tolerance = options->tolerance > 0 ? options->tolerance : ESTIMATE_TOLERANCE;
 

@@ -20,9 +20,6 @@
 /* One more method on the path. */
 void peak_tried(struct estimate_how *how, const char *name);
 
-/* Whether the tolerance is met. */
-bool peak_meets(const struct peak *peak, const struct estimate_options *options);
-
 /* Flags the tolerance that is not met, or takes the flag away. */
 void peak_flag_tolerance(struct peak *peak, const struct estimate_options *options);
 
@@ -31,9 +28,6 @@ bool peak_fit(const struct trace *trace, enum estimate_family family, struct pea
 
 /* That fit as the value. */
 void peak_take_shape(struct peak *peak);
-
-/* A value without any model: it says so in its uncertainty. */
-void peak_take_samples(const struct trace *trace, struct peak *peak);
 
 /* The family that is given, or polynomials, and families from there. */
 void peak_climb(const struct trace *trace, const struct estimate_options *options, struct peak *peak);

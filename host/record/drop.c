@@ -9,7 +9,7 @@
 #include "common/wire.h"
 #include "common/wire_table.h"
 
-const char *const drop_channel_names[DROP_CHANNELS] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
+static const char *const channel_names[DROP_CHANNELS] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
 
 int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_ms)
 {
@@ -24,7 +24,7 @@ int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_
 	drop.last_tick_ms = last_tick_ms;
 	for (unsigned i = 0; i < DROP_CHANNELS; i++) {
 		uint32_t per_tick = i % 3 == 0 ? WIRE_X_PER_TICK : WIRE_YZ_PER_TICK;
-		struct channel *channel = record_add_channel(&drop, drop_channel_names[i], 1000.0 * per_tick,
+		struct channel *channel = record_add_channel(&drop, channel_names[i], 1000.0 * per_tick,
 		                                             (size_t)ticks * per_tick);
 		if (!channel) {
 			record_free(&drop);
@@ -125,9 +125,9 @@ void drop_set_axes(struct record *record)
 {
 	for (size_t i = 0; i < record->channel_count; i++)
 		for (unsigned k = 0; k < DROP_CHANNELS; k++)
-			if (strcmp(record->channels[i].name, drop_channel_names[k]) == 0) {
+			if (strcmp(record->channels[i].name, channel_names[k]) == 0) {
 				record->channels[i].sensor = (uint8_t)(k / 3 + 1);
-				record->channels[i].axis = drop_channel_names[k][2];
+				record->channels[i].axis = channel_names[k][2];
 			}
 }
 

@@ -16,9 +16,6 @@ enum {
 	DROP_TICKS_MAX = 2048, /* more than the longest capture the tower can be set to */
 };
 
-/* "S1X" to "S2Z", in the order of a drop's channels. */
-extern const char *const drop_channel_names[DROP_CHANNELS];
-
 /* Makes *record the drop of ticks first..last, all samples lost. DT_E_RANGE, DT_E_MEMORY. */
 DT_MUST_USE int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_ms);
 

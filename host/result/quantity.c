@@ -297,7 +297,7 @@ void *result_at(struct result *result, enum quantity_place place, size_t i, cons
 	return &result->analysis->resultants[i];
 }
 
-uint32_t quantity_hash(void)
+static uint32_t quantity_hash(void)
 {
 	static const char text[] =
 #define QUANTITY_PLACE(PLACE, OBJECT, table, array, path) #OBJECT " " array "/" path ";"

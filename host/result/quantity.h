@@ -109,10 +109,8 @@ struct result result_of(struct record *record, struct analysis *analysis, struct
 /* The i-th object at a place, and whose it is ("S1X", "S1", ""); NULL behind the last. */
 void *result_at(struct result *result, enum quantity_place place, size_t i, const char **subject);
 
-/* CRC-32 of what a reader of results must know: keys, kinds, places. Another number: another table. */
-uint32_t quantity_hash(void);
-
-/* The same as eight hexadecimal digits; every call writes the same into one place. */
+/* CRC-32 of what a reader of results must know: keys, kinds, places. Another number: another table. Eight
+ * hexadecimal digits; every call writes the same into one place. */
 enum { QUANTITY_VERSION_CHARS = 9 };
 const char *quantity_version(void);
 

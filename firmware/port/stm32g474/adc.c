@@ -97,7 +97,7 @@ static void set_sequence(uint32_t adc, const uint8_t *inputs, unsigned count)
 }
 
 /* The slave needs the very settings of its master. */
-static void configure(const struct pair *pair, unsigned sensor)
+static void adc_configure(const struct pair *pair, unsigned sensor)
 {
 	uint32_t adc = pair->adc[sensor];
 
@@ -109,7 +109,7 @@ static void configure(const struct pair *pair, unsigned sensor)
 }
 
 /* The common register first: it can be written only while both are disabled. */
-static int set_up(const struct pair *pair)
+static int adc_set_up(const struct pair *pair)
 {
 	int result = 0;
 
@@ -118,7 +118,7 @@ static int set_up(const struct pair *pair)
 	for (unsigned sensor = 0; sensor < SENSORS && result == 0; sensor++) {
 		result = enable(pair->adc[sensor]);
 		if (result == 0)
-			configure(pair, sensor);
+			adc_configure(pair, sensor);
 	}
 	return result;
 }
@@ -132,13 +132,13 @@ int adc_setup(void)
 	(void)RD(RCC_AHB2ENR);
 	bias = 0;
 	bias_high = 0;
-	result = set_up(&pairs[ADC_GROUP_X]);
-	return result == 0 ? set_up(&pairs[ADC_GROUP_YZ]) : result;
+	result = adc_set_up(&pairs[ADC_GROUP_X]);
+	return result == 0 ? adc_set_up(&pairs[ADC_GROUP_YZ]) : result;
 }
 
 /* DMA completely, then its request, then its enable (13.4.3), then the converters: starting the master starts
  * both. */
-static void start(const struct pair *pair)
+static void start_pair(const struct pair *pair)
 {
 	uint32_t control =
 	        DMA_CCR_PL_HIGHEST | DMA_CCR_MSIZE_32 | DMA_CCR_PSIZE_32 | DMA_CCR_MINC | DMA_CCR_CIRC;
@@ -156,7 +156,7 @@ static void start(const struct pair *pair)
 void adc_start(void)
 {
 	for (unsigned group = 0; group < ADC_GROUPS; group++)
-		start(&pairs[group]);
+		start_pair(&pairs[group]);
 }
 
 /* ---- running ---- */
@@ -246,7 +246,7 @@ int adc_align(enum adc_group group)
 		return result;
 	for (unsigned sensor = 0; sensor < SENSORS; sensor++)
 		WR(pair->adc[sensor] + ADC_ISR, ADC_ISR_OVR);
-	start(pair);
+	start_pair(pair);
 	return 1;
 }
 

@@ -39,7 +39,7 @@ static struct {
 
 /* ---- set-up ---- */
 
-static const struct timing *find(uint32_t kernel_hz, uint32_t data_kbit_s)
+static const struct timing *find_timing(uint32_t kernel_hz, uint32_t data_kbit_s)
 {
 	for (unsigned i = 0; i < sizeof(timings) / sizeof(timings[0]); i++)
 		if (timings[i].kernel_hz == kernel_hz && timings[i].data_kbit_s == data_kbit_s)
@@ -55,7 +55,7 @@ static void set_data_timing(const struct timing *data)
 }
 
 /* INIT and CCE are set. */
-static void configure(const struct timing *nominal, const struct timing *data)
+static void can_configure(const struct timing *nominal, const struct timing *data)
 {
 	WR(FDCAN_CKDIV, 0);
 	WR(FDCAN_NBTP, (nominal->after - 1u) << 25 | (nominal->before - 1u) << 8 | (nominal->after - 1u));
@@ -73,7 +73,7 @@ static void configure(const struct timing *nominal, const struct timing *data)
 }
 
 /* INIT, then CCE, then what they protect; leaving INIT clears CCE (44.3.4). */
-static int set_up(const struct timing *nominal, const struct timing *data)
+static int can_set_up(const struct timing *nominal, const struct timing *data)
 {
 	uint32_t mode = data != NULL ? FDCAN_CCCR_FDOE | FDCAN_CCCR_BRSE : 0;
 	uint32_t closed = FDCAN_CCCR_INIT | FDCAN_CCCR_CCE;
@@ -87,22 +87,22 @@ static int set_up(const struct timing *nominal, const struct timing *data)
 		return result;
 	WR(FDCAN_CCCR, closed);
 	WR(FDCAN_CCCR, closed | mode);
-	configure(nominal, data);
+	can_configure(nominal, data);
 	WR(FDCAN_CCCR, mode);
 	return register_wait(FDCAN_CCCR, FDCAN_CCCR_INIT, 0, ANSWER_POLLS);
 }
 
 int can_setup(uint32_t kernel_hz, bool classic, uint32_t data_kbit_s)
 {
-	const struct timing *nominal = find(kernel_hz, NOMINAL);
-	const struct timing *data = data_kbit_s == NOMINAL ? NULL : find(kernel_hz, data_kbit_s);
+	const struct timing *nominal = find_timing(kernel_hz, NOMINAL);
+	const struct timing *data = data_kbit_s == NOMINAL ? NULL : find_timing(kernel_hz, data_kbit_s);
 	int result;
 
 	if (nominal == NULL || (!classic && data == NULL))
 		return DT_E_ARGUMENT;
 	register_mask(INTERRUPT_CONTROL);
 	can.received = (struct ring)RING_OVER(can.storage);
-	result = set_up(nominal, classic ? NULL : data);
+	result = can_set_up(nominal, classic ? NULL : data);
 	register_mask(0);
 	return result;
 }

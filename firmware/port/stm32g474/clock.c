@@ -32,7 +32,7 @@ static int capture(uint32_t *count)
 	return result;
 }
 
-static int measure(uint32_t *counts)
+static int measure_counts(uint32_t *counts)
 {
 	uint32_t first, second;
 	int result;
@@ -62,7 +62,7 @@ static int find_crystal(const struct crystal **crystal)
 	register_set(RCC_CR, RCC_CR_HSEON);
 	result = register_wait(RCC_CR, RCC_CR_HSERDY, RCC_CR_HSERDY, CRYSTAL_POLLS);
 	if (result == 0)
-		result = measure(&counts);
+		result = measure_counts(&counts);
 	if (result != 0)
 		return result;
 	for (unsigned i = 0; i < sizeof(crystals) / sizeof(crystals[0]); i++)

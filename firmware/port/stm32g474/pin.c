@@ -47,7 +47,7 @@ static void two_bits(uint32_t address, unsigned number, uint32_t value)
 }
 
 /* The mode last: with it the pin leaves its reset state. */
-static void set_up(const struct pin *pin)
+static void set_up_pin(const struct pin *pin)
 {
 	uint32_t base = GPIO(pin->port);
 	unsigned shift = 4u * (pin->number % 8u);
@@ -64,7 +64,7 @@ void pin_setup(void)
 	register_set(RCC_AHB2ENR, RCC_AHB2ENR_GPIOABC);
 	(void)RD(RCC_AHB2ENR);
 	for (unsigned i = 0; i < PINS; i++)
-		set_up(&pins[i]);
+		set_up_pin(&pins[i]);
 }
 
 uint16_t pin_io(void)

@@ -12,7 +12,7 @@ enum {
 
 static uint32_t last; /* never given out again */
 
-static int start(void)
+static int random_start(void)
 {
 	int result;
 
@@ -28,7 +28,7 @@ static int start(void)
 }
 
 /* What the pipeline holds may come of the bad noise. */
-static void restart(void)
+static void random_restart(void)
 {
 	WR(RNG_SR, 0);
 	WR(RNG_CR, 0);
@@ -53,7 +53,7 @@ int random_number(uint32_t *value)
 {
 	uint32_t number = 0;
 
-	if ((RD(RNG_CR) & RNG_CR_RNGEN) == 0 && start() != 0)
+	if ((RD(RNG_CR) & RNG_CR_RNGEN) == 0 && random_start() != 0)
 		return DT_E_SYSTEM;
 	for (unsigned i = 0; i < TRIES; i++) {
 		if (read_one(&number) == 0) {
@@ -61,7 +61,7 @@ int random_number(uint32_t *value)
 			*value = number;
 			return 0;
 		}
-		restart();
+		random_restart();
 	}
 	return DT_E_SYSTEM;
 }
