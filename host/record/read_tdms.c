@@ -4,6 +4,7 @@
  * objects with properties, and raw data of those objects that have some. Data of DAQmx and data with scales
  * that are still to be applied are refused.
  */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,6 +34,8 @@ struct tdms_object {
 	uint32_t path_length, type;
 	uint64_t count, bytes; /* of a chunk */
 	bool active, unscaled, scales;
+	bool moved;            /* step or beginning are told twice, and differ */
+	const char *begins_at; /* its wf_start_time, 16 bytes; NULL: not told */
 	char name[64], unit[32];
 	double increment_s, offset_s;
 	double *value;
@@ -120,9 +123,11 @@ static void set_text(struct tdms_object *object, const char *name, uint32_t leng
 
 static void set_number(struct tdms_object *object, const char *name, uint32_t length, double value)
 {
-	if (says(name, length, "wf_increment"))
+	if (says(name, length, "wf_increment")) {
+		object->moved |= object->used > 0 && fabs(value - object->increment_s) > 1e-9 * fabs(value);
 		object->increment_s = value;
-	else if (says(name, length, "wf_start_offset"))
+	}
+	if (says(name, length, "wf_start_offset"))
 		object->offset_s = value;
 	else if (says(name, length, "NI_Number_Of_Scales"))
 		object->scales = value > 0;
@@ -145,6 +150,13 @@ static int take_property(struct tdms *tdms, struct tdms_object *object)
 		return tdms_refuse(tdms, "cut or damaged in its properties");
 	if (size == 0)
 		return tdms_refuse(tdms, "a property of a type that is not known");
+	if (type == TYPE_TIMESTAMP && says(name, length, "wf_start_time")) {
+		const char *at = tdms->source->bytes + tdms->at;
+
+		object->moved |= object->used > 0 && object->begins_at != NULL &&
+		                 memcmp(object->begins_at, at, size) != 0;
+		object->begins_at = at;
+	}
 	if (type_kind(type, &kind))
 		set_number(object, name, length,
 		           bytes_value(tdms->source->bytes + tdms->at, kind, tdms->big));
@@ -234,6 +246,8 @@ static int take_objects(struct tdms *tdms, uint32_t toc)
 		uint64_t properties;
 		int error;
 
+		if (object == NULL && !tdms->cut)
+			return tdms_refuse(tdms, "more objects than 1024");
 		if (object == NULL)
 			break;
 		error = take_index(tdms, object);
@@ -292,7 +306,7 @@ static int take_chunk(struct tdms *tdms, size_t at, size_t stride)
 
 static int take_raw(struct tdms *tdms, uint32_t toc, size_t at, size_t end)
 {
-	size_t chunk = 0, stride = 0;
+	size_t chunk = 0, stride = 0, active = 0;
 	uint64_t rows = 0;
 	int error = 0;
 
@@ -304,9 +318,12 @@ static int take_raw(struct tdms *tdms, uint32_t toc, size_t at, size_t end)
 		chunk += (size_t)object->bytes;
 		stride += type_bytes(object->type);
 		if (toc & TOC_INTERLEAVED &&
-		    (type_bytes(object->type) == 0 || (rows > 0 && object->count != rows)))
-			return tdms_refuse(tdms, "interleaved data of strings or of unequal counts");
+		    (type_bytes(object->type) == 0 || (active > 0 && object->count != rows)))
+			return tdms_refuse(
+			        tdms,
+			        "interleaved data of strings or of unequal counts, expected equal ones");
 		rows = object->count;
+		active++;
 	}
 	if (chunk == 0 || (end - at) % chunk != 0)
 		return tdms_refuse(tdms, "raw data that are no whole chunks: cut or damaged");
@@ -353,6 +370,12 @@ static int give_columns(struct tdms *tdms, struct table_data *table)
 
 		if (object->used == 0)
 			continue;
+		if (object->moved)
+			return source_refuse(
+			        tdms->message, DT_E_FORMAT, tdms->source->file, 0,
+			        "TDMS file: %s was appended to with another beginning or step, expected one "
+			        "recording",
+			        object->name);
 		if (object->scales && object->unscaled)
 			return source_refuse(
 			        tdms->message, DT_E_FORMAT, tdms->source->file, 0,
