@@ -21,4 +21,11 @@ void doubt_plateau(struct trace *trace, double noise_g);
 void doubt_channel(const struct trace *trace, const struct estimate_baseline *baseline, struct peak *peak,
                    struct estimate_pulse *pulse);
 
+/* Of an axis of S2 as read, in its event: when a contact larger than the first begins; INFINITY: none does.
+ */
+double doubt_slap_s(const struct trace *trace);
+
+/* X and Y of S1, then of S2; all four are there. True where any is flagged. */
+bool doubt_axes(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2]);
+
 #endif

@@ -114,6 +114,46 @@ static void flag_short(const struct desk *desk, struct analysis *analysis)
 	}
 }
 
+/* A corner drop's second contact may be the larger one: the first is the one that was asked for. */
+static void estimate_first_contact(const struct desk *desk)
+{
+	double until = INFINITY;
+
+	for (const char *axis = "XYZ"; *axis; axis++) {
+		size_t i = estimate_find(desk, "S2", *axis);
+
+		if (i < desk->record->channel_count)
+			until = fmin(until, doubt_slap_s(&desk->work[i].trace));
+	}
+	for (size_t i = 0; isfinite(until) && i < desk->record->channel_count; i++) {
+		struct trace *trace = &desk->work[i].trace;
+
+		trace->last = trace_index(trace, until);
+	}
+}
+
+/* Whether S1 and S2 see one shock. */
+static void estimate_compare(const struct desk *desk, struct analysis *analysis)
+{
+	struct estimate_channel *channel[2][2] = {{NULL}};
+	const struct trace *trace[2][2] = {{NULL}};
+
+	for (unsigned i = 0; i < 4; i++) {
+		size_t at = estimate_find(desk, i < 2 ? "S1" : "S2", i % 2 == 0 ? 'X' : 'Y');
+
+		if (at == desk->record->channel_count)
+			return;
+		channel[i / 2][i % 2] = &analysis->channels[at];
+		trace[i / 2][i % 2] = &desk->work[at].trace;
+	}
+	if (!doubt_axes(trace, channel))
+		return;
+	for (size_t i = 0; i < analysis->resultant_count; i++)
+		analysis->resultants[i].how.flags |= ESTIMATE_FLAG_AXES;
+	if (analysis->has_lag && analysis->lag.status == ESTIMATE_OK)
+		analysis->lag.status = ESTIMATE_AMBIGUOUS;
+}
+
 static void analyse_rebound(const struct desk *desk, struct analysis *analysis)
 {
 	const double gravity = desk->options->gravity_m_s2 > 0 ? desk->options->gravity_m_s2 : UNITS_G_M_S2;
@@ -144,6 +184,7 @@ static bool has_good_sample(const struct desk *desk)
 
 static int estimate_analyse(const struct desk *desk, struct analysis *analysis)
 {
+	estimate_first_contact(desk);
 	for (size_t i = 0; i < analysis->channel_count; i++) {
 		int status = estimate_prepare(desk, i, &analysis->channels[i].baseline);
 
@@ -159,6 +200,7 @@ static int estimate_analyse(const struct desk *desk, struct analysis *analysis)
 	estimate_decays(desk, analysis);
 	estimate_sensors(desk, analysis);
 	estimate_plate(desk, analysis);
+	estimate_compare(desk, analysis);
 	if (desk->options->impact_speed_m_s > 0)
 		analyse_rebound(desk, analysis);
 	return 0;

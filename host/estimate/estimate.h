@@ -43,6 +43,7 @@ enum {
 	ESTIMATE_FLAG_RIVAL = 1u << 11, /* "rival": another extreme is as high, as far as noise lets tell */
 	ESTIMATE_FLAG_STEP = 1u << 12,  /* "step": the pulse ends within one sample, as no sensor does */
 	ESTIMATE_FLAG_TAIL = 1u << 13,  /* "tail": more than noise follows the pulse; sigma is widened */
+	ESTIMATE_FLAG_AXES = 1u << 14,  /* "axes_disagree": S1 and S2 do not see one shock on this axis */
 };
 
 /* Name of the lowest flag bit in flags; "" for 0. */

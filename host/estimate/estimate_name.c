@@ -34,7 +34,8 @@ const char *estimate_flag_name(unsigned flags)
 	                                    "zero_unsure",
 	                                    "rival",
 	                                    "step",
-	                                    "tail"};
+	                                    "tail",
+	                                    "axes_disagree"};
 
 	for (unsigned i = 0; i < sizeof(names) / sizeof(names[0]); i++)
 		if (flags & 1u << i)

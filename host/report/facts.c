@@ -287,6 +287,8 @@ const char *report_note_words(unsigned flag)
 		return "it ends within one sample, as no sensor does: look for a broken cable";
 	case ESTIMATE_FLAG_TAIL:
 		return "more than noise follows the pulse; the uncertainty holds it";
+	case ESTIMATE_FLAG_AXES:
+		return "S1 and S2 do not see one shock: an axis is reversed, exchanged or dead";
 	default:
 		return estimate_flag_name(flag);
 	}

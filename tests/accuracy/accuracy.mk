@@ -30,10 +30,16 @@ endif
 
 DROPS ?= 10000
 
-.PHONY: accuracy knockout thresholds chart
+.PHONY: accuracy adversarial knockout thresholds chart
 accuracy: setup ## every estimate against its Cramer-Rao bound, thousands of drops of known truth (DROPS=)
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(BUILD)/tests/accuracy
 	@$(BUILD)/tests/accuracy --drops $(DROPS)
+
+ADVERSARIAL_DROPS ?= 1750
+
+adversarial: setup ## silently wrong values and false alarms in 100 000 drops that nothing is fitted to (ADVERSARIAL_DROPS=)
+	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(BUILD)/tests/test_adversarial
+	@DROPS=$(ADVERSARIAL_DROPS) $(BUILD)/tests/test_adversarial
 
 # Drops of our own tower, in virtual time; recordings where somebody has put them.
 KNOCKOUT_DROPS = $(foreach s,geometry-1 geometry-2A geometry-2B,$(foreach a,15 20 25 30 35,$(BUILD)/knockout/$s-$a.log))

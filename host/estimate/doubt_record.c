@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+
+#include "host/estimate/doubt.h"
+#include "host/estimate/limits.h"
+#include "host/estimate/quiet.h"
+
+/* The case is at rest between two contacts when it has been so long. */
+#define REST_S 5e-3
+
+/* Before a second contact its foot. */
+#define FOOT_S 1e-3
+
+/* Both sensors see one shock: what Y reads of X differs by more between them only where something is wrong.
+ */
+#define RATIO_APART 1.6
+
+/* Of an axis whose sign and height mean something; half of it is what the sign is taken by. */
+#define AXIS_SIGMAS 20.0
+
+/* Where the contact that sample k belongs to has ended; last when it has not. */
+static size_t contact_end(const struct trace *trace, size_t k, double zero_g, double level_g)
+{
+	size_t rest = (size_t)(REST_S * trace->rate_hz) + 1, n = 0;
+
+	for (; k < trace->last && n < rest; k++) {
+		n++;
+		if (trace_good(trace, k) && fabs(trace->value_g[k] - zero_g) > level_g)
+			n = 0;
+	}
+	return n < rest ? trace->last : k;
+}
+
+/* The first of two samples side by side from k on that are off zero by as much. */
+static size_t contact_begin(const struct trace *trace, size_t k, double zero_g, double level_g)
+{
+	for (; k + 1 < trace->last; k++)
+		if (trace_good(trace, k) && trace_good(trace, k + 1) &&
+		    fabs(trace->value_g[k] - zero_g) > level_g &&
+		    fabs(trace->value_g[k + 1] - zero_g) > level_g)
+			return k;
+	return trace->last;
+}
+
+/* The largest of two samples side by side in [k, until). */
+static double contact_height(const struct trace *trace, size_t k, size_t until, double zero_g)
+{
+	double most = 0;
+
+	for (; k + 1 < until; k++)
+		if (trace_good(trace, k) && trace_good(trace, k + 1))
+			most = fmax(most, fmin(fabs(trace->value_g[k] - zero_g),
+			                       fabs(trace->value_g[k + 1] - zero_g)));
+	return most;
+}
+
+double doubt_slap_s(const struct trace *trace)
+{
+	double zero, most;
+	size_t first, end, again;
+
+	if (trace->last <= trace->first + 1 || trace->first == 0)
+		return INFINITY;
+	zero = quiet_glance(trace, 0, trace->first, NULL);
+	most = contact_height(trace, trace->first, trace->last, zero);
+	first = contact_begin(trace, trace->first, zero, LIMIT_AGAIN * most);
+	end = contact_end(trace, first, zero, LIMIT_EDGE * most);
+	again = contact_begin(trace, end, zero, LIMIT_AGAIN * most);
+	if (again >= trace->last ||
+	    !(contact_height(trace, end, trace->last, zero) > contact_height(trace, first, end, zero)))
+		return INFINITY;
+	return trace_time(trace, again) - FOOT_S;
+}
+
+/* Whether an axis stands so far out of its noise that its sign and height mean something. */
+static bool axis_sure(const struct estimate_channel *channel)
+{
+	return channel->peak.how.status == ESTIMATE_OK && !(channel->peak.how.flags & ESTIMATE_FLAG_WEAK) &&
+	       fabs(channel->peak.value_g) > AXIS_SIGMAS * channel->baseline.noise_g;
+}
+
+/* The direction that a trace first goes in, by half of its peak; 0 where it has none. */
+static int axis_sign(const struct trace *trace, const struct estimate_channel *channel)
+{
+	size_t k = trace_reaches(trace, trace->first, trace->last, fabs(channel->peak.value_g) / 2);
+
+	return k == trace->last ? 0 : trace->value_g[k] < 0 ? -1 : 1;
+}
+
+static void axis_flag(struct estimate_channel *channel)
+{
+	channel->peak.how.flags |= ESTIMATE_FLAG_AXES;
+	channel->pulse.flags |= ESTIMATE_FLAG_AXES;
+}
+
+/* X and Y of one sensor against the other's, whose Y shows nothing of what it should by far. */
+static bool axis_dead(struct estimate_channel *const alive[2], struct estimate_channel *const other[2])
+{
+	return axis_sure(alive[0]) && axis_sure(alive[1]) && axis_sure(other[0]) &&
+	       other[1]->peak.how.status == ESTIMATE_NO_PEAK &&
+	       fabs(alive[1]->peak.value_g / alive[0]->peak.value_g * other[0]->peak.value_g) >
+	               AXIS_SIGMAS * other[1]->baseline.noise_g;
+}
+
+/* Exchanged X and Y explain what S1 and S2 read better than what they are called. */
+static bool axis_exchanged(struct estimate_channel *const channel[2][2])
+{
+	double s1 = log(fabs(channel[0][1]->peak.value_g / channel[0][0]->peak.value_g));
+	double s2 = log(fabs(channel[1][1]->peak.value_g / channel[1][0]->peak.value_g));
+
+	for (unsigned i = 0; i < 4; i++)
+		if (!axis_sure(channel[i / 2][i % 2]))
+			return false;
+	return fabs(s1 - s2) > log(RATIO_APART) && fabs(s1 + s2) < fabs(s1 - s2) / 2;
+}
+
+bool doubt_axes(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2])
+{
+	bool any = axis_exchanged(channel) || axis_dead(channel[0], channel[1]) ||
+	           axis_dead(channel[1], channel[0]);
+
+	for (unsigned i = 0; any && i < 4; i++)
+		axis_flag(channel[i / 2][i % 2]);
+	for (unsigned i = 0; i < 2; i++) {
+		if (!axis_sure(channel[0][i]) || !axis_sure(channel[1][i]) ||
+		    axis_sign(trace[0][i], channel[0][i]) * axis_sign(trace[1][i], channel[1][i]) >= 0)
+			continue;
+		axis_flag(channel[0][i]);
+		axis_flag(channel[1][i]);
+		any = true;
+	}
+	return any;
+}
