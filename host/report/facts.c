@@ -316,6 +316,7 @@ static void facts_note(struct noting *noting, double value, unsigned flags, cons
 size_t report_notes(const struct report *report, struct report_note notes[REPORT_NOTES_MAX])
 {
 	const struct analysis *a = report->analysis;
+	const unsigned of_pulse = ESTIMATE_FLAG_ZERO | ESTIMATE_FLAG_STEP | ESTIMATE_FLAG_TAIL;
 	struct noting noting = {.notes = notes, .flag = 1};
 
 	for (; estimate_flag_name(noting.flag)[0]; noting.flag <<= 1) {
@@ -326,8 +327,8 @@ size_t report_notes(const struct report *report, struct report_note notes[REPORT
 			const char *name = report->record->channels[i].name;
 
 			facts_note(&noting, e->peak.value_g, e->peak.how.flags, name, "peak");
-			facts_note(&noting, e->pulse.velocity_change_m_s, e->pulse.flags & ESTIMATE_FLAG_ZERO,
-			           name, "velocity change");
+			facts_note(&noting, e->pulse.velocity_change_m_s, e->pulse.flags & of_pulse, name,
+			           "velocity change");
 			facts_note(&noting, e->pulse.contact_time_s, e->pulse.contact.flags, name, "contact");
 		}
 		for (size_t i = 0; i < a->resultant_count; i++)
