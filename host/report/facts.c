@@ -370,10 +370,15 @@ bool report_video(const struct report *report, const struct report_zero *zero, c
 
 const char *report_channel_status(const struct estimate_channel *estimate, char *text, size_t size)
 {
+	const unsigned doubts = (estimate->peak.how.flags | estimate->pulse.flags) &
+	                        (ESTIMATE_FLAG_STEP | ESTIMATE_FLAG_TAIL | ESTIMATE_FLAG_AXES);
+
 	if (estimate->peak.how.status != ESTIMATE_OK)
 		snprintf(text, size, "%s", estimate_status_name(estimate->peak.how.status));
 	else if (estimate->pulse.status != ESTIMATE_OK)
 		snprintf(text, size, "width %s", estimate_status_name(estimate->pulse.status));
+	else if (doubts)
+		snprintf(text, size, "%s", estimate_flag_name(doubts));
 	else
 		snprintf(text, size, "ok");
 	return text;

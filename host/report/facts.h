@@ -66,7 +66,7 @@ const struct estimate_channel *report_axis(const struct report *report, const ch
 /* The baseline that is taken off for pictures, g. */
 double report_offset(const struct estimate_channel *estimate);
 
-/* What of a channel's result is not ok, in a word or two: "ok", "clipped", "width short". */
+/* What of a channel's result is not ok, in a word or two: "ok", "clipped", "width short", "tail". */
 const char *report_channel_status(const struct estimate_channel *estimate, char *text, size_t size);
 
 /* Whether S1 follows S2 as an oscillator does: its lag is then the one to be shown first. */
