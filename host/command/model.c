@@ -168,6 +168,8 @@ static const struct option_row rows[] = {
                      "paper or steady, for comparison; default: auto"),
         OPTION_PERCENT("tolerance", struct model_arguments, ensemble.options.accuracy,
                        "auto: how far the answer may be from planar's (5)"),
+        OPTION_NUMBER("lag-tolerance", "US", struct model_arguments, ensemble.options.lag_accuracy_us, 0.1,
+                      1e6, "the same of a lag (50)"),
         OPTION_TAKEN("ask", "LIST", struct model_arguments, ensemble.options, take_ask,
                      "plate, axes, box, lag, s2, direction: only these; default: everything"),
         OPTION_TAKEN("refine", "LIST", struct model_arguments, ensemble.options, take_refine,

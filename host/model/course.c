@@ -368,6 +368,8 @@ static int follow(struct run *c, struct watch *watch, struct course_result *r)
 {
 	const struct course *in = c->in;
 	bool flies = course_peaks_in_flight(in);
+	/* such a plate may throw the box down once more */
+	bool heavy = in->body.plate_mass_kg > LIGHT_PLATE * in->body.case_mass_kg;
 	double end = c->contact_end_s;
 	int error = 0;
 
@@ -376,7 +378,7 @@ static int follow(struct run *c, struct watch *watch, struct course_result *r)
 		if (error)
 			break;
 		watch_step(watch, &c->ode);
-		if (in->rough && watch_passed(watch, COURSE_DEPTH, 1.0) && all_passed(in, watch)) {
+		if (in->rough && !heavy && watch_passed(watch, COURSE_DEPTH, 1.0) && all_passed(in, watch)) {
 			r->cut_short = isnan(c->released_s);
 			break;
 		}

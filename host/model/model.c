@@ -108,6 +108,9 @@ static int model_check_options(const struct model_options *o, char *message)
 		                   o->tolerance, MODEL_TOLERANCE_MIN);
 	if (!(o->accuracy >= 0.0 && o->accuracy <= 1.0))
 		return drop_refuse(message, DT_E_ARGUMENT, "accuracy is %g, expected 0 to 1", o->accuracy);
+	if (!(o->lag_accuracy_us >= 0.0))
+		return drop_refuse(message, DT_E_ARGUMENT, "lag accuracy is %g us, expected above 0",
+		                   o->lag_accuracy_us);
 	return 0;
 }
 

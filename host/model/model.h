@@ -81,10 +81,12 @@ struct model_options {
 	unsigned asked; /* MODEL_ASK_PLATE | ...: peaks that no bit asks for may come as NAN; 0: everything */
 	double accuracy; /* auto: how far the answer may be from planar's, as a share of it; 0: MODEL_ACCURACY
 	                  */
+	double lag_accuracy_us; /* the same of a lag; 0: MODEL_LAG_ACCURACY_US */
 };
 #define MODEL_TOLERANCE 1e-5
 #define MODEL_TOLERANCE_MIN 1e-10
 #define MODEL_ACCURACY 0.05
+#define MODEL_LAG_ACCURACY_US 50.0
 
 /* MODEL_OF_RUNG, ring counted, MODEL_TOLERANCE. */
 extern const struct model_options model_defaults;
@@ -130,9 +132,10 @@ struct model_prediction {
 	double lag_s;                   /* S1's resultant peak after S2's */
 	unsigned evaluations;           /* of the equations of motion: its cost; 0 where the form is closed */
 	/* of auto only, else NAN and none: */
-	double difference;        /* from planar, predicted, as a share, of the worst of what is asked */
+	double difference; /* from planar as a share, numbers' error included, of the worst of what is asked
+	                    */
 	enum model_fidelity next; /* the rung above the one taken; MODEL_AUTO: none */
-	double next_change;       /* what it would change, found or predicted */
+	double next_change;       /* what it would change */
 };
 
 enum { MODEL_MESSAGE_MAX = 256 };

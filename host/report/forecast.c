@@ -28,7 +28,8 @@ static int written(FILE *out)
 /* What the rung above says otherwise, as a share; NAN without one. */
 static double next_change(const struct forecast *f)
 {
-	return f->next ? auto_apart(f->prediction, f->next, f->asked ? f->asked : (unsigned)MODEL_ASK_ALL)
+	return f->next ? auto_apart(f->prediction, f->next, f->asked ? f->asked : (unsigned)MODEL_ASK_ALL,
+	                            0.0)
 	               : (double)NAN;
 }
 
