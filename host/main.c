@@ -40,7 +40,8 @@ static void help(FILE *out)
 	fputs("\n'droptower COMMAND --help' tells the options, 'droptower --schema' what a result is. Exit "
 	      "codes: 0 done, 2 usage, 3 input "
 	      "unusable,\n"
-	      "4 link or hardware, 5 refused by an interlock or stopped.\n",
+	      "4 link or hardware, 5 refused by an interlock or stopped, 6 a limit of the test plan is not "
+	      "met.\n",
 	      out);
 }
 

@@ -126,6 +126,21 @@ static int scene_read_fitted(struct reading *reading, const char *name, const ch
 	return 1;
 }
 
+static int scene_read_limit(struct reading *reading, const char *name, const char *value)
+{
+	char *limits = reading->scene.limits;
+	size_t used = strlen(limits);
+	int more = snprintf(limits + used, sizeof(reading->scene.limits) - used, "%d:%s=%s\n",
+	                    reading->settings.line, name, value);
+
+	if (!plain_is_line(value, strlen(value)))
+		return settings_fail(&reading->settings, DT_E_FORMAT, "%.60s is no line of UTF-8 text", name);
+	if (used + (size_t)more >= sizeof(reading->scene.limits))
+		return settings_fail(&reading->settings, DT_E_FORMAT, "[limits] is longer than %d characters",
+		                     SCENE_LIMITS_MAX);
+	return 1;
+}
+
 static int scene_read_entry(struct settings *settings, const char *section, const char *name,
                             const char *value)
 {
@@ -136,6 +151,8 @@ static int scene_read_entry(struct settings *settings, const char *section, cons
 		return scene_read_text(reading, name, value);
 	if (strcmp(section, "fit") == 0)
 		return scene_read_fitted(reading, name, value);
+	if (strcmp(section, "limits") == 0)
+		return scene_read_limit(reading, name, value);
 	for (size_t i = 0; i < KEYS; i++) {
 		if (strcmp(section, keys[i].section) != 0)
 			continue;
@@ -210,6 +227,17 @@ static void scene_write_fitted(const struct scene *scene, FILE *out)
 	}
 }
 
+/* Each without its line's number; what goes on in a further line is a key again. */
+static void scene_write_limits(const struct scene *scene, FILE *out)
+{
+	fputs("\n[limits]\n", out);
+	for (const char *at = scene->limits; *at != '\0'; at = strchr(at, '\n') + 1) {
+		const char *key = strchr(at, ':') + 1, *value = strchr(key, '=') + 1;
+
+		fprintf(out, "%.*s = %.*s\n", (int)(value - 1 - key), key, (int)strcspn(value, "\n"), value);
+	}
+}
+
 void scene_write(const struct scene *scene, FILE *out)
 {
 	struct scene placed = *scene;
@@ -236,6 +264,8 @@ void scene_write(const struct scene *scene, FILE *out)
 		fitted = fitted || scene->fitted_u[i] > 0.0;
 	if (fitted)
 		scene_write_fitted(scene, out);
+	if (scene->limits[0] != '\0')
+		scene_write_limits(scene, out);
 }
 
 void scene_limits(const char *section, const char *key, double *min, double *max)

@@ -11,7 +11,7 @@
 #include "common/error.h"
 #include "common/scenes/settings.h"
 
-enum { SCENE_MESSAGE_MAX = SETTINGS_MESSAGE_MAX, SCENE_FITTED = 9 };
+enum { SCENE_MESSAGE_MAX = SETTINGS_MESSAGE_MAX, SCENE_FITTED = 9, SCENE_LIMITS_MAX = 2048 };
 
 /* What a fit finds of a product, in the order of the keys of section [fit]. There, `KEY = u r1 r2 ...` is its
  * standard uncertainty and its correlations with the keys before it. u is relative, but in deg of angles, of
@@ -26,6 +26,9 @@ struct scene {
 #undef SCENE_KEY
 	double fitted_u[SCENE_FITTED]; /* 0: not known */
 	double fitted_correlation[SCENE_FITTED][SCENE_FITTED];
+	/* Section [limits] as it stands, "LINE:KEY=VALUE\n" each: what it means is the host's
+	 * (host/result/plan.h). */
+	char limits[SCENE_LIMITS_MAX];
 };
 
 /* Reads and checks file. 0, or DT_E_* with "FILE:LINE: what is wrong, what was expected" in message and
@@ -38,7 +41,7 @@ DT_MUST_USE int scene_read(struct scene *scene, const char *file, char message[S
  * message. */
 DT_MUST_USE int scene_check(const struct scene *scene, const char *where, char message[SCENE_MESSAGE_MAX]);
 
-/* Writes all that differs from what a key is without being given, and [fit] where u is known. */
+/* Writes all that differs from what a key is without being given, [fit] where u is known, and [limits]. */
 void scene_write(const struct scene *scene, FILE *out);
 
 /* What section.key of scene.def may be; NAN when there is no such key. */

@@ -165,6 +165,7 @@ struct archive_drop {
 	bool simulated;                    /* known to be from a simulated tower; false: not known */
 	const char *version;               /* of the result; NULL: there is none */
 	const char *quantities;            /* quantity_version of it; "": from before there was one */
+	const char *verdict;               /* of the test plan: "pass", ...; "" without limits */
 	double value[ARCHIVE_VALUE_COUNT]; /* NAN: none */
 	double sigma[ARCHIVE_VALUE_COUNT];
 	unsigned not_ok;   /* bit for each value whose status is not ok */

@@ -261,7 +261,8 @@ static const char drop_columns[] =
         "SELECT " SERIES_COLUMNS
         ", d.number, CASE d.proof WHEN '' THEN d.state ELSE d.proof END, d.decision, d.reason, d.operator, "
         "d.note, d.raw, d.sha256,"
-        " d.time, d.bytes, d.simulated, v.name, r.not_ok, r.flags, d.entry, d.fault, d.id, r.quantities"
+        " d.time, d.bytes, d.simulated, v.name, r.not_ok, r.flags, d.entry, d.fault, d.id, r.quantities, "
+        "(SELECT decision FROM of_verdict WHERE result_id = r.id)"
 #define QUANTITY_COLUMN(NAME, name, unit, ...) ", r." name "_" unit ", r." name "_sigma_" unit
 #include "host/result/quantity.def"
         ;
@@ -270,14 +271,14 @@ static const char drop_columns[] =
 static const char drop_numbers[] =
         "SELECT " SERIES_COLUMNS
         ", d.number, d.proof, d.decision, NULL, NULL, NULL, NULL, substr(d.sha256, 1, 1)"
-        ", NULL, NULL, NULL, NULL, r.not_ok, NULL, NULL, NULL, d.id, NULL"
+        ", NULL, NULL, NULL, NULL, r.not_ok, NULL, NULL, NULL, d.id, NULL, NULL"
 #define QUANTITY_COLUMN(NAME, name, unit, ...) ", r." name "_" unit ", NULL"
 #include "host/result/quantity.def"
         ;
 
 static void drop_of(const struct archive *archive, sqlite3_stmt *s, struct archive_drop *drop)
 {
-	enum { N = SERIES_COLUMN_COUNT, VALUES = N + 18 };
+	enum { N = SERIES_COLUMN_COUNT, VALUES = N + 19 };
 
 	*drop = (struct archive_drop){
 	        .series = series_of(s),
@@ -298,6 +299,7 @@ static void drop_of(const struct archive *archive, sqlite3_stmt *s, struct archi
 	        .sealed = sqlite3_column_int64(s, N + 14) != 0,
 	        .fault = sql_text(s, N + 15),
 	        .quantities = sql_text(s, N + 17),
+	        .verdict = sql_text(s, N + 18),
 	};
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
 		drop->value[i] = number_or_nan(s, VALUES + 2 * i);

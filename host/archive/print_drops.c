@@ -35,6 +35,7 @@ static const struct table_column first_columns[] = {
         COLUMN(WORDS, drop.quantities, .key = "quantities"),
         COLUMN(WORDS, drop.flags, .key = "flags"),
         COLUMN(KNOWN, drop.simulated, .key = "simulated"),
+        COLUMN(WORDS, drop.verdict, .key = "verdict"),
 };
 static const struct table_column value_columns[] = {
 #define QUANTITY_COLUMN(NAME, name, unit, ...) \
@@ -83,7 +84,8 @@ static void fill_remarks(struct drop_row *row)
 {
 	const struct archive_drop *d = &row->drop;
 
-	snprintf(row->remarks, sizeof(row->remarks), "%s%s%s%s%s%s%s%s%s%s", d->fault[0] != '\0' ? " " : "",
+	snprintf(row->remarks, sizeof(row->remarks), "%s%s%s%s%s%s%s%s%s%s%s%s",
+	         d->verdict[0] != '\0' ? " limits: " : "", d->verdict, d->fault[0] != '\0' ? " " : "",
 	         d->fault, !d->sealed && d->sha256[0] != '\0' ? " not sealed" : "",
 	         d->simulated ? " simulated tower" : "", d->flags[0] != '\0' ? " " : "", d->flags,
 	         d->reason[0] != '\0' ? "; " : "", d->reason, d->note[0] != '\0' ? "; " : "", d->note);

@@ -14,6 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "host/result/plan.h"
 #include "host/archive/proof.h"
 
 enum { SCENE_MAX_BYTES = 65536, NUMBER_MAX = 1000000 };
@@ -108,11 +109,13 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 {
 	char message[SCENE_MESSAGE_MAX], *text;
 	struct scene scene;
+	struct plan plan;
 	int result = archive_check_names(archive, name, campaign);
 
 	if (result != 0)
 		return result;
-	if (scene_read(&scene, scene_file, message) != 0)
+	if (scene_read(&scene, scene_file, message) != 0 ||
+	    plan_read(&plan, scene.limits, scene_file, message) != 0)
 		return archive_refuse(archive, DT_E_FORMAT, "%s", message);
 	if (isnan(angle_deg))
 		angle_deg = scene.drop_angle_deg;

@@ -21,7 +21,7 @@ struct arguments {
 	char profile_as_columns[4096];
 	double angle_deg;
 	unsigned drop; /* of the log; 0: all */
-	bool list, every_shock, repeats;
+	bool list, every_shock, repeats, presets;
 	unsigned shock; /* of a long record; 0: none by its number */
 	double window_s[2];
 	struct evaluate_options evaluate;
@@ -62,6 +62,20 @@ static int take_window(const struct option_table *table, const char *name, const
 		}
 	}
 	return option_wrong(table, "--%s is '%s', expected FROM:TO in seconds", name, text);
+}
+
+static int take_limits(const struct option_table *table, const char *name, const char *text, void *into)
+{
+	struct arguments *arguments = into;
+	size_t i = 0;
+
+	arguments->presets = strcmp(text, "list") == 0;
+	while (plan_preset(i) != NULL && strcmp(plan_preset(i)->name, text) != 0)
+		i++;
+	if (plan_preset(i) == NULL && !arguments->presets)
+		return option_wrong(table, "--%s is '%s', expected a preset, or list", name, text);
+	arguments->evaluate.limits = text;
+	return OPTIONS_READ;
 }
 
 static const struct option_row rows[] = {
@@ -115,8 +129,11 @@ static const struct option_row rows[] = {
                     "hold a pulse against time_s,lower_g,upper_g; time 0 is where it leaves 10 %"),
         OPTION_FLAG("band-at-peak", struct arguments, evaluate.band.at_peak,
                     "time 0 of the band is the pulse's peak"),
+        OPTION_TAKEN_BY("limits", "PRESET", take_limits,
+                        "hold the drop against a test standard's pulse, in place of the scene's [limits]; "
+                        "'list' tells them"),
         OPTION_TEXT("channel", "NAME", struct arguments, evaluate.band.channel,
-                    "the band's channel; without it, the one with the largest peak"),
+                    "the channel of --band and --limits; without it, the one with the largest peak"),
         OPTION_FLAG("json", struct arguments, evaluate.json, "one JSON object per drop on standard output"),
         OPTION_TEXT("html", "PAGE", struct arguments, evaluate.html,
                     "write a page (one FILE of one drop, or --drop N)"),
@@ -281,9 +298,11 @@ static int analyze_check(const struct arguments *arguments, int argc, char **arg
 		return command_usage("analyze", "--list goes without --drop and --html");
 	if (!isnan(arguments->angle_deg) && arguments->scene_file == NULL)
 		return command_usage("analyze", "--angle needs a --scene to lay it over");
-	if (arguments->band_file == NULL &&
-	    (arguments->evaluate.band.channel != NULL || arguments->evaluate.band.at_peak))
-		return command_usage("analyze", "--channel and --band-at-peak need a --band");
+	if (arguments->band_file == NULL && arguments->evaluate.limits == NULL &&
+	    arguments->evaluate.band.channel != NULL)
+		return command_usage("analyze", "--channel needs a --band or --limits");
+	if (arguments->band_file == NULL && arguments->evaluate.band.at_peak)
+		return command_usage("analyze", "--band-at-peak needs a --band");
 	if (command_is_input("analyze", arguments->evaluate.html, argv[optind]))
 		return COMMAND_USAGE;
 	return COMMAND_DONE;
@@ -341,6 +360,52 @@ static int analyze_words(char **words, int count, const struct arguments *argume
 	return code;
 }
 
+struct preset_row {
+	struct plan_preset preset;
+	double velocity_m_s, height_m;
+};
+
+static const struct table_column preset_columns[] = {
+        TABLE_COLUMN(WORDS, struct preset_row, preset.name, .key = "preset", .title = "preset", .width = -26),
+        TABLE_COLUMN(NUMBER, struct preset_row, preset.peak_g, .key = "peak_g", .title = "peak", .unit = "g",
+                     .width = 7, .digits = -6),
+        TABLE_COLUMN(NUMBER, struct preset_row, preset.duration_ms, .key = "duration_ms", .title = "ms",
+                     .width = 5, .digits = -6),
+        TABLE_COLUMN(NUMBER, struct preset_row, velocity_m_s, .key = "velocity_change_m_s", .title = "dv m/s",
+                     .width = 7, .digits = 2),
+        TABLE_COLUMN(NUMBER, struct preset_row, height_m, .key = "height_m", .title = "fall m", .width = 7,
+                     .digits = 2),
+        TABLE_COLUMN(NUMBER, struct preset_row, preset.peak_percent, .key = "peak_percent", .title = "peak %",
+                     .width = 6, .digits = -3),
+        TABLE_COLUMN(NUMBER, struct preset_row, preset.velocity_percent, .key = "velocity_percent",
+                     .title = "dv %", .width = 5, .digits = -3),
+        TABLE_COLUMN(NUMBER, struct preset_row, preset.band_percent, .key = "band_percent", .title = "band %",
+                     .width = 6, .digits = -3),
+        TABLE_COLUMN(NUMBER, struct preset_row, preset.transverse_percent, .key = "transverse_percent",
+                     .title = "transverse %", .width = 12, .digits = -3),
+        TABLE_COLUMN(YES, struct preset_row, preset.verified, .key = "verified", .title = "verified",
+                     .width = -8),
+        TABLE_COLUMN(WORDS, struct preset_row, preset.source, .key = "source", .title = "source"),
+};
+
+static int analyze_presets(bool json)
+{
+	struct table table = {.out = stdout, .format = json ? TABLE_JSON : TABLE_TEXT};
+
+	table_begin(&table, preset_columns, TABLE_COUNT(preset_columns));
+	for (size_t i = 0; plan_preset(i) != NULL; i++) {
+		struct preset_row row = {.preset = *plan_preset(i)};
+
+		row.velocity_m_s =
+		        plan_velocity_m_s(row.preset.shape, row.preset.peak_g, row.preset.duration_ms * 1e-3);
+		row.height_m = plan_height_m(row.velocity_m_s);
+		table_row(&table, &row);
+	}
+	if (json)
+		fputc('\n', stdout);
+	return table_end(&table) == 0 ? COMMAND_DONE : COMMAND_INPUT;
+}
+
 int command_analyze(int argc, char **argv)
 {
 	struct arguments arguments = {
@@ -352,6 +417,8 @@ int command_analyze(int argc, char **argv)
 
 	if (code != OPTIONS_READ)
 		return code;
+	if (arguments.presets)
+		return analyze_presets(arguments.evaluate.json);
 	code = analyze_check(&arguments, argc, argv);
 	if (arguments.repeats)
 		arguments.evaluate.repeats = &repeats;

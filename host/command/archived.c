@@ -119,6 +119,7 @@ static int command_archived_analyse(struct archive *archive, const char *drop, c
 		return DT_E_FORMAT;
 	}
 	said = result_of(record, &e.analysis, &e.report.options);
+	said.verdict = e.report.verdict != NULL ? &e.verdict : NULL;
 	result = archive_result(archive, drop, DT_VERSION, &said, json);
 	if (result != 0)
 		snprintf(message, ARCHIVE_MESSAGE_MAX, "%s", archive_message(archive));

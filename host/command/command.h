@@ -16,6 +16,7 @@ enum command_exit {
 	COMMAND_INPUT = 3,   /* input unusable, or --strict and a flag is set */
 	COMMAND_LINK = 4,    /* link or hardware */
 	COMMAND_REFUSED = 5, /* by an interlock, or stopped by the operator */
+	COMMAND_LIMIT = 6,   /* a limit of the test plan is not met, or undecided */
 };
 
 int command_run(int argc, char **argv);

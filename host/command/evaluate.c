@@ -109,6 +109,39 @@ static int find_shocks(struct evaluated *e, const struct evaluate_options *optio
 	return EVALUATE_TOLD;
 }
 
+/* Against the scene's limits, or a preset's. */
+static int judge(struct evaluated *e, const struct evaluate_options *options)
+{
+	const char *file = options->limits != NULL ? "--limits" : options->scene ? options->scene->name : "";
+	const char *limits = options->scene ? options->scene->limits : "";
+	struct result said = {.record = (struct record *)(uintptr_t)e->report.record,
+	                      .analysis = &e->analysis,
+	                      .options = &e->report.options,
+	                      .measured = measured_of(e->report.record)};
+	char message[SCENE_MESSAGE_MAX], named[160];
+	struct plan plan;
+	int result;
+
+	if (options->limits != NULL) {
+		bool channel = options->band.channel != NULL;
+
+		snprintf(named, sizeof(named), "0:preset=%.60s\n%s%.31s%s", options->limits,
+		         channel ? "0:channel=" : "", channel ? options->band.channel : "",
+		         channel ? "\n" : "");
+		limits = named;
+	}
+	if (limits[0] == '\0')
+		return 0;
+	result = plan_read(&plan, limits, file, message);
+	if (result != 0) {
+		command_error("%s", message);
+		return EVALUATE_TOLD;
+	}
+	result = verdict_judge(&e->verdict, &plan, &said);
+	e->report.verdict = result == 0 ? &e->verdict : NULL;
+	return result;
+}
+
 /* The first channel that is too slow for the class; false when there is none. */
 static bool refuses_cfc(const struct record *record, unsigned cfc)
 {
@@ -159,6 +192,8 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 	                            .unattended = options->unattended,
 	                            .tolerance_asked = options->tolerance > 0};
 	result = find_shocks(e, options, &estimate);
+	if (result == 0)
+		result = judge(e, options);
 	if (result != 0) {
 		evaluate_close(e);
 		return result;
@@ -219,6 +254,9 @@ int evaluate(struct record *record, const struct evaluate_options *options)
 		command_error("%s: flagged, and --strict was asked for", record->file);
 		code = COMMAND_INPUT;
 	}
+	if (code == COMMAND_DONE && e.report.verdict != NULL &&
+	    !(decide_meets(e.verdict.decision) && (e.verdict.decision == DECIDE_PASS || !options->strict)))
+		code = COMMAND_LIMIT; /* the table says which */
 	evaluate_close(&e);
 	return code;
 }
@@ -244,7 +282,10 @@ int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg)
 {
 	char message[SCENE_MESSAGE_MAX], path[PATH_MAX];
 	int result = scene_read(scene, beside_scene_file(file, path), message);
+	struct plan plan;
 
+	if (result == 0)
+		result = plan_read(&plan, scene->limits, beside_scene_file(file, path), message);
 	if (result == 0 && !isnan(angle_deg)) {
 		scene->drop_angle_deg = angle_deg;
 		result = scene_check(scene, "--angle", message);

@@ -23,6 +23,7 @@ struct evaluate_options {
 	struct events_options events; /* how shocks are found */
 	bool show_events;             /* shocks and free falls in the table too */
 	struct band_options band;     /* its curve NULL: none */
+	const char *limits;           /* a preset's name, in place of the scene's limits; NULL: those */
 	bool json;                    /* JSON to stdout instead of the table */
 	const char *html;             /* page to write; NULL: none */
 	const char *json_file;        /* JSON beside it; NULL: none */
@@ -40,6 +41,7 @@ struct evaluated {
 	struct events events;
 	struct free_falls falls;
 	struct band band;
+	struct verdict verdict;
 };
 
 enum { EVALUATE_TOLD = 1 };

@@ -146,7 +146,7 @@ static int report_archived(struct run *run, struct record *record)
 	snprintf(record->file, sizeof(record->file), "%s", r->raw);
 	shown = evaluate(record, &options);
 	mine.series = r->series;
-	if (shown == COMMAND_DONE) {
+	if (shown == COMMAND_DONE || shown == COMMAND_LIMIT) {
 		fprintf(out, "\ndrop     %s/%u\nraw log  %s\n", r->series, r->number, r->log);
 		if (archive_each_series(run->archive, &mine, tell_series, out) != 0)
 			return archived_failed(run->archive);
@@ -180,7 +180,7 @@ static int report_files(struct run *run, struct record *record)
 		return COMMAND_INPUT;
 	}
 	code = evaluate(record, &options);
-	if (code == COMMAND_DONE)
+	if (code == COMMAND_DONE || code == COMMAND_LIMIT)
 		fprintf(run->json ? stderr : stdout,
 		        "\nraw log  %s.log\ntable    %s\nJSON     %s\nreport   %s\n", run->stem, csv, json,
 		        html);

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/result/plan.h"
 #include "host/console/work_private.h"
 #include "host/base/put.h"
 
@@ -29,10 +30,13 @@ int work_open_scenes(struct work *work, char message[ARCHIVE_MESSAGE_MAX])
 	}
 	for (; work->scenes < count; work->scenes++) {
 		struct work_scene_file *s = &work->scene[work->scenes];
+		struct plan plan;
 		int result;
 
 		s->file = work->options.scenes[work->scenes];
 		result = scene_read(&s->scene, s->file, message);
+		if (result == 0)
+			result = plan_read(&plan, s->scene.limits, s->file, message);
 		if (result != 0)
 			return result;
 	}

@@ -186,11 +186,30 @@ static void foot(struct page *page)
 	page_end(out, page->report->version);
 }
 
+static void html_verdict(struct page *page)
+{
+	const struct verdict *v = page->report->verdict;
+
+	if (v == NULL)
+		return;
+	fprintf(page->out, "<h2>Limits</h2>\n<div class=\"verdict %s\">",
+	        decide_meets(v->decision) ? "good" : "bad");
+	verdict_line(v, page->out);
+	fputs("</div>\n", page->out);
+	if (verdict_table(v, TABLE_HTML, page->out) != 0)
+		page->error = DT_E_MEMORY;
+	fprintf(page->out, "<p class=\"note\">%s %s. Uncertainty of %s.%s%s</p>\n",
+	        v->by[0] != '\0' ? "Limits by" : "Limits of the scene.", v->by, v->rests_on,
+	        v->verified ? "" : " ", v->verified ? "" : VERDICT_UNVERIFIED ".");
+	fprintf(page->out, "<p class=\"note\">Decision rule: %s.</p>\n", v->rule);
+}
+
 static void html_write_page(struct page *page)
 {
 	html_head(page);
 	band(page);
 	html_cards(page);
+	html_verdict(page);
 	flags(page);
 	page_pictures(page);
 	page_tables(page);

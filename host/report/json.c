@@ -6,6 +6,7 @@
 #include <cjson/cJSON.h>
 
 #include "host/model/ensemble.h"
+#include "common/base/text.h"
 #include "host/estimate/cfc.h"
 #include "host/report/facts.h"
 #include "host/base/put.h"
@@ -231,6 +232,25 @@ static void put_model(struct builder *b, cJSON *root, const struct report *repor
 		put_number(b, apart, rows[i].key, 100.0 * rows[i].rungs_apart / fabs(rows[i].predicted));
 }
 
+static void put_verdict(struct builder *b, cJSON *root, const struct verdict *verdict)
+{
+	cJSON *json = put_if(b, root, "verdict", verdict != NULL, QUANTITY_VERDICT, verdict);
+	struct text items;
+
+	if (json == NULL)
+		return;
+	if (text_open(&items) != 0) {
+		b->failed = true;
+		return;
+	}
+	if (text_close(&items, verdict_table(verdict, TABLE_JSON, items.out)) != 0) {
+		b->failed = true;
+		return;
+	}
+	put_item(b, json, "items", cJSON_CreateRaw(items.bytes));
+	free(items.bytes);
+}
+
 static cJSON *build(struct builder *b, const struct report *report)
 {
 	const struct record *r = report->record;
@@ -267,6 +287,7 @@ static cJSON *build(struct builder *b, const struct report *report)
 	put_if(b, root, "plate", a->has_plate, QUANTITY_RINGDOWN, &a->plate);
 	put_if(b, root, "rebound", a->has_rebound, QUANTITY_REBOUND, &a->rebound);
 	put_model(b, root, report);
+	put_verdict(b, root, report->verdict);
 	shock_put(b, root, report);
 	return root;
 }

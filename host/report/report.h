@@ -11,6 +11,7 @@
 #include "host/estimate/estimate.h"
 #include "host/model/model.h"
 #include "host/record/record.h"
+#include "host/result/verdict.h"
 #include "host/shock/band.h"
 #include "host/shock/events.h"
 #include "host/shock/free_fall.h"
@@ -25,6 +26,7 @@ struct report {
 	const struct events *events;               /* NULL: none were looked for */
 	const struct free_falls *falls;            /* as events */
 	const struct band *band;                   /* NULL: no band was given */
+	const struct verdict *verdict;             /* NULL: no limits were given */
 	bool show_events;                          /* in the table too */
 	bool simulated;                            /* no product fell: the page says so */
 	bool unattended;                           /* nobody was asked before it fell */

@@ -55,9 +55,9 @@ static int series_take_drop(void *context, const struct archive_drop *drop)
 	a = &d->a;
 	*a = *drop;
 	a->series = page->series;
-	const char **texts[SERIES_TEXTS] = {&a->state,   &a->decision, &a->reason,    &a->operator_name,
-	                                    &a->note,    &a->raw,      &a->sha256,    &a->time,
-	                                    &a->version, &a->flags,    &a->quantities};
+	const char **texts[SERIES_TEXTS] = {&a->state,   &a->decision, &a->reason,     &a->operator_name,
+	                                    &a->note,    &a->raw,      &a->sha256,     &a->time,
+	                                    &a->version, &a->flags,    &a->quantities, &a->verdict};
 	for (size_t i = 0; i < SERIES_TEXTS; i++)
 		series_keep(d->text[i], texts[i]);
 	return 0;
@@ -116,6 +116,12 @@ static int read_drop(struct series_page *page, struct series_drop *drop)
 	if (result)
 		return result == DT_E_FORMAT ? 0 : result;
 	drop->has_result = true;
+	if (!plan_is_empty(&page->plan) && series_is_drawn(drop)) {
+		result = verdict_judge(&drop->verdict, &page->plan, &said);
+		drop->judged = result == 0;
+		if (result)
+			return result;
+	}
 	drop->report = (struct report){.record = &drop->record, .analysis = &drop->analysis};
 	drop->zero = report_zero(&drop->report);
 	for (size_t i = 0; i < drop->analysis.resultant_count && page->has_model; i++)
@@ -214,6 +220,16 @@ static int tell_all_lacking(struct series_page *page)
 	return DT_E_CORRUPT;
 }
 
+static int read_plan(struct series_page *page)
+{
+	char message[SCENE_MESSAGE_MAX];
+	int result = plan_read(&page->plan, page->scene.limits, page->series.name, message);
+
+	if (result)
+		snprintf(page->page.message, page->page.size, "%s", message);
+	return result;
+}
+
 static int series_gather(struct series_page *page)
 {
 	struct archive *archive = page->request->archive;
@@ -229,6 +245,8 @@ static int series_gather(struct series_page *page)
 		result = archive_seal(archive, &page->seal);
 	if (result == 0)
 		result = solve_model(page);
+	if (result == 0 && read_plan(page) != 0)
+		return DT_E_FORMAT;
 	for (size_t i = 0; i < page->count && result == 0; i++)
 		result = read_drop(page, page->drop[i]);
 	if (result != 0)
@@ -274,6 +292,7 @@ size_t series_counted(const struct series_page *page)
 static int series_write_page(struct series_page *page)
 {
 	series_head(page);
+	series_limits(page);
 	series_subject(page);
 	series_results(page);
 	series_remarks(page);

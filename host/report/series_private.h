@@ -9,7 +9,7 @@
 #include "host/report/script.h"
 #include "host/report/series.h"
 
-enum { SERIES_TEXTS = 11 };
+enum { SERIES_TEXTS = 12 };
 
 struct series_drop {
 	struct archive_drop a; /* its texts stand in text */
@@ -22,6 +22,8 @@ struct series_drop {
 	struct estimate_options options; /* of the result: the high-pass that was undone */
 	struct report report;            /* of these */
 	struct report_zero zero;
+	struct verdict verdict; /* of its samples and its result, by the plan of the series */
+	bool judged;
 	double model_s; /* the model's first touch, after zero; NAN: no model to lay over it */
 };
 
@@ -32,6 +34,7 @@ struct series_page {
 	struct archive_seal seal;
 	char text[6][ARCHIVE_TEXT_MAX + 1];
 	struct scene scene;
+	struct plan plan;
 	bool has_model, has_below;
 	struct model_prediction prediction, below;
 	struct series_drop **drop;
@@ -61,6 +64,7 @@ const char *series_decision(const struct series_drop *drop);
 
 /* Sections, in the order of the page. */
 void series_head(struct series_page *page);
+void series_limits(struct series_page *page);
 void series_subject(struct series_page *page);
 void series_results(struct series_page *page);
 void series_remarks(struct series_page *page);

@@ -269,6 +269,25 @@ static void text_write_model(const struct report *report, FILE *out)
 	fputc('\n', out);
 }
 
+static void text_write_verdict(const struct verdict *verdict, FILE *out)
+{
+	int column;
+
+	if (verdict == NULL)
+		return;
+	fprintf(out, "\nlimits%s%s: ", verdict->by[0] != '\0' ? " of " : "", verdict->by);
+	verdict_line(verdict, out);
+	fputc('\n', out);
+	(void)verdict_table(verdict, TABLE_TEXT, out);
+	column = fprintf(out, "Rule:");
+	column = text_fill(out, column, verdict->rule, ".");
+	column = text_fill(out, column, "Uncertainty:", "");
+	column = text_fill(out, column, verdict->rests_on, ".");
+	if (!verdict->verified)
+		(void)text_fill(out, column, VERDICT_UNVERIFIED, ".");
+	fputc('\n', out);
+}
+
 static void text_write_frames(const struct record *r, FILE *out)
 {
 	const struct record_counters *c = &r->counters;
@@ -304,6 +323,7 @@ int report_text(const struct report *report, FILE *out)
 	write_joint(report, out);
 	write_notes(report, out);
 	text_write_model(report, out);
+	text_write_verdict(report->verdict, out);
 	shock_write(report, zero.time_s, out);
 	text_write_frames(report->record, out);
 	return fflush(out) != 0 || ferror(out) ? DT_E_SYSTEM : 0;

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "common/crc.h"
+#include "host/result/verdict.h"
 
 #define QUANTITY_OBJECT(OBJECT, type) typedef type object_##OBJECT;
 #include "host/result/quantity.def"
@@ -238,7 +239,7 @@ void quantity_clear(enum quantity_object which, void *object)
 
 struct result result_of(struct record *record, struct analysis *analysis, struct estimate_options *options)
 {
-	return (struct result){record, analysis, options, measured_of(record)};
+	return (struct result){record, analysis, options, measured_of(record), NULL};
 }
 
 static void *of_channel(struct result *result, enum quantity_place place, size_t i, const char **subject)
@@ -279,6 +280,8 @@ static void *of_drop(struct result *result, enum quantity_place place)
 		return a->has_plate ? &a->plate : NULL;
 	case QUANTITY_AT_REBOUND:
 		return a->has_rebound ? &a->rebound : NULL;
+	case QUANTITY_AT_VERDICT:
+		return result->verdict;
 	default:
 		return a->has_lag ? &a->lag : NULL;
 	}

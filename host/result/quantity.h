@@ -97,12 +97,15 @@ enum estimate_status quantity_object_status(enum quantity_object which, const vo
  * although the object is ok. */
 enum estimate_status quantity_status(const struct quantity *quantity, const void *object);
 
+struct verdict;
+
 /* All that is reported of one record. */
 struct result {
 	struct record *record;
 	struct analysis *analysis;
 	struct estimate_options *options;
 	struct measured measured;
+	struct verdict *verdict; /* NULL: none */
 };
 struct result result_of(struct record *record, struct analysis *analysis, struct estimate_options *options);
 

@@ -9,8 +9,7 @@
 #include "host/estimate/filter.h"
 #include "host/estimate/iepe.h"
 
-/* Of the channel with the largest peak, or the one asked for; channel_count if there is none. */
-static size_t band_choose(const struct record *record, const struct analysis *analysis, const char *name)
+size_t band_channel(const struct record *record, const struct analysis *analysis, const char *name)
 {
 	size_t best = record->channel_count;
 	double most = 0;
@@ -44,10 +43,23 @@ static int band_prepare(struct trace *trace, const struct estimate_baseline *bas
 	return result;
 }
 
+int band_open(struct trace *trace, const struct record *record, const struct analysis *analysis,
+              const struct estimate_options *estimate, size_t channel)
+{
+	int result = trace_open(trace, &record->channels[channel], -INFINITY, INFINITY);
+
+	if (result != 0)
+		return result;
+	result = band_prepare(trace, &analysis->channels[channel].baseline, estimate);
+	if (result != 0)
+		trace_close(trace);
+	return result;
+}
+
 int band_check(const struct record *record, const struct analysis *analysis,
                const struct estimate_options *estimate, const struct band_options *options, struct band *band)
 {
-	size_t i = band_choose(record, analysis, options->channel);
+	size_t i = band_channel(record, analysis, options->channel);
 	struct band checked = {.at_peak = options->at_peak};
 	const struct estimate_channel *e;
 	struct trace trace;
@@ -59,15 +71,12 @@ int band_check(const struct record *record, const struct analysis *analysis,
 	checked.zero_s = options->at_peak ? e->peak.time_s : e->pulse.start_s;
 	if (!isfinite(checked.zero_s))
 		return DT_E_EMPTY;
-	result = trace_open(&trace, &record->channels[i], -INFINITY, INFINITY);
+	result = band_open(&trace, record, analysis, estimate, i);
 	if (result != 0)
 		return result;
-	result = band_prepare(&trace, &e->baseline, estimate);
-	if (result == 0) {
-		memcpy(checked.channel, record->channels[i].name, sizeof(checked.channel));
-		checked.verdict = limit_pulse(options->curve, &trace, checked.zero_s);
-		*band = checked;
-	}
+	memcpy(checked.channel, record->channels[i].name, sizeof(checked.channel));
+	checked.verdict = limit_pulse(options->curve, &trace, checked.zero_s);
+	*band = checked;
 	trace_close(&trace);
-	return result;
+	return 0;
 }

@@ -26,4 +26,11 @@ DT_MUST_USE int band_check(const struct record *record, const struct analysis *a
                            const struct estimate_options *estimate, const struct band_options *options,
                            struct band *band);
 
+/* The channel of that name, NULL: with the largest peak; channel_count when there is none. */
+size_t band_channel(const struct record *record, const struct analysis *analysis, const char *name);
+
+/* A channel's samples as above; closed by trace_close after success. */
+DT_MUST_USE int band_open(struct trace *trace, const struct record *record, const struct analysis *analysis,
+                          const struct estimate_options *estimate, size_t channel);
+
 #endif
