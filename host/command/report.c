@@ -16,8 +16,8 @@
 #include "host/report/series.h"
 
 struct arguments {
-	const char *archive, *html, *pdf, *csv;
-	bool undecided, partial;
+	const char *archive, *html, *pdf, *csv, *laboratory;
+	bool undecided, partial, strict;
 };
 
 static const struct option_row rows[] = {
@@ -26,6 +26,12 @@ static const struct option_row rows[] = {
         OPTION_TEXT("pdf", "FILE", struct arguments, pdf,
                     "the same on paper; needs chromium, chromium-browser or google-chrome"),
         OPTION_TEXT("csv", "FILE", struct arguments, csv, "the table for spreadsheets, as series show --csv"),
+        OPTION_TEXT(
+                "laboratory", "FILE", struct arguments, laboratory,
+                "a report under ISO/IEC 17025, 7.8: laboratory, customer, item, sensors from this .ini file; "
+                "what it lacks makes the report a draft"),
+        OPTION_FLAG("strict", struct arguments, strict,
+                    "with --laboratory: no report with a sensor whose calibration was overdue (exit 3)"),
         OPTION_TEXT("archive", "DIR", struct arguments, archive,
                     "the archive's folder; without it $DROPTOWER_ARCHIVE, else ./archive"),
         OPTION_FLAG("undecided", struct arguments, undecided, "drops that are not decided count, too"),
@@ -158,9 +164,13 @@ static int report_write_page(const struct arguments *a, const struct text *page)
 
 static int report_write_all(struct archive *archive, const char *series, const struct arguments *a)
 {
+	char message[SETTINGS_MESSAGE_MAX];
+	struct laboratory laboratory;
 	struct series_report request = {.archive = archive,
 	                                .series = series,
 	                                .undecided = a->undecided,
+	                                .laboratory = a->laboratory != NULL ? &laboratory : NULL,
+	                                .strict = a->strict,
 	                                .version = DT_VERSION,
 	                                .partial = a->partial,
 	                                .lacking = report_tell};
@@ -168,6 +178,8 @@ static int report_write_all(struct archive *archive, const char *series, const s
 	struct text page = {.bytes = NULL};
 	int code;
 
+	if (a->laboratory != NULL && laboratory_read(&laboratory, a->laboratory, message) != 0)
+		return failed(message);
 	if (archive_scene(archive, series, &scene) != 0)
 		return archived_failed(archive);
 	code = a->html != NULL || a->pdf != NULL ? report_make(&request, &page) : report_look(&request);

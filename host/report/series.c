@@ -255,6 +255,12 @@ static int series_gather(struct series_page *page)
 		                                                               : archive_message(archive));
 	if (result == 0)
 		result = tell_all_lacking(page);
+	if (result == 0 && page->request->strict && series_is_overdue(page)) {
+		snprintf(page->page.message, page->page.size,
+		         "%s: a sensor's calibration was overdue at a drop, and --strict was asked for",
+		         page->series.name);
+		result = DT_E_STATE;
+	}
 	if (result != 0)
 		return result;
 	set_window(page);
@@ -292,6 +298,7 @@ size_t series_counted(const struct series_page *page)
 static int series_write_page(struct series_page *page)
 {
 	series_head(page);
+	series_laboratory(page);
 	series_limits(page);
 	series_subject(page);
 	series_results(page);
@@ -300,6 +307,8 @@ static int series_write_page(struct series_page *page)
 	series_excluded(page);
 	series_model(page);
 	series_records(page);
+	if (page->request->laboratory)
+		fputs("<p><b>End of the report.</b></p>\n", page->page.out);
 	page_end(page->page.out, page->request->version);
 	series_evidence(page);
 	if (page->page.error)

@@ -13,6 +13,7 @@
 #include <stdio.h>
 
 #include "host/archive/archive.h"
+#include "host/report/laboratory.h"
 
 /* How the last comment of the page begins: what it rests on, a line each, for `droptower verify`:
  * "series NAME", "log PLACE SHA-256" for each drop, "chain ENTRY HEAD", and an empty seal
@@ -22,16 +23,19 @@
 struct series_report {
 	struct archive *archive;
 	const char *series;
-	bool undecided;      /* drops that are not decided count, too */
-	const char *version; /* of the program, for the page's foot; NULL: not said */
-	bool partial;        /* even when a trace cannot be drawn or a file is not what was recorded */
+	bool undecided;                      /* drops that are not decided count, too */
+	const char *version;                 /* of the program, for the page's foot; NULL: not said */
+	const struct laboratory *laboratory; /* NULL: no report under ISO/IEC 17025, 7.8 */
+	bool strict;                         /* no report with a sensor whose calibration was overdue */
+	bool partial; /* even when a trace cannot be drawn or a file is not what was recorded */
 	/* Called with one line for each recorded drop of which that is so, and why; NULL: nobody is told. */
 	void (*lacking)(void *context, const char *text);
 	void *context;
 };
 
 /* Writes the page to out, gnuplot is run for its pictures. 0, or DT_E_* with one line in message, and what
- * out has got is of no use: DT_E_UNKNOWN, no such series; DT_E_CORRUPT, a drop lacks what the page rests on,
+ * out has got is of no use: DT_E_UNKNOWN, no such series; DT_E_STATE, a calibration was
+ * overdue, and strict is set; DT_E_CORRUPT, a drop lacks what the page rests on,
  * and partial is not set. What is lacking is told, and stands on the page of a partial one. */
 DT_MUST_USE int series_report_html(const struct series_report *request, FILE *out, char *message,
                                    size_t size);

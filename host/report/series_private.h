@@ -64,6 +64,7 @@ const char *series_decision(const struct series_drop *drop);
 
 /* Sections, in the order of the page. */
 void series_head(struct series_page *page);
+void series_laboratory(struct series_page *page);
 void series_limits(struct series_page *page);
 void series_subject(struct series_page *page);
 void series_results(struct series_page *page);
@@ -72,6 +73,9 @@ void series_pictures(struct series_page *page);
 void series_excluded(struct series_page *page);
 void series_model(struct series_page *page);
 void series_records(struct series_page *page);
+
+/* Whether a sensor of the laboratory's profile was overdue at a drop that counts. */
+bool series_is_overdue(const struct series_page *page);
 
 /* Behind the page. */
 void series_evidence(const struct series_page *page);
