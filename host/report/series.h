@@ -23,14 +23,14 @@
 struct series_report {
 	struct archive *archive;
 	const char *series;
-	bool undecided;                      /* drops that are not decided count, too */
-	const char *version;                 /* of the program, for the page's foot; NULL: not said */
-	const struct laboratory *laboratory; /* NULL: no report under ISO/IEC 17025, 7.8 */
-	bool strict;                         /* no report with a sensor whose calibration was overdue */
-	bool partial; /* even when a trace cannot be drawn or a file is not what was recorded */
+	bool undecided;      /* drops that are not decided count, too */
+	const char *version; /* of the program, for the page's foot; NULL: not said */
+	bool partial;        /* even when a trace cannot be drawn or a file is not what was recorded */
 	/* Called with one line for each recorded drop of which that is so, and why; NULL: nobody is told. */
 	void (*lacking)(void *context, const char *text);
 	void *context;
+	const struct laboratory *laboratory; /* NULL: no report under ISO/IEC 17025, 7.8 */
+	bool strict;                         /* no report with a sensor whose calibration was overdue */
 };
 
 /* Writes the page to out, gnuplot is run for its pictures. 0, or DT_E_* with one line in message, and what

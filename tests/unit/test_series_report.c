@@ -181,7 +181,8 @@ static void make_series(void)
 
 static int report_to(char **page, bool undecided)
 {
-	struct series_report request = {archive, "by-hand", undecided, "1.0-test", true, NULL, NULL};
+	struct series_report request = {archive, "by-hand", undecided, "1.0-test", true,
+	                                NULL,    NULL,      NULL,      false};
 	size_t length = 0;
 	FILE *out = open_memstream(page, &length);
 	int result;
@@ -595,7 +596,7 @@ static void test_all_on_a_simulated_tower(void **state)
 
 static void test_unknown_series(void **state)
 {
-	struct series_report request = {archive, "nobody", false, NULL, true, NULL, NULL};
+	struct series_report request = {archive, "nobody", false, NULL, true, NULL, NULL, NULL, false};
 	FILE *out = fopen("/dev/null", "w");
 
 	(void)state;
@@ -624,7 +625,7 @@ static void test_no_gnuplot(void **state)
 
 static void test_full_disk(void **state)
 {
-	struct series_report request = {archive, "by-hand", false, NULL, true, NULL, NULL};
+	struct series_report request = {archive, "by-hand", false, NULL, true, NULL, NULL, NULL, false};
 	FILE *out = fopen("/dev/full", "w");
 
 	(void)state;
