@@ -47,6 +47,8 @@ static void help(FILE *out)
 
 static int main_run(int argc, char **argv)
 {
+	const char *names[COMMANDS + 1] = {NULL}, *meant;
+
 	if (argc < 2) {
 		help(stderr);
 		return COMMAND_USAGE;
@@ -63,7 +65,13 @@ static int main_run(int argc, char **argv)
 	for (int i = 0; i < COMMANDS; i++)
 		if (strcmp(argv[1], commands[i].name) == 0)
 			return commands[i].run(argc - 1, argv + 1);
-	command_error("no command '%s'; 'droptower --help' lists them", argv[1]);
+	for (int i = 0; i < COMMANDS; i++)
+		names[i] = commands[i].name;
+	meant = option_nearest(argv[1], names);
+	if (meant != NULL)
+		command_error("no command '%s', perhaps '%s'; 'droptower --help' lists them", argv[1], meant);
+	else
+		command_error("no command '%s'; 'droptower --help' lists them", argv[1]);
 	return COMMAND_USAGE;
 }
 
@@ -74,7 +82,7 @@ int main(int argc, char **argv)
 	gsl_set_error_handler_off();
 	code = main_run(argc, argv);
 	/* a command that failed has said why */
-	if ((fflush(stdout) != 0 || ferror(stdout)) && code == COMMAND_DONE) {
+	if ((fflush(stdout) != 0 || ferror(stdout)) && code == COMMAND_DONE && !command_nobody_reads()) {
 		command_error("standard output: not all of it could be written");
 		code = COMMAND_INPUT;
 	}

@@ -84,11 +84,62 @@ int option_wrong(const struct option_table *table, const char *format, ...)
 	return code;
 }
 
+enum { NEAR_CHARS = 32, NEAR_EDITS = 2 };
+
+/* Letters that were left out, put in, or are others (Levenshtein). */
+static size_t edits(const char *a, const char *b)
+{
+	size_t row[NEAR_CHARS + 1], length = strlen(b);
+
+	if (length > NEAR_CHARS || strlen(a) > NEAR_CHARS)
+		return NEAR_CHARS;
+	for (size_t k = 0; k <= length; k++)
+		row[k] = k;
+	for (size_t i = 1; a[i - 1] != '\0'; i++) {
+		size_t before = row[0];
+
+		row[0] = i;
+		for (size_t k = 1; k <= length; k++) {
+			size_t other = before + (a[i - 1] != b[k - 1]),
+			       less = row[k - 1] < row[k] ? row[k - 1] : row[k];
+
+			before = row[k];
+			row[k] = other < less + 1 ? other : less + 1;
+		}
+	}
+	return row[length];
+}
+
+const char *option_nearest(const char *text, const char *const *names)
+{
+	const char *best = NULL;
+	size_t least = NEAR_EDITS + 1;
+
+	for (; *names != NULL; names++) {
+		size_t apart = edits(text, *names);
+
+		if (apart < least && apart < strlen(*names)) {
+			least = apart;
+			best = *names;
+		}
+	}
+	return best;
+}
+
 /* What getopt_long(3) did not take, read as word. */
 static int refuse_word(const struct option_table *table, const char *word)
 {
-	if (optopt == 0 || strncmp(word, "--", 2) != 0)
-		return option_wrong(table, "no option '%s'", word);
+	if (optopt == 0 || strncmp(word, "--", 2) != 0) {
+		const char *names[OPTION_ROWS_MAX + 2] = {"help"}, *meant;
+		char name[NEAR_CHARS + 2];
+
+		for (int i = 0; i < table->count; i++)
+			names[i + 1] = table->rows[i].name;
+		snprintf(name, sizeof(name), "%.*s", (int)strcspn(word, "="), word);
+		meant = strncmp(name, "--", 2) == 0 ? option_nearest(name + 2, names) : NULL;
+		return meant != NULL ? option_wrong(table, "no option '%s', perhaps --%s", word, meant)
+		                     : option_wrong(table, "no option '%s'", word);
+	}
 	if (strchr(word, '=') != NULL)
 		return option_wrong(table, "option '%s' takes no value", word);
 	return option_wrong(table, "option '%s' lacks its value", word);

@@ -122,6 +122,9 @@ int option_wrong(const struct option_table *table, const char *format, ...)
 int option_vwrong(const char *program, const char *command, const char *format, va_list arguments)
         __attribute__((format(printf, 3, 0)));
 
+/* The name that was perhaps meant; NULL when none is near. names ends with NULL. */
+const char *option_nearest(const char *text, const char *const *names);
+
 /* One of so many names: its number, or -1 after saying what was expected. */
 int option_choose(const struct option_table *table, const char *name, const char *text,
                   const char *const *names, int count);

@@ -26,16 +26,24 @@ int beside(const char *relative, char path[PATH_MAX])
 	return 0;
 }
 
+/* What was installed with the program comes first; a program that was not lies in the sources' build folder.
+ */
 int beside_scene(const char *name, char path[PATH_MAX])
 {
+	static const char *const folders[] = {"../share/droptower/scenes", "../common/scenes",
+	                                      "../../common/scenes"};
 	char relative[NAME_MAX];
 
-	if (access("common/scenes/geometry-2A.ini", R_OK) == 0) {
-		snprintf(path, PATH_MAX, "common/scenes/%s", name);
-		return 0;
+	for (size_t i = 0; i < sizeof(folders) / sizeof(folders[0]); i++) {
+		if (beside(folders[i], path) != 0)
+			return -1;
+		if (access(path, R_OK) != 0)
+			continue;
+		snprintf(relative, sizeof(relative), "%s/%s", folders[i], name);
+		return beside(relative, path);
 	}
-	snprintf(relative, sizeof(relative), "../share/droptower/scenes/%s", name);
-	return beside(relative, path);
+	errno = ENOENT;
+	return -1;
 }
 
 const char *beside_scene_file(const char *name, char path[PATH_MAX])

@@ -10,8 +10,8 @@
  * is something is not looked at. */
 int beside(const char *relative, char path[PATH_MAX]);
 
-/* A scene that comes along, or a pattern of them: in the sources' folder theirs, elsewhere those that were
- * installed. As beside. */
+/* A scene that comes along, or a pattern of them: those that were installed with this program, or the
+ * sources' when it lies in their build folder. As beside; -1 when there are none. */
 int beside_scene(const char *name, char path[PATH_MAX]);
 
 /* The scene file that a user means by name: that file, if there is one; else, when it names no folder, the

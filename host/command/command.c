@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/command/command.h"
 
+#include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "common/base/number.h"
 #include "common/error.h"
@@ -29,6 +31,13 @@ int command_usage(const char *name, const char *format, ...)
 	code = option_vwrong("droptower", name, format, arguments);
 	va_end(arguments);
 	return code;
+}
+
+bool command_nobody_reads(void)
+{
+	struct pollfd out = {.fd = STDOUT_FILENO};
+
+	return poll(&out, 1, 0) > 0 && (out.revents & POLLERR) != 0;
 }
 
 bool command_is_input(const char *name, const char *out, const char *in)

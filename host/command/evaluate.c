@@ -31,7 +31,8 @@ static int evaluate_write_out(const struct report *report, const struct evaluate
 {
 	char message[512];
 
-	if ((options->json ? report_json(report, stdout) : report_text(report, stdout)) != 0) {
+	if ((options->json ? report_json(report, stdout) : report_text(report, stdout)) != 0 &&
+	    !command_nobody_reads()) {
 		command_error("standard output: %s", strerror(errno));
 		return COMMAND_INPUT;
 	}

@@ -50,3 +50,14 @@ uninstall: ## remove what install has installed (same PREFIX and DESTDIR)
 		'$(DESTDIR)$(SHARE)/bash-completion/completions/droptower'
 	@rm -rf '$(DESTDIR)$(SHARE)/droptower/scenes'
 	@rmdir '$(DESTDIR)$(SHARE)/droptower' 2>/dev/null || true
+
+# ---- a Debian package, with dpkg-deb alone ----
+
+DEB = $(BUILD)/droptower.deb
+DEB_STAGE = $(BUILD)/deb
+
+.PHONY: deb
+deb: ## build a Debian package of this version, build/droptower.deb
+	@rm -rf $(DEB_STAGE)
+	@$(MAKE) --no-print-directory BUILD=$(BUILD) PREFIX=/usr DESTDIR=$(abspath $(DEB_STAGE)) install
+	@$(INSTALL_IN)/deb $(DEB_STAGE) 0~git$(shell git log -1 --format=%cd --date=format:%Y%m%d 2>/dev/null).$(subst -,.,$(VERSION)) $(DEB)

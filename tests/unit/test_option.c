@@ -103,6 +103,7 @@ static void what_is_wrong_is_said_and_what_was_expected(void **state)
 	} cases[] = {
 	        {{"--nothing"}, "no option '--nothing'"},
 	        {{"-x"}, "no option '-x'"},
+	        {{"--nubmer=x"}, "no option '--nubmer=x', perhaps --number"},
 	        {{"--text"}, "option '--text' lacks its value"},
 	        {{"--flag=1"}, "option '--flag=1' takes no value"},
 	        {{"word"}, "'word' is too much"},
