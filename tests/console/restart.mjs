@@ -60,7 +60,7 @@ async function nothingLost() {
 	await desk.until({ step: "setup", state: ["CAPTURED", "SAFE", "READY"] });
 	const held = await desk.data("state") === "CAPTURED"; // else it was collected before the signal came
 	if (held)
-		await desk.untilText("#state-text", /holds a drop/);
+		await desk.untilText("#trouble", /holds a drop/);
 	await desk.page.selectOption("#continue-series", SERIES);
 	await desk.picture("15-whose-drop");
 	await desk.click("#continue-go");

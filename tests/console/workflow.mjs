@@ -558,9 +558,9 @@ async function tooHigh() {
 	await desk.ready(); // as the tower has it
 	await desk.untilText("#state", /^NOT READY$/);
 	assert.notEqual(await desk.page.getAttribute("#state-tile", "data-state"), "READY");
-	for (const where of ["#state-text", "#arm-say"])
+	for (const where of ["#trouble", "#arm-say"])
 		await desk.untilText(where, /gate_lower_um = 3806000, expected 10000 to 2400000 um/);
-	const [full, shown] = await desk.page.$eval("#state-text", (node) => [node.scrollHeight, node.clientHeight]);
+	const [full, shown] = await desk.page.$eval("#trouble", (node) => [node.scrollHeight, node.clientHeight]);
 	assert.ok(shown >= full, `the reason is cut off: ${shown} of ${full} px`);
 }
 

@@ -171,13 +171,15 @@ function completeness(result) {
 	return result.drop?.crc_agrees === true ? "✓ Every sample arrived." : "⚠ Completeness is not proven.";
 }
 
+const MET = new Set(["pass", "conditional pass"]);
+
 /* What speaks against taking the drop as it is, in words. */
 function doubtsOf(result, verdict) {
 	const complete = completeness(result);
 	return [
 		...flagsOf(result).keys(),
 		complete.startsWith("⚠") && complete.slice(2),
-		verdict && verdict !== "pass" && `limits: ${verdict}`,
+		verdict && !MET.has(verdict) && `limits: ${verdict}`,
 	].filter(Boolean);
 }
 
@@ -185,7 +187,8 @@ const SIGN = { good: "✓", warn: "⚠", bad: "✗" };
 
 /* Of the limits when there are some; else of what was found in the record. */
 function verdictWords(verdict, doubts) {
-	if (verdict) return [verdict.includes("fail") ? "bad" : doubts.length ? "warn" : "good", verdict.toUpperCase()];
+	const level = verdict.includes("fail") ? "bad" : verdict === "pass" && !doubts.length ? "good" : "warn";
+	if (verdict) return [level, verdict.toUpperCase()];
 	return doubts.length ? ["warn", "LOOK FIRST"] : ["good", "NO FLAGS"];
 }
 
@@ -194,7 +197,8 @@ export function showResult(name, result, drops = []) {
 	const rowOf = (drop) => `${drop.series}/${drop.number}` === name;
 	const row = drops.find(rowOf);
 	const others = drops.filter((drop) => drop.decision === "accepted" && drop.state === "recorded" && !rowOf(drop));
-	const verdict = result.verdict?.decision ?? "";
+	const decided = result.verdict?.decision ?? "";
+	const verdict = decided === "none" ? "" : decided;
 	const doubts = doubtsOf(result, verdict);
 	const [level, words] = verdictWords(verdict, doubts);
 	const lines = [...flagsOf(result)].map(flagLine);

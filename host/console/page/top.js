@@ -56,9 +56,14 @@ function lost(losses, tower) {
 	byId("lost").title = `${text}; ${losses.asked_again} blocks were asked for again`;
 }
 
-function disk({ free_bytes: free, drops_left: left, trouble }) {
-	show(byId("trouble"), trouble !== "");
-	setText(byId("trouble"), `Archive: ${trouble}`);
+/* In full, below the header: why the tower cannot be used, and what the archive could not take. */
+function troubles(state) {
+	const all = [state.tower.trouble, state.disk.trouble && `Archive: ${state.disk.trouble}`].filter(Boolean);
+	show(byId("trouble"), all.length > 0);
+	setText(byId("trouble"), all.join(". "));
+}
+
+function disk({ free_bytes: free, drops_left: left }) {
 	const many = left > 1000 ? "" : `, ${number(left, 0)} drops`;
 	return fact("disk", `${bytes(free)}${many}`, left < 5 ? "bad" : left < 50 ? "warn" : "good");
 }
@@ -101,7 +106,7 @@ function stateWords(tower) {
 	if (!tower.seen) return ["NO TOWER", tower.trouble || "nothing was heard of the tower yet"];
 	if (tower.state === "READY" && tower.blocked) return ["NOT READY", tower.trouble];
 	const fault = tower.fault && tower.fault !== "NONE" ? tower.fault_text : "";
-	return [tower.state.replace("_", " "), [fault || (STATES[tower.state] ?? tower.text), tower.trouble].filter(Boolean).join(". ")];
+	return [tower.state.replace("_", " "), fault || (STATES[tower.state] ?? tower.text)];
 }
 
 function stateTile(tower) {
@@ -113,7 +118,6 @@ function stateTile(tower) {
 	setText(byId("state-text"), text);
 	byId("state-text").title = text;
 	setData(byId("state-tile"), "state", known ? shown : "NONE");
-	setData(byId("state-tile"), "trouble", tower.trouble ? "yes" : "no");
 	byId("state-sign").setAttribute("href", `#sign-${(known && SIGNS[shown]) || "unknown"}`);
 	if (changed) setText(byId("announce"), `${name}: ${text}`);
 	document.title = `${name} – drop tower`;
@@ -142,6 +146,7 @@ export function showTop(state) {
 	bus(state.bus);
 	lost(state.lost, state.tower);
 	disk(state.disk);
+	troubles(state);
 	hold(state.hold);
 	fact("kind", state.simulation ? "simulated" : "real");
 	show(byId("simulated-strip"), state.simulation !== null);
