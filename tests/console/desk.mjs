@@ -258,7 +258,7 @@ export class Desk {
 				await route.fulfill({ response });
 			}, { times: 1 });
 		});
-		await this.click("#release");
+		await this.click("#release", SOON);
 		return done;
 	}
 
