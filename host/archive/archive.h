@@ -249,10 +249,14 @@ DT_MUST_USE int archive_changes(struct archive *archive, int64_t *number);
 /* ---- care ---- */
 
 /* Calls wrong with one line for each file that is missing or not what was recorded, and marks the drops in
- * the index as far as it can be written. series NULL: all of it, the chain included; number 0: all drops of
- * the series. wrong may be NULL. Returns how many lines, or DT_E_*. */
+ * the index as far as it can be written. series NULL: all of it; number 0: all drops of the series and its
+ * own sidecar. wrong may be NULL. Returns how many lines, or DT_E_*. */
 DT_MUST_USE int archive_verify(struct archive *archive, const char *series, unsigned number,
                                void (*wrong)(void *context, const char *text), void *context);
+
+/* The same of the series' own sidecar alone; what is wrong with the chain is told, and not counted. */
+DT_MUST_USE int archive_verify_series(struct archive *archive, const char *series,
+                                      void (*wrong)(void *context, const char *text), void *context);
 
 /* The chain's last entry, which stands for all that the archive holds, and how many recorded drops it does
  * not know. */

@@ -56,6 +56,15 @@ static int hold_unknown(struct proof *proof, const struct chain_entry *entry)
 	return 0;
 }
 
+static void hold_sidecar(struct proof *proof, const struct chain_entry *entry)
+{
+	char *text = proof_text(proof, entry);
+
+	if (text == NULL)
+		proof_of_file(proof, PROOF_SIDECAR, entry->path, entry->bytes, entry->hash, -1);
+	free(text);
+}
+
 int proof_of_rest(struct proof *proof, bool drops)
 {
 	const struct chain *chain = &proof->chain;
@@ -63,16 +72,13 @@ int proof_of_rest(struct proof *proof, bool drops)
 
 	for (size_t i = 0; i < chain->count && result == 0; i++) {
 		const struct chain_entry *entry = &chain->entry[chain->by_path[i]];
-		char *text;
 
 		if (entry != chain_find(chain, entry->path) || strcmp(entry->hash, CHAIN_REMOVED) == 0)
 			continue;
 		if (sidecar_is_of_drop(entry->path))
 			result = !drops ? 0 : hold_unknown(proof, entry);
-		else if ((text = proof_text(proof, entry)) != NULL)
-			free(text);
 		else
-			proof_of_file(proof, PROOF_SIDECAR, entry->path, entry->bytes, entry->hash, -1);
+			hold_sidecar(proof, entry);
 	}
 	return result;
 }
@@ -92,6 +98,55 @@ static int hold_chain(struct proof *proof)
 	return 0;
 }
 
+/* A series' own sidecar, which the chain has; one from before the chain is held against nothing. */
+static void hold_series(struct proof *proof, const char *series)
+{
+	char place[ARCHIVE_NAME_MAX + 16];
+	int length = snprintf(place, sizeof(place), "/%s/series.ini", series);
+
+	for (size_t i = 0; i < proof->chain.count; i++) {
+		const struct chain_entry *entry = &proof->chain.entry[i];
+		size_t end = strlen(entry->path);
+
+		if (end > (size_t)length && strcmp(entry->path + end - length, place) == 0 &&
+		    entry == chain_find(&proof->chain, entry->path) &&
+		    strcmp(entry->hash, CHAIN_REMOVED) != 0)
+			hold_sidecar(proof, entry);
+	}
+}
+
+/* As a mark of a drop is for who looks without being told. */
+static void verify_series(struct proof *proof, const char *series)
+{
+	struct archive *archive = proof->archive;
+	unsigned told = proof->told;
+
+	proof->fault[0] = '\0';
+	hold_series(proof, series);
+	if (proof->told > told && archive->unread[0] == '\0')
+		snprintf(archive->unread, sizeof(archive->unread), "%s", proof->fault);
+}
+
+int archive_verify_series(struct archive *archive, const char *series,
+                          void (*wrong)(void *context, const char *text), void *context)
+{
+	struct proof proof;
+	int result = proof_open(archive, &proof);
+	unsigned of_chain;
+
+	if (result != 0)
+		return result;
+	proof.wrong = wrong;
+	proof.context = context;
+	result = hold_chain(&proof);
+	of_chain = proof.told;
+	if (result == 0)
+		verify_series(&proof, series);
+	result = result != 0 ? result : (int)(proof.told - of_chain);
+	proof_close(&proof);
+	return result;
+}
+
 int archive_verify(struct archive *archive, const char *series, unsigned number,
                    void (*wrong)(void *context, const char *text), void *context)
 {
@@ -104,6 +159,8 @@ int archive_verify(struct archive *archive, const char *series, unsigned number,
 	proof.context = context;
 	if (series == NULL)
 		result = hold_chain(&proof);
+	else if (number == 0)
+		verify_series(&proof, series);
 	if (result == 0)
 		result = proof_of_all(&proof, series, number);
 	if (result == 0 && series == NULL)

@@ -150,14 +150,18 @@ int durable_append(const char *path, int64_t at, const void *bytes, size_t size)
 
 char *durable_read(const char *path, size_t *size)
 {
-	FILE *in = fopen(path, "re");
+	int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* a FIFO would wait for who writes it */
+	FILE *in = fd >= 0 ? fdopen(fd, "r") : NULL;
 	char *text = NULL;
 	struct stat status;
 	size_t length = 0;
 	int failed;
 
-	if (in == NULL)
+	if (in == NULL) {
+		if (fd >= 0)
+			shut(fd, -1);
 		return NULL;
+	}
 	if (fstat(fileno(in), &status) == 0 && S_ISREG(status.st_mode) && status.st_size <= FILE_MAX_BYTES)
 		text = malloc((size_t)status.st_size + 1);
 	else

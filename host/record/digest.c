@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "common/base/process.h"
@@ -33,12 +34,18 @@ int digest_file(const char *path, char text[DIGEST_CHARS], int64_t *bytes, int c
 {
 	struct sha256_ctx context;
 	uint8_t block[32768];
-	int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY), result = 0, failed;
+	int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK), result = 0, failed;
+	struct stat status;
 	int64_t total = 0;
 	ssize_t n = 0;
 
 	if (fd < 0)
 		return DT_E_SYSTEM;
+	if (fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) { /* a FIFO or a device would have no end */
+		close(fd);
+		errno = EINVAL;
+		return DT_E_SYSTEM;
+	}
 	sha256_init(&context);
 	while (result == 0 && ((n = read(fd, block, sizeof(block))) > 0 || (n < 0 && errno == EINTR))) {
 		if (n < 0)

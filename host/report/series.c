@@ -208,15 +208,25 @@ static bool tell_lacking(const struct series_page *page, const struct series_dro
 
 static int tell_all_lacking(struct series_page *page)
 {
+	const struct series_report *request = page->request;
+	int rest =
+	        archive_verify_series(request->archive, request->series, request->lacking, request->context);
 	size_t count = 0;
 
+	if (rest < 0)
+		return rest;
 	for (size_t i = 0; i < page->count; i++)
 		count += tell_lacking(page, page->drop[i]);
-	if (!count || page->request->partial)
+	if ((!count && !rest) || request->partial)
 		return 0;
-	snprintf(page->page.message, page->page.size,
-	         "%s: %zu of %zu drops lack what a report rests on; --partial makes it all the same",
-	         page->series.name, count, page->count);
+	if (!count)
+		snprintf(page->page.message, page->page.size,
+		         "%s: its sidecar is not what was recorded; --partial makes it all the same",
+		         page->series.name);
+	else
+		snprintf(page->page.message, page->page.size,
+		         "%s: %zu of %zu drops lack what a report rests on; --partial makes it all the same",
+		         page->series.name, count, page->count);
 	return DT_E_CORRUPT;
 }
 
