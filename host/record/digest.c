@@ -35,7 +35,7 @@ int digest_file(const char *path, char text[DIGEST_CHARS], int64_t *bytes, int c
 	struct sha256_ctx context;
 	uint8_t block[32768];
 	int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK), result = 0, failed;
-	struct stat status;
+	struct stat status = {.st_mode = 0};
 	int64_t total = 0;
 	ssize_t n = 0;
 
@@ -43,7 +43,7 @@ int digest_file(const char *path, char text[DIGEST_CHARS], int64_t *bytes, int c
 		return DT_E_SYSTEM;
 	if (fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) { /* a FIFO or a device would have no end */
 		close(fd);
-		errno = EINVAL;
+		errno = S_ISDIR(status.st_mode) ? EISDIR : EINVAL;
 		return DT_E_SYSTEM;
 	}
 	sha256_init(&context);
