@@ -88,7 +88,6 @@ void core_open(void);
 void core_run(void);
 bool core_waits(void); /* main has nothing to do until something comes */
 void core_line(unsigned exception, bool high);
-void core_pend(unsigned exception);
 uint32_t core_pc(void);
 void core_report(const char *path);
 

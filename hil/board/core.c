@@ -81,7 +81,7 @@ void core_line(unsigned exception, bool high)
 	core.lines = high ? core.lines | bit : core.lines & ~bit;
 }
 
-void core_pend(unsigned exception)
+static void core_pend(unsigned exception)
 {
 	core.pending |= 1ull << exception;
 }
