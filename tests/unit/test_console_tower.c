@@ -969,7 +969,7 @@ static void a_drop_from_before_waits_for_a_series(void **state)
 	assert_int_equal(heard(WIRE_OP_ACCEPT) + heard(WIRE_OP_DISCARD), 0);
 	must(tower_select, "{\"series\":\"box\"}");
 	wait_recorded("box/1");
-	assert_true(heard(WIRE_OP_ACCEPT) >= 1);
+	wait_heard(WIRE_OP_ACCEPT, 1);
 	found = archived();
 	assert_int_equal(found.count, 1);
 	assert_string_equal(found.state, "recorded");
