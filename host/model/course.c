@@ -130,6 +130,9 @@ static void course_start(struct run *c, const struct course *in)
 
 /* ---- touches, releases, slip ---- */
 
+/* The shortest touch or hold, of a step: one that ends at the instant it began would begin again. */
+#define GRAZE_SHARE 1e-6
+
 struct change_of {
 	const struct run *run;
 	struct event event;
@@ -156,22 +159,23 @@ static double changed_then(double t, void *context)
 }
 
 /* Whether, and when, a change happens in the last step: by its end, or, of a touch or a hold, by half of it.
- */
+ * What began with the step does not end with its begin. */
 static bool changes(const struct run *c, struct event e, const double half[], double *at)
 {
 	struct change_of k = {c, e};
 	const struct ode_piece *p = &c->ode.last;
 	bool early = changed(c, e, half) > 0.0;
-	double middle = 0.5 * (p->from + p->end);
+	double middle = 0.5 * (p->from + p->end), low = p->from;
 
 	if (!(changed(c, e, c->ode.y) > 0.0) && (!early || e.change == LEAVES))
 		return false;
-	if (changed_then(p->from, &k) > 0.0) { /* just left or touched, but for rounding */
-		*at = p->from;
-		return e.change == LETS_GO ||
-		       (e.change == TOUCHES && body_closing(&c->body, p->term[0], e.corner) > 0.0);
+	if (e.change != TOUCHES)
+		low = early ? p->from + GRAZE_SHARE * p->length : middle;
+	if (changed_then(low, &k) > 0.0) {
+		*at = low;
+		return e.change != TOUCHES || body_closing(&c->body, p->term[0], e.corner) > 0.0;
 	}
-	return root_find(changed_then, &k, p->from, early ? middle : p->end, at) == 0;
+	return root_find(changed_then, &k, low, early ? middle : p->end, at) == 0;
 }
 
 /* The first change in the last step. */
