@@ -159,19 +159,19 @@ static int problem_of(bool planar, struct problem *p)
 	                            law.damping,
 	                            s.mount_stiffness_n_m,
 	                            mount_c};
-	p->course.body = (struct body){.turns = planar,
-	                               .case_mass_kg = s.product_case_mass_kg,
-	                               .plate_mass_kg = s.mount_plate_mass_kg,
-	                               .inertia_kg_m2 = inertia,
-	                               .angle_rad = UNITS_RAD(s.drop_angle_deg),
-	                               .gravity_m_s2 = s.drop_gravity_m_s2,
-	                               .speed_m_s = speed,
-	                               .lever_x_m = lever_x,
-	                               .lever_y_m = lever_y,
-	                               .stiffness_n_m15 = k,
-	                               .law = law,
-	                               .mount_n_m = s.mount_stiffness_n_m,
-	                               .mount_damping_n_s_m = mount_c};
+	p->course = (struct course){.body = {.turns = planar,
+	                                     .case_mass_kg = s.product_case_mass_kg,
+	                                     .plate_mass_kg = s.mount_plate_mass_kg,
+	                                     .inertia_kg_m2 = inertia,
+	                                     .angle_rad = UNITS_RAD(s.drop_angle_deg),
+	                                     .gravity_m_s2 = s.drop_gravity_m_s2,
+	                                     .speed_m_s = speed,
+	                                     .lever_x_m = lever_x,
+	                                     .lever_y_m = lever_y,
+	                                     .stiffness_n_m15 = k,
+	                                     .law = law,
+	                                     .mount_n_m = s.mount_stiffness_n_m,
+	                                     .mount_damping_n_s_m = mount_c}};
 	status = our_peaks(p, 1e-13, p->peak);
 	return status ? status : theirs(p, RK8PD, REFERENCE_TOLERANCE, &p->truth);
 }
