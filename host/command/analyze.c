@@ -67,12 +67,9 @@ static int take_window(const struct option_table *table, const char *name, const
 static int take_limits(const struct option_table *table, const char *name, const char *text, void *into)
 {
 	struct arguments *arguments = into;
-	size_t i = 0;
 
 	arguments->presets = strcmp(text, "list") == 0;
-	while (plan_preset(i) != NULL && strcmp(plan_preset(i)->name, text) != 0)
-		i++;
-	if (plan_preset(i) == NULL && !arguments->presets)
+	if (plan_preset_find(text) == NULL && !arguments->presets)
 		return option_wrong(table, "--%s is '%s', expected a preset, or list", name, text);
 	arguments->evaluate.limits = text;
 	return OPTIONS_READ;
@@ -222,14 +219,11 @@ static int analyze_record(struct record *record, const struct arguments *argumen
 
 static int analyze_one(const char *file, const struct arguments *arguments)
 {
-	char message[READ_MESSAGE_MAX];
 	struct record record;
-	int code;
+	int code = files_read(&record, file, arguments->columns, arguments->drop);
 
-	if (read_nth(&record, file, arguments->columns, arguments->drop, message) != 0) {
-		command_error("%s", message);
-		return COMMAND_INPUT;
-	}
+	if (code != COMMAND_DONE)
+		return code;
 	code = analyze_record(&record, arguments);
 	record_free(&record);
 	return code;

@@ -25,6 +25,7 @@
  */
 #include <stdbool.h>
 
+#include "common/units.h"
 #include "host/model/contact.h"
 
 enum { BODY_CORNERS = 4, BODY_FIRST = 1 }; /* BODY_FIRST: the mask of corner 0 */
@@ -86,8 +87,8 @@ struct body {
 };
 
 /* Wedge: where K was identified, and how far from flat an imprint still is one. */
-#define BODY_WEDGE_RAD (25.0 * 3.14159265358979323846 / 180.0)
-#define BODY_WEDGE_MIN_RAD (10.0 * 3.14159265358979323846 / 180.0)
+#define BODY_WEDGE_RAD UNITS_RAD(25.0)
+#define BODY_WEDGE_MIN_RAD UNITS_RAD(10.0)
 double body_wedge(double angle_rad);
 
 /* A later touch is not taken for slower than this, so that a box comes to rest. */

@@ -5,6 +5,8 @@
 
 #include <gsl/gsl_cdf.h>
 
+#include "common/units.h"
+
 #define REACH 8.0 /* of the common part, standard uncertainties */
 
 enum { PANELS = 800 };
@@ -105,7 +107,7 @@ double decide_all(const struct decide_point *point, size_t count)
 
 		sum += weight * exp(-0.5 * at * at) * decide_all_given(point, count, at);
 	}
-	return sum * step / 3.0 / sqrt(2.0 * 3.14159265358979323846);
+	return sum * step / 3.0 / sqrt(2.0 * UNITS_PI);
 }
 
 double decide_guard(const struct decide_point *point, size_t count, double guard)

@@ -10,7 +10,6 @@
 #include "common/base/number.h"
 #include "common/units.h"
 
-#define PI 3.14159265358979323846
 #define TRAPEZOID_FLANK 0.1 /* of the duration, each */
 #define SPECTRUM_Q 10.0
 #define WIDTH_LEVEL 0.1
@@ -30,6 +29,14 @@ const struct plan_preset *plan_preset(size_t i)
 	return i < sizeof(presets) / sizeof(presets[0]) ? &presets[i] : NULL;
 }
 
+const struct plan_preset *plan_preset_find(const char *name)
+{
+	for (size_t i = 0; i < sizeof(presets) / sizeof(presets[0]); i++)
+		if (strcmp(presets[i].name, name) == 0)
+			return &presets[i];
+	return NULL;
+}
+
 /* ---- nominal pulses ---- */
 
 double plan_pulse(enum plan_shape shape, double t)
@@ -38,19 +45,20 @@ double plan_pulse(enum plan_shape shape, double t)
 		return 0.0;
 	if (shape == PLAN_SAW_TOOTH)
 		return t;
-	return shape == PLAN_HALF_SINE ? sin(PI * t) : fmin(1.0, fmin(t, 1.0 - t) / TRAPEZOID_FLANK);
+	return shape == PLAN_HALF_SINE ? sin(UNITS_PI * t) : fmin(1.0, fmin(t, 1.0 - t) / TRAPEZOID_FLANK);
 }
 
 double plan_width(enum plan_shape shape)
 {
 	if (shape == PLAN_SAW_TOOTH)
 		return 1.0 - WIDTH_LEVEL;
-	return 1.0 - 2.0 * (shape == PLAN_HALF_SINE ? asin(WIDTH_LEVEL) / PI : TRAPEZOID_FLANK * WIDTH_LEVEL);
+	return 1.0 -
+	       2.0 * (shape == PLAN_HALF_SINE ? asin(WIDTH_LEVEL) / UNITS_PI : TRAPEZOID_FLANK * WIDTH_LEVEL);
 }
 
 double plan_velocity_m_s(enum plan_shape shape, double peak_g, double duration_s)
 {
-	static const double area[] = {[PLAN_HALF_SINE] = 2.0 / PI,
+	static const double area[] = {[PLAN_HALF_SINE] = 2.0 / UNITS_PI,
 	                              [PLAN_SAW_TOOTH] = 0.5,
 	                              [PLAN_TRAPEZOID] = 1.0 - TRAPEZOID_FLANK};
 
@@ -189,11 +197,9 @@ static int read_spectrum(struct plan_reading *r, const char *text)
 
 static int read_preset(struct plan_reading *r, const char *name)
 {
-	for (size_t i = 0; plan_preset(i) != NULL; i++)
-		if (strcmp(name, plan_preset(i)->name) == 0) {
-			r->plan->preset = plan_preset(i);
-			return 0;
-		}
+	r->plan->preset = plan_preset_find(name);
+	if (r->plan->preset != NULL)
+		return 0;
 	return plan_refuse(r, "no preset '%.60s'; 'droptower analyze --limits list' lists them", name);
 }
 

@@ -39,6 +39,9 @@ struct plan_preset {
 /* The i-th; NULL behind the last. */
 const struct plan_preset *plan_preset(size_t i);
 
+/* The one of that name; NULL: none. */
+const struct plan_preset *plan_preset_find(const char *name);
+
 /* Area of the nominal pulse; from how high a fall has that speed. */
 double plan_velocity_m_s(enum plan_shape shape, double peak_g, double duration_s);
 double plan_height_m(double velocity_m_s);

@@ -6,11 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/units.h"
 #include "host/shock/band.h"
 #include "host/shock/signal.h"
 #include "host/shock/spectrum.h"
 
-#define PI 3.14159265358979323846
 #define BAND_BEFORE 0.4 /* of the pulse's duration: where the band begins before it and ends behind it */
 #define BAND_AFTER 0.1
 #define BAND_STEEP 0.05 /* of the duration: how far a steep side may be off in time */
@@ -302,7 +302,9 @@ static int judge_band_of(struct judging *j, struct verdict_item *item, const str
 {
 	const struct estimate_channel *e = &j->result->analysis->channels[j->channel];
 	const struct plan_preset *p = j->plan->preset;
-	double rise = p->shape == PLAN_HALF_SINE ? asin(0.1) / PI : p->shape == PLAN_SAW_TOOTH ? 0.1 : 0.01;
+	double rise = p->shape == PLAN_HALF_SINE   ? asin(0.1) / UNITS_PI
+	              : p->shape == PLAN_SAW_TOOTH ? 0.1
+	                                           : 0.01;
 	struct pulse_band b = {.plan = j->plan,
 	                       .trace = trace,
 	                       .sign = e->peak.value_g < 0.0 ? -1.0 : 1.0,
@@ -356,21 +358,7 @@ static int judge_band(struct judging *j)
 static double noise_of_spectrum(const struct estimate_channel *e, double rate_hz, double q,
                                 double frequency_hz)
 {
-	return e->baseline.noise_g * sqrt(PI * frequency_hz * q / rate_hz);
-}
-
-static struct limit_point spectrum_at(const struct limit_curve *curve, double frequency_hz)
-{
-	size_t i = 1;
-	double part;
-
-	while (i + 1 < curve->count && frequency_hz > curve->point[i].x)
-		i++;
-	part = log(frequency_hz / curve->point[i - 1].x) / log(curve->point[i].x / curve->point[i - 1].x);
-	return (struct limit_point){
-	        frequency_hz,
-	        curve->point[i - 1].lower * pow(curve->point[i].lower / curve->point[i - 1].lower, part),
-	        curve->point[i - 1].upper * pow(curve->point[i].upper / curve->point[i - 1].upper, part)};
+	return e->baseline.noise_g * sqrt(UNITS_PI * frequency_hz * q / rate_hz);
 }
 
 static void judge_spectrum_of(struct judging *j, struct verdict_item *item, const struct spectrum *s)
@@ -382,10 +370,12 @@ static void judge_spectrum_of(struct judging *j, struct verdict_item *item, cons
 
 	for (size_t i = 0; i < count; i++) {
 		double value = s->channel[0].side[SRS_MAXIMAX][i], f = s->frequency_hz[i];
-		struct limit_point at = spectrum_at(&j->plan->spectrum, f);
-		/* in dB, so that no frequency weighs more than another */
-		double margin = log(fmin(at.upper / value, value / at.lower));
+		struct limit_point at = {f, (double)NAN, (double)NAN};
+		double margin;
 
+		(void)limit_at(&j->plan->spectrum, LIMIT_SPECTRUM, f, &at);
+		/* in dB, so that no frequency weighs more than another */
+		margin = log(fmin(at.upper / value, value / at.lower));
 		point[i] = (struct decide_point){at.upper - value, value - at.lower,
 		                                 noise_of_spectrum(e, s->channel[0].rate_hz, j->plan->q, f),
 		                                 chain_of(j->plan) * value};

@@ -94,7 +94,8 @@ static int read_points(struct limit_curve *curve, const struct source *source, e
 			return source_refuse(message, DT_E_FORMAT, source->file, line.number,
 			                     "not a point of the curve, expected the %zu numbers %s", columns,
 			                     names);
-		point = (struct limit_point){number[0], number[1], number[columns - 1]};
+		point = (struct limit_point){number[0], kind == LIMIT_SPECTRUM ? 0 : number[1],
+		                             number[columns - 1]};
 		why = objection(curve, kind, point);
 		if (why)
 			return source_refuse(message, DT_E_FORMAT, source->file, line.number,
@@ -156,7 +157,7 @@ bool limit_at(const struct limit_curve *curve, enum limit_kind kind, double x, s
 	if (kind == LIMIT_SPECTRUM) {
 		part = log(x / a->x) / log(b->x / a->x);
 		at->upper = a->upper * exp(part * log(b->upper / a->upper));
-		at->lower = 0;
+		at->lower = a->lower > 0 ? a->lower * exp(part * log(b->lower / a->lower)) : 0;
 		return true;
 	}
 	part = (x - a->x) / (b->x - a->x);

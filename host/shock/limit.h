@@ -24,7 +24,7 @@
 
 struct limit_point {
 	double x;            /* Hz or s */
-	double lower, upper; /* of a limit curve only upper */
+	double lower, upper; /* lower 0 in a limit curve's file */
 };
 
 struct limit_curve {
