@@ -124,3 +124,13 @@ void files_free(struct files *files)
 	free(files->file);
 	*files = (struct files){.count = 0};
 }
+
+int files_read(struct record *record, const char *file, const char *columns, unsigned drop)
+{
+	char message[READ_MESSAGE_MAX];
+
+	if (read_nth(record, file, columns, drop, message) == 0)
+		return COMMAND_DONE;
+	command_error("%s", message);
+	return COMMAND_INPUT;
+}

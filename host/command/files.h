@@ -8,6 +8,8 @@
  */
 #include <stddef.h>
 
+#include "host/record/read.h"
+
 struct files {
 	char **file;
 	size_t count, room;
@@ -17,5 +19,8 @@ struct files {
 /* A COMMAND_* code; errors were printed, and there is nothing to free then. */
 int files_expand(struct files *files, char **words, int count);
 void files_free(struct files *files);
+
+/* One file's record, as read_nth has it; a COMMAND_* code, the error printed. */
+int files_read(struct record *record, const char *file, const char *columns, unsigned drop);
 
 #endif

@@ -253,14 +253,11 @@ static int spectrum_of(const struct record *record, const struct arguments *argu
 
 static int srs_file(const char *file, const struct arguments *arguments)
 {
-	char message[READ_MESSAGE_MAX];
 	struct record record;
-	int code;
+	int code = files_read(&record, file, arguments->columns, arguments->drop);
 
-	if (read_nth(&record, file, arguments->columns, arguments->drop, message) != 0) {
-		command_error("%s", message);
-		return COMMAND_INPUT;
-	}
+	if (code != COMMAND_DONE)
+		return code;
 	code = spectrum_of(&record, arguments);
 	record_free(&record);
 	return code;
