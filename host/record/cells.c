@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
 #include "common/base/number.h"
 
@@ -14,6 +15,16 @@ static bool cells_is_blank(char c)
 static bool is_digit(char c)
 {
 	return c >= '0' && c <= '9';
+}
+
+bool piece_has(struct piece piece, const char *word)
+{
+	size_t length = strlen(word);
+
+	for (size_t at = 0; at + length <= piece.length; at++)
+		if (strncasecmp(piece.text + at, word, length) == 0)
+			return true;
+	return false;
 }
 
 /* ---- a line to cells ---- */

@@ -21,6 +21,9 @@ struct piece {
 	size_t length;
 };
 
+/* Whether the word is anywhere in it, in capitals or not. */
+bool piece_has(struct piece piece, const char *word);
+
 struct cells_style {
 	char separator; /* 0 = any; ' ' = runs of blanks and tabs */
 	char decimal;   /* 0 = as the line looks */

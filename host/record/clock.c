@@ -2,6 +2,7 @@
 #include "host/record/clock.h"
 
 #include <stddef.h>
+#include <time.h>
 
 static const int64_t NS = 1000000000;
 static const int NS_DIGITS = 9;
@@ -36,15 +37,6 @@ static bool clock_sign(struct scan *scan, const char *any)
 			return true;
 		}
 	return false;
-}
-
-/* Days since 1970 of the Gregorian calendar. */
-static int64_t days_of(int64_t year, int64_t month, int64_t day)
-{
-	int64_t y = year - (month <= 2), era = y / 400, of_era = y - era * 400;
-	int64_t of_year = (153 * (month + (month > 2 ? -3 : 9)) + 2) / 5 + day - 1;
-
-	return era * 146097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719468;
 }
 
 static bool clock_fraction(struct scan *scan, int64_t *ns, int *digits)
@@ -91,7 +83,9 @@ bool clock_parse(struct piece text, int64_t *ns, int *digits)
 		    !clock_number(&scan, 2, 2, 12, &month) || !clock_sign(&scan, "-") ||
 		    !clock_number(&scan, 2, 2, 31, &day) || !clock_sign(&scan, "T ") || month < 1 || day < 1)
 			return false;
-		found = days_of(year, month, day) * 86400 * NS;
+		found = timegm(&(struct tm){
+		                .tm_year = (int)year - 1900, .tm_mon = (int)month - 1, .tm_mday = (int)day}) *
+		        NS;
 	}
 	if (!clock_number(&scan, 1, 2, 23, &hour) || !clock_sign(&scan, ":") ||
 	    !clock_number(&scan, 2, 2, 59, &minute) || !clock_sign(&scan, ":") ||

@@ -117,7 +117,7 @@ int encoding_settle(struct source *source, const char **name, char message[READ_
 		                     "text in UTF-16 of an odd number of bytes: the file is cut");
 	text = malloc(2 * source->size + UTF8_MOST);
 	if (text == NULL)
-		return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
+		return source_no_memory(message, source->file);
 	*name = order == 'l' ? "utf-16le" : order == 'b' ? "utf-16be" : "cp1252";
 	used = order != '\0' ? from_utf16(bytes, source->size, order == 'b', text)
 	                     : from_cp1252(bytes, source->size, text);

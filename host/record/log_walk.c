@@ -456,7 +456,7 @@ int log_walk(struct log_file *log, uint64_t from, uint64_t to, struct log_visito
 		walk->join = join_create();
 	if (walk == NULL || walk->join == NULL) {
 		free(walk);
-		return source_refuse(message, DT_E_MEMORY, log->file, 0, "%s", error_text(DT_E_MEMORY));
+		return source_no_memory(message, log->file);
 	}
 	walk->visitor = visitor;
 	walk->contents = contents;

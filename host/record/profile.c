@@ -78,7 +78,7 @@ static int profile_line(struct profile *profile, const struct source *source, co
 	        text);
 }
 
-int profile_read(struct profile *profile, const char *path, char message[READ_MESSAGE_MAX])
+static int profile_read(struct profile *profile, const char *path, char *message)
 {
 	struct source_line line = {0};
 	struct source source;
@@ -97,12 +97,26 @@ int profile_read(struct profile *profile, const char *path, char message[READ_ME
 	return error;
 }
 
-bool profile_beside(const char *file, char path[4096])
+static bool profile_beside(const char *file, char path[4096])
 {
 	const char *slash = strrchr(file, '/');
 	int length = slash != NULL ? (int)(slash - file) + 1 : 0;
 
 	return snprintf(path, 4096, "%.*s%s", length, file, BESIDE) < 4096 && access(path, R_OK) == 0;
+}
+
+int profile_of(struct profile **profile, const char *file, const char *columns,
+               char message[READ_MESSAGE_MAX])
+{
+	char path[4096];
+
+	*profile = NULL;
+	if (columns == NULL ? !profile_beside(file, path) : columns[0] != '@')
+		return 0;
+	*profile = calloc(1, sizeof(**profile));
+	if (*profile == NULL)
+		return source_no_memory(message, file);
+	return profile_read(*profile, columns != NULL ? columns + 1 : path, message);
 }
 
 /* ---- writing ---- */
@@ -149,9 +163,8 @@ int profile_save(const char *path, const char *file, const char *columns, char m
 	struct sniff *sniff = calloc(1, sizeof(*sniff));
 	struct source source = {0};
 	const char *encoding;
-	int error = sniff != NULL
-	                    ? source_load(&source, file, "a recording", message)
-	                    : source_refuse(message, DT_E_MEMORY, file, 0, "%s", error_text(DT_E_MEMORY));
+	int error = sniff != NULL ? source_load(&source, file, "a recording", message)
+	                          : source_no_memory(message, file);
 
 	if (!error)
 		error = encoding_settle(&source, &encoding, message);

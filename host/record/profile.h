@@ -5,11 +5,14 @@
  * A profile: how files of one origin are read, kept as an INI file and held against each of them.
  *
  *     [import]
- *     columns = time:ms,fixture:g,board:mV/(10.2mV/g),-      as --columns
- *     separator = tab                                          tab, semicolon, comma, bar, blanks; without
- * it, any decimal = comma                                          comma or point; without it, as the lines
- * look names = Time|Accel|IntAccel                              of the file's columns; a file with others is
- * refused
+ *     columns = time:ms,fixture:g,board:mV/(10.2mV/g),-
+ *     separator = tab
+ *     decimal = comma
+ *     names = Time|Accel|IntAccel
+ *
+ * columns is as --columns has it. separator is tab, semicolon, comma, bar or blanks; without it, any. decimal
+ * is comma or point; without it, as the lines look. names are those of the file's columns; a file with others
+ * is refused.
  *
  * "@PATH" in place of --columns names one. Without --columns the file import.ini in the recording's folder is
  * one, for text and tables of other people.
@@ -26,11 +29,11 @@ struct profile {
 	char names[PROFILE_NAMES_MAX]; /* "" where any will do */
 };
 
-/* 0, or an error told in message. */
-DT_MUST_USE int profile_read(struct profile *profile, const char *path, char message[READ_MESSAGE_MAX]);
-
-/* Whether there is one in the folder of a recording; its path. */
-bool profile_beside(const char *file, char path[4096]);
+/* The profile that a recording is read by: of columns "@PATH" that one, without columns (NULL) the one beside
+ * the file. *profile is NULL where there is none, else freed by the caller, after an error too. 0, or an
+ * error told in message. */
+DT_MUST_USE int profile_of(struct profile **profile, const char *file, const char *columns,
+                           char message[READ_MESSAGE_MAX]);
 
 /* Names as a profile has them. */
 void profile_names(const struct piece *name, size_t count, char names[PROFILE_NAMES_MAX]);

@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "common/base/number.h"
 #include "host/record/cells.h"
@@ -20,16 +19,6 @@ struct at2 {
 	bool has_units;
 	struct source_line line; /* of NPTS: numbers follow */
 };
-
-static const char *at2_find(const struct source_line *line, const char *word)
-{
-	size_t length = strlen(word);
-
-	for (size_t i = 0; i + length <= line->length; i++)
-		if (strncasecmp(line->text + i, word, length) == 0)
-			return line->text + i;
-	return NULL;
-}
 
 /* The numbers of a line, in order. */
 static size_t at2_numbers(const struct source_line *line, double value[2])
@@ -53,9 +42,10 @@ static bool at2_head(const struct source *source, struct at2 *at2)
 	double value[2] = {0, 0};
 
 	while (line.number < AT2_HEAD_LINES && source_next_line(source, &line)) {
-		if (at2_find(&line, "UNITS OF G") != NULL)
-			at2->has_units = true;
-		if (at2_find(&line, "NPTS") == NULL || at2_find(&line, "DT") == NULL)
+		struct piece text = {line.text, line.length};
+
+		at2->has_units |= piece_has(text, "UNITS OF G");
+		if (!piece_has(text, "NPTS") || !piece_has(text, "DT"))
 			continue;
 		at2->line = line;
 		if (at2_numbers(&line, value) == 2 && value[0] >= 2 && value[0] < 1e9 && value[1] > 0) {
@@ -94,7 +84,7 @@ int read_at2(struct table_data *table, const struct source *source, char message
 		                     "ground motion without UNITS OF G, expected an acceleration");
 	column = table_data_add(table, at2.points);
 	if (column == NULL)
-		return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
+		return source_no_memory(message, source->file);
 	snprintf(column->name, sizeof(column->name), "acceleration");
 	snprintf(column->unit, sizeof(column->unit), "g");
 	column->rate_hz = 1 / at2.step_s;

@@ -62,8 +62,7 @@ struct reading {
 
 static int refuse_memory(const struct reading *reading)
 {
-	return source_refuse(reading->message, DT_E_MEMORY, reading->source->file, 0, "%s",
-	                     error_text(DT_E_MEMORY));
+	return source_no_memory(reading->message, reading->source->file);
 }
 
 static bool read_delimited_is_blank(const struct source_line *line)
@@ -635,28 +634,14 @@ static int read_delimited_all(struct reading *reading)
 	return error ? error : read_delimited_finish(reading);
 }
 
-/* "@PATH" is a profile, and so is the one beside a file without columns. */
-static int take_profile(struct reading *reading, const char *columns)
-{
-	char path[4096];
-	int error;
-
-	if (columns == NULL ? !profile_beside(reading->source->file, path) : columns[0] != '@')
-		return 0;
-	reading->profile = calloc(1, sizeof(*reading->profile));
-	if (reading->profile == NULL)
-		return refuse_memory(reading);
-	error = profile_read(reading->profile, columns != NULL ? columns + 1 : path, reading->message);
-	reading->style = reading->profile->style;
-	return error;
-}
-
 static int read_delimited_by(struct reading *reading, const char *columns)
 {
-	int error = take_profile(reading, columns);
+	int error = profile_of(&reading->profile, reading->source->file, columns, reading->message);
 
-	if (!error && reading->profile != NULL)
+	if (!error && reading->profile != NULL) {
 		columns = reading->profile->columns;
+		reading->style = reading->profile->style;
+	}
 	if (!error && columns != NULL)
 		error = columns_parse(&reading->columns, columns, reading->message);
 	if (!error && columns == NULL) {
@@ -682,7 +667,7 @@ int read_delimited(struct record *record, struct source *source, const char *col
 		return error;
 	reading = calloc(1, sizeof(*reading));
 	if (!reading)
-		return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
+		return source_no_memory(message, source->file);
 	reading->source = source;
 	reading->message = message;
 	reading->record = &filled;

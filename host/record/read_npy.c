@@ -109,8 +109,7 @@ int read_npy(struct table_data *table, const struct source *source, char message
 		struct table_column *column = table_data_add(table, npy.rows);
 
 		if (column == NULL)
-			return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s",
-			                     error_text(DT_E_MEMORY));
+			return source_no_memory(message, source->file);
 		for (size_t k = 0; k < npy.rows; k++) {
 			size_t at = npy.fortran ? c * npy.rows + k : k * npy.columns + c;
 

@@ -293,8 +293,7 @@ static int take_chunk(struct tdms *tdms, size_t at, size_t stride)
 			continue;
 		if (type_kind(object->type, &kind)) {
 			if (!tdms_make_room(object, (size_t)object->count))
-				return source_refuse(tdms->message, DT_E_MEMORY, tdms->source->file, 0, "%s",
-				                     error_text(DT_E_MEMORY));
+				return source_no_memory(tdms->message, tdms->source->file);
 			for (uint64_t k = 0; k < object->count; k++)
 				object->value[object->used++] = bytes_value(
 				        tdms->source->bytes + at + within + k * step, kind, tdms->big);
@@ -383,8 +382,7 @@ static int give_columns(struct tdms *tdms, struct table_data *table)
 			        object->name);
 		column = table_data_add(table, object->used);
 		if (column == NULL)
-			return source_refuse(tdms->message, DT_E_MEMORY, tdms->source->file, 0, "%s",
-			                     error_text(DT_E_MEMORY));
+			return source_no_memory(tdms->message, tdms->source->file);
 		memcpy(column->value, object->value, object->used * sizeof(double));
 		memcpy(column->name, object->name, sizeof(column->name));
 		memcpy(column->unit, object->unit, sizeof(column->unit));
@@ -406,7 +404,7 @@ int read_tdms(struct table_data *table, const struct source *source, char messag
 		tdms->object = calloc(OBJECTS_MOST, sizeof(*tdms->object));
 	}
 	if (tdms == NULL || tdms->object == NULL)
-		error = source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
+		error = source_no_memory(message, source->file);
 	while (!error && at < source->size)
 		error = take_segment(tdms, at, &at);
 	if (!error)

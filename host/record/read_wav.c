@@ -90,8 +90,7 @@ int read_wav(struct table_data *table, const struct source *source, char message
 		struct table_column *column = table_data_add(table, rows);
 
 		if (column == NULL)
-			return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s",
-			                     error_text(DT_E_MEMORY));
+			return source_no_memory(message, source->file);
 		snprintf(column->name, sizeof(column->name), "ch%zu", c + 1);
 		column->rate_hz = wav.rate_hz;
 		for (size_t k = 0; k < rows; k++) {

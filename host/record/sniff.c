@@ -247,16 +247,6 @@ static int find_style(struct work *work, struct candidate *best)
 
 /* ---- names and units ---- */
 
-static bool has(struct piece name, const char *word)
-{
-	size_t length = strlen(word);
-
-	for (size_t at = 0; at + length <= name.length; at++)
-		if (strncasecmp(name.text + at, word, length) == 0)
-			return true;
-	return false;
-}
-
 static bool begins(struct piece name, const char *word)
 {
 	size_t length = strlen(word);
@@ -287,16 +277,17 @@ static bool is_time_name(struct piece name)
 
 static bool is_acceleration_name(struct piece name)
 {
-	return has(name, "acc") || has(name, "beschl") || has(name, "shock") || has(name, "vib") ||
-	       has(name, "impact") ||
+	return piece_has(name, "acc") || piece_has(name, "beschl") || piece_has(name, "shock") ||
+	       piece_has(name, "vib") || piece_has(name, "impact") ||
 	       (begins(name, "a") && (name.length == 1 || !is_letter(name.text[1]) ||
 	                              (name.length == 2 && strchr("xyzXYZ", name.text[1]))));
 }
 
 static bool is_mass_name(struct piece name)
 {
-	return has(name, "mass") || has(name, "weight") || has(name, "gewicht") || has(name, "load") ||
-	       has(name, "tare") || has(name, "poids") || has(name, "masse");
+	return piece_has(name, "mass") || piece_has(name, "weight") || piece_has(name, "gewicht") ||
+	       piece_has(name, "load") || piece_has(name, "tare") || piece_has(name, "poids") ||
+	       piece_has(name, "masse");
 }
 
 /* A name without the unit in brackets, or the word that is one, behind it. */
@@ -817,7 +808,7 @@ int sniff_text(struct sniff *sniff, const struct source *source, char message[RE
 		        "has marks of a CSV of ours or a LabVIEW file, but does not begin as one: "
 		        "damaged, or cut out of another");
 	else if (work == NULL || head == NULL)
-		error = source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
+		error = source_no_memory(message, source->file);
 	if (!error) {
 		work->source = source;
 		work->message = message;

@@ -33,6 +33,11 @@ int source_refuse(char message[READ_MESSAGE_MAX], int code, const char *file, ui
 	return code;
 }
 
+int source_no_memory(char message[READ_MESSAGE_MAX], const char *file)
+{
+	return source_refuse(message, DT_E_MEMORY, file, 0, "%s", error_text(DT_E_MEMORY));
+}
+
 static int refuse_system(char *message, const struct source *source)
 {
 	return source_refuse(message, DT_E_SYSTEM, source->file, 0, "%s, expected %s", strerror(errno),

@@ -41,6 +41,9 @@ __attribute__((format(printf, 5, 6))) int source_refuse(char message[READ_MESSAG
                                                         const char *file, uint64_t line, const char *format,
                                                         ...);
 
+/* The same where memory was not there. */
+int source_no_memory(char message[READ_MESSAGE_MAX], const char *file);
+
 /* The formats that are no logs. Each fills *record, initialised by the call, except for its file name.
  * Delimited text becomes UTF-8 in its source; without columns it must tell them itself (sniff.h). */
 DT_MUST_USE int read_csv(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX]);

@@ -109,8 +109,7 @@ static int make_time(struct making *making)
 	int error = 0;
 
 	if (time_s == NULL)
-		return source_refuse(making->message, DT_E_MEMORY, making->source->file, 0, "%s",
-		                     error_text(DT_E_MEMORY));
+		return source_no_memory(making->message, making->source->file);
 	for (size_t k = 0; k < column->count; k++) {
 		time_s[k] = column->value[k] / spec->divisor;
 		largest = fmax(largest, fabs(time_s[k]));
@@ -164,8 +163,7 @@ static int make_channel(struct making *making, size_t i)
 		        spec->name, column->count);
 	channel = record_add_channel(making->record, spec->name, rate_hz, column->count);
 	if (channel == NULL)
-		return source_refuse(making->message, DT_E_MEMORY, making->source->file, 0, "%s",
-		                     error_text(DT_E_MEMORY));
+		return source_no_memory(making->message, making->source->file);
 	channel->start_s = timed ? 0 : column->start_s;
 	channel->flags = timed && making->timebase.uneven ? RECORD_FLAG_UNEVEN : 0;
 	for (size_t k = 0; k < column->count; k++) {
@@ -175,8 +173,7 @@ static int make_channel(struct making *making, size_t i)
 		channel->sample[k] = good ? 0 : SAMPLE_BAD;
 	}
 	if (timed && timebase_spread(&making->timebase, channel) != 0)
-		return source_refuse(making->message, DT_E_MEMORY, making->source->file, 0, "%s",
-		                     error_text(DT_E_MEMORY));
+		return source_no_memory(making->message, making->source->file);
 	return 0;
 }
 
@@ -240,18 +237,11 @@ static int make_named(struct making *making, const char *columns)
 
 static int make_by(struct making *making, const char *columns)
 {
-	char path[4096];
-	struct profile *profile = NULL;
-	int error = 0;
+	struct profile *profile;
+	int error = profile_of(&profile, making->source->file, columns, making->message);
 
-	if (columns == NULL ? profile_beside(making->source->file, path) : columns[0] == '@') {
-		profile = calloc(1, sizeof(*profile));
-		error = profile == NULL ? source_refuse(making->message, DT_E_MEMORY, making->source->file, 0,
-		                                        "%s", error_text(DT_E_MEMORY))
-		                        : profile_read(profile, columns != NULL ? columns + 1 : path,
-		                                       making->message);
-		columns = profile != NULL ? profile->columns : NULL;
-	}
+	if (!error && profile != NULL)
+		columns = profile->columns;
 	if (!error)
 		error = columns != NULL ? make_named(making, columns) : make_sniffed(making);
 	if (!error && profile != NULL)
@@ -269,7 +259,7 @@ int table_data_record(const struct table_data *table, struct record *record, con
 	int error;
 
 	if (making == NULL)
-		return source_refuse(message, DT_E_MEMORY, source->file, 0, "%s", error_text(DT_E_MEMORY));
+		return source_no_memory(message, source->file);
 	*making = (struct making){.table = table, .source = source, .record = &filled, .message = message};
 	record_init(&filled);
 	if (table->count == 0 || table->count > COLUMNS_MAX)

@@ -7,6 +7,8 @@
 #include <string.h>
 
 #include <gsl/gsl_cdf.h>
+#include <gsl/gsl_fit.h>
+#include <gsl/gsl_statistics_double.h>
 
 enum { CHANGE_LEAST = 8, TREND_LEAST = 3 };
 static const double MOVES_CHANCE = 0.0027, KOLMOGOROV = 1.63;
@@ -89,41 +91,26 @@ int repeats_add(struct repeats *repeats, struct result *result)
 
 static void repeats_mean(struct repeats_row *row)
 {
-	double sum = 0, squares = 0;
-
-	for (size_t i = 0; i < row->count; i++)
-		sum += row->value[i];
-	row->mean = row->count > 0 ? sum / (double)row->count : NAN;
-	for (size_t i = 0; i < row->count; i++)
-		squares += (row->value[i] - row->mean) * (row->value[i] - row->mean);
-	row->sd = row->count > 1 ? sqrt(squares / (double)(row->count - 1)) : NAN;
+	row->mean = row->count > 0 ? gsl_stats_mean(row->value, 1, row->count) : NAN;
+	row->sd = row->count > 1 ? gsl_stats_sd_m(row->value, 1, row->count, row->mean) : NAN;
 }
 
 /* Sum of squares that the line leaves; INFINITY without one. */
 static double repeats_line(struct repeats_row *row)
 {
-	double n = (double)row->count, middle = 0, across = 0, both = 0, left = 0, first;
+	double n = (double)row->count, span, first, begin, variance, left, unused[2];
 
 	row->trend = row->sigma_trend = row->change = row->sigma_change = NAN;
 	if (row->count < TREND_LEAST)
 		return INFINITY;
-	for (size_t i = 0; i < row->count; i++)
-		middle += row->number[i] / n;
-	for (size_t i = 0; i < row->count; i++) {
-		across += (row->number[i] - middle) * (row->number[i] - middle);
-		both += (row->number[i] - middle) * (row->value[i] - row->mean);
-	}
-	row->trend = both / across;
-	for (size_t i = 0; i < row->count; i++) {
-		double rest = row->value[i] - row->mean - row->trend * (row->number[i] - middle);
-
-		left += rest * rest;
-	}
-	row->sigma_trend = sqrt(left / (n - 2) / across);
+	gsl_fit_linear(row->number, 1, row->value, 1, row->count, &begin, &row->trend, &unused[0], &unused[1],
+	               &variance, &left);
+	row->sigma_trend = sqrt(variance);
 	row->moves = fabs(row->trend) > gsl_cdf_tdist_Qinv(MOVES_CHANCE / 2, n - 2) * row->sigma_trend;
-	first = row->mean + row->trend * (row->number[0] - middle);
-	row->change = row->trend * (row->number[row->count - 1] - row->number[0]) / first;
-	row->sigma_change = fabs(row->sigma_trend * (row->number[row->count - 1] - row->number[0]) / first);
+	first = begin + row->trend * row->number[0];
+	span = row->number[row->count - 1] - row->number[0];
+	row->change = row->trend * span / first;
+	row->sigma_change = fabs(row->sigma_trend * span / first);
 	return left;
 }
 
