@@ -69,6 +69,14 @@ export async function stop(child, signal = "SIGTERM") {
 	return status;
 }
 
+// What a chain of tests leaves, as far as it was begun.
+export async function stopAll(browser, ...children) {
+	await browser?.close();
+	for (const child of children)
+		if (child)
+			await stop(child);
+}
+
 export async function droptower(...args) {
 	return (await promisify(execFile)(join(build, "droptower"), args, { maxBuffer: 1 << 26 })).stdout;
 }

@@ -5,7 +5,7 @@
 import assert from "node:assert/strict";
 import { join } from "node:path";
 import { Desk, browse } from "./desk.mjs";
-import { droptower, makeFolder, sanitized, serve, start, stop } from "./programs.mjs";
+import { droptower, makeFolder, sanitized, serve, start, stop, stopAll } from "./programs.mjs";
 import { note } from "./tap.mjs";
 
 const SERIES = "kept";
@@ -93,12 +93,7 @@ async function nothingWrong() {
 	assert.ok(!/Sanitizer|runtime error/.test(server.said + bench.said), server.said + bench.said);
 }
 
-async function end() {
-	await browser?.close();
-	for (const child of [server, bench])
-		if (child)
-			await stop(child);
-}
+const end = () => stopAll(browser, server, bench);
 
 async function onFailure() {
 	await desk?.photograph("failed-restart").catch(() => {});

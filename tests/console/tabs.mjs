@@ -7,7 +7,7 @@ import assert from "node:assert/strict";
 import { createServer, request } from "node:http";
 import { join } from "node:path";
 import { Desk, browse } from "./desk.mjs";
-import { build, makeFolder, serve, stop } from "./programs.mjs";
+import { build, makeFolder, serve, stop, stopAll } from "./programs.mjs";
 import { note } from "./tap.mjs";
 
 const SERIES = "tabs";
@@ -124,10 +124,8 @@ async function nothingWrong() {
 
 async function end() {
 	letGo();
-	await browser?.close();
 	relay?.close();
-	if (server)
-		await stop(server);
+	await stopAll(browser, server);
 }
 
 async function onFailure() {

@@ -7,7 +7,7 @@ import { chmodSync, readFileSync, renameSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { Desk, browse } from "./desk.mjs";
 import { look } from "./looks.mjs";
-import { build, droptower, makeFolder, serve, stop } from "./programs.mjs";
+import { build, droptower, makeFolder, serve, stop, stopAll } from "./programs.mjs";
 import { note } from "./tap.mjs";
 
 const SERIES = "box-30";
@@ -569,11 +569,7 @@ async function nothingWrong() {
 	assert.equal(await stop(server), 0, server.said);
 }
 
-async function end() {
-	await browser?.close();
-	if (server)
-		await stop(server);
-}
+const end = () => stopAll(browser, server);
 
 async function onFailure() {
 	await desk?.photograph("failed").catch(() => {});

@@ -870,6 +870,15 @@ static void an_arm_from_before_an_abort_is_void(void **state)
 	assert_int_equal(archived().count, 0);
 }
 
+/* CLEARs that the tower does not answer; each holds the tower's thread for a while. */
+static void fill_queue(struct asked *cleared, unsigned count)
+{
+	select_box();
+	behave(1u << WIRE_OP_CLEAR, 0, true);
+	for (unsigned i = 0; i < count; i++)
+		ask(&cleared[i], tower_clear, "{}");
+}
+
 static void abort_goes_past_a_full_queue(void **state)
 {
 	enum { MANY = 200 };
@@ -878,10 +887,7 @@ static void abort_goes_past_a_full_queue(void **state)
 	char text[512];
 
 	(void)state;
-	select_box();
-	behave(1u << WIRE_OP_CLEAR, 0, true);
-	for (unsigned i = 0; i < MANY; i++)
-		ask(&cleared[i], tower_clear, "{}");
+	fill_queue(cleared, MANY);
 	ask(&aborted, tower_abort, "{}");
 	for (unsigned i = 0; i < MANY + 1; i++)
 		wait_answer();
@@ -1124,16 +1130,13 @@ static bool waits_for_tower(const struct job *job)
 /* Verbs that wait behind others when the thread ends; what they carry is given back. */
 static void the_end_refuses_what_waits(void **state)
 {
-	enum { MANY = 20 }; /* not answered, each holds the tower's thread for a while */
+	enum { MANY = 20 };
 	struct asked cleared[MANY], armed, selected;
 	int64_t until_ms = session_now_ms() + WAIT_MS;
 	char text[512];
 
 	(void)state;
-	select_box();
-	behave(1u << WIRE_OP_CLEAR, 0, true);
-	for (unsigned i = 0; i < MANY; i++)
-		ask(&cleared[i], tower_clear, "{}");
+	fill_queue(cleared, MANY);
 	ask(&armed, tower_arm, "{}");
 	ask(&selected, tower_select, "{\"series\":\"box\"}");
 	while (!waits_for_tower(&selected.job) && session_now_ms() < until_ms)
