@@ -5,10 +5,12 @@
  * What a record itself says against the numbers that are taken from it. Each check looks at one thing that no
  * intact sensor on a shock does; what it touches is clipped, flagged or widened.
  *
- *   doubt_plateau   a top that falls off on both sides and trembles less than the noise: a cut of unknown
- * range doubt_channel   a fall to rest within one sample: "step" a zero after the pulse that is not the one
- * before: "tail", peak and velocity change are widened by it; a force that fades on: "tail", the velocity
- * change is a pulse of fewer than eight samples: its width is widened
+ * doubt_plateau: a top that falls off on both sides and trembles less than the noise is a cut of unknown
+ * range.
+ *
+ * doubt_channel: a fall to rest within one sample is "step". A zero after the pulse that is not the one
+ * before is "tail", and widens peak and velocity change. A force that fades on is "tail", and widens the
+ * velocity change. The width of a pulse of fewer than eight samples is widened.
  */
 #include "host/estimate/estimate.h"
 #include "host/estimate/peak.h"

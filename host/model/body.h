@@ -12,9 +12,10 @@
  *            if `wedge`; both are kept per corner and set by body_touch
  *   along    a spring of `grip` times the normal one's tangent (Mindlin 1949 gives 2/3 for two smooth
  *            bodies), its force held to friction times the normal one: a corner that would slide further
- *            slips, its deflection grows with the limit only and does not fall with it; grip = 0:
- * frictionless mounts   k (1 + softening/(1 + |u|^2 softening_per_m2)) u + c u', u the plate's place as seen
- * from the turning box (mounts_turn) or from the room
+ *            slips, its deflection grows with the limit only and does not fall with it; no friction
+ *            where grip is 0
+ *   mounts   k (1 + softening/(1 + |u|^2 softening_per_m2)) u + c u', u the plate's place as seen from the
+ *            turning box (mounts_turn) or from the room
  *
  * A body that does not turn moves along the vertical only: four states, no grip. Its S2 reads what a box that
  * felt this force would turn by all the same.

@@ -4,9 +4,8 @@
 /*
  * A drop against its test plan (plan.h): a decision for each limit (decide.h), and the worst of them.
  *
- * The uncertainty of a value is its own, and, where the plan states one, the measuring chain's. What is
- * flagged
- * - the value, its channel, or the drop - is undecided unless it fails. So is what has no value or no
+ * The uncertainty of a value is its own, and, where the plan states one, the measuring chain's. A value that
+ * is flagged, or whose channel or drop is, is undecided unless it fails. So is what has no value or no
  * uncertainty.
  */
 #include "host/base/table.h"
