@@ -115,6 +115,7 @@ struct log_walk {
 
 	struct log_event heartbeats;
 	struct log_bus bus, bus_before;
+	unsigned bus_returns; /* from one of the two to the other and back, without a pause */
 	struct log_capture_parameters parameters;
 	struct wire_sdo request;
 };

@@ -8,7 +8,10 @@
 #include "host/record/log_walk.h"
 #include "host/record/source.h"
 
-enum { BUS_CHANGE_US = 1000000 }; /* an adapter that was plugged in again takes longer */
+enum {
+	BUS_CHANGE_US = 1000000, /* an adapter that was plugged in again takes longer */
+	BUS_RETURNS = 8,         /* a line whose bus was damaged returns once, and rarely twice alike */
+};
 
 /* The first line that says something begins with '('. */
 bool candump_is(struct log_file *log)
@@ -48,8 +51,11 @@ static void check_bus(struct log_walk *walk, const struct log_line *line)
 
 	take_bus(line, now.name);
 	if (strcmp(now.name, walk->bus.name) != 0) {
-		if (strcmp(now.name, walk->bus_before.name) == 0 &&
-		    now.time_us - walk->bus_before.time_us < BUS_CHANGE_US)
+		bool returns = strcmp(now.name, walk->bus_before.name) == 0 &&
+		               now.time_us - walk->bus_before.time_us < BUS_CHANGE_US;
+
+		walk->bus_returns = returns ? walk->bus_returns + 1 : 0;
+		if (walk->bus_returns == BUS_RETURNS)
 			walk->result = source_refuse(walk->message, DT_E_FORMAT, walk->file, line->number,
 			                             "a tower on %s beside that on %s, expected the frames "
 			                             "of one bus",
