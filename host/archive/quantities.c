@@ -241,6 +241,7 @@ static void *object_of(struct result *said, enum quantity_place place, const cha
 	a->has_lag |= place == QUANTITY_AT_LAG;
 	a->has_plate |= place == QUANTITY_AT_PLATE;
 	a->has_rebound |= place == QUANTITY_AT_REBOUND;
+	a->has_motion |= place == QUANTITY_AT_MOTION;
 	for (size_t i = 0; (object = result_at(said, place, i, &whose)); i++)
 		if (strcmp(whose, subject) == 0)
 			return object;
@@ -332,6 +333,7 @@ static void quantities_clear(struct analysis *a)
 	quantity_clear(QUANTITY_DRIVEN, &a->lag);
 	quantity_clear(QUANTITY_RINGDOWN, &a->plate);
 	quantity_clear(QUANTITY_REBOUND, &a->rebound);
+	quantity_clear(QUANTITY_MOTION, &a->motion);
 }
 
 static unsigned flag_of(const char *name)

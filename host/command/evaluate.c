@@ -16,7 +16,9 @@
 #include "host/record/drop.h"
 #include "common/base/text.h"
 #include "host/base/whole.h"
+#include "host/model/ensemble.h"
 #include "host/report/report.h"
+#include "host/result/quantity.h"
 #include "host/shock/free_fall.h"
 
 static int write_json_file(const struct report *report, const char *file, char *message, size_t size)
@@ -110,6 +112,74 @@ static int find_shocks(struct evaluated *e, const struct evaluate_options *optio
 	return EVALUATE_TOLD;
 }
 
+const char *evaluate_fit_drop(const struct record *record, double angle_deg, double height_m,
+                              struct fit_drop *drop)
+{
+	for (unsigned a = 0; a < MOTION_AXES; a++) {
+		const struct channel *c = record_axis(record, fit_axis_names[a]);
+
+		if (c == NULL || c->count == 0)
+			return fit_axis_names[a];
+		drop->axis[a] = (struct fit_channel){c->value_g, c->sample, c->count, c->rate_hz, c->start_s};
+	}
+	drop->angle_deg = angle_deg;
+	drop->height_m = height_m;
+	return NULL;
+}
+
+static struct estimate_motion motion_of_later(const struct fit_later *later)
+{
+	const double *value = later->drop.derived, *sd = later->drop.derived_sd, *own = later->drop.own;
+	double speed = exp(own[FIT_LN_SPEED]);
+
+	return (struct estimate_motion){.contact_time_s = value[MOTION_CONTACT_S],
+	                                .sigma_contact_time_s = sd[MOTION_CONTACT_S],
+	                                .restitution = value[MOTION_RESTITUTION],
+	                                .sigma_restitution = sd[MOTION_RESTITUTION],
+	                                .spin_rad_s = value[MOTION_SPIN_RAD_S],
+	                                .sigma_spin_rad_s = sd[MOTION_SPIN_RAD_S],
+	                                .lag_s = value[MOTION_LAG_S],
+	                                .sigma_lag_s = sd[MOTION_LAG_S],
+	                                .lag_x_s = value[MOTION_LAG_X_S],
+	                                .sigma_lag_x_s = sd[MOTION_LAG_X_S],
+	                                .angle_deg = own[FIT_GAMMA_DEG],
+	                                .sigma_angle_deg = later->drop.sd[FIT_GAMMA_DEG],
+	                                .speed_m_s = speed,
+	                                .sigma_speed_m_s = speed * later->drop.sd[FIT_LN_SPEED],
+	                                .chi_square = later->doubt.chi2 / (double)later->doubt.samples,
+	                                .refused = "",
+	                                .status = ESTIMATE_OK};
+}
+
+/* The body of a fitted scene laid over the drop. 0 or DT_E_MEMORY. */
+static int find_motion(struct evaluated *e, const struct scene *scene)
+{
+	struct estimate_motion *motion = &e->analysis.motion;
+	struct fit_options options = fit_options_usual(scene);
+	struct fit_drop drop;
+	struct fit_later later;
+	int result;
+
+	e->analysis.has_motion =
+	        ensemble_fitted(scene) && evaluate_fit_drop(e->report.record, scene->drop_angle_deg,
+	                                                    scene->drop_height_m, &drop) == NULL;
+	if (!e->analysis.has_motion)
+		return 0;
+	result = fit_later_drop(scene, &drop, &options, &later, e->refused);
+	if (result == DT_E_MEMORY)
+		return result;
+	if (result == 0)
+		snprintf(e->refused, sizeof(e->refused), "%s", later.doubt.words);
+	if (e->refused[0] == '\0') {
+		*motion = motion_of_later(&later);
+		return 0;
+	}
+	quantity_clear(QUANTITY_MOTION, motion);
+	motion->refused = e->refused;
+	motion->status = ESTIMATE_NOT_CONVERGED;
+	return 0;
+}
+
 /* Against the scene's limits, or a preset's. */
 static int judge(struct evaluated *e, const struct evaluate_options *options)
 {
@@ -201,7 +271,9 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 	}
 	if (scene == NULL)
 		return 0;
-	result = model_solve(scene, MODEL_AUTO, NULL, &e->prediction, message);
+	result = find_motion(e, scene);
+	if (result == 0)
+		result = model_solve(scene, MODEL_AUTO, NULL, &e->prediction, message);
 	if (result != 0 && result != DT_E_MEMORY) {
 		command_error("%s: no prediction: %s", scene->name, message);
 		return 0;

@@ -9,6 +9,7 @@
 
 #include "common/scenes/scene.h"
 #include "host/estimate/estimate.h"
+#include "host/fit/fit.h"
 #include "host/record/record.h"
 #include "host/report/report.h"
 #include "host/result/repeats.h"
@@ -42,6 +43,7 @@ struct evaluated {
 	struct free_falls falls;
 	struct band band;
 	struct verdict verdict;
+	char refused[FIT_MESSAGE_MAX]; /* what analysis.motion.refused says */
 };
 
 enum { EVALUATE_TOLD = 1 };
@@ -58,6 +60,10 @@ int evaluate(struct record *record, const struct evaluate_options *options);
 /* The JSON of a record as `analyze --scene` gives it, to be freed, with e open; NULL if it cannot be
  * analysed. scene may be NULL. */
 char *evaluate_json(struct evaluated *e, const struct record *record, const struct scene *scene);
+
+/* A drop of the tower as a fit wants it; borrows record's samples. NULL, or the channel that is missing. */
+const char *evaluate_fit_drop(const struct record *record, double angle_deg, double height_m,
+                              struct fit_drop *drop);
 
 /* Reads a scene and lays angle_deg over it when that is not NAN. 0 or a COMMAND_* code, errors printed. */
 int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg);

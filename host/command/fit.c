@@ -74,22 +74,14 @@ struct fitting {
 static int fit_add(struct fitting *f, struct record *record, const char *name, double angle_deg,
                    double height_m)
 {
-	struct fit_drop *drop = &f->drop[f->count];
+	const char *missing = evaluate_fit_drop(record, angle_deg, height_m, &f->drop[f->count]);
 
-	for (unsigned a = 0; a < MOTION_AXES; a++) {
-		const struct channel *c = record_axis(record, fit_axis_names[a]);
-
-		if (c == NULL || c->count == 0) {
-			command_error(
-			        "%s: no channel %s, expected a drop of the tower with S1X, S1Y, S2X and S2Y",
-			        name, fit_axis_names[a]);
-			record_free(record);
-			return COMMAND_INPUT;
-		}
-		drop->axis[a] = (struct fit_channel){c->value_g, c->sample, c->count, c->rate_hz, c->start_s};
+	if (missing != NULL) {
+		command_error("%s: no channel %s, expected a drop of the tower with S1X, S1Y, S2X and S2Y",
+		              name, missing);
+		record_free(record);
+		return COMMAND_INPUT;
 	}
-	drop->angle_deg = angle_deg;
-	drop->height_m = height_m;
 	snprintf(f->name[f->count], sizeof(f->name[0]), "%.127s", name);
 	f->record[f->count++] = *record;
 	return COMMAND_DONE;
@@ -380,8 +372,8 @@ static void fit_json(const struct fitting *f)
 		for (size_t j = 0; j < MOTION_SHARED; j++)
 			printf("%s%.9g", j > 0 ? "," : i > 0 ? "],[" : "[[", fit->covariance[i][j]);
 	printf("]]");
-	printf(",\"chi2\":%.9g,\"samples\":%zu,\"starts\":%u,\"agreed\":%u,\"windows\":{", fit->chi2,
-	       fit->samples, fit->starts, fit->agreed);
+	printf(",\"chi2\":%.9g,\"samples\":%zu,\"starts\":%u,\"agreed\":%u,\"windows\":{", fit->doubt.chi2,
+	       fit->doubt.samples, fit->starts, fit->agreed);
 	for (size_t a = 0; a < MOTION_AXES; a++) {
 		printf("%s\"%s\":", a > 0 ? "," : "", fit_axis_names[a]);
 		for (size_t w = 0; w < FIT_WINDOWS; w++)
@@ -409,7 +401,7 @@ static void fit_text(const struct fitting *f)
 	printf("\nresiduals: %.3f of the noise's squares over %zu samples; largest oscillation left %.1f at "
 	       "%.0f Hz; "
 	       "drops pull %.1f, gains together %.1f\n",
-	       fit->chi2 / (double)fit->samples, fit->samples, fit->doubt.periodogram,
+	       fit->doubt.chi2 / (double)fit->doubt.samples, fit->doubt.samples, fit->doubt.periodogram,
 	       fit->doubt.periodogram_hz, fit->doubt.pull, fit->doubt.group);
 	if (fit->widened > 1.0)
 		printf("gains scatter more than --gain-sd says: all variances are taken %.1f times\n",

@@ -188,6 +188,21 @@ struct estimate_rebound {
 	enum estimate_status status;
 };
 
+/* The true motion of box and plate: the body of a scene that was fitted to earlier drops (host/fit), laid
+ * over this one. All NAN unless ok. */
+struct estimate_motion {
+	double contact_time_s, sigma_contact_time_s;
+	double restitution, sigma_restitution; /* of the centre of gravity */
+	double spin_rad_s, sigma_spin_rad_s;   /* at the release; positive turns X away from the vertical */
+	double lag_s, sigma_lag_s;             /* S1's largest resultant after S2's */
+	double lag_x_s, sigma_lag_x_s;         /* the same of X */
+	double angle_deg, sigma_angle_deg;     /* at the touch */
+	double speed_m_s, sigma_speed_m_s;     /* of impact */
+	double chi_square;                     /* reduced, of the residual against the noise */
+	const char *refused;                   /* why not; "": it is ok */
+	enum estimate_status status;
+};
+
 enum { ESTIMATE_SENSORS_MAX = 2 };
 
 struct analysis {
@@ -201,6 +216,8 @@ struct analysis {
 	struct estimate_ringdown plate; /* X and Y of S1 combined by their weights */
 	bool has_rebound;               /* the impact speed was given, and S2 has a velocity change */
 	struct estimate_rebound rebound;
+	bool has_motion; /* a fitted scene was given, and the tower's sensors are there */
+	struct estimate_motion motion;
 };
 
 #define ESTIMATE_TOLERANCE 0.005

@@ -82,6 +82,8 @@ static void start_common(const struct scene *scene, const struct fit_options *o,
 		}
 	for (size_t i = FIT_GAIN; i < FIT_COMMON; i++)
 		s->prior_sd[i] = o->common_gain_sd;
+	for (size_t i = 0; i < FIT_COMMON; i++)
+		s->known[i][i] = s->prior_sd[i] > 0.0 ? 1.0 / (s->prior_sd[i] * s->prior_sd[i]) : 1.0;
 	memcpy(s->common, s->centre, sizeof(s->common));
 }
 
@@ -269,24 +271,15 @@ static double covariance_of(const struct solve *s, const struct solve_drop *d, s
 	                         : d->covariance[own[i - MOTION_SHARED]][own[j - MOTION_SHARED]];
 }
 
-static void derive(struct solve *s, const struct solve_drop *d, struct fit_drop_result *r)
+/* Of the histories that solve_histories made last, with slopes. */
+static void derive(const struct solve *s, const struct solve_drop *d, struct fit_drop_result *r)
 {
-	double p[MOTION_PARAMETERS], slope[MOTION_PARAMETERS][MOTION_DERIVED], moved[MOTION_DERIVED];
+	double slope[MOTION_PARAMETERS][MOTION_DERIVED] = {{0.0}};
 
-	solve_parameters(s, d, p);
-	if (motion_solve(s->scene, p, s->nodes, s->motion, r->derived) != 0)
-		return;
-	for (size_t i = 0; i < MOTION_PARAMETERS; i++) {
-		double was = p[i];
-
-		p[i] += solve_step_of(i);
-		if ((s->held && i < MOTION_SHARED) ||
-		    motion_solve(s->scene, p, s->nodes, s->motion, moved) != 0)
-			memcpy(moved, r->derived, sizeof(moved));
-		for (size_t q = 0; q < MOTION_DERIVED; q++)
-			slope[i][q] = (moved[q] - r->derived[q]) / solve_step_of(i);
-		p[i] = was;
-	}
+	memcpy(r->derived, s->derived[0], sizeof(r->derived));
+	for (size_t i = 0; i < MOTION_PARAMETERS; i++)
+		for (size_t q = 0; q < MOTION_DERIVED && solve_moves(s, i); q++)
+			slope[i][q] = (s->derived[1 + i][q] - s->derived[0][q]) / solve_step_of(i);
 	for (size_t q = 0; q < MOTION_DERIVED; q++) {
 		double variance = 0.0;
 
@@ -342,7 +335,7 @@ static void widen(struct solve *s, struct fit *fit)
 	}
 }
 
-static void conclude_drop(struct solve *s, const struct solve_drop *d, struct fit_drop_result *r)
+static void conclude_drop(const struct solve *s, const struct solve_drop *d, struct fit_drop_result *r)
 {
 	memcpy(r->own, d->own, sizeof(r->own));
 	r->pull = pull_of(d);
@@ -449,10 +442,13 @@ static int fit_prepared(const struct scene *start, const struct fit_options *opt
 	}
 	widen(s, fit);
 	conclude_common(s, fit);
+	s->derives = true;
 	for (unsigned k = 0; k < s->drops; k++)
-		conclude_drop(s, &s->drop[k], &fit->drop[k]);
+		if (solve_histories(s, &s->drop[k], true))
+			conclude_drop(s, &s->drop[k], &fit->drop[k]);
+	s->derives = false;
 	conclude_scene(s, start, fit);
-	if (judge(s, fit) != 0) {
+	if (judge(s, fit->drop, fit->widened, &fit->doubt) != 0) {
 		snprintf(message, FIT_MESSAGE_MAX, "no memory");
 		return DT_E_MEMORY;
 	}
@@ -523,33 +519,82 @@ int fit_predict(const struct scene *scene, double derived[MOTION_DERIVED], doubl
 
 /* ---- a later drop ---- */
 
-/* To 15 ms: what the plate does later tells nothing of onset, angle and speed. */
-enum { LATER_ITERATIONS = 4, LATER_NODES = SCAN_NODES };
-#define LATER_ENOUGH 0.5
+/* To 6 ms for onset, angle and speed alone, then to 10 ms: what the plate does later tells no more of them.
+ */
+enum { LATER_ITERATIONS = 2, LATER_OWN_NODES = 300, LATER_NODES = MOTION_FINE_NODES + 40 };
+
+/* Gains of squares that are not worth another iteration, without and with the product's parameters. */
+#define LATER_ENOUGH 2.0
+#define LATER_ENOUGH_ALL 20.0
+
+/* What [fit] knows of the product takes the place of the weak priors. False: it is no covariance. */
+static bool start_known(const struct scene *scene, struct solve *s)
+{
+	double a[FIT_COMMON][FIT_COMMON];
+
+	memset(a, 0, sizeof(a));
+	for (size_t i = 0; i < FIT_COMMON; i++) {
+		if (i < MOTION_SHARED)
+			s->prior_sd[i] = s->prior_sd[i] > 0.0 ? scene->fitted_u[i] : 0.0;
+		a[i][i] = s->prior_sd[i] > 0.0 ? s->prior_sd[i] * s->prior_sd[i] : 1.0;
+	}
+	for (size_t i = 0; i < MOTION_SHARED; i++)
+		for (size_t j = 0; j < i; j++)
+			a[i][j] = scene->fitted_correlation[i][j] * s->prior_sd[i] * s->prior_sd[j];
+	if (!solve_factor(FIT_COMMON, FIT_COMMON, &a[0][0]))
+		return false;
+	solve_invert(FIT_COMMON, &a[0][0], &s->known[0][0]);
+	return true;
+}
+
+/* The drop's own unknowns first, then, to first order, all together. */
+static int later_solve(struct solve *s, struct fit_later *later, char message[FIT_MESSAGE_MAX])
+{
+	struct solve_drop *d = s->drop;
+	bool found;
+
+	align(s, d);
+	s->held = true;
+	s->nodes = LATER_OWN_NODES;
+	found = solve_run(s, LATER_ITERATIONS, LATER_ENOUGH);
+	s->held = false;
+	s->nodes = LATER_NODES;
+	s->derives = true;
+	if (!found || !solve_run(s, LATER_ITERATIONS, LATER_ENOUGH_ALL) || !solve_covariance_there(s)) {
+		snprintf(message, FIT_MESSAGE_MAX, "the scene's product cannot have made this drop");
+		return DT_E_NUMERIC;
+	}
+	conclude_drop(s, d, &later->drop);
+	later->doubt.moved = solve_known(s);
+	s->nodes = MOTION_NODES;
+	if (judge(s, &later->drop, 1.0, &later->doubt) != 0) {
+		snprintf(message, FIT_MESSAGE_MAX, "no memory");
+		return DT_E_MEMORY;
+	}
+	memcpy(later->drop.derived, s->derived[1 + MOTION_PARAMETERS], sizeof(later->drop.derived));
+	return 0;
+}
 
 int fit_later_drop(const struct scene *scene, const struct fit_drop *drop, const struct fit_options *options,
-                   struct fit_drop_result *result, double *chi2, size_t *samples,
-                   char message[FIT_MESSAGE_MAX])
+                   struct fit_later *later, char message[FIT_MESSAGE_MAX])
 {
 	struct solve_drop d;
-	struct solve s = {.scene = scene, .drop = &d, .drops = 1, .held = true, .nodes = LATER_NODES};
+	struct solve s = {.scene = scene, .drop = &d, .drops = 1};
 	int error = prepare_drop(scene, drop, options, &d, message);
 
 	if (error)
 		return error;
+	*later = (struct fit_later){.doubt.words = ""};
 	s.motion = malloc((1 + MOTION_PARAMETERS) * sizeof(*s.motion));
 	start_common(scene, options, &s);
-	error = s.motion ? 0 : DT_E_MEMORY;
-	if (!error) {
-		align(&s, &d);
-		if (solve_run(&s, LATER_ITERATIONS, LATER_ENOUGH) && solve_covariance_there(&s)) {
-			conclude_drop(&s, &d, result);
-			*chi2 = s.squares;
-			*samples = s.used;
-		} else {
-			error = DT_E_NUMERIC;
-			snprintf(message, FIT_MESSAGE_MAX, "the scene's product cannot have made this drop");
-		}
+	if (!s.motion) {
+		error = DT_E_MEMORY;
+		snprintf(message, FIT_MESSAGE_MAX, "no memory");
+	} else if (!(scene->fitted_u[MOTION_LN_STIFFNESS] > 0.0) || !start_known(scene, &s)) {
+		error = DT_E_ARGUMENT;
+		snprintf(message, FIT_MESSAGE_MAX, "the scene has no [fit] that is a covariance");
+	} else {
+		error = later_solve(&s, later, message);
 	}
 	free(s.motion);
 	prepare_free(&d);

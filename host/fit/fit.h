@@ -71,8 +71,11 @@ struct fit_doubt {
 	double window_z[MOTION_AXES][FIT_WINDOWS];
 	double periodogram, periodogram_hz;
 	int periodogram_axis;
-	double pull;                 /* the largest of a drop */
-	double group;                /* of all drops' gains together; 0 with one drop */
+	double pull;  /* the largest of a drop */
+	double group; /* of all drops' gains together; 0 with one drop */
+	double moved; /* of a later drop: how far the product would have to differ */
+	double chi2;  /* over samples */
+	size_t samples;
 	char words[FIT_MESSAGE_MAX]; /* "" none: the residual is content */
 };
 
@@ -91,8 +94,6 @@ struct fit {
 	double covariance[MOTION_SHARED][MOTION_SHARED]; /* in motion.h's coordinates; absent ones 0 */
 	struct fit_drop_result drop[FIT_DROPS_MAX];
 	double widened; /* all variances by so much, since gains scatter more than was said; 1: as they are */
-	double chi2;
-	size_t samples;
 	unsigned starts, agreed; /* starts that came within 0.1 of the lowest sum */
 	struct fit_doubt doubt;
 	struct fit_next next;
@@ -109,10 +110,18 @@ DT_MUST_USE int fit_drops(const struct scene *start, const struct fit_drop *drop
 DT_MUST_USE int fit_predict(const struct scene *scene, double derived[MOTION_DERIVED],
                             double sd[MOTION_DERIVED]);
 
-/* A later drop of a product whose scene is known: onset, angle and speed, gains and zeros, the product's
- * parameters held. Fills result, and *chi2 over *samples. */
+/* A later drop of a product whose scene has [fit]: its onset, angle, speed, gains and zeros, and the product
+ * as far as [fit] leaves it open. What comes out has bars for all of that. With doubt.words it is no
+ * measurement. */
+struct fit_later {
+	struct fit_drop_result drop;
+	struct fit_doubt doubt;
+};
+
+/* 0; DT_E_ARGUMENT: such a drop or scene is of no use; DT_E_NUMERIC: no such product makes it; DT_E_MEMORY;
+ * message says what and why. */
 DT_MUST_USE int fit_later_drop(const struct scene *scene, const struct fit_drop *drop,
-                               const struct fit_options *options, struct fit_drop_result *result,
-                               double *chi2, size_t *samples, char message[FIT_MESSAGE_MAX]);
+                               const struct fit_options *options, struct fit_later *later,
+                               char message[FIT_MESSAGE_MAX]);
 
 #endif

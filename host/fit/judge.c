@@ -17,10 +17,14 @@ const char *const fit_window_names[FIT_WINDOWS] = {"before the touch", "0 to 1 m
 #define ALARM_PERIODOGRAM 14.0
 #define ALARM_PULL 30.0
 #define ALARM_GROUP 20.0
+#define ALARM_MOVED 30.0
 
-#define PERIODOGRAM_FROM_HZ 50.0
-#define PERIODOGRAM_STEP_HZ 25.0
-#define PERIODOGRAM_TO_HZ 3450.0
+enum { PERIODOGRAM_LINES = 137 };
+
+static double periodogram_hz(size_t line)
+{
+	return 50.0 + 25.0 * (double)line;
+}
 
 struct sums {
 	double squares[MOTION_AXES][FIT_WINDOWS];
@@ -38,46 +42,47 @@ static enum fit_window judge_window(double t, double release)
 	return t < 10e-3 ? FIT_TO_10_MS : t < 20e-3 ? FIT_TO_20_MS : FIT_RING;
 }
 
-/* Sums over frequencies by rotation; of one channel of one drop. */
+/* Of one channel of one drop, all frequencies at once (Goertzel 1958); a sample left out counts as 0. */
 static void judge_periodogram(const struct solve_drop *d, const double *residual, unsigned axis,
                               struct fit_doubt *doubt)
 {
-	for (double hz = PERIODOGRAM_FROM_HZ; hz <= PERIODOGRAM_TO_HZ; hz += PERIODOGRAM_STEP_HZ) {
-		double sum[2] = {0.0, 0.0}, turn[2] = {1.0, 0.0}, by[2] = {1.0, 0.0}, step = 0.0, last = 0.0,
-		       power;
-		size_t n = 0;
+	double by[PERIODOGRAM_LINES], now[PERIODOGRAM_LINES] = {0.0}, was[PERIODOGRAM_LINES] = {0.0};
+	double step = (double)INFINITY, last = (double)NAN;
+	size_t n = 0;
 
-		for (size_t i = 0; i < d->count; i++) {
-			const struct solve_sample *sample = &d->sample[i];
-			double was = turn[0], now = sample->t_s - last;
-
-			if (sample->axis != axis || isnan(residual[i]))
-				continue;
-			if (fabs(now - step) > 1e-9) {
-				step = now;
-				by[0] = cos(2.0 * UNITS_PI * hz * step);
-				by[1] = sin(2.0 * UNITS_PI * hz * step);
-			}
-			turn[0] = was * by[0] - turn[1] * by[1];
-			turn[1] = was * by[1] + turn[1] * by[0];
-			last = sample->t_s;
-			sum[0] += residual[i] * turn[0];
-			sum[1] += residual[i] * turn[1];
-			n++;
-		}
-		if (n == 0)
+	for (size_t i = 1; i < d->count; i++)
+		if (d->sample[i].axis == axis && d->sample[i - 1].axis == axis)
+			step = fmin(step, d->sample[i].t_s - d->sample[i - 1].t_s);
+	for (size_t k = 0; k < PERIODOGRAM_LINES; k++)
+		by[k] = 2.0 * cos(2.0 * UNITS_PI * periodogram_hz(k) * step);
+	for (size_t i = 0; i < d->count; i++) {
+		if (d->sample[i].axis != axis || isnan(residual[i]))
 			continue;
-		power = (sum[0] * sum[0] + sum[1] * sum[1]) / ((double)n * d->colour[axis]);
+		for (long left_out = n ? lround((d->sample[i].t_s - last) / step) : 1; left_out > 0;
+		     left_out--)
+			for (size_t k = 0; k < PERIODOGRAM_LINES; k++) {
+				double next = (left_out > 1 ? 0.0 : residual[i]) + by[k] * now[k] - was[k];
+
+				was[k] = now[k];
+				now[k] = next;
+			}
+		last = d->sample[i].t_s;
+		n++;
+	}
+	for (size_t k = 0; k < PERIODOGRAM_LINES && n > 0; k++) {
+		double power = (now[k] * now[k] + was[k] * was[k] - by[k] * now[k] * was[k]) /
+		               ((double)n * d->colour[axis]);
+
 		if (power > doubt->periodogram) {
 			doubt->periodogram = power;
-			doubt->periodogram_hz = hz;
+			doubt->periodogram_hz = periodogram_hz(k);
 			doubt->periodogram_axis = (int)axis;
 		}
 	}
 }
 
 static int judge_drop(struct solve *s, struct solve_drop *d, double release, struct sums *sums,
-                      struct fit *fit)
+                      struct fit_doubt *doubt)
 {
 	double *residual = malloc((d->count + 1) * sizeof(*residual));
 
@@ -94,7 +99,7 @@ static int judge_drop(struct solve *s, struct solve_drop *d, double release, str
 			sums->count[d->sample[i].axis][w]++;
 		}
 		for (unsigned a = 0; a < MOTION_AXES; a++)
-			judge_periodogram(d, residual, a, &fit->doubt);
+			judge_periodogram(d, residual, a, doubt);
 	}
 	free(residual);
 	return 0;
@@ -146,20 +151,23 @@ static void judge_say(struct fit_doubt *d, unsigned axis, unsigned window, doubl
 		         "the gains of all drops are off together (%.3g for 8): a sensitivity or the "
 		         "cross-axis is wrong",
 		         d->group);
+	else if (d->moved > ALARM_MOVED)
+		snprintf(d->words, sizeof(d->words),
+		         "the product would have to be another than the scene's (%.3g for 9)", d->moved);
 }
 
-int judge(struct solve *s, struct fit *fit)
+int judge(struct solve *s, const struct fit_drop_result *drop, double widened, struct fit_doubt *doubt)
 {
 	struct sums sums = {.count = {{0}}};
 	unsigned worst[2] = {0, 0};
 	double most = -(double)INFINITY;
 
 	for (unsigned k = 0; k < s->drops; k++) {
-		double release = fit->drop[k].derived[MOTION_CONTACT_S];
+		double release = drop[k].derived[MOTION_CONTACT_S];
 
-		if (judge_drop(s, &s->drop[k], isfinite(release) ? release : 10e-3, &sums, fit) != 0)
+		if (judge_drop(s, &s->drop[k], isfinite(release) ? release : 10e-3, &sums, doubt) != 0)
 			return DT_E_MEMORY;
-		fit->doubt.pull = fmax(fit->doubt.pull, fit->drop[k].pull / fit->widened);
+		doubt->pull = fmax(doubt->pull, drop[k].pull / widened);
 	}
 	for (unsigned a = 0; a < MOTION_AXES; a++)
 		for (unsigned w = 0; w < FIT_WINDOWS; w++) {
@@ -167,17 +175,17 @@ int judge(struct solve *s, struct fit *fit)
 			       z = n > 0 ? (sums.squares[a][w] - n) / sqrt(2.0 * n * s->drop[0].colour[a])
 			                 : 0.0;
 
-			fit->doubt.window_z[a][w] = z;
-			fit->chi2 += sums.squares[a][w];
-			fit->samples += sums.count[a][w];
+			doubt->window_z[a][w] = z;
+			doubt->chi2 += sums.squares[a][w];
+			doubt->samples += sums.count[a][w];
 			if (z > most) {
 				most = z;
 				worst[0] = a;
 				worst[1] = w;
 			}
 		}
-	fit->doubt.group = judge_group(s, fit->widened);
-	judge_say(&fit->doubt, worst[0], worst[1], most, s->drops);
+	doubt->group = judge_group(s, widened);
+	judge_say(doubt, worst[0], worst[1], most, s->drops);
 	return 0;
 }
 
@@ -240,9 +248,7 @@ static double next_weigh(const struct solve *s, double information[FIT_COMMON][F
 
 static void next_start(struct solve *s, double information[FIT_COMMON][FIT_COMMON])
 {
-	memset(information, 0, FIT_COMMON * sizeof(*information));
-	for (size_t i = 0; i < FIT_COMMON; i++)
-		information[i][i] = s->prior_sd[i] > 0.0 ? 1.0 / (s->prior_sd[i] * s->prior_sd[i]) : 1.0;
+	memcpy(information, s->known, sizeof(s->known));
 	for (unsigned k = 0; k < s->drops; k++)
 		(void)solve_information(s, &s->drop[k], information);
 }

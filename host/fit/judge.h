@@ -4,8 +4,10 @@
 /* What a fit does not explain, and which drop would tell most. Used within host/fit. */
 #include "host/fit/solve.h"
 
-/* Fills doubt, chi2 and samples. 0 or DT_E_MEMORY. */
-DT_MUST_USE int judge(struct solve *s, struct fit *fit);
+/* What the drops leave, given what came out of each. Fills doubt with its chi2 and samples. 0 or DT_E_MEMORY.
+ */
+DT_MUST_USE int judge(struct solve *s, const struct fit_drop_result *drop, double widened,
+                      struct fit_doubt *doubt);
 
 /* Fills next. */
 void judge_next(struct solve *s, struct fit *fit);

@@ -155,7 +155,8 @@ static void derived_node(struct derived *d, const struct body *b, size_t node, c
 	for (int i = 0; i < MOTION_AXES; i++)
 		motion_peak(&d->axis[i], node, axis[i]);
 	for (int s = 0; s < 2; s++)
-		motion_peak(&d->resultant[s], node, hypot(axis[2 * s], axis[2 * s + 1]));
+		motion_peak(&d->resultant[s], node,
+		            sqrt(axis[2 * s] * axis[2 * s] + axis[2 * s + 1] * axis[2 * s + 1]));
 	if (node > 0 && !released && depth <= 0.0)
 		derived_release(d, b, node, depth, up, y[BODY_SPIN]);
 	d->depth = depth;
@@ -166,6 +167,7 @@ static void derived_node(struct derived *d, const struct body *b, size_t node, c
 static void derived_end(struct derived *d)
 {
 	d->into[MOTION_LAG_S] = d->resultant[0].at_s - d->resultant[1].at_s;
+	d->into[MOTION_LAG_X_S] = d->axis[MOTION_S1X].at_s - d->axis[MOTION_S2X].at_s;
 	d->into[MOTION_S1R_G] = d->resultant[0].value;
 	d->into[MOTION_S2R_G] = d->resultant[1].value;
 	for (int i = 0; i < MOTION_AXES; i++)

@@ -47,7 +47,8 @@ enum motion_derived {
 	MOTION_RESTITUTION, /* upward speed of the centre of gravity of box and plate at the release, over
 	                       that of impact */
 	MOTION_SPIN_RAD_S,
-	MOTION_LAG_S, /* S1's largest resultant after S2's */
+	MOTION_LAG_S,   /* S1's largest resultant after S2's */
+	MOTION_LAG_X_S, /* S1X's largest after S2X's */
 	MOTION_S1R_G,
 	MOTION_S2R_G,
 	MOTION_PEAK_S1X_G, /* largest with its sign; the four axes in order */

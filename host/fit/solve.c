@@ -54,6 +54,18 @@ void solve_back(size_t n, size_t stride, const double *f, double *x)
 	}
 }
 
+void solve_invert(size_t n, const double *factor, double *inverse)
+{
+	for (size_t j = 0; j < n; j++) {
+		double x[FIT_OWN + FIT_COMMON] = {0.0};
+
+		x[j] = 1.0;
+		solve_back(n, n, factor, x);
+		for (size_t i = 0; i < n; i++)
+			inverse[i * n + j] = x[i];
+	}
+}
+
 /* ---- a history at the samples ---- */
 
 struct place {
@@ -100,18 +112,18 @@ void solve_parameters(const struct solve *s, const struct solve_drop *d, double 
 	p[MOTION_LN_SPEED] = d->own[FIT_LN_SPEED];
 }
 
-static bool solve_moves(const struct solve *s, size_t parameter)
+bool solve_moves(const struct solve *s, size_t parameter)
 {
 	return parameter >= MOTION_SHARED || (!s->held && s->prior_sd[parameter] > 0.0);
 }
 
-/* The history, and, with slopes, that of each parameter a step further. */
-static bool solve_histories(struct solve *s, const struct solve_drop *d, bool slopes)
+bool solve_histories(struct solve *s, const struct solve_drop *d, bool slopes)
 {
 	double p[MOTION_PARAMETERS];
 
 	solve_parameters(s, d, p);
-	if (motion_solve(s->scene, p, s->nodes, s->motion, NULL) != 0)
+	if (motion_solve(s->scene, p, s->nodes, s->motion,
+	                 s->derives ? s->derived[slopes ? 0 : 1 + MOTION_PARAMETERS] : NULL) != 0)
 		return false;
 	for (size_t i = 0; slopes && i < MOTION_PARAMETERS; i++) {
 		double was = p[i];
@@ -119,7 +131,8 @@ static bool solve_histories(struct solve *s, const struct solve_drop *d, bool sl
 		if (!solve_moves(s, i))
 			continue;
 		p[i] += steps[i];
-		if (motion_solve(s->scene, p, s->nodes, s->motion + 1 + i, NULL) != 0)
+		if (motion_solve(s->scene, p, s->nodes, s->motion + 1 + i,
+		                 s->derives ? s->derived[1 + i] : NULL) != 0)
 			return false;
 		p[i] = was;
 	}
@@ -227,6 +240,16 @@ static double solve_prior(double value, double centre, double sd)
 	return sd > 0.0 ? (value - centre) * (value - centre) / (sd * sd) : 0.0;
 }
 
+double solve_known(const struct solve *s)
+{
+	double sum = 0.0;
+
+	for (size_t i = 0; i < FIT_COMMON; i++)
+		for (size_t j = 0; j < FIT_COMMON; j++)
+			sum += (s->common[i] - s->centre[i]) * s->known[i][j] * (s->common[j] - s->centre[j]);
+	return sum;
+}
+
 static bool solve_sum(struct solve *s, struct solve_drop *d, bool slopes)
 {
 	if (!solve_histories(s, d, slopes))
@@ -276,15 +299,12 @@ static bool solve_normal(struct solve *s, bool slopes)
 		if (!solve_sum(s, &s->drop[k], slopes))
 			return false;
 	}
-	for (size_t i = 0; i < FIT_COMMON && !s->held; i++) {
-		double sd = s->prior_sd[i];
-
-		s->squares += solve_prior(s->common[i], s->centre[i], sd);
-		if (!slopes)
-			continue;
-		s->a[i][i] += sd > 0.0 ? 1.0 / (sd * sd) : 1.0;
-		s->right[i] += sd > 0.0 ? (s->centre[i] - s->common[i]) / (sd * sd) : 0.0;
-	}
+	s->squares += s->held ? 0.0 : solve_known(s);
+	for (size_t i = 0; i < FIT_COMMON && !s->held && slopes; i++)
+		for (size_t j = 0; j < FIT_COMMON; j++) {
+			s->a[i][j] += s->known[i][j];
+			s->right[i] += s->known[i][j] * (s->centre[j] - s->common[j]);
+		}
 	return isfinite(s->squares);
 }
 
@@ -412,18 +432,6 @@ bool solve_run(struct solve *s, unsigned iterations, double enough)
 }
 
 /* ---- covariance ---- */
-
-static void solve_invert(size_t n, const double *factor, double *inverse)
-{
-	for (size_t j = 0; j < n; j++) {
-		double x[FIT_OWN + FIT_COMMON] = {0.0};
-
-		x[j] = 1.0;
-		solve_back(n, n, factor, x);
-		for (size_t i = 0; i < n; i++)
-			inverse[i * n + j] = x[i];
-	}
-}
 
 /* A drop's own: c^-1 + x S^-1 x^T with x = c^-1 b^T, and with the common ones: -S^-1 x^T. */
 static bool solve_covariance_of(struct solve *s, struct solve_drop *d)

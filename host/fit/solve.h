@@ -31,12 +31,15 @@ struct solve {
 	bool held;                                                           /* the common ones are known */
 	size_t nodes;                                                        /* of the histories */
 	double common[FIT_COMMON], centre[FIT_COMMON], prior_sd[FIT_COMMON]; /* prior_sd 0: held */
-	double share; /* of the envelope in the weights */
+	double known[FIT_COMMON][FIT_COMMON]; /* information of the priors; 1 of one that is held */
+	double share;                         /* of the envelope in the weights */
 	double a[FIT_COMMON][FIT_COMMON], right[FIT_COMMON];
 	double covariance[FIT_COMMON][FIT_COMMON];
 	double squares;        /* with priors */
 	size_t used;           /* samples in it */
-	struct motion *motion; /* [1 + MOTION_PARAMETERS] */
+	struct motion *motion; /* [1 + MOTION_PARAMETERS], and, if `derives`, what is derived of each */
+	bool derives;
+	double derived[2 + MOTION_PARAMETERS][MOTION_DERIVED]; /* the last: of the latest without slopes */
 };
 
 /* Minimises from what common and own are, which it leaves at the minimum. False: nowhere to go. */
@@ -51,6 +54,14 @@ bool solve_covariance(struct solve *s);
 /* The same where the last iteration began, which costs no histories. */
 bool solve_covariance_there(struct solve *s);
 
+/* The history of a drop into motion[0], and, with slopes, those with one parameter a step further, where it
+ * moves. */
+bool solve_histories(struct solve *s, const struct solve_drop *d, bool slopes);
+bool solve_moves(const struct solve *s, size_t parameter);
+
+/* How far the common ones are from their priors. */
+double solve_known(const struct solve *s);
+
 /* Adds the information on the common ones of one drop, its own eliminated. */
 bool solve_information(struct solve *s, struct solve_drop *d, double information[FIT_COMMON][FIT_COMMON]);
 
@@ -63,6 +74,7 @@ void solve_parameters(const struct solve *s, const struct solve_drop *d, double 
 /* In place: a = L L^T of the first n; false unless positive definite. */
 bool solve_factor(size_t n, size_t stride, double *a);
 void solve_back(size_t n, size_t stride, const double *factor, double *x);
+void solve_invert(size_t n, const double *factor, double *inverse);
 double solve_step_of(size_t parameter);
 
 #endif

@@ -286,6 +286,7 @@ static cJSON *build(struct builder *b, const struct report *report)
 		put_all(b, put_object(b, lag, "driven"), QUANTITY_DRIVEN, &a->lag);
 	put_if(b, root, "plate", a->has_plate, QUANTITY_RINGDOWN, &a->plate);
 	put_if(b, root, "rebound", a->has_rebound, QUANTITY_REBOUND, &a->rebound);
+	put_if(b, root, "motion", a->has_motion, QUANTITY_MOTION, &a->motion);
 	put_model(b, root, report);
 	put_verdict(b, root, report->verdict);
 	shock_put(b, root, report);

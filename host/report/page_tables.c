@@ -85,7 +85,7 @@ static void joint(struct page *page)
 	const struct analysis *a = page->report->analysis;
 	FILE *out = page->out;
 
-	if (!a->has_lag && !a->has_plate && !a->has_rebound)
+	if (!a->has_lag && !a->has_plate && !a->has_rebound && !a->has_motion)
 		return;
 	fputs("<h2>S1 against S2</h2>\n<div class=\"scroll\"><table "
 	      "class=\"small\"><tr><th>quantity</th><th>value</th>"
@@ -99,7 +99,14 @@ static void joint(struct page *page)
 		joint_rows(out, QUANTITY_RINGDOWN, &a->plate);
 	if (a->has_rebound)
 		joint_rows(out, QUANTITY_REBOUND, &a->rebound);
+	if (a->has_motion)
+		joint_rows(out, QUANTITY_MOTION, &a->motion);
 	fputs("</table></div>\n", out);
+	if (a->has_motion && a->motion.status != ESTIMATE_OK) {
+		fputs("<p class=\"note\">The body of the fitted scene is not laid over this drop: ", out);
+		html_text(out, a->motion.refused);
+		fputs(".</p>\n", out);
+	}
 }
 
 static void model(struct page *page)

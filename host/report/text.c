@@ -197,7 +197,7 @@ static void write_joint(const struct report *report, FILE *out)
 {
 	const struct analysis *a = report->analysis;
 
-	if (a->has_lag || a->has_plate || a->has_rebound)
+	if (a->has_lag || a->has_plate || a->has_rebound || a->has_motion)
 		fputc('\n', out);
 	if (a->has_lag)
 		write_lag(report, out);
@@ -210,6 +210,14 @@ static void write_joint(const struct report *report, FILE *out)
 		fprintf(out, "rebound:");
 		text_write_all(QUANTITY_REBOUND, &a->rebound, out);
 		fprintf(out, "  %s\n", estimate_status_name(a->rebound.status));
+	}
+	if (a->has_motion && a->motion.status == ESTIMATE_OK) {
+		fprintf(out, "fitted body:");
+		text_write_all(QUANTITY_MOTION, &a->motion, out);
+		fputs("  ok\n", out);
+	} else if (a->has_motion) {
+		(void)text_fill(out, fprintf(out, "fitted body: refused,"), a->motion.refused, "");
+		fputc('\n', out);
 	}
 }
 

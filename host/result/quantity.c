@@ -280,6 +280,8 @@ static void *of_drop(struct result *result, enum quantity_place place)
 		return a->has_plate ? &a->plate : NULL;
 	case QUANTITY_AT_REBOUND:
 		return a->has_rebound ? &a->rebound : NULL;
+	case QUANTITY_AT_MOTION:
+		return a->has_motion ? &a->motion : NULL;
 	case QUANTITY_AT_VERDICT:
 		return result->verdict;
 	default:

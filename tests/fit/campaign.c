@@ -36,6 +36,71 @@ static void tally_print(const char *name, const struct tally *t, double scale)
 		       scale * sqrt(t->bars / t->count), 100.0 * t->within / t->count, t->count);
 }
 
+/* One more drop of each group's product at any angle of 15 to 35 deg, by the scene that the group gave. */
+struct later {
+	struct tally e, contact, lag, lag_x, spin, all;
+	unsigned asked, refused, failed;
+	clock_t cost;
+};
+
+static void later_tally(struct later *l, const struct by_hand_truth *t, const struct fit_drop_result *r)
+{
+	const double truth[] = {t->restitution, t->contact_s, t->lag_s, t->lag_x_s, t->spin_rad_s};
+	const enum motion_derived of[] = {MOTION_RESTITUTION, MOTION_CONTACT_S, MOTION_LAG_S, MOTION_LAG_X_S,
+	                                  MOTION_SPIN_RAD_S};
+	struct tally *to[] = {&l->e, &l->contact, &l->lag, &l->lag_x, &l->spin};
+
+	for (size_t i = 0; i < 5; i++) {
+		double found = i == 4 ? fabs(r->derived[of[i]]) : r->derived[of[i]], off = found - truth[i];
+
+		tally_add(to[i], i == 0 ? off / truth[i] : off,
+		          r->derived_sd[of[i]] / (i == 0 ? truth[i] : 1));
+		tally_add(&l->all, off / r->derived_sd[of[i]], 1);
+		if (getenv("V") && fabs(off) > 3 * r->derived_sd[of[i]])
+			printf("later %zu: %g for %g +- %g\n", i, found, truth[i], r->derived_sd[of[i]]);
+	}
+}
+
+static void later_drop(struct later *l, struct by_hand *h, const struct scene *scene,
+                       const struct fit_options *o, gsl_rng *random)
+{
+	static struct by_hand_drop drop;
+	char message[FIT_MESSAGE_MAX];
+	struct fit_later found;
+	struct by_hand_truth truth;
+	clock_t from;
+	int error;
+
+	h->truth.drop_angle_deg = 15 + 20 * gsl_rng_uniform(random);
+	by_hand_drop(h, random, &drop);
+	from = clock();
+	error = fit_later_drop(scene, &drop.drop, o, &found, message);
+	l->cost += clock() - from;
+	l->asked++;
+	if (error)
+		printf("later failed: %s\n", message);
+	else if (found.doubt.words[0])
+		printf("later doubt at %.1f deg: %s\n", drop.angle_deg, found.doubt.words);
+	l->failed += error != 0;
+	l->refused += !error && found.doubt.words[0];
+	if (error || found.doubt.words[0])
+		return;
+	truth = by_hand_truth(h, &drop);
+	later_tally(l, &truth, &found.drop);
+}
+
+static void later_print(const struct later *l)
+{
+	tally_print("later: restitution, %", &l->e, 100);
+	tally_print("later: contact time, us", &l->contact, 1e6);
+	tally_print("later: lag, us", &l->lag, 1e6);
+	tally_print("later: lag of X, us", &l->lag_x, 1e6);
+	tally_print("later: spin, rad/s", &l->spin, 1);
+	tally_print("later: all, in bars", &l->all, 1);
+	printf("later: %u drops, failed %u, refused %u, CPU %.2f ms each\n", l->asked, l->failed, l->refused,
+	       1e3 * (double)l->cost / CLOCKS_PER_SEC / fmax(l->asked, 1));
+}
+
 static bool is(const char *kind, const char *name)
 {
 	return strcmp(kind, name) == 0;
@@ -81,6 +146,7 @@ int main(int argc, char **argv)
 	double truth_p[MOTION_PARAMETERS], chi2 = 0;
 	gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
 	struct scene scene, start;
+	struct later later = {.asked = 0};
 	clock_t cost = 0;
 
 	if (argc < 6 || count > 16 || scene_read(&scene, argv[1], message) != 0)
@@ -117,7 +183,9 @@ int main(int argc, char **argv)
 			printf("failed: %s\n", message);
 			continue;
 		}
-		chi2 += fit.chi2 / (double)fit.samples;
+		for (unsigned k = 0; k < 4 && !fit.doubt.words[0]; k++)
+			later_drop(&later, &h, &fit.scene, &o, random);
+		chi2 += fit.doubt.chi2 / (double)fit.doubt.samples;
 		same += fit.agreed;
 		if (fit.doubt.words[0]) {
 			refused++;
@@ -170,6 +238,7 @@ int main(int argc, char **argv)
 	       "%.1f, CPU %.3f s each\n",
 	       argv[4], groups, count, failed, refused, wrong, chi2 / (groups - failed),
 	       (double)same / groups, (double)cost / CLOCKS_PER_SEC / groups);
+	later_print(&later);
 	printf("next drop: %.0f deg from %.2f m, gain %.1f\n", fit.next.angle_deg, fit.next.height_m,
 	       fit.next.d_gain);
 	for (int a = 0; a < 4 && groups == 1; a++)

@@ -132,7 +132,7 @@ struct by_hand_truth by_hand_truth(const struct by_hand *h, const struct by_hand
 	struct by_hand_truth truth = {0};
 	struct product p;
 	struct product_reading r;
-	struct peak peak[2] = {{0}};
+	struct peak peak[2] = {{0}}, x[2] = {{0}};
 	double mass = h->truth.mount_plate_mass_kg + h->truth.product_case_mass_kg;
 	double low = 0, depth = 0, up = 0;
 
@@ -145,6 +145,8 @@ struct by_hand_truth by_hand_truth(const struct by_hand *h, const struct by_hand
 		product_read(&p, &r);
 		peak_follow(&peak[0], t, hypot(r.s1_x, r.s1_y));
 		peak_follow(&peak[1], t, hypot(r.s2_x, r.s2_y));
+		peak_follow(&x[0], t, r.s1_x);
+		peak_follow(&x[1], t, r.s2_x);
 		c = cos(p.state[PRODUCT_ANGLE]);
 		s = sin(p.state[PRODUCT_ANGLE]);
 		now = -(p.state[PRODUCT_Y] - p.lever_x_m * c - p.lever_y_m * s);
@@ -155,10 +157,12 @@ struct by_hand_truth by_hand_truth(const struct by_hand *h, const struct by_hand
 			low = depth / (depth - now);
 			truth.contact_s = t - 1e-6 + low * 1e-6;
 			truth.restitution = (up + low * (now_up - up)) / d->speed_m_s;
+			truth.spin_rad_s = fabs(p.state[PRODUCT_SPIN]);
 		}
 		depth = now;
 		up = now_up;
 	}
 	truth.lag_s = peak[0].at_s - peak[1].at_s;
+	truth.lag_x_s = x[0].at_s - x[1].at_s;
 	return truth;
 }

@@ -30,9 +30,10 @@ struct by_hand_drop {
 
 void by_hand_drop(const struct by_hand *h, gsl_rng *random, struct by_hand_drop *d);
 
-/* What is true of it: contact time, restitution of the centre of gravity, lag. */
+/* What is true of it: contact time, restitution of the centre of gravity, lags of resultants and of X, spin.
+ */
 struct by_hand_truth {
-	double contact_s, restitution, lag_s;
+	double contact_s, restitution, lag_s, lag_x_s, spin_rad_s;
 };
 struct by_hand_truth by_hand_truth(const struct by_hand *h, const struct by_hand_drop *d);
 

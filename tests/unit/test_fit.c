@@ -200,24 +200,74 @@ static void test_wrong_wiring_is_refused(void **state)
 	assert_non_null(strstr(message, "no impact"));
 }
 
-static void test_a_later_drop_of_a_known_product(void **state)
+/* As a fit of three drops leaves it. */
+static struct scene known(const struct by_hand *h)
 {
-	const double angle = 30;
-	struct by_hand h = product();
-	struct scene scene = h.truth;
-	struct fit_drop_result r;
-	struct fit_options options;
-	double chi2;
-	size_t samples;
+	const double angles[] = {15, 25, 35};
+	struct by_hand same = *h;
+	struct scene start = h->truth;
 	char message[FIT_MESSAGE_MAX];
 
+	make(&same, DROPS, angles);
+	assert_int_equal(try_fit(&start, DROPS, message), 0);
+	assert_string_equal(fit.doubt.words, "");
+	return fit.scene;
+}
+
+static int try_later(const struct scene *scene, struct by_hand *h, double angle_deg, struct fit_later *later)
+{
+	const struct fit_options options = fit_options_usual(scene);
+	char message[FIT_MESSAGE_MAX];
+
+	make(h, 1, &angle_deg);
+	return fit_later_drop(scene, given, &options, later, message);
+}
+
+static void test_a_later_drop_of_a_known_product(void **state)
+{
+	struct by_hand h = product();
+	struct scene scene = known(&h);
+	struct fit_later later;
+	struct by_hand_truth truth;
+	const double *r = later.drop.derived, *sd = later.drop.derived_sd;
+
 	(void)state;
-	make(&h, 1, &angle);
-	options = fit_options_usual(&scene);
-	assert_int_equal(fit_later_drop(&scene, given, &options, &r, &chi2, &samples, message), 0);
-	assert_true(fabs(r.own[FIT_GAMMA_DEG] - made[0].angle_deg) < 4 * r.sd[FIT_GAMMA_DEG]);
-	assert_true(r.sd[FIT_GAMMA_DEG] < .5);
-	assert_true(chi2 / (double)samples > .85 && chi2 / (double)samples < 1.15);
+	for (double angle = 17; angle < 34; angle += 5) {
+		assert_int_equal(try_later(&scene, &h, angle, &later), 0);
+		assert_string_equal(later.doubt.words, "");
+		assert_true(later.doubt.chi2 / (double)later.doubt.samples < 1.1);
+		truth = by_hand_truth(&h, &made[0]);
+		assert_true(fabs(r[MOTION_RESTITUTION] / truth.restitution - 1) < .02);
+		assert_true(fabs(r[MOTION_RESTITUTION] - truth.restitution) < 3.5 * sd[MOTION_RESTITUTION]);
+		assert_true(fabs(r[MOTION_CONTACT_S] - truth.contact_s) <
+		            fmin(35e-6, 3.5 * sd[MOTION_CONTACT_S]));
+		assert_true(fabs(r[MOTION_LAG_S] - truth.lag_s) < fmin(4.5e-6, 3.5 * sd[MOTION_LAG_S]));
+		assert_true(fabs(r[MOTION_LAG_X_S] - truth.lag_x_s) < fmin(4.5e-6, 3.5 * sd[MOTION_LAG_X_S]));
+		assert_true(fabs(later.drop.own[FIT_GAMMA_DEG] - made[0].angle_deg) <
+		            4 * later.drop.sd[FIT_GAMMA_DEG]);
+	}
+}
+
+static void test_a_later_drop_of_another_product_is_refused(void **state)
+{
+	struct by_hand h = product(), other = h;
+	struct scene scene = known(&h);
+	struct fit_later later;
+
+	(void)state;
+	other.truth.contact_stiffness_n_m15 *= 1.1;
+	assert_int_equal(try_later(&scene, &other, 30, &later), 0);
+	assert_string_not_equal(later.doubt.words, "");
+	other = h;
+	other.truth.contact_restitution += .05;
+	assert_int_equal(try_later(&scene, &other, 20, &later), 0);
+	assert_string_not_equal(later.doubt.words, "");
+	other = h;
+	other.mode_hz = 900;
+	other.mode_share = .1;
+	assert_int_equal(try_later(&scene, &other, 30, &later), 0);
+	assert_non_null(strstr(later.doubt.words, "S2Y is not explained"));
+	assert_int_equal(try_later(&h.truth, &h, 30, &later), DT_E_ARGUMENT);
 }
 
 int main(void)
@@ -231,6 +281,7 @@ int main(void)
 	        cmocka_unit_test(test_gains_that_scatter_more_than_was_said_widen_the_bars),
 	        cmocka_unit_test(test_wrong_wiring_is_refused),
 	        cmocka_unit_test(test_a_later_drop_of_a_known_product),
+	        cmocka_unit_test(test_a_later_drop_of_another_product_is_refused),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -23,11 +23,11 @@ static void check_unit(const struct quantity *q)
 	static const struct {
 		const char *shown, *end;
 		double scale;
-	} units[] = {{"ms", "_s", 1e3},         {"us", "_s", 1e6},  {"s", "_s", 1},
-	             {"mm", "_m", 1e3},         {"g", "_g", 1},     {"g/s", "_g_s", 1},
-	             {"Hz", "_hz", 1},          {"m/s", "_m_s", 1}, {"ppm", "_ppm", 1},
-	             {"m/s2", "_m_s2", 1},      {"ms", "_ms", 1},   {"Hz", "natural_hz", 1},
-	             {"m/s", "velocity_m_s", 1}};
+	} units[] = {{"ms", "_s", 1e3},          {"us", "_s", 1e6},      {"s", "_s", 1},
+	             {"mm", "_m", 1e3},          {"g", "_g", 1},         {"g/s", "_g_s", 1},
+	             {"Hz", "_hz", 1},           {"m/s", "_m_s", 1},     {"ppm", "_ppm", 1},
+	             {"m/s2", "_m_s2", 1},       {"ms", "_ms", 1},       {"Hz", "natural_hz", 1},
+	             {"m/s", "velocity_m_s", 1}, {"rad/s", "_rad_s", 1}, {"deg", "_deg", 1}};
 
 	for (size_t i = 0; i < sizeof(units) / sizeof(units[0]); i++)
 		if (strcmp(q->shown, units[i].shown) == 0 && ends_in(q->key, units[i].end) &&
