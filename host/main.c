@@ -16,6 +16,7 @@ static const struct {
 } commands[] = {
         {"run", command_run, "arm, drop, capture, analyse and report; without --link on a simulated tower"},
         {"analyze", command_analyze, "logged drops and foreign recordings to results"},
+        {"batch", command_batch, "any number of recordings to one union of results, on many processors"},
         {"model", command_model, "what a drop should look like: prediction, sweeps, Monte Carlo"},
         {"fit", command_fit, "a product's parameters from its drops, with uncertainty; the next drop to do"},
         {"scene", command_scene, "a first scene of a product from its masses and sizes"},

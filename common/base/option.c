@@ -231,9 +231,31 @@ static int option_take_row(const struct option_table *table, const struct option
 	}
 }
 
+/* As getopt(3) wants them. */
+static void put_letters(const struct option_table *table, char *letters)
+{
+	for (int i = 0; table->letters != NULL && table->letters[i] != '\0'; i++) {
+		if (table->letters[i] == ' ')
+			continue;
+		*letters++ = table->letters[i];
+		if (table->rows[i].value != NULL)
+			*letters++ = ':';
+	}
+	*letters = '\0';
+}
+
+static int option_of_letter(const struct option_table *table, int option)
+{
+	const char *letter =
+	        table->letters != NULL && option < ROW_OPTION ? strchr(table->letters, option) : NULL;
+
+	return letter != NULL ? ROW_OPTION + (int)(letter - table->letters) : option;
+}
+
 int option_read(const struct option_table *table, void *into, int argc, char **argv)
 {
 	struct option known[OPTION_ROWS_MAX + 2] = {{0}};
+	char letters[2 * OPTION_ROWS_MAX + 2] = "h";
 	int option, code = OPTIONS_READ;
 
 	for (int i = 0; i < table->count && i < OPTION_ROWS_MAX; i++)
@@ -241,15 +263,19 @@ int option_read(const struct option_table *table, void *into, int argc, char **a
 		                           table->rows[i].value != NULL ? required_argument : no_argument,
 		                           NULL, ROW_OPTION + i};
 	known[table->count] = (struct option){"help", no_argument, NULL, 'h'};
+	put_letters(table, letters + 1);
 	opterr = 0;
-	while (code == OPTIONS_READ && (option = getopt_long(argc, argv, "h", known, NULL)) != -1) {
+	while (code == OPTIONS_READ && (option = getopt_long(argc, argv, letters, known, NULL)) != -1) {
 		if (option == 'h') {
 			option_help(table);
 			return OPTIONS_TOLD;
 		}
+		option = option_of_letter(table, option);
 		code = option < ROW_OPTION
 		               ? refuse_word(table, argv[optind - 1])
 		               : option_take_row(table, &table->rows[option - ROW_OPTION], optarg, into);
+		if (code == OPTIONS_READ && table->note != NULL)
+			table->note(into, &table->rows[option - ROW_OPTION], optarg);
 	}
 	if (code == OPTIONS_READ && !table->words && optind != argc)
 		code = option_wrong(table, "'%s' is too much", argv[optind]);

@@ -54,13 +54,18 @@ struct option_row {
 	const char *help; /* --help breaks its lines */
 };
 
+/* Told of each row that was read, with its text (NULL of a flag). */
+typedef void option_note(void *into, const struct option_row *row, const char *text);
+
 struct option_table {
 	const char *program, *command; /* command: NULL in a program without any */
 	const char *head;              /* usage and what it does, up to the rows */
 	const struct option_row *rows;
 	int count;
-	bool words;       /* it takes words beside options */
-	const char *tail; /* behind the rows, or NULL */
+	bool words;          /* it takes words beside options */
+	const char *tail;    /* behind the rows, or NULL */
+	option_note *note;   /* or NULL */
+	const char *letters; /* of the first rows, a blank for none: -j beside --jobs; or NULL */
 };
 
 /* A field's place; another type than the one named does not compile. */

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "common/base/number.h"
+#include "host/command/analyze.h"
 #include "host/command/command.h"
-#include "host/command/evaluate.h"
 #include "host/command/files.h"
 #include "host/command/list.h"
 #include "host/command/repeats.h"
@@ -15,17 +15,6 @@
 #include "host/record/profile.h"
 #include "host/record/read.h"
 #include "host/shock/window.h"
-
-struct arguments {
-	const char *columns, *profile, *save_profile, *scene_file, *band_file;
-	char profile_as_columns[4096];
-	double angle_deg;
-	unsigned drop; /* of the log; 0: all */
-	bool list, every_shock, repeats, presets;
-	unsigned shock; /* of a long record; 0: none by its number */
-	double window_s[2];
-	struct evaluate_options evaluate;
-};
 
 static int take_class(const struct option_table *table, const char *name, const char *text, void *class)
 {
@@ -66,7 +55,7 @@ static int take_window(const struct option_table *table, const char *name, const
 
 static int take_limits(const struct option_table *table, const char *name, const char *text, void *into)
 {
-	struct arguments *arguments = into;
+	struct analyze_arguments *arguments = into;
 
 	arguments->presets = strcmp(text, "list") == 0;
 	if (plan_preset_find(text) == NULL && !arguments->presets)
@@ -76,65 +65,67 @@ static int take_limits(const struct option_table *table, const char *name, const
 }
 
 static const struct option_row rows[] = {
-        OPTION_FLAG("list", struct arguments, list,
+        OPTION_FLAG("list", struct analyze_arguments, list,
                     "what drops a log holds, without analysing them; of a large log an index is kept as "
                     "FILE.index"),
-        OPTION_UNSIGNED("drop", "N", struct arguments, drop, 1, 1e9,
+        OPTION_UNSIGNED("drop", "N", struct analyze_arguments, drop, 1, 1e9,
                         "only the N-th drop of the log, counted from 1 (one FILE only)"),
-        OPTION_UNSIGNED("shock", "N", struct arguments, shock, 1, 1e9,
+        OPTION_UNSIGNED("shock", "N", struct analyze_arguments, shock, 1, 1e9,
                         "only the stretch about the N-th shock of a long record, in the order of time"),
-        OPTION_FLAG("every-shock", struct arguments, every_shock, "a result for each shock of a long record"),
-        OPTION_TAKEN("window", "FROM:TO", struct arguments, window_s, take_window,
+        OPTION_FLAG("every-shock", struct analyze_arguments, every_shock,
+                    "a result for each shock of a long record"),
+        OPTION_TAKEN("window", "FROM:TO", struct analyze_arguments, window_s, take_window,
                      "only so much of the record, s"),
-        OPTION_FLAG("repeats", struct arguments, repeats,
+        OPTION_FLAG("repeats", struct analyze_arguments, repeats,
                     "instead of a result each: one table over all FILEs, drops or shocks as repeats of one "
                     "thing, "
                     "with mean, SD, trend and change"),
         OPTION_TEXT(
-                "columns", "SPEC", struct arguments, columns,
+                "columns", "SPEC", struct analyze_arguments, columns,
                 "what the columns of foreign text are, where it does not tell or tells wrong: one name:unit "
                 "per column, '-' before the unit flips the sign, a lone '-' skips, e.g. "
                 "\"time:ms,fixture:g,board:-g,-\"; units s ms us ns clock, g m/s2 ft/s2 kg (kilo-g), "
                 "g*FACTOR, mV/(10.2mV/g); without a time column say name:unit@RATE_HZ"),
         OPTION_TEXT(
-                "profile", "NAME", struct arguments, profile,
+                "profile", "NAME", struct analyze_arguments, profile,
                 "read foreign files as this profile says; without it, as import.ini in their folder says"),
-        OPTION_TEXT("save-profile", "NAME", struct arguments, save_profile,
+        OPTION_TEXT("save-profile", "NAME", struct analyze_arguments, save_profile,
                     "keep how the first FILE was read as a profile, which may be edited"),
-        OPTION_TEXT("scene", "FILE", struct arguments, scene_file,
+        OPTION_TEXT("scene", "FILE", struct analyze_arguments, scene_file,
                     "compare with the model's prediction for this scene"),
-        OPTION_TAKEN("angle", "DEG", struct arguments, angle_deg, command_angle,
+        OPTION_TAKEN("angle", "DEG", struct analyze_arguments, angle_deg, command_angle,
                      "contact angle, instead of the scene's"),
-        OPTION_NUMBER("lowpass", "HZ", struct arguments, evaluate.lowpass_hz, 1e-3, 1e9,
+        OPTION_NUMBER("lowpass", "HZ", struct analyze_arguments, evaluate.lowpass_hz, 1e-3, 1e9,
                       "zero-phase low-pass before everything else"),
-        OPTION_TAKEN("cfc", "CLASS", struct arguments, evaluate.cfc, take_class,
+        OPTION_TAKEN("cfc", "CLASS", struct analyze_arguments, evaluate.cfc, take_class,
                      "channel frequency class 60, 180, 600 or 1000 (SAE J211, ISO 6487), zero-phase"),
-        OPTION_NUMBER("iepe", "S", struct arguments, evaluate.iepe_time_constant_s, 0, 1e3,
+        OPTION_NUMBER("iepe", "S", struct analyze_arguments, evaluate.iepe_time_constant_s, 0, 1e3,
                       "undo the sensor supply's high-pass of this time constant (0: leave it); without it, "
                       "the scene's where channels are the tower's"),
-        OPTION_TAKEN("family", "NAME", struct arguments, evaluate.family, take_family,
+        OPTION_TAKEN("family", "NAME", struct analyze_arguments, evaluate.family, take_family,
                      "the contact pulse is a half-sine, haversine or sine-power (auto)"),
-        OPTION_PERCENT("tolerance", struct arguments, evaluate.tolerance,
+        OPTION_PERCENT("tolerance", struct analyze_arguments, evaluate.tolerance,
                        "standard uncertainty asked for, of the value (0.5); what it takes is done"),
-        OPTION_FLAG("events", struct arguments, evaluate.show_events,
+        OPTION_FLAG("events", struct analyze_arguments, evaluate.show_events,
                     "list shocks, largest first, and free falls in the table too"),
-        OPTION_NUMBER("event-level", "G", struct arguments, evaluate.events.level_g, 1e-6, 1e9,
+        OPTION_NUMBER("event-level", "G", struct analyze_arguments, evaluate.events.level_g, 1e-6, 1e9,
                       "what leaves its rest by more than this is a shock; without it, 8 sigma of the noise"),
-        OPTION_NUMBER("hold-off", "S", struct arguments, evaluate.events.hold_off_s, 1e-9, 1e3,
+        OPTION_NUMBER("hold-off", "S", struct analyze_arguments, evaluate.events.hold_off_s, 1e-9, 1e3,
                       "a shock is over when nothing has left that level for so long (0.02)"),
-        OPTION_TEXT("band", "CSV", struct arguments, band_file,
+        OPTION_TEXT("band", "CSV", struct analyze_arguments, band_file,
                     "hold a pulse against time_s,lower_g,upper_g; time 0 is where it leaves 10 %"),
-        OPTION_FLAG("band-at-peak", struct arguments, evaluate.band.at_peak,
+        OPTION_FLAG("band-at-peak", struct analyze_arguments, evaluate.band.at_peak,
                     "time 0 of the band is the pulse's peak"),
         OPTION_TAKEN_BY("limits", "PRESET", take_limits,
                         "hold the drop against a test standard's pulse, in place of the scene's [limits]; "
                         "'list' tells them"),
-        OPTION_TEXT("channel", "NAME", struct arguments, evaluate.band.channel,
+        OPTION_TEXT("channel", "NAME", struct analyze_arguments, evaluate.band.channel,
                     "the channel of --band and --limits; without it, the one with the largest peak"),
-        OPTION_FLAG("json", struct arguments, evaluate.json, "one JSON object per drop on standard output"),
-        OPTION_TEXT("html", "PAGE", struct arguments, evaluate.html,
+        OPTION_FLAG("json", struct analyze_arguments, evaluate.json,
+                    "one JSON object per drop on standard output"),
+        OPTION_TEXT("html", "PAGE", struct analyze_arguments, evaluate.html,
                     "write a page (one FILE of one drop, or --drop N)"),
-        OPTION_FLAG("strict", struct arguments, evaluate.strict,
+        OPTION_FLAG("strict", struct analyze_arguments, evaluate.strict,
                     "a flagged record or channel is a failure (exit 3)"),
 };
 
@@ -176,7 +167,7 @@ static int analyze_cut(const struct record *record, double from_s, double to_s, 
 	return code;
 }
 
-static int analyze_shocks(const struct record *record, const struct arguments *arguments)
+static int analyze_shocks(const struct record *record, const struct analyze_arguments *arguments)
 {
 	const struct evaluate_options *options = &arguments->evaluate;
 	struct shock_windows windows;
@@ -207,7 +198,7 @@ static int analyze_shocks(const struct record *record, const struct arguments *a
 	return code;
 }
 
-static int analyze_record(struct record *record, const struct arguments *arguments)
+static int analyze_record(struct record *record, const struct analyze_arguments *arguments)
 {
 	if (arguments->every_shock || arguments->shock > 0)
 		return analyze_shocks(record, arguments);
@@ -217,7 +208,7 @@ static int analyze_record(struct record *record, const struct arguments *argumen
 	return evaluate(record, &arguments->evaluate);
 }
 
-static int analyze_one(const char *file, const struct arguments *arguments)
+static int analyze_one(const char *file, const struct analyze_arguments *arguments)
 {
 	struct record record;
 	int code = files_read(&record, file, arguments->columns, arguments->drop);
@@ -231,7 +222,7 @@ static int analyze_one(const char *file, const struct arguments *arguments)
 
 struct analysing {
 	const char *file;
-	const struct arguments *arguments;
+	const struct analyze_arguments *arguments;
 	unsigned count;
 	int code;
 };
@@ -255,7 +246,7 @@ static int analyze_drop(void *context, const struct log_capture *capture, struct
 	return 0;
 }
 
-static int analyze_each(const char *file, const struct arguments *arguments)
+static int analyze_each(const char *file, const struct analyze_arguments *arguments)
 {
 	struct analysing analysing = {.file = file, .arguments = arguments, .code = COMMAND_DONE};
 	char message[READ_MESSAGE_MAX];
@@ -266,7 +257,7 @@ static int analyze_each(const char *file, const struct arguments *arguments)
 	return COMMAND_INPUT;
 }
 
-static int analyze_file(const char *file, const struct arguments *arguments)
+int analyze_file(const char *file, const struct analyze_arguments *arguments)
 {
 	if (arguments->list)
 		return list_drops(file, arguments->evaluate.json);
@@ -274,7 +265,8 @@ static int analyze_file(const char *file, const struct arguments *arguments)
 	                                                                : analyze_each(file, arguments);
 }
 
-static int analyze_check(const struct arguments *arguments, int argc, char **argv)
+/* What concerns words, and what is shown. */
+static int analyze_check(const struct analyze_arguments *arguments, int argc, char **argv)
 {
 	if (optind == argc)
 		return command_usage("analyze", "no FILE given");
@@ -282,23 +274,30 @@ static int analyze_check(const struct arguments *arguments, int argc, char **arg
 		return command_usage("analyze", "--html takes one FILE, %d are given", argc - optind);
 	if (arguments->drop != 0 && optind + 1 != argc)
 		return command_usage("analyze", "--drop takes one FILE, %d are given", argc - optind);
-	if (arguments->every_shock + (arguments->shock > 0) + !isnan(arguments->window_s[0]) > 1)
-		return command_usage("analyze", "expected one of --shock, --every-shock and --window");
 	if (arguments->evaluate.html != NULL && (arguments->every_shock || arguments->repeats))
 		return command_usage("analyze", "--html goes without --every-shock and --repeats");
-	if (arguments->profile != NULL && (arguments->columns != NULL || arguments->save_profile != NULL))
-		return command_usage("analyze", "--profile goes without --columns and --save-profile");
+	if (arguments->profile != NULL && arguments->save_profile != NULL)
+		return command_usage("analyze", "--profile goes without --save-profile");
 	if (arguments->list && (arguments->drop != 0 || arguments->evaluate.html != NULL))
 		return command_usage("analyze", "--list goes without --drop and --html");
-	if (!isnan(arguments->angle_deg) && arguments->scene_file == NULL)
-		return command_usage("analyze", "--angle needs a --scene to lay it over");
-	if (arguments->band_file == NULL && arguments->evaluate.limits == NULL &&
-	    arguments->evaluate.band.channel != NULL)
-		return command_usage("analyze", "--channel needs a --band or --limits");
-	if (arguments->band_file == NULL && arguments->evaluate.band.at_peak)
-		return command_usage("analyze", "--band-at-peak needs a --band");
 	if (command_is_input("analyze", arguments->evaluate.html, argv[optind]))
 		return COMMAND_USAGE;
+	return COMMAND_DONE;
+}
+
+static int analyze_agree(const struct analyze_arguments *arguments, const char *command)
+{
+	if (arguments->every_shock + (arguments->shock > 0) + !isnan(arguments->window_s[0]) > 1)
+		return command_usage(command, "expected one of --shock, --every-shock and --window");
+	if (arguments->profile != NULL && arguments->columns != NULL)
+		return command_usage(command, "--profile goes without --columns");
+	if (!isnan(arguments->angle_deg) && arguments->scene_file == NULL)
+		return command_usage(command, "--angle needs a --scene to lay it over");
+	if (arguments->band_file == NULL && arguments->evaluate.limits == NULL &&
+	    arguments->evaluate.band.channel != NULL)
+		return command_usage(command, "--channel needs a --band or --limits");
+	if (arguments->band_file == NULL && arguments->evaluate.band.at_peak)
+		return command_usage(command, "--band-at-peak needs a --band");
 	return COMMAND_DONE;
 }
 
@@ -312,7 +311,55 @@ static int read_band(struct limit_curve *curve, const char *file)
 	return COMMAND_INPUT;
 }
 
-static int analyze_files(const struct files *files, const struct arguments *arguments)
+void analyze_begin(struct analyze_arguments *arguments)
+{
+	*arguments = (struct analyze_arguments){
+	        .angle_deg = NAN, .window_s = {NAN, NAN}, .evaluate = {.iepe_time_constant_s = NAN}};
+}
+
+int analyze_rows(struct option_row into[OPTION_ROWS_MAX])
+{
+	static const char *const shows[] = {"list", "drop", "repeats", "save-profile",
+	                                    "json", "html", "events",  NULL};
+	int count = 0;
+
+	for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+		const char *const *name = shows;
+
+		while (*name != NULL && strcmp(*name, rows[i].name) != 0)
+			name++;
+		if (*name == NULL)
+			into[count++] = rows[i];
+	}
+	return count;
+}
+
+int analyze_ready(struct analyze_arguments *arguments, const char *command)
+{
+	int code = analyze_agree(arguments, command);
+
+	if (arguments->profile != NULL) {
+		snprintf(arguments->profile_as_columns, sizeof(arguments->profile_as_columns), "@%s",
+		         arguments->profile);
+		arguments->columns = arguments->profile_as_columns;
+	}
+	if (code == COMMAND_DONE && arguments->scene_file != NULL) {
+		code = evaluate_read_scene(&arguments->scene, arguments->scene_file, arguments->angle_deg);
+		arguments->evaluate.scene = &arguments->scene;
+	}
+	if (code == COMMAND_DONE && arguments->band_file != NULL) {
+		code = read_band(&arguments->band, arguments->band_file);
+		arguments->evaluate.band.curve = &arguments->band;
+	}
+	return code;
+}
+
+void analyze_end(struct analyze_arguments *arguments)
+{
+	limit_free(&arguments->band);
+}
+
+static int analyze_files(const struct files *files, const struct analyze_arguments *arguments)
 {
 	int code = COMMAND_DONE;
 	size_t failed = 0;
@@ -330,7 +377,7 @@ static int analyze_files(const struct files *files, const struct arguments *argu
 	return code;
 }
 
-static int analyze_words(char **words, int count, const struct arguments *arguments)
+static int analyze_words(char **words, int count, const struct analyze_arguments *arguments)
 {
 	char message[READ_MESSAGE_MAX];
 	struct files files;
@@ -402,13 +449,12 @@ static int analyze_presets(bool json)
 
 int command_analyze(int argc, char **argv)
 {
-	struct arguments arguments = {
-	        .angle_deg = NAN, .window_s = {NAN, NAN}, .evaluate = {.iepe_time_constant_s = NAN}};
-	struct limit_curve band = {0};
+	struct analyze_arguments arguments;
 	struct repeats repeats = {.row = NULL};
-	struct scene scene;
-	int code = option_read(&known_options, &arguments, argc, argv);
+	int code;
 
+	analyze_begin(&arguments);
+	code = option_read(&known_options, &arguments, argc, argv);
 	if (code != OPTIONS_READ)
 		return code;
 	if (arguments.presets)
@@ -416,22 +462,11 @@ int command_analyze(int argc, char **argv)
 	code = analyze_check(&arguments, argc, argv);
 	if (arguments.repeats)
 		arguments.evaluate.repeats = &repeats;
-	if (arguments.profile != NULL) {
-		snprintf(arguments.profile_as_columns, sizeof(arguments.profile_as_columns), "@%s",
-		         arguments.profile);
-		arguments.columns = arguments.profile_as_columns;
-	}
-	if (code == COMMAND_DONE && arguments.scene_file != NULL) {
-		code = evaluate_read_scene(&scene, arguments.scene_file, arguments.angle_deg);
-		arguments.evaluate.scene = &scene;
-	}
-	if (code == COMMAND_DONE && arguments.band_file != NULL) {
-		code = read_band(&band, arguments.band_file);
-		arguments.evaluate.band.curve = &band;
-	}
+	if (code == COMMAND_DONE)
+		code = analyze_ready(&arguments, "analyze");
 	if (code == COMMAND_DONE)
 		code = analyze_words(argv + optind, argc - optind, &arguments);
 	repeats_free(&repeats);
-	limit_free(&band);
+	analyze_end(&arguments);
 	return code;
 }

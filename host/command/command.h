@@ -21,6 +21,7 @@ enum command_exit {
 
 int command_run(int argc, char **argv);
 int command_analyze(int argc, char **argv);
+int command_batch(int argc, char **argv);
 int command_srs(int argc, char **argv);
 int command_replay(int argc, char **argv);
 int command_convert(int argc, char **argv);

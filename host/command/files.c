@@ -13,7 +13,7 @@
 
 #include "host/command/command.h"
 
-static bool files_add(struct files *files, const char *path)
+bool files_add(struct files *files, const char *path)
 {
 	char *copy = strdup(path);
 

@@ -6,6 +6,7 @@
  * their names (not those of its folders, hidden ones, profiles and indexes), of a pattern (* ? []) in the
  * last part of a path the files that match.
  */
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "host/record/read.h"
@@ -19,6 +20,9 @@ struct files {
 /* A COMMAND_* code; errors were printed, and there is nothing to free then. */
 int files_expand(struct files *files, char **words, int count);
 void files_free(struct files *files);
+
+/* One more; false without memory. */
+bool files_add(struct files *files, const char *path);
 
 /* One file's record, as read_nth has it; a COMMAND_* code, the error printed. */
 int files_read(struct record *record, const char *file, const char *columns, unsigned drop);

@@ -97,18 +97,19 @@ static int profile_read(struct profile *profile, const char *path, char *message
 	return error;
 }
 
-static bool profile_beside(const char *file, char path[4096])
+bool profile_beside(const char *file, char path[PROFILE_PATH_MAX])
 {
 	const char *slash = strrchr(file, '/');
 	int length = slash != NULL ? (int)(slash - file) + 1 : 0;
 
-	return snprintf(path, 4096, "%.*s%s", length, file, BESIDE) < 4096 && access(path, R_OK) == 0;
+	return snprintf(path, PROFILE_PATH_MAX, "%.*s%s", length, file, BESIDE) < PROFILE_PATH_MAX &&
+	       access(path, R_OK) == 0;
 }
 
 int profile_of(struct profile **profile, const char *file, const char *columns,
                char message[READ_MESSAGE_MAX])
 {
-	char path[4096];
+	char path[PROFILE_PATH_MAX];
 
 	*profile = NULL;
 	if (columns == NULL ? !profile_beside(file, path) : columns[0] != '@')

@@ -20,10 +20,10 @@
 #include "host/record/cells.h"
 #include "host/record/read.h"
 
-enum { PROFILE_COLUMNS_MAX = 4096, PROFILE_NAMES_MAX = 1024 };
+enum { PROFILE_PATH_MAX = 4096, PROFILE_COLUMNS_MAX = 4096, PROFILE_NAMES_MAX = 1024 };
 
 struct profile {
-	char path[4096];
+	char path[PROFILE_PATH_MAX];
 	char columns[PROFILE_COLUMNS_MAX];
 	struct cells_style style;
 	char names[PROFILE_NAMES_MAX]; /* "" where any will do */
@@ -34,6 +34,9 @@ struct profile {
  * error told in message. */
 DT_MUST_USE int profile_of(struct profile **profile, const char *file, const char *columns,
                            char message[READ_MESSAGE_MAX]);
+
+/* Whether a profile that can be read lies beside a file, and its path. */
+bool profile_beside(const char *file, char path[PROFILE_PATH_MAX]);
 
 /* Names as a profile has them. */
 void profile_names(const struct piece *name, size_t count, char names[PROFILE_NAMES_MAX]);

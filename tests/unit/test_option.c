@@ -170,9 +170,38 @@ static void a_number_is_the_whole_text(void **state)
 	             number_whole("", 0, 7, &whole) || number_whole("7a", 0, 7, &whole));
 }
 
+static void note(void *into, const struct option_row *row, const char *text)
+{
+	struct given *given = into;
+
+	given->words.word[given->words.count++] = row->name;
+	given->words.word[given->words.count++] = text != NULL ? text : "-";
+}
+
+static void test_letters_and_notes(void **state)
+{
+	struct option_table with = table;
+	char *argv[] = {(char *)(uintptr_t) "verb",     (char *)(uintptr_t) "-n2", (char *)(uintptr_t) "-f",
+	                (char *)(uintptr_t) "--coun=3", (char *)(uintptr_t) "-n",  (char *)(uintptr_t) "1.5"};
+	static const char *const noted[] = {"number", "2", "flag", "-", "count", "3", "number", "1.5"};
+	struct given given = {.flag = false};
+
+	(void)state;
+	with.letters = "f n";
+	with.note = note;
+	optind = 0;
+	assert_int_equal(option_read(&with, &given, 6, argv), OPTIONS_READ);
+	assert_true(given.flag);
+	assert_true(fabs(given.number - 1.5) < 1e-12);
+	assert_int_equal(given.words.count, 8);
+	for (int i = 0; i < 8; i++)
+		assert_string_equal(given.words.word[i], noted[i]);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(test_letters_and_notes),
 	        cmocka_unit_test(every_kind_reaches_its_field),
 	        cmocka_unit_test(what_is_wrong_is_said_and_what_was_expected),
 	        cmocka_unit_test(help_is_the_rows),
