@@ -9,34 +9,13 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "host/base/date.h"
 #include "host/record/digest.h"
 #include "host/archive/quantities.h"
 
 struct archive_filter archive_filter_none(void)
 {
 	return (struct archive_filter){.angle_deg = NAN};
-}
-
-/* YYYY-MM or YYYY-MM-DD in the calendar. */
-static bool is_day(const char *text, size_t length)
-{
-	static const int days[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
-	int year = atoi(text), month = atoi(text + 5), day = length > 7 ? atoi(text + 8) : 1;
-	int leap = month == 2 && (year % 4 == 0 && (year % 100 != 0 || year % 400 == 0));
-
-	return month >= 1 && month <= 12 && day >= 1 && day <= days[month - 1] + leap;
-}
-
-static bool is_date(const char *text)
-{
-	static const char pattern[] = "0000-00-00";
-	size_t length = strlen(text);
-
-	for (size_t i = 0; i < length; i++)
-		if (i >= sizeof(pattern) - 1 ||
-		    (pattern[i] == '-' ? text[i] != '-' : text[i] < '0' || text[i] > '9'))
-			return false;
-	return length == 4 || ((length == 7 || length == 10) && is_day(text, length));
 }
 
 bool archive_parse_dates(const char *text, struct archive_dates *dates, struct archive_filter *filter)
@@ -48,7 +27,7 @@ bool archive_parse_dates(const char *text, struct archive_dates *dates, struct a
 	snprintf(dates->to, sizeof(dates->to), "%.11s", dots != NULL ? dots + 2 : dates->from);
 	filter->from = dates->from;
 	filter->to = dates->to;
-	return is_date(dates->from) && is_date(dates->to);
+	return date_is_period(dates->from) && date_is_period(dates->to);
 }
 
 /* ---- a statement with the conditions that were asked for ---- */

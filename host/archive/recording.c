@@ -14,6 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "host/base/date.h"
 #include "host/result/plan.h"
 #include "host/archive/proof.h"
 
@@ -446,15 +447,13 @@ static int write_calibration(struct archive *archive, const char *sensor, double
 int archive_calibrate(struct archive *archive, const char *sensor, double gain, const char *date,
                       const char *note)
 {
-	struct tm day;
-	const char *end = strptime(date, "%Y-%m-%d", &day);
 	int result = archive_check_name(archive, "sensor", sensor);
 
 	if (result == 0)
 		result = archive_check_text(archive, "note", note);
 	if (result != 0)
 		return result;
-	if (end == NULL || *end != '\0' || strlen(date) != 10)
+	if (!date_is_day(date))
 		return archive_refuse(archive, DT_E_ARGUMENT, "'%.40s' is no date, expected YYYY-MM-DD",
 		                      date);
 	if (!(gain >= 0.1 && gain <= 10))

@@ -4,8 +4,7 @@
 #include <string.h>
 
 #include "common/plain.h"
-
-enum { DAY_CHARS = 10 };
+#include "host/base/date.h"
 
 const struct laboratory_row laboratory_rows[LABORATORY_FIELDS] = {
 #define LABORATORY_FIELD(section, key, clause, need, label) {#section, #key, clause, need, label},
@@ -22,16 +21,6 @@ static bool is_date_field(size_t field)
 {
 	return field == LABORATORY_report_issued || field == LABORATORY_item_received ||
 	       field == LABORATORY_s1_due || field == LABORATORY_s2_due;
-}
-
-static bool is_day(const char *text)
-{
-	if (strlen(text) != DAY_CHARS)
-		return false;
-	for (int i = 0; i < DAY_CHARS; i++)
-		if (i == 4 || i == 7 ? text[i] != '-' : text[i] < '0' || text[i] > '9')
-			return false;
-	return true;
 }
 
 static int laboratory_entry(struct settings *settings, const char *section, const char *name,
@@ -51,7 +40,7 @@ static int laboratory_entry(struct settings *settings, const char *section, cons
 			return settings_fail(settings, DT_E_FORMAT,
 			                     "%.60s is no line of at most %d bytes of UTF-8", name,
 			                     LABORATORY_TEXT_MAX);
-		if (is_date_field(i) && !is_day(value))
+		if (is_date_field(i) && !date_is_day(value))
 			return settings_fail(settings, DT_E_FORMAT, "%.60s is '%.60s', expected YYYY-MM-DD",
 			                     name, value);
 		memcpy(text, value, strlen(value) + 1);
@@ -81,5 +70,5 @@ unsigned laboratory_missing(const struct laboratory *laboratory)
 
 bool laboratory_is_overdue(const struct laboratory *laboratory, enum laboratory_field due, const char *day)
 {
-	return laboratory->text[due][0] != '\0' && strncmp(day, laboratory->text[due], DAY_CHARS) > 0;
+	return laboratory->text[due][0] != '\0' && strncmp(day, laboratory->text[due], DATE_DAY_CHARS) > 0;
 }

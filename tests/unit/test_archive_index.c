@@ -86,6 +86,8 @@ static void test_a_version_1_index_is_migrated(void **state)
 	assert_int_equal(archive_note(archive, "one/1", "Ann", "still here"), 0);
 	assert_int_equal(archive_calibrate(archive, "S1", 1.01, "2026-11-02", ""), 0);
 	assert_int_equal(archive_calibrate(archive, "S1", 1.01, "2026-11-32", ""), DT_E_ARGUMENT);
+	assert_int_equal(archive_calibrate(archive, "S1", 1.01, "2026-02-29", ""), DT_E_ARGUMENT);
+	assert_int_equal(archive_calibrate(archive, "S1", 1.01, "2026-11", ""), DT_E_ARGUMENT);
 	assert_int_equal(archive_calibrate(archive, "S1", 0, "2026-11-02", ""), DT_E_RANGE);
 	archive_close(archive);
 }

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_BASE_DATE_H
+#define DT_HOST_BASE_DATE_H
+/*
+ * Dates of the calendar as people write them. Pure functions.
+ */
+#include <stdbool.h>
+
+enum { DATE_DAY_CHARS = 10 };
+
+/* YYYY-MM-DD. */
+bool date_is_day(const char *text);
+
+/* YYYY, YYYY-MM or YYYY-MM-DD. */
+bool date_is_period(const char *text);
+
+#endif
