@@ -9,8 +9,9 @@
 
 #include "host/archive/print.h"
 #include "tests/unit/archive_stock.h"
+#include "tests/unit/scratch.h"
 
-static char folder[] = "/tmp/droptower-bench-XXXXXX";
+static char folder[SCRATCH_MAX];
 static FILE *nowhere;
 
 static struct archive *open_it(enum archive_mode mode)
@@ -31,7 +32,7 @@ bool bench_archive_make(void)
 	int result;
 
 	nowhere = fopen("/dev/null", "w");
-	if (nowhere == NULL || mkdtemp(folder) == NULL)
+	if (nowhere == NULL || mkdtemp(scratch_name(folder, "bench")) == NULL)
 		return false;
 	archive = open_it(ARCHIVE_CREATE);
 	result = archive_new_series(archive, "first", "bench", "common/scenes/geometry-2A.ini", 25, NAN, 5);

@@ -21,6 +21,7 @@
 #include "host/console/guard.h"
 #include "host/console/hold.h"
 #include "host/console/route.h"
+#include "tests/unit/scratch.h"
 
 static const char token[] = "00112233445566778899aabbccddeeff";
 
@@ -73,12 +74,12 @@ static void write_file(const char *file, const char *text, mode_t mode)
 
 static void test_token_file(void **state)
 {
-	char folder[] = "/tmp/droptower-guard-XXXXXX", file[64], message[GUARD_MESSAGE_MAX];
+	char folder[SCRATCH_MAX], file[SCRATCH_MAX + 8], message[GUARD_MESSAGE_MAX];
 	char made[GUARD_TOKEN_MAX + 1] = "", again[GUARD_TOKEN_MAX + 1] = "untouched";
 	struct stat there;
 
 	(void)state;
-	assert_non_null(mkdtemp(folder));
+	assert_non_null(mkdtemp(scratch_name(folder, "guard")));
 	snprintf(file, sizeof(file), "%s/token", folder);
 	assert_int_equal(guard_read_token(file, made, message), 0);
 	assert_int_equal(stat(file, &there), 0);

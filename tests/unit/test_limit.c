@@ -16,12 +16,13 @@
 #include "host/shock/signal.h"
 #include "tests/unit/near.h"
 #include "tests/unit/synth.h"
+#include "tests/unit/scratch.h"
 
-static char file[] = "/tmp/droptower-limit-XXXXXX";
+static char file[SCRATCH_MAX];
 
 static int make_file(void **state)
 {
-	int fd = mkstemp(file);
+	int fd = mkstemp(scratch_name(file, "limit"));
 
 	(void)state;
 	return fd < 0 ? -1 : close(fd);
@@ -56,7 +57,7 @@ static struct limit_curve made(enum limit_kind kind, const char *text)
 
 static void refuses(enum limit_kind kind, const char *text, const char *place, const char *what)
 {
-	char message[READ_MESSAGE_MAX] = "", wanted[64];
+	char message[READ_MESSAGE_MAX] = "", wanted[SCRATCH_MAX + 64];
 	struct limit_curve curve = {0};
 
 	assert_int_not_equal(parse(&curve, kind, text, message), 0);

@@ -20,6 +20,7 @@
 #include "host/session/loopback.h"
 #include "host/session/mac.h"
 #include "host/session/publish.h"
+#include "tests/unit/scratch.h"
 
 enum {
 	SIZE = 114,
@@ -274,12 +275,12 @@ static void refuses(const char *path, const char *what)
 
 static void key_files(void **state)
 {
-	char folder[] = "/tmp/droptower-proof-XXXXXX", path[64], message[MAC_MESSAGE_MAX];
+	char folder[SCRATCH_MAX], path[SCRATCH_MAX + 8], message[MAC_MESSAGE_MAX];
 	static const mode_t open_to_others[] = {0640, 0620, 0604, 0644, 0610, 0601, 0660, 0666};
 	struct mac_key key;
 
 	(void)state;
-	assert_non_null(mkdtemp(folder));
+	assert_non_null(mkdtemp(scratch_name(folder, "proof")));
 	snprintf(path, sizeof(path), "%s/key", folder);
 	refuses(path, "No such file");
 	write_key(path, 32, 0600);

@@ -18,11 +18,12 @@
 #include <unistd.h>
 
 #include "host/report/pdf.h"
+#include "tests/unit/scratch.h"
 
 #define PAGE "<!DOCTYPE html><title>a page</title>"
 
 /* bin has the browsers, temporary is where their folders are made, and seen what they say of themselves. */
-static char folder[64], bin[80], temporary[80], seen[80];
+static char folder[SCRATCH_MAX], bin[80], temporary[80], seen[80];
 static char message[512];
 
 static int set_up(void **state)
@@ -30,8 +31,7 @@ static int set_up(void **state)
 	char path[256];
 
 	(void)state;
-	strcpy(folder, "/tmp/droptower-pdf-test-XXXXXX");
-	if (!mkdtemp(folder))
+	if (!mkdtemp(scratch_name(folder, "pdf-test")))
 		return 1;
 	snprintf(bin, sizeof(bin), "%s/bin", folder);
 	snprintf(temporary, sizeof(temporary), "%s/with a blank #", folder);

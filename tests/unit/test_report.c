@@ -23,6 +23,7 @@
 #include "host/report/facts.h"
 #include "host/report/picture.h"
 #include "host/report/traces.h"
+#include "tests/unit/scratch.h"
 
 enum { CHANNELS = 6 };
 
@@ -811,10 +812,9 @@ static void test_picture(void **state)
 
 /* ---- the page ---- */
 
-static void make_folder(char path[32])
+static void make_folder(char path[SCRATCH_MAX])
 {
-	strcpy(path, "/tmp/dt-report-XXXXXX");
-	assert_non_null(mkdtemp(path));
+	assert_non_null(mkdtemp(scratch_name(path, "report")));
 }
 
 static char *read_file(const char *path)
@@ -832,7 +832,7 @@ static char *read_file(const char *path)
 /* Makes the page in a folder of its own, which must hold nothing else afterwards. */
 static char *make_page(const struct report *report)
 {
-	char folder[32], path[64], message[200] = "";
+	char folder[SCRATCH_MAX], path[SCRATCH_MAX + 32], message[200] = "";
 	char *page;
 
 	make_folder(folder);
@@ -951,7 +951,7 @@ static void test_html_foreign(void **state)
 static void test_html_unwritable(void **state)
 {
 	struct fixture *f = *state;
-	char message[200] = "", folder[32], path[64];
+	char message[200] = "", folder[SCRATCH_MAX], path[SCRATCH_MAX + 32];
 	struct stat stat_before, stat_after;
 
 	assert_int_equal(report_html(&f->report, "/nowhere/at/all/page.html", message, sizeof(message)),
@@ -970,7 +970,8 @@ static void test_html_unwritable(void **state)
 static void test_html_without_gnuplot(void **state)
 {
 	struct fixture *f = *state;
-	char message[200] = "", folder[32], path[64], *old = strdup(getenv("PATH") ? getenv("PATH") : "");
+	char message[200] = "", folder[SCRATCH_MAX], path[SCRATCH_MAX + 32],
+	     *old = strdup(getenv("PATH") ? getenv("PATH") : "");
 
 	assert_non_null(old);
 	make_folder(folder);

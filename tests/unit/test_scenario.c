@@ -17,6 +17,7 @@
 
 #include "hil/scenario.h"
 #include "hil/tower.h"
+#include "tests/unit/scratch.h"
 
 /* Three lines more than the body has: a mistake in its first line is in line 4. */
 #define HEAD "title = T\n[run]\nscene = common/scenes/geometry-1.ini\n"
@@ -26,8 +27,8 @@ static char message[SCENARIO_MESSAGE_MAX];
 
 static int read_text(struct scenario *scenario, const char *text)
 {
-	char file[] = "/tmp/droptower-scenario-XXXXXX";
-	int fd = mkstemp(file), result;
+	char file[SCRATCH_MAX];
+	int fd = mkstemp(scratch_name(file, "scenario")), result;
 	FILE *out = fdopen(fd, "w");
 
 	assert_non_null(out);

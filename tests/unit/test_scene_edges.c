@@ -17,6 +17,7 @@
 
 #include "common/scenes/scene.h"
 #include "tests/unit/near.h"
+#include "tests/unit/scratch.h"
 
 static char message[SCENE_MESSAGE_MAX];
 
@@ -67,8 +68,9 @@ static void each_contradiction_is_said(void **state)
 /* Geometry 2A with its name and title in other words, and more lines at its end. */
 static int read_with(struct scene *scene, const char *head, const char *tail)
 {
-	char file[] = "/tmp/droptower-scene-XXXXXX", line[256];
-	FILE *in = fopen("common/scenes/geometry-2A.ini", "r"), *out = fdopen(mkstemp(file), "w");
+	char file[SCRATCH_MAX], line[256];
+	FILE *in = fopen("common/scenes/geometry-2A.ini", "r"),
+	     *out = fdopen(mkstemp(scratch_name(file, "scene")), "w");
 	int result;
 
 	assert_non_null(in);

@@ -20,8 +20,9 @@
 #include <unistd.h>
 
 #include "common/link/temporary.h"
+#include "tests/unit/scratch.h"
 
-static char parent[] = "/tmp/droptower-trial-XXXXXX";
+static char parent[SCRATCH_MAX];
 
 static bool is_there(const char *path)
 {
@@ -33,7 +34,7 @@ static bool is_there(const char *path)
 static int begin(void **state)
 {
 	(void)state;
-	return mkdtemp(parent) != NULL && setenv("TMPDIR", parent, 1) == 0 ? 0 : -1;
+	return mkdtemp(scratch_name(parent, "trial")) != NULL && setenv("TMPDIR", parent, 1) == 0 ? 0 : -1;
 }
 
 static int end(void **state)
@@ -103,7 +104,7 @@ static void test_a_killed_ones_folder_is_swept(void **state)
 /* Links of that name, folders without a lock and files are none of ours. */
 static void test_what_is_not_ours_stays(void **state)
 {
-	char path[3][80], kept[80];
+	char path[3][SCRATCH_MAX + 32], kept[SCRATCH_MAX + 32];
 	struct temporary own;
 
 	(void)state;

@@ -14,13 +14,14 @@
 #include <unistd.h>
 
 #include "host/base/whole.h"
+#include "tests/unit/scratch.h"
 
-static char folder[] = "/tmp/droptower-whole-XXXXXX";
+static char folder[SCRATCH_MAX];
 
 static int setup(void **state)
 {
 	(void)state;
-	return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
+	return mkdtemp(scratch_name(folder, "whole")) && chdir(folder) == 0 ? 0 : -1;
 }
 
 static int teardown(void **state)

@@ -17,6 +17,7 @@
 
 #include "host/base/durable.h"
 #include "common/base/text.h"
+#include "tests/unit/scratch.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 #define SANITIZED 1
@@ -107,11 +108,11 @@ static void test_a_file_that_lacks_a_byte_is_told(void **state)
 
 static void test_nothing_is_put_in_the_place_of_something(void **state)
 {
-	char folder[] = "/tmp/droptower-text-XXXXXX", path[64], part[80], *text;
+	char folder[SCRATCH_MAX], path[SCRATCH_MAX + 16], part[SCRATCH_MAX + 24], *text;
 	size_t size;
 
 	(void)state;
-	assert_non_null(mkdtemp(folder));
+	assert_non_null(mkdtemp(scratch_name(folder, "text")));
 	snprintf(path, sizeof(path), "%s/0001.ini", folder);
 	snprintf(part, sizeof(part), "%s.part", path);
 	assert_int_equal(durable_write(path, "kept", 4), 0);
