@@ -171,6 +171,21 @@ const struct chain_entry *chain_find_hash(const struct chain *chain, const char 
 	return NULL;
 }
 
+const struct chain_entry *chain_place(const struct chain *chain, const char *path, int64_t number,
+                                      struct chain_place *place)
+{
+	size_t at = number > 0 && (uint64_t)number <= chain->count ? (size_t)number - 1 : 0;
+
+	if (at < chain->count && chain->entry[at].number != number) /* the chain is broken */
+		for (at = 0; at < chain->count && chain->entry[at].number != number;)
+			at++;
+	if (number < 1 || at >= chain->count || strcmp(chain->entry[at].path, path) != 0)
+		return NULL;
+	*place = (struct chain_place){.number = number};
+	snprintf(place->head, sizeof(place->head), "%s", at > 0 ? chain->entry[at - 1].head : genesis);
+	return &chain->entry[at];
+}
+
 /* ---- growing ---- */
 
 /* The end of the file into tail; how much there is, and where the file ends. */

@@ -58,6 +58,11 @@ struct chain_place {
 /* Finds it, after chain_finish of the entry before it. */
 DT_MUST_USE int chain_next(struct archive *archive, struct chain_place *place);
 
+/* The place of entry NUMBER of path, which a sidecar entered there tells; NULL when path has no such entry.
+ */
+const struct chain_entry *chain_place(const struct chain *chain, const char *path, int64_t number,
+                                      struct chain_place *place);
+
 /* Enters path; the index notes the new head. */
 DT_MUST_USE int chain_enter(struct archive *archive, const struct chain_place *place, const char *path,
                             int64_t bytes, const char *hash);

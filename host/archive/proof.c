@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/archive/proof.h"
+#include "host/archive/indexed.h"
 
 #include <errno.h>
 #include <stdarg.h>
@@ -11,12 +11,17 @@
 
 int proof_open(struct archive *archive, struct proof *proof)
 {
+	int result;
+
 	*proof = (struct proof){.archive = archive, .copy = -1};
-	return chain_load(archive, &proof->chain);
+	result = archive->index != NULL ? sql_number(archive, &proof->noted, "SELECT entries FROM chain", "")
+	                                : DT_E_EMPTY; /* before it is made again */
+	return result != 0 && result != DT_E_EMPTY ? result : chain_load(archive, &proof->chain);
 }
 
 void proof_close(struct proof *proof)
 {
+	indexed_close(proof);
 	chain_free(&proof->chain);
 }
 
@@ -28,12 +33,15 @@ void proof_fault(struct proof *proof, enum proof_part part, bool missing, const 
 	va_start(arguments, format);
 	vsnprintf(text, sizeof(text), format, arguments);
 	va_end(arguments);
+	for (char *tab = text; (tab = strchr(tab, '\t')) != NULL;) /* of a line of a sidecar */
+		*tab = ' ';
 	if (proof->wrong != NULL)
 		proof->wrong(proof->context, text);
 	proof->told++;
 	if (proof->fault[0] == '\0')
 		memcpy(proof->fault, text, sizeof(text));
 	proof->log_or_sidecar |= part != PROOF_RESULT;
+	proof->index |= part == PROOF_INDEX;
 	proof->missing |= missing;
 	proof->altered |= !missing;
 }
@@ -231,33 +239,26 @@ static char *unsealed_text(struct proof *proof)
 
 /* ---- a drop ---- */
 
-/* The index has the log's hash and each result's text, too. */
-static void hold_index(struct proof *proof, const struct sidecar *sidecar)
+/* The log's hash of a sidecar that is what was entered is the one to go by. */
+static void believe(struct proof *proof, const struct sidecar *sidecar)
 {
-	const char *hash = sidecar_value(sidecar, "sha256");
-
-	if (strcmp(hash, proof->hash) == 0)
+	if (!proof->sealed)
 		return;
-	if (!proof->sealed) {
-		proof_fault(proof, PROOF_SIDECAR, false, "%s: altered: sha256 = %.64s, expected %s",
-		            proof->file, hash, proof->hash);
-		return;
-	}
-	proof_fault(proof, PROOF_INDEX, false,
-	            "index.sqlite: altered: SHA-256 %s for the log of %s, expected %.64s", proof->hash,
-	            proof->name, hash);
-	snprintf(proof->hash, sizeof(proof->hash), "%.64s", hash);
+	snprintf(proof->hash, sizeof(proof->hash), "%.64s", sidecar_value(sidecar, "sha256"));
 	proof->bytes = strtoll(sidecar_value(sidecar, "bytes"), NULL, 10);
 }
 
-/* What the index has of a result: 1 with bytes and hash, 0 without any, DT_E_*. */
-static int result_of_index(struct proof *proof, const char *version, int64_t *bytes, char hash[DIGEST_CHARS])
+/* What the index has of a result, held against what the sidecar and its own text say: 1 with bytes and hash
+ * of the text, 0 without any, DT_E_*. */
+static int hold_result_of_index(struct proof *proof, const struct sidecar_result *r, int64_t *bytes,
+                                char hash[DIGEST_CHARS])
 {
 	sqlite3_stmt *s;
-	int result = sql_query(proof->archive, &s,
-	                       "SELECT t.json FROM results r JOIN versions v ON v.id = r.version_id"
-	                       " JOIN texts t ON t.result_id = r.id WHERE r.drop_id = ? AND v.name = ?",
-	                       "is", proof->drop, version);
+	int result =
+	        sql_query(proof->archive, &s,
+	                  "SELECT t.json, r.id, r.time FROM results r JOIN versions v ON v.id = r.version_id"
+	                  " JOIN texts t ON t.result_id = r.id WHERE r.drop_id = ? AND v.name = ?",
+	                  "is", proof->drop, r->version);
 
 	if (result != 0)
 		return result;
@@ -265,6 +266,13 @@ static int result_of_index(struct proof *proof, const char *version, int64_t *by
 	if (result > 0) {
 		*bytes = (int64_t)strlen(sql_text(s, 0));
 		digest_of(sql_text(s, 0), (size_t)*bytes, hash);
+		if (!proof->indexed && r->bytes >= 0 &&
+		    (strcmp(hash, r->hash) != 0 || strcmp(sql_text(s, 2), r->time) != 0))
+			proof_fault(proof, PROOF_RESULT, false,
+			            "index.sqlite: altered: the result of %s by %s is not the one recorded",
+			            proof->name, r->version);
+		result = indexed_hold_result(proof, sqlite3_column_int64(s, 1), sql_text(s, 0));
+		result = result != 0 ? result : 1;
 	}
 	sqlite3_finalize(s);
 	return result;
@@ -281,35 +289,46 @@ static int hold_result(struct proof *proof, const char *text)
 		proof_fault(proof, PROOF_SIDECAR, false, "%s: damaged: result = %.100s", proof->file, text);
 		return 0;
 	}
-	known = result_of_index(proof, r.version, &bytes, hash);
-	if (known < 0)
+	known = hold_result_of_index(proof, &r, &bytes, hash);
+	if (known < 0 || (known == 0 && r.bytes < 0))
 		return known;
-	if (known > 0 && r.bytes >= 0 && strcmp(hash, r.hash) != 0)
-		proof_fault(proof, PROOF_RESULT, false,
-		            "index.sqlite: altered: the result of %s by %s is not the one recorded",
-		            proof->name, r.version);
-	if (known == 0 && r.bytes < 0)
-		return 0;
 	sidecar_json_path(proof->archive, proof->file, r.version, path);
-	proof_of_file(proof, PROOF_RESULT, path + strlen(proof->archive->folder) + 1,
-	              r.bytes >= 0 ? r.bytes : bytes, r.bytes >= 0 ? r.hash : hash, -1);
+	if (proof_of_file(proof, PROOF_RESULT, path + strlen(proof->archive->folder) + 1,
+	                  r.bytes >= 0 ? r.bytes : bytes, r.bytes >= 0 ? r.hash : hash, -1) &&
+	    known == 0 && !proof->indexed)
+		proof_fault(proof, PROOF_RESULT, true, "index.sqlite: missing: the result of %s by %s",
+		            proof->name, r.version);
 	return 0;
 }
 
+/* What no line names: the order of results, the number of the entry. */
+static void hold_entry(struct proof *proof, const struct chain_entry *entry)
+{
+	if (!proof->indexed && entry != NULL && entry->sound)
+		proof_fault(proof, PROOF_INDEX, false,
+		            "index.sqlite: altered: %s: entry = %lld, expected what " CHAIN_FILE
+		            " has as entry %lld",
+		            proof->name, (long long)proof->entry, (long long)entry->number);
+}
+
 /* Takes text. */
-static int proof_hold_text(struct proof *proof, char *text)
+static int proof_hold_text(struct proof *proof, const struct chain_entry *entry, char *text)
 {
 	struct sidecar sidecar = {.file = proof->file};
+	unsigned told = proof->told;
 	const char *at, *line;
 	int result = 0;
 
 	if (sidecar_split(proof->archive, &sidecar, text) != 0) {
 		proof_fault(proof, PROOF_SIDECAR, false, "%s", archive_message(proof->archive));
 	} else {
-		hold_index(proof, &sidecar);
+		result = indexed_hold_drop(proof, entry, &sidecar);
+		believe(proof, &sidecar);
 		at = sidecar.line;
 		while (result == 0 && *(line = sidecar_next(&sidecar, "result", &at)) != '\0')
 			result = hold_result(proof, line);
+		if (result == 0 && proof->told == told)
+			hold_entry(proof, entry);
 	}
 	free(text);
 	return result;
@@ -318,11 +337,11 @@ static int proof_hold_text(struct proof *proof, char *text)
 static int proof_read_row(struct proof *proof, int64_t drop)
 {
 	sqlite3_stmt *s;
-	int result =
-	        sql_query(proof->archive, &s,
-	                  "SELECT s.name || '/' || d.number, d.raw, d.sha256, d.bytes, d.entry FROM drops d"
-	                  " JOIN series s ON s.id = d.series_id WHERE d.id = ?",
-	                  "i", drop);
+	int result = sql_query(
+	        proof->archive, &s,
+	        "SELECT s.name || '/' || d.number, d.raw, d.sha256, d.bytes, d.entry,"
+	        " d.state = 'recording' FROM drops d JOIN series s ON s.id = d.series_id WHERE d.id = ?",
+	        "i", drop);
 
 	if (result != 0)
 		return result;
@@ -333,6 +352,7 @@ static int proof_read_row(struct proof *proof, int64_t drop)
 	snprintf(proof->hash, sizeof(proof->hash), "%s", sql_text(s, 2));
 	proof->bytes = sqlite3_column_int64(s, 3);
 	proof->entry = sqlite3_column_int64(s, 4);
+	proof->begun = sqlite3_column_int(s, 5) != 0;
 	sqlite3_finalize(s);
 	if (result == 0)
 		return archive_refuse(proof->archive, DT_E_UNKNOWN, "no such drop");
@@ -385,26 +405,63 @@ static int proof_mark(struct proof *proof)
 	return proof->fault[0] != '\0' ? remember(proof) : 0;
 }
 
-int proof_of_drop(struct proof *proof, int64_t drop)
+/* A drop that is being recorded, or was interrupted, has nothing to be held against but its row. */
+static int hold_begun(struct proof *proof, const struct chain_entry *entry)
+{
+	struct sidecar sidecar = {.file = proof->file};
+	char *text = entry != NULL ? proof_text(proof, entry) : NULL;
+	int result = 0;
+
+	if (text != NULL && sidecar_split(proof->archive, &sidecar, text) == 0)
+		result = indexed_hold_drop(proof, entry, &sidecar);
+	free(text);
+	return result;
+}
+
+static int hold_recorded(struct proof *proof, const struct chain_entry *entry)
+{
+	char *text = entry != NULL ? sealed_text(proof, entry) : unsealed_text(proof);
+	bool whole = text != NULL;
+	int result = 0;
+
+	entry = chain_find(&proof->chain, proof->file); /* which sealed_text may have read again */
+	if (whole)
+		result = proof_hold_text(proof, entry, text);
+	else if (entry != NULL)
+		result = indexed_hold_drop(proof, entry, NULL);
+	if (result == 0 && !whole)
+		hold_entry(proof, entry);
+	return result;
+}
+
+/* All that is read of the index is of one moment. */
+static int hold_drop(struct proof *proof, int64_t drop)
 {
 	const struct chain_entry *entry;
-	char *text;
 	int result = proof_read_row(proof, drop);
 
 	if (result != 0)
 		return result;
 	proof->log_or_sidecar = proof->missing = proof->altered = proof->unread = false;
+	proof->index = proof->indexed = false;
 	proof->fault[0] = '\0';
 	entry = chain_find(&proof->chain, proof->file);
 	proof->sealed = entry != NULL;
-	text = entry != NULL ? sealed_text(proof, entry) : unsealed_text(proof);
-	if (text != NULL)
-		result = proof_hold_text(proof, text);
-	if (result == 0) {
+	return proof->begun ? hold_begun(proof, entry) : hold_recorded(proof, entry);
+}
+
+int proof_of_drop(struct proof *proof, int64_t drop)
+{
+	int result = sql_script(proof->archive, "SAVEPOINT look");
+
+	if (result != 0)
+		return result;
+	result = hold_drop(proof, drop);
+	if (sql_script(proof->archive, "RELEASE look") != 0 && result == 0)
+		result = DT_E_SYSTEM;
+	if (result == 0 && !proof->begun)
 		proof_of_file(proof, PROOF_LOG, proof->raw, proof->bytes, proof->hash, proof->copy);
-		result = proof_mark(proof);
-	}
-	return result;
+	return result != 0 ? result : proof_mark(proof);
 }
 
 /* ---- before a change ---- */
@@ -424,6 +481,12 @@ int proof_look(struct archive *archive, const char *drop, char fault[ARCHIVE_MES
 	result = proof_of_drop(&proof, place.drop);
 	if (result == 0 && proof.unread)
 		result = archive_refuse(archive, DT_E_SYSTEM, "%.100s: %.500s", drop, archive->unread);
+	if (result == 0 && proof.index)
+		result = archive_refuse(
+		        archive, DT_E_CORRUPT,
+		        "%.100s cannot be changed: %.300s; 'droptower series --rebuild' makes the "
+		        "index again",
+		        drop, proof.fault);
 	if (result == 0)
 		snprintf(fault, ARCHIVE_MESSAGE_MAX, "%s", proof.fault);
 	proof_close(&proof);

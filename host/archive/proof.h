@@ -10,6 +10,7 @@
 struct proof {
 	struct archive *archive;
 	struct chain chain;
+	int64_t noted; /* the last entry that the index knows of: what comes behind was not acknowledged */
 	void (*wrong)(void *context, const char *text); /* NULL: nobody is told */
 	void *context;
 	unsigned told; /* over all drops */
@@ -21,6 +22,11 @@ struct proof {
 	int copy;                /* gets the bytes of the log; -1: nobody does */
 	bool log_or_sidecar;     /* is wrong, rather than a result */
 	bool missing, altered, sealed;
+	bool begun;   /* it is not recorded, says the index */
+	bool index;   /* its row is wrong, which a change would write into its sidecar */
+	bool indexed; /* its row is what the chain has of it, now or as of an entry that was overtaken */
+	bool today;   /* the result at hand was made by today's table of quantities */
+	sqlite3_stmt *place[QUANTITY_PLACES], *columns, *flags; /* of indexed.c, kept for the next drop */
 	bool unread; /* a file is there and could not be read: it may be what was recorded */
 	char fault[ARCHIVE_MESSAGE_MAX]; /* the first; "": none */
 };
@@ -28,19 +34,21 @@ struct proof {
 DT_MUST_USE int proof_open(struct archive *archive, struct proof *proof);
 void proof_close(struct proof *proof);
 
-/* The drop of that row, which is recorded; the index is marked as far as it can be written. */
+/* The drop of that row; the index is marked as far as it can be written. */
 DT_MUST_USE int proof_of_drop(struct proof *proof, int64_t drop);
 
-/* All recorded drops of a series, or of all when it is NULL; number 0: each of them. */
+/* All drops of a series, or of all when it is NULL; number 0: each of them. */
 DT_MUST_USE int proof_of_all(struct proof *proof, const char *series, unsigned number);
 
-/* Every other sidecar of the chain; drops: and whether the index has the drops that the chain has. */
-DT_MUST_USE int proof_of_rest(struct proof *proof, bool drops);
+/* Every other sidecar of the chain, or of a series; drops: and whether the index has the drops that the chain
+ * has. */
+DT_MUST_USE int proof_of_rest(struct proof *proof, const char *series, bool drops);
 
 /* What was entered, when it is there: in its place, or still beside it. To be freed; NULL. */
 char *proof_text(const struct proof *proof, const struct chain_entry *entry);
 
-/* What is wrong with the files of SERIES/NUMBER; "" when nothing is, or it is not recorded. */
+/* What is wrong with the files of SERIES/NUMBER; "" when nothing is, or it is not recorded. DT_E_CORRUPT: its
+ * row is, which a change would write into its sidecar. */
 DT_MUST_USE int proof_look(struct archive *archive, const char *drop, char fault[ARCHIVE_MESSAGE_MAX]);
 
 /* A change writes the sidecar again, so that what was wrong before goes into its history. */

@@ -8,11 +8,15 @@
 #include <string.h>
 
 #include "host/archive/quantities.h"
+#include "host/archive/said.h"
 #include "common/base/text.h"
 
-static bool is_kept(const struct quantity *q)
+const struct quantity *quantities_next(enum quantity_object object, const struct quantity *last)
 {
-	return q->kind != QUANTITY_NAMES;
+	do
+		last = quantity_next(object, last);
+	while (last != NULL && last->kind == QUANTITY_NAMES); /* only JSON has them */
+	return last;
 }
 
 /* Ends the statement in text and prepares it. */
@@ -38,11 +42,10 @@ static void each(FILE *out, const struct quantity_home *home,
 {
 	const struct quantity *q = NULL;
 
-	while ((q = quantity_next(home->object, q)))
-		if (is_kept(q)) {
-			fputs(", ", out);
-			put(out, home, q);
-		}
+	while ((q = quantities_next(home->object, q))) {
+		fputs(", ", out);
+		put(out, home, q);
+	}
 }
 
 static void put_key(FILE *out, const struct quantity_home *home, const struct quantity *q)
@@ -56,19 +59,6 @@ static void put_mark(FILE *out, const struct quantity_home *home, const struct q
 	(void)home;
 	(void)q;
 	fputc('?', out);
-}
-
-/* Where the JSON of a result has it. */
-static void put_path(FILE *out, const struct quantity_home *home, const struct quantity *q)
-{
-	const char *from = home->array[0] ? "c.value" : "t.json";
-
-	if (q->kind == QUANTITY_FLAGS)
-		fprintf(out, "(SELECT group_concat(value, ' ') FROM json_each(%s, '$.%s%s%s'))", from,
-		        home->path, home->path[0] ? "." : "", q->key);
-	else
-		fprintf(out, "json_extract(%s, '$.%s%s%s')", from, home->path, home->path[0] ? "." : "",
-		        q->key);
 }
 
 /* ---- tables ---- */
@@ -99,16 +89,14 @@ static int need_table(struct archive *archive, const struct quantity_home *home)
 	        "CREATE TABLE IF NOT EXISTS %s (result_id INTEGER NOT NULL REFERENCES results(id)"
 	        " ON DELETE CASCADE, subject TEXT NOT NULL, ",
 	        home->table);
-	while ((q = quantity_next(home->object, q)) != NULL)
-		if (is_kept(q))
-			fprintf(text.out, "\"%s\", ", q->key);
+	while ((q = quantities_next(home->object, q)) != NULL)
+		fprintf(text.out, "\"%s\", ", q->key);
 	fputs("PRIMARY KEY (result_id, subject)) WITHOUT ROWID", text.out);
 	if (text_close(&text, 0) != 0)
 		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
 	result = sql_script(archive, text.bytes);
-	while (result == 0 && (q = quantity_next(home->object, q)) != NULL)
-		if (is_kept(q))
-			result = need_column(archive, home->table, q->key);
+	while (result == 0 && (q = quantities_next(home->object, q)) != NULL)
+		result = need_column(archive, home->table, q->key);
 	free(text.bytes);
 	return result;
 }
@@ -127,10 +115,25 @@ int quantities_shape(struct archive *archive)
 	return result;
 }
 
-/* ---- from an analysis ---- */
+/* ---- from an analysis, or from the JSON of one ---- */
+
+/* An object in memory, or else in JSON. */
+static int quantities_bind(struct archive *archive, sqlite3_stmt *s, int at, const struct quantity *q,
+                           const void *object, const cJSON *json)
+{
+	char text[QUANTITY_TEXT_MAX];
+	double number;
+
+	if (json != NULL ? said_words(json, q->key, text) : quantity_words(q, object, text))
+		return sql_bind_text(archive, s, at, text);
+	number = json != NULL ? said_number(json, q->key) : quantity_number(q, object);
+	if (isfinite(number))
+		sqlite3_bind_double(s, at, number);
+	return 0;
+}
 
 static int insert_object(struct archive *archive, int64_t row, const struct quantity_home *home,
-                         const char *subject, const void *object)
+                         const char *subject, const void *object, const cJSON *json)
 {
 	const struct quantity *q = NULL;
 	struct text text;
@@ -149,17 +152,8 @@ static int insert_object(struct archive *archive, int64_t row, const struct quan
 		return result;
 	sqlite3_bind_int64(s, 1, row);
 	result = sql_bind_text(archive, s, 2, subject);
-	while (result == 0 && (q = quantity_next(home->object, q))) {
-		char value[QUANTITY_TEXT_MAX];
-
-		if (!is_kept(q))
-			continue;
-		if (quantity_words(q, object, value))
-			result = sql_bind_text(archive, s, at, value);
-		else if (isfinite(quantity_number(q, object)))
-			sqlite3_bind_double(s, at, quantity_number(q, object));
-		at++;
-	}
+	while (result == 0 && (q = quantities_next(home->object, q)))
+		result = quantities_bind(archive, s, at++, q, object, json);
 	if (result == 0)
 		result = sql_step(archive, s);
 	sqlite3_finalize(s);
@@ -176,55 +170,44 @@ int quantities_insert(struct archive *archive, int64_t row, struct result *said)
 
 		for (size_t i = 0;
 		     result == 0 && (object = result_at(said, (enum quantity_place)p, i, &subject)); i++)
-			result = insert_object(archive, row, &quantity_homes[p], subject, object);
+			result = insert_object(archive, row, &quantity_homes[p], subject, object, NULL);
 	}
 	return result;
 }
 
-/* ---- from the JSON of a result that was recorded ---- */
-
-static int fill_place(struct archive *archive, const struct quantity_home *home, int64_t row)
+static int fill_row(struct archive *archive, int64_t row, const char *text)
 {
-	bool listed = home->array[0] != '\0';
-	struct text text;
-	sqlite3_stmt *s;
-	int result = quantities_begin(archive, &text);
+	cJSON *json = cJSON_Parse(text);
+	int result = json != NULL ? 0 : archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
 
-	if (result != 0)
-		return result;
-	fprintf(text.out, "INSERT OR IGNORE INTO %s (result_id, subject", home->table);
-	each(text.out, home, put_key);
-	if (listed)
-		fprintf(text.out, ") SELECT t.result_id, coalesce(json_extract(c.value, '$.%s'), '')",
-		        strcmp(home->array, "channels") == 0 ? "name" : "sensor");
-	else
-		fputs(") SELECT t.result_id, ''", text.out);
-	each(text.out, home, put_path);
-	fputs(" FROM texts t", text.out);
-	if (listed)
-		fprintf(text.out,
-		        ", json_each(CASE WHEN json_valid(t.json) THEN t.json ELSE '{}' END, '$.%s') c",
-		        home->array);
-	fprintf(text.out,
-	        " WHERE (?1 = 0 OR t.result_id = ?1) AND CASE WHEN json_valid(t.json) THEN json_type(%s, "
-	        "'$%s%s')"
-	        " END = 'object'",
-	        listed ? "c.value" : "t.json", home->path[0] ? "." : "", home->path);
-	result = quantities_query(archive, &s, &text);
-	if (result != 0)
-		return result;
-	sqlite3_bind_int64(s, 1, row);
-	result = sql_step(archive, s);
-	sqlite3_finalize(s);
+	for (int p = 0; p < QUANTITY_PLACES && result == 0; p++) {
+		struct said said;
+
+		for (int i = 0; result == 0 && said_at(json, &quantity_homes[p], i, &said); i++)
+			if (said.object != NULL)
+				result = insert_object(archive, row, &quantity_homes[p], said.subject, NULL,
+				                       said.object);
+	}
+	cJSON_Delete(json);
 	return result;
 }
 
 int quantities_fill(struct archive *archive, int64_t row)
 {
-	int result = 0;
+	sqlite3_stmt *s;
+	int result = sql_query(
+	        archive, &s,
+	        "SELECT result_id, json FROM texts WHERE (?1 = 0 OR result_id = ?1) AND json_valid(json)",
+	        "i", row);
 
-	for (int p = 0; p < QUANTITY_PLACES && result == 0; p++)
-		result = fill_place(archive, &quantity_homes[p], row);
+	if (result != 0)
+		return result;
+	while ((result = sql_step(archive, s)) > 0) {
+		result = fill_row(archive, sqlite3_column_int64(s, 0), sql_text(s, 1));
+		if (result != 0)
+			break;
+	}
+	sqlite3_finalize(s);
 	return result;
 }
 
@@ -258,11 +241,9 @@ static void quantities_read_row(sqlite3_stmt *s, const struct quantity_home *hom
 	const struct quantity *q = NULL;
 	int at = 1;
 
-	while ((q = quantity_next(home->object, q))) {
+	while ((q = quantities_next(home->object, q))) {
 		char text[QUANTITY_TEXT_MAX];
 
-		if (!is_kept(q))
-			continue;
 		if (quantity_words(q, object, text))
 			quantity_set_text(q, object, sql_text(s, at));
 		else
@@ -274,11 +255,9 @@ static void quantities_read_row(sqlite3_stmt *s, const struct quantity_home *hom
 	}
 }
 
-static int read_place(struct archive *archive, int64_t row, enum quantity_place place, struct result *said)
+int quantities_select(struct archive *archive, const struct quantity_home *home, sqlite3_stmt **s)
 {
-	const struct quantity_home *home = &quantity_homes[place];
 	struct text text;
-	sqlite3_stmt *s;
 	int result = quantities_begin(archive, &text);
 
 	if (result != 0)
@@ -286,7 +265,15 @@ static int read_place(struct archive *archive, int64_t row, enum quantity_place 
 	fputs("SELECT subject", text.out);
 	each(text.out, home, put_key);
 	fprintf(text.out, " FROM %s WHERE result_id = ?", home->table);
-	result = quantities_query(archive, &s, &text);
+	return quantities_query(archive, s, &text);
+}
+
+static int read_place(struct archive *archive, int64_t row, enum quantity_place place, struct result *said)
+{
+	const struct quantity_home *home = &quantity_homes[place];
+	sqlite3_stmt *s;
+	int result = quantities_select(archive, home, &s);
+
 	if (result != 0)
 		return result;
 	sqlite3_bind_int64(s, 1, row);

@@ -14,9 +14,17 @@ DT_MUST_USE int quantities_shape(struct archive *archive);
 /* Puts an analysis in. */
 DT_MUST_USE int quantities_insert(struct archive *archive, int64_t row, struct result *said);
 
-/* The same from the text of a result that was recorded, by SQLite: for a rebuild, and for an index from
- * before there were rows. row 0: of all results. */
+/* The same from the text of a result that was recorded: for a rebuild, and for an index from before there
+ * were rows. row 0: of all results. */
 DT_MUST_USE int quantities_fill(struct archive *archive, int64_t row);
+
+/* The rows of a place for a result that is to be bound: subject, then the values in the order of
+ * quantities_next. To be finalized. */
+DT_MUST_USE int quantities_select(struct archive *archive, const struct quantity_home *home,
+                                  sqlite3_stmt **s);
+
+/* As quantity_next, of those that are columns. */
+const struct quantity *quantities_next(enum quantity_object object, const struct quantity *last);
 
 /* Back, with paths and methods left empty. A record that has channels, from its log, keeps what it has but
  * its flags. On success and on error the analysis' channels are to be freed. */

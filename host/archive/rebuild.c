@@ -244,7 +244,7 @@ static int fill_index(struct rebuild *rebuild)
 	if (result == 0)
 		result = proof_of_all(&rebuild->proof, NULL, 0);
 	if (result == 0)
-		result = proof_of_rest(&rebuild->proof, false);
+		result = proof_of_rest(&rebuild->proof, NULL, false);
 	if (result == 0 && chain->broken != 0)
 		proof_fault(&rebuild->proof, PROOF_CHAIN, false, CHAIN_FILE ": broken at entry %lld",
 		            (long long)chain->broken);

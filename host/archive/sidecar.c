@@ -117,6 +117,72 @@ void sidecar_name(const char *raw, char file[ARCHIVE_NAME_MAX + 64])
 	         raw);
 }
 
+/* ---- its text ---- */
+
+/* The row is there. drop: its row, 0 of a series. */
+static int sidecar_text(struct archive *archive, sqlite3_stmt *s, int64_t drop,
+                        const struct chain_place *place, struct text *text)
+{
+	int result = 0;
+
+	if (text_open(text) != 0)
+		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+	sidecar_put_series(text->out, s);
+	if (drop != 0) {
+		sidecar_put_drop(text->out, s);
+		result = put_history(archive, text->out, drop);
+	}
+	fprintf(text->out, "entry = %lld\nprevious = %s\n", (long long)place->number, place->head);
+	if (text_close(text, result) == 0)
+		return 0;
+	return result != 0 ? result : archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+}
+
+/* 1 with the row, to be finalized; 0 when there is none. */
+static int select_row(struct archive *archive, const char *text, int64_t id, sqlite3_stmt **s)
+{
+	int result = sql_query(archive, s, text, "i", id);
+
+	if (result != 0)
+		return result;
+	result = sql_step(archive, *s);
+	if (result <= 0)
+		sqlite3_finalize(*s);
+	return result;
+}
+
+static const char of_drop[] = "SELECT " SERIES_COLUMNS ", d.number, d.state, d.time, d.operator, d.note,"
+                              " d.decision, d.reason, d.raw, d.bytes, d.sha256, d.simulated" SERIES_TABLES
+                              "JOIN drops d ON d.series_id = s.id WHERE d.id = ?";
+static const char of_series[] = "SELECT " SERIES_COLUMNS SERIES_TABLES "WHERE s.id = ?";
+
+static int text_of(struct archive *archive, const char *query, int64_t id, bool drop,
+                   const struct chain_place *place, struct text *text)
+{
+	sqlite3_stmt *s;
+	int result = select_row(archive, query, id, &s);
+
+	if (result <= 0)
+		return result < 0 ? result : archive_refuse(archive, DT_E_UNKNOWN, "no such row");
+	result = sidecar_text(archive, s, drop ? id : 0, place, text);
+	sqlite3_finalize(s);
+	return result;
+}
+
+int sidecar_text_of_drop(struct archive *archive, int64_t drop, const struct chain_place *place,
+                         struct text *text)
+{
+	return text_of(archive, of_drop, drop, true, place, text);
+}
+
+int sidecar_text_of_series(struct archive *archive, int64_t series, const struct chain_place *place,
+                           struct text *text)
+{
+	return text_of(archive, of_series, series, false, place, text);
+}
+
+/* ---- written ---- */
+
 /* The row is there; writes what to says, "raw/..." with any ending. */
 static int sidecar_write_out(struct archive *archive, sqlite3_stmt *s, const char *to, int64_t drop)
 {
@@ -125,19 +191,10 @@ static int sidecar_write_out(struct archive *archive, sqlite3_stmt *s, const cha
 	struct text text;
 	int result = chain_next(archive, &place);
 
+	if (result == 0)
+		result = sidecar_text(archive, s, drop, &place, &text);
 	if (result != 0)
 		return result;
-	if (text_open(&text) != 0)
-		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
-	sidecar_put_series(text.out, s);
-	if (drop != 0) {
-		sidecar_put_drop(text.out, s);
-		result = put_history(archive, text.out, drop);
-	}
-	fprintf(text.out, "entry = %lld\nprevious = %s\n", (long long)place.number, place.head);
-	if (text_close(&text, result) != 0)
-		return result != 0 ? result
-		                   : archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
 	sidecar_name(to, file);
 	result = sidecar_put(archive, file, text.bytes, text.size, &place);
 	free(text.bytes);
@@ -151,19 +208,12 @@ int sidecar_write_drop(struct archive *archive, int64_t drop)
 {
 	char to[ARCHIVE_NAME_MAX + 64];
 	sqlite3_stmt *s;
-	int result = sql_query(archive, &s,
-	                       "SELECT " SERIES_COLUMNS ", d.number, d.state, d.time, d.operator, d.note,"
-	                       " d.decision, d.reason, d.raw, d.bytes, d.sha256, d.simulated" SERIES_TABLES
-	                       "JOIN drops d ON d.series_id = s.id WHERE d.id = ?",
-	                       "i", drop);
+	int result = select_row(archive, of_drop, drop, &s);
 
-	if (result != 0)
+	if (result <= 0)
 		return result;
-	result = sql_step(archive, s);
-	if (result > 0) {
-		snprintf(to, sizeof(to), "%s", sql_text(s, SERIES_COLUMN_COUNT + 7));
-		result = sidecar_write_out(archive, s, to, drop);
-	}
+	snprintf(to, sizeof(to), "%s", sql_text(s, SERIES_COLUMN_COUNT + 7));
+	result = sidecar_write_out(archive, s, to, drop);
 	sqlite3_finalize(s);
 	return result;
 }
@@ -172,16 +222,12 @@ int sidecar_write_series(struct archive *archive, int64_t series)
 {
 	char to[ARCHIVE_NAME_MAX + 64];
 	sqlite3_stmt *s;
-	int result =
-	        sql_query(archive, &s, "SELECT " SERIES_COLUMNS SERIES_TABLES "WHERE s.id = ?", "i", series);
+	int result = select_row(archive, of_series, series, &s);
 
-	if (result != 0)
+	if (result <= 0)
 		return result;
-	result = sql_step(archive, s);
-	if (result > 0) {
-		snprintf(to, sizeof(to), "raw/%.4s/%s/series.ini", sql_text(s, 6), sql_text(s, 1));
-		result = sidecar_write_out(archive, s, to, 0);
-	}
+	snprintf(to, sizeof(to), "raw/%.4s/%s/series.ini", sql_text(s, 6), sql_text(s, 1));
+	result = sidecar_write_out(archive, s, to, 0);
 	sqlite3_finalize(s);
 	return result;
 }

@@ -18,6 +18,13 @@ void sidecar_name(const char *raw, char file[ARCHIVE_NAME_MAX + 64]);
 DT_MUST_USE int sidecar_write_drop(struct archive *archive, int64_t drop);
 DT_MUST_USE int sidecar_write_series(struct archive *archive, int64_t series);
 
+/* What they write of a drop, and of a series, at that place; text is open until text_close. */
+struct text;
+DT_MUST_USE int sidecar_text_of_drop(struct archive *archive, int64_t drop, const struct chain_place *place,
+                                     struct text *text);
+DT_MUST_USE int sidecar_text_of_series(struct archive *archive, int64_t series,
+                                       const struct chain_place *place, struct text *text);
+
 /* A text of somebody's making, at a place of chain_next. file: in the folder. */
 DT_MUST_USE int sidecar_put(struct archive *archive, const char *file, const char *text, size_t size,
                             const struct chain_place *place);

@@ -239,12 +239,13 @@ static int sidecar_read_take_drop(struct archive *archive, const struct sidecar 
 		        sidecar->file, number, name, raw);
 	result = sql_run(archive,
 	                 "INSERT INTO drops (series_id, number, state, decision, reason, operator, note, raw,"
-	                 " bytes, sha256, time, simulated) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-	                 "iissssssissi", series, (int64_t)number, sidecar_value(sidecar, "state"),
+	                 " bytes, sha256, time, simulated)"
+	                 " VALUES (?, ?, ?, ?, ?, ?, ?, ?, CAST(NULLIF(?, '') AS INTEGER), ?, ?, ?)",
+	                 "iisssssssssi", series, (int64_t)number, sidecar_value(sidecar, "state"),
 	                 sidecar_value(sidecar, "decision"), sidecar_value(sidecar, "reason"),
 	                 sidecar_value(sidecar, "operator"), sidecar_value(sidecar, "note"), raw,
-	                 (int64_t)strtoll(sidecar_value(sidecar, "bytes"), NULL, 10),
-	                 sidecar_value(sidecar, "sha256"), sidecar_value(sidecar, "time"),
+	                 sidecar_value(sidecar, "bytes"), sidecar_value(sidecar, "sha256"),
+	                 sidecar_value(sidecar, "time"),
 	                 (int64_t)(strcmp(sidecar_value(sidecar, "simulated"), "1") == 0));
 	*drop = sqlite3_last_insert_rowid(archive->index);
 	return result != 0 ? result : take_events(archive, sidecar, *drop);

@@ -2,17 +2,18 @@
 /*
  * Many drops at once, and what is not a drop's: the chain itself, the sidecars of series and calibrations.
  */
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/archive/proof.h"
+#include "host/archive/indexed.h"
 
 int proof_of_all(struct proof *proof, const char *series, unsigned number)
 {
 	sqlite3_stmt *s;
 	int result = sql_query(proof->archive, &s,
 	                       "SELECT d.id FROM drops d JOIN series s ON s.id = d.series_id"
-	                       " WHERE d.state <> 'recording' AND (?1 IS NULL OR s.name = ?1)"
+	                       " WHERE (?1 IS NULL OR s.name = ?1)"
 	                       " AND (?2 = 0 OR d.number = ?2) ORDER BY d.raw",
 	                       "si", series, (int64_t)number);
 
@@ -56,16 +57,33 @@ static int hold_unknown(struct proof *proof, const struct chain_entry *entry)
 	return 0;
 }
 
-static void hold_sidecar(struct proof *proof, const struct chain_entry *entry)
+/* Of a series or a calibration. */
+static int hold_sidecar(struct proof *proof, const struct chain_entry *entry)
 {
+	struct sidecar sidecar = {.file = entry->path};
 	char *text = proof_text(proof, entry);
+	int result = 0;
 
 	if (text == NULL)
 		proof_of_file(proof, PROOF_SIDECAR, entry->path, entry->bytes, entry->hash, -1);
+	else if (entry->number <= proof->noted && sidecar_split(proof->archive, &sidecar, text) == 0)
+		result = indexed_hold_other(proof, &sidecar);
 	free(text);
+	return result;
 }
 
-int proof_of_rest(struct proof *proof, bool drops)
+/* Whether the drop of this path is of a series; NULL: of any. */
+static bool is_of_series(const char *path, const char *series)
+{
+	const char *name = strrchr(path, '/');
+	size_t length = series != NULL ? strlen(series) : 0;
+
+	return series == NULL ||
+	       (name != NULL && (size_t)(name - path) > length && name[-(ptrdiff_t)length - 1] == '/' &&
+	        strncmp(name - length, series, length) == 0);
+}
+
+int proof_of_rest(struct proof *proof, const char *series, bool drops)
 {
 	const struct chain *chain = &proof->chain;
 	int result = 0;
@@ -73,12 +91,13 @@ int proof_of_rest(struct proof *proof, bool drops)
 	for (size_t i = 0; i < chain->count && result == 0; i++) {
 		const struct chain_entry *entry = &chain->entry[chain->by_path[i]];
 
-		if (entry != chain_find(chain, entry->path) || strcmp(entry->hash, CHAIN_REMOVED) == 0)
+		if (entry != chain_find(chain, entry->path) || strcmp(entry->hash, CHAIN_REMOVED) == 0 ||
+		    !is_of_series(entry->path, series))
 			continue;
-		if (sidecar_is_of_drop(entry->path))
-			result = !drops ? 0 : hold_unknown(proof, entry);
-		else
-			hold_sidecar(proof, entry);
+		if (!sidecar_is_of_drop(entry->path))
+			result = hold_sidecar(proof, entry);
+		else if (drops)
+			result = hold_unknown(proof, entry);
 	}
 	return result;
 }
@@ -98,33 +117,19 @@ static int hold_chain(struct proof *proof)
 	return 0;
 }
 
-/* A series' own sidecar, which the chain has; one from before the chain is held against nothing. */
-static void hold_series(struct proof *proof, const char *series)
-{
-	char place[ARCHIVE_NAME_MAX + 16];
-	int length = snprintf(place, sizeof(place), "/%s/series.ini", series);
-
-	for (size_t i = 0; i < proof->chain.count; i++) {
-		const struct chain_entry *entry = &proof->chain.entry[i];
-		size_t end = strlen(entry->path);
-
-		if (end > (size_t)length && strcmp(entry->path + end - length, place) == 0 &&
-		    entry == chain_find(&proof->chain, entry->path) &&
-		    strcmp(entry->hash, CHAIN_REMOVED) != 0)
-			hold_sidecar(proof, entry);
-	}
-}
-
-/* As a mark of a drop is for who looks without being told. */
-static void verify_series(struct proof *proof, const char *series)
+/* The series' own sidecar, and drops that the index lacks; as a mark of a drop is for who looks without being
+ * told. */
+static int verify_series(struct proof *proof, const char *series)
 {
 	struct archive *archive = proof->archive;
 	unsigned told = proof->told;
+	int result;
 
 	proof->fault[0] = '\0';
-	hold_series(proof, series);
+	result = proof_of_rest(proof, series, true);
 	if (proof->told > told && archive->unread[0] == '\0')
 		snprintf(archive->unread, sizeof(archive->unread), "%s", proof->fault);
+	return result;
 }
 
 int archive_verify_series(struct archive *archive, const char *series,
@@ -141,7 +146,7 @@ int archive_verify_series(struct archive *archive, const char *series,
 	result = hold_chain(&proof);
 	of_chain = proof.told;
 	if (result == 0)
-		verify_series(&proof, series);
+		result = verify_series(&proof, series);
 	result = result != 0 ? result : (int)(proof.told - of_chain);
 	proof_close(&proof);
 	return result;
@@ -160,11 +165,13 @@ int archive_verify(struct archive *archive, const char *series, unsigned number,
 	if (series == NULL)
 		result = hold_chain(&proof);
 	else if (number == 0)
-		verify_series(&proof, series);
+		result = verify_series(&proof, series);
 	if (result == 0)
 		result = proof_of_all(&proof, series, number);
 	if (result == 0 && series == NULL)
-		result = proof_of_rest(&proof, true);
+		result = proof_of_rest(&proof, NULL, true);
+	if (result == 0 && series == NULL)
+		result = indexed_hold_more(&proof);
 	told = (int)proof.told;
 	proof_close(&proof);
 	return result != 0 ? result : told;

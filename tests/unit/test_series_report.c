@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  *
- * The report of a series made by hand: results written here as JSON, logs as CSV. The page is read as text;
+ * The report of a series made by hand: results written here, logs as CSV. The page is read as text;
  * what its tables must say follows from the numbers below, or is asked of the archive.
  */
 #include <stdarg.h>
@@ -15,9 +15,11 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "common/base/text.h"
 #include "host/archive/table.h"
 #include "host/record/drop.h"
 #include "host/record/write.h"
+#include "host/report/report.h"
 #include "host/report/series.h"
 #include "tests/unit/scratch.h"
 
@@ -116,6 +118,18 @@ static struct estimate_channel channel_of(double value)
 	};
 }
 
+static void put_result(const char *drop, struct result *said)
+{
+	struct report report = {
+	        .record = said->record, .analysis = said->analysis, .options = *said->options};
+	struct text json;
+
+	assert_int_equal(text_open(&json), 0);
+	assert_int_equal(text_close(&json, report_json(&report, json.out)), 0);
+	assert_int_equal(archive_result(archive, drop, "1.0-test", said, json.bytes), 0);
+	free(json.bytes);
+}
+
 /* Every value of it another number. S2 X is as asked. */
 static void give_result(const char *drop, double v, enum estimate_status status, unsigned flags)
 {
@@ -155,7 +169,7 @@ static void give_result(const char *drop, double v, enum estimate_status status,
 	}
 	estimates[3].peak.how.status = status;
 	estimates[3].flags = flags;
-	assert_int_equal(archive_result(archive, drop, "1.0-test", &said, "{}"), 0);
+	put_result(drop, &said);
 }
 
 static void decide(const char *drop, enum archive_decision decision, const char *reason)
