@@ -71,7 +71,8 @@ static void bench_watch_end(struct bench *bench)
 		bench->done_ms = -1;
 	else if (bench->done_ms < 0)
 		bench->done_ms = bench_now_ms(bench);
-	if ((bench->done_ms >= 0 && bench_now_ms(bench) - bench->done_ms >= COUNTERS_MS) ||
+	if ((bench->done_ms >= 0 &&
+	     bench_now_ms(bench) - bench->done_ms >= (bench->watch->soon ? 0 : COUNTERS_MS)) ||
 	    bench_now_s(bench) >= bench->watch->end_s)
 		bench->stop = true;
 }

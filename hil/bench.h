@@ -58,6 +58,7 @@ struct bench_options {
 
 struct bench_watch {
 	double end_s;
+	bool soon;                 /* the counters need not be told */
 	struct timeline *timeline; /* NULL: none */
 	struct observe observe;
 	double results[SCENARIO_RESULTS]; /* NAN: did not happen */

@@ -25,8 +25,16 @@ static void begin_span(struct bench *bench, const struct event *event)
 	bench->until_ms[event->action] = bench_now_ms(bench) + (int64_t)(1000 * event->duration_s + 0.5);
 }
 
+/* What goes wrong, other than what is mended or sent. */
+static bool goes_wrong(enum event_action action)
+{
+	return action != EVENT_REPAIR && action != EVENT_SEND && action != EVENT_VERB;
+}
+
 void bench_event(struct bench *bench, const struct event *event)
 {
+	if (bench->watch != NULL && goes_wrong(event->action))
+		observe_event(&bench->watch->observe, bench_now_s(bench));
 	switch (event->action) {
 	case EVENT_FAULT:
 	case EVENT_REPAIR:

@@ -60,6 +60,7 @@ static void latch_energised(struct hazard *hazard, bool asked, double tower_s)
 	if (!(tower_s - hazard->warning_s >= WARNING_MIN_S)) /* NAN fails too */
 		hazard_note(hazard, "latch opened before the warning was over", tower_s);
 	hazard->latch_s = tower_s;
+	hazard->asked |= asked;
 	hazard->captures = 0;
 	hazard->relief_told = false;
 }
@@ -107,6 +108,28 @@ static void hazard_watch_guards(struct hazard *hazard, uint16_t inputs, double t
 	}
 }
 
+/* What falls, whatever the outputs say. */
+static void watch_fall(struct hazard *hazard, const struct tower_truth *truth, double tower_s)
+{
+	const bool dropping = isfinite(truth->latch_open_s) || isfinite(truth->separation_s);
+
+	if (dropping && !hazard->dropping && !hazard->asked)
+		hazard_note(hazard, "frame or product fell and nobody had released", tower_s);
+	hazard->dropping = dropping;
+}
+
+static void watch_brakes(struct hazard *hazard, const struct tower_truth *truth, double tower_s)
+{
+	const bool below = truth->frame_moving && tower_s >= truth->frame_down_s;
+	const bool relieved = hazard->outputs & WIRE_IO_DAMPERS_RELIEVE &&
+	                      (hazard->inputs & CHAIN) == CHAIN &&
+	                      tower_s >= truth->frame_down_s + BRAKE_LATE_S;
+	const bool free_running = below && (relieved || !(hazard->inputs & WIRE_IO_DAMPERS_ENGAGED));
+
+	hazard->unbraked += free_running && !hazard->free_running;
+	hazard->free_running = free_running;
+}
+
 static void watch_relief(struct hazard *hazard, const struct tower_truth *truth, double tower_s)
 {
 	const bool on = hazard->outputs & WIRE_IO_DAMPERS_RELIEVE;
@@ -132,11 +155,8 @@ void hazard_sample(struct hazard *hazard, uint16_t inputs, unsigned captures, co
 	hazard->latch_open_s = truth->latch_open_s;
 	hazard_watch_guards(hazard, inputs, tower_s);
 	watch_relief(hazard, truth, tower_s);
-	if (hazard->state == WIRE_STATE_READY && !hazard->ready_told &&
-	    tower_s - hazard->loss_s > READY_LATE_S) {
-		hazard->ready_told = true;
-		hazard_note(hazard, "READY with a guard lost and not acknowledged", tower_s);
-	}
+	watch_fall(hazard, truth, tower_s);
+	watch_brakes(hazard, truth, tower_s);
 }
 
 /* ---- what it says ---- */
@@ -156,6 +176,11 @@ void hazard_state(struct hazard *hazard, uint8_t state, const struct tower_truth
 	if (hazard->state != UINT8_MAX && wire_state_moving(hazard->state) && !wire_state_moving(state) &&
 	    truth->frame_away)
 		hazard_note(hazard, "motion ended with the frame in the rails", tower_s);
+	if (state == WIRE_STATE_READY && !hazard->ready_told && tower_s - hazard->loss_s > READY_LATE_S) {
+		hazard->ready_told = true;
+		hazard_note(hazard, "READY with a guard lost and not acknowledged", tower_s);
+	}
+	hazard->asked &= wire_state_moving(state) || state == WIRE_STATE_ARMED;
 	hazard->state = state;
 }
 

@@ -16,6 +16,7 @@
 
 struct hazard {
 	unsigned count;
+	unsigned unbraked; /* frames that moved on where dampers should have braked them */
 	const char *first; /* what it was, NULL: nothing */
 	double first_s;    /* tower's time */
 
@@ -29,6 +30,9 @@ struct hazard {
 	unsigned unwarned;         /* blocks in a row that should have had a warning */
 	uint8_t state;
 	bool chain_told, ready_told, relief_told, unbraked_told;
+	bool asked;    /* since the frame was last at rest a RELEASE opened its latch */
+	bool dropping; /* frame or product have left their places */
+	bool free_running;
 };
 
 /* dampers_m: travel to them. */

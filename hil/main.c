@@ -264,6 +264,8 @@ static int main_judge(const struct scenario *scenario, const struct line *line,
 	if (watch->observe.hazard.first != NULL)
 		printf("  unsafe at %.3f s: %s\n", watch->observe.hazard.first_s,
 		       watch->observe.hazard.first);
+	if (!isnan(watch->results[SCENARIO_reaction_ms]))
+		printf("  answered after %.3f ms\n", watch->results[SCENARIO_reaction_ms]);
 	free(report.bytes);
 	snprintf(title, sizeof(title), "%s: %s (%s%s)", name, scenario->title, failures ? "FAIL " : "PASS",
 	         failures ? failed : "");
@@ -289,6 +291,7 @@ static int run_scenario(struct line *line)
 	}
 	main_set_options(&line->bench, &scenario);
 	watch.end_s = scenario.run_end_s;
+	watch.soon = scenario.run_safety != 0;
 	if (line->timeline_file != NULL)
 		watch.timeline = timeline_create();
 	line->bench.watch = &watch;

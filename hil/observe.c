@@ -38,9 +38,10 @@ void observe_init(struct observe *observe, const struct scene *scene, double tow
 	observe->state = observe->fault = UINT8_MAX;
 	observe->block_s = -1;
 	observe->hash = 0xCBF29CE484222325u;
-	observe->truth = (struct tower_truth){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, false};
+	observe->truth = (struct tower_truth){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, false, false};
 	observe->release_us = observe->latch_us = observe->latch_s = observe->warning_ms = NAN;
 	observe->relieve_s = observe->dropout_first_us = NAN;
+	observe->event_s = observe->reaction_ms = NAN;
 	hazard_init(&observe->hazard, scene->tower_dampers_m);
 	begin_blocks(observe);
 }
@@ -126,16 +127,32 @@ void observe_at_host(struct observe *observe, const struct frame *frame)
 
 /* ---- what the firmware says ---- */
 
+void observe_event(struct observe *observe, double now_s)
+{
+	observe->event_s = now_s;
+	observe->reaction_ms = NAN;
+}
+
+/* A state that answers what went wrong: a fault, keep out, or disarmed. */
+static bool answers(uint8_t before, uint8_t state)
+{
+	return state == WIRE_STATE_FAULT_HELD || state == WIRE_STATE_FAULT_MOVING ||
+	       state == WIRE_STATE_KEEP_OUT ||
+	       (state == WIRE_STATE_SAFE && (before == WIRE_STATE_READY || before == WIRE_STATE_ARMED));
+}
+
 static void observe_note_state(struct observe *observe, uint8_t state, double tower_s)
 {
 	hazard_state(&observe->hazard, state, &observe->truth, tower_s);
 	if (state == observe->state)
 		return;
+	if (isnan(observe->reaction_ms) && answers(observe->state, state))
+		observe->reaction_ms = 1e3 * (observe->now_s - observe->event_s);
 	observe->state = state;
 	take_note(observe, &observe->path, state);
 }
 
-static void see_block(struct observe *observe, unsigned sensor, const struct frame *frame, double tower_s)
+static void see_block(struct observe *observe, unsigned sensor, const struct frame *frame, double tick_s)
 {
 	struct wire_block block;
 
@@ -144,7 +161,9 @@ static void see_block(struct observe *observe, unsigned sensor, const struct fra
 	if (block.tick_ms < OBSERVE_TICKS)
 		observe->blocks[sensor].sent[block.tick_ms] = 1;
 	observe->block_s = observe->now_s;
-	observe_note_state(observe, block.status & WIRE_STATUS_STATE, tower_s);
+	/* a block that has waited says what was */
+	observe_note_state(observe, block.status & WIRE_STATUS_STATE,
+	                   tick_s + 1e-3 * block.tick_ms * observe->tower_rate);
 	if (sensor == 0)
 		hazard_block(&observe->hazard, block.status & WIRE_STATUS_STATE, block.io);
 }
@@ -318,7 +337,7 @@ static void see_message(struct observe *observe, const struct frame *frame, doub
 	int sensor = observe_block_sensor(frame);
 
 	if (sensor >= 0)
-		see_block(observe, (unsigned)sensor, frame, tower_s);
+		see_block(observe, (unsigned)sensor, frame, tick_s);
 	else if (frame->id == WIRE_ID_STATUS)
 		see_status(observe, frame, tower_s);
 	else if (frame->id == WIRE_ID_EMCY)
@@ -381,6 +400,7 @@ void observe_edge(struct observe *observe, unsigned bit, bool on, double edge_us
 static void see_truth(struct observe *observe, const struct tower_truth *truth)
 {
 	observe->truth.frame_away = truth->frame_away;
+	observe->truth.frame_moving = truth->frame_moving;
 	if (isnan(truth->latch_open_s))
 		return;
 	if (isfinite(truth->impact_s) && truth->impact_s != observe->truth.impact_s) {
@@ -468,6 +488,8 @@ void observe_results(const struct observe *observe, double results[SCENARIO_RESU
 	results[SCENARIO_s2_bursts] = observe->impacts ? (double)observe->bursts : NAN;
 	results[SCENARIO_warning_ms] = observe->warning_ms;
 	tail_results(observe, results);
+	results[SCENARIO_reaction_ms] = observe->reaction_ms;
+	results[SCENARIO_unbraked] = observe->hazard.unbraked;
 	results[SCENARIO_unsafe] = hazard_count(&observe->hazard) + observe->emcy_is_wrong;
 	results[SCENARIO_ledger_sent] = (double)observe->sent_error;
 	results[SCENARIO_ledger_received] = (double)observe->given_error;

@@ -84,6 +84,7 @@ struct observe {
 
 	struct tower_truth truth; /* of the latest drop that began */
 	unsigned impacts, resets;
+	double event_s, reaction_ms; /* when something went wrong last, and how soon a state answered; NAN */
 	struct hazard hazard;
 	double release_us; /* when the last RELEASE reached the firmware, NAN: never */
 	double latch_us;   /* from there to the latch's edge, NAN */
@@ -100,6 +101,9 @@ void observe_init(struct observe *observe, const struct scene *scene, double tow
 
 /* The firmware started anew: its counters and ticks begin at 0. */
 void observe_reset(struct observe *observe);
+
+/* Something goes wrong now. */
+void observe_event(struct observe *observe, double now_s);
 
 /* An edge of the firmware's output; the tower has not made it yet. */
 void observe_edge(struct observe *observe, unsigned bit, bool on, double edge_us, double tower_s);

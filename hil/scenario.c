@@ -190,19 +190,20 @@ static int scenario_read_entry(struct settings *settings, const char *section, c
 static int scenario_complete(const struct scenario_reading *reading)
 {
 	const struct scenario *scenario = &reading->scenario;
+	const bool all = scenario->run_safety == 0;
 	const char *missing = NULL;
 
 	if (scenario->title[0] == '\0')
 		missing = "title";
 	else if (scenario->scene_file[0] == '\0')
 		missing = "[run] scene";
-	else if (!scenario->end.given)
+	else if (all && !scenario->end.given)
 		missing = "[expect] end";
-	else if (!scenario->fault.given)
+	else if (all && !scenario->fault.given)
 		missing = "[expect] fault";
-	else if (!scenario->emcy.given)
+	else if (all && !scenario->emcy.given)
 		missing = "[expect] emcy";
-	else if (!scenario->marks.given && !(scenario->result[SCENARIO_captures].max <= 0))
+	else if (all && !scenario->marks.given && !(scenario->result[SCENARIO_captures].max <= 0))
 		missing = "[expect] marks";
 	return missing == NULL ? 0
 	                       : settings_refuse(&reading->settings, DT_E_FORMAT, "%s is missing", missing);
@@ -218,6 +219,8 @@ int scenario_read(struct scenario *scenario, const char *file, char message[SCEN
 		*number_in(&reading.scenario, &numbers[i]) = numbers[i].initial;
 	scenario_expect_nominal(&reading.scenario);
 	result = settings_read(&reading.settings);
+	if (reading.scenario.run_safety != 0)
+		scenario_expect_safety(&reading.scenario);
 	if (result == 0)
 		result = scenario_complete(&reading);
 	if (result == 0)

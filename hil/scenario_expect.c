@@ -178,3 +178,16 @@ void scenario_expect_nominal(struct scenario *scenario)
 	scenario->counter[WIRE_COUNTER_frames_sent] = (struct scenario_range){NAN, NAN};
 	scenario->counter[WIRE_COUNTER_frames_received] = (struct scenario_range){NAN, NAN};
 }
+
+void scenario_expect_safety(struct scenario *scenario)
+{
+	const struct scenario_range nothing = {NAN, NAN};
+
+	for (unsigned i = 0; i < LISTS; i++)
+		((struct scenario_list *)(void *)((char *)scenario + lists[i].offset))->given = false;
+	for (unsigned i = 0; i < SCENARIO_RESULTS; i++)
+		if (i != SCENARIO_unsafe && i != SCENARIO_unbraked)
+			scenario->result[i] = nothing;
+	for (unsigned i = 0; i < WIRE_COUNTERS; i++)
+		scenario->counter[i] = nothing;
+}

@@ -31,6 +31,9 @@ int scenario_read_counter(struct scenario_reading *reading, const char *name, co
 /* Everything as expected of a file that says nothing. */
 void scenario_expect_nominal(struct scenario *scenario);
 
+/* Nothing but what must never be. */
+void scenario_expect_safety(struct scenario *scenario);
+
 /* ---- pieces of text ---- */
 
 /* Decimal, or hexadecimal with 0x. */

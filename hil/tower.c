@@ -187,8 +187,10 @@ void tower_fault(struct tower *t, enum tower_fault fault, bool on)
 	if (fault == TOWER_MAGNET_STUCK && t->place == PLACE_MAGNET && !output_on(t, WIRE_IO_MAGNET_HOLD))
 		t->magnet_drops_s = on ? INFINITY : t->now_s + t->scene.tower_magnet_dropout_s;
 	if (fault == TOWER_FRAME_JAMMED && !on && t->frame_state == FRAME_STOPPED &&
-	    t->passed <= MARK_DAMPERS)
+	    t->passed <= MARK_DAMPERS) {
 		t->frame_state = FRAME_MOVING;
+		t->truth.frame_moving = true;
+	}
 	tower_sensors_set_up(t);
 	tower_motion_renew(t);
 	tower_sensors_feel(t, 0);
@@ -229,7 +231,7 @@ void tower_lift(struct tower *t)
 		t->captured[i] = false;
 	t->place = output_on(t, WIRE_IO_MAGNET_HOLD) ? PLACE_MAGNET : PLACE_PIN;
 	t->magnet_drops_s = INFINITY;
-	t->truth = (struct tower_truth){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, false};
+	t->truth = (struct tower_truth){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, false, false};
 	scatter_draw(t);
 	product_init(&t->product, &t->scene, UNITS_RAD(t->truth.angle_deg));
 	product_carry(&t->product, 0);

@@ -47,7 +47,8 @@ struct tower_truth {
 	double angle_deg; /* of this drop, from the start */
 	double separation_travel_m;
 	double frame_speed_at_separation_m_s;
-	bool frame_away; /* now: neither in its latch nor met by the dampers */
+	bool frame_away;   /* now: neither in its latch nor met by the dampers */
+	bool frame_moving; /* now */
 };
 
 enum tower_fault {

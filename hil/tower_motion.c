@@ -157,6 +157,7 @@ void tower_motion_renew(struct tower *t)
 static void frame_stop(struct tower *t, double distance_m)
 {
 	t->frame_state = FRAME_STOPPED;
+	t->truth.frame_moving = false;
 	t->frame = (struct motion){t->now_s, distance_m, 0, 0};
 }
 
@@ -209,7 +210,7 @@ static void latch_opens(struct tower *t)
 		return;
 	t->frame_state = FRAME_MOVING;
 	t->truth.latch_open_s = t->now_s;
-	t->truth.frame_away = true;
+	t->truth.frame_away = t->truth.frame_moving = true;
 	tower_motion_renew(t);
 }
 

@@ -11,8 +11,11 @@ BOARD = $(if $(wildcard /usr/include/unicorn/unicorn.h),$(BUILD)/droptower-firmw
 
 $(call obj,$(BOARD_C)): CPPFLAGS += $(LINUX)
 
-.PHONY: board
+.PHONY: board size
 board: $(BOARD) stm32g474 ## build the program that runs the board's image, if libunicorn is there
+size: $(BUILD)/droptower-bench board ## size, stack and instruction counts of the image that is flashed, against their budgets
+	@hil/board/size $(BUILD)
+
 ifndef SANITIZE
 tests: $(BOARD)
 endif

@@ -244,8 +244,10 @@ static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *unu
 	(void)unused;
 	if (address - BOARD_FLASH >= BOARD_FLASH_BYTES) /* a return, which the processor reports next */
 		return;
-	if (core.depth == 0 && address == board.app_poll && core.idle == 0)
+	if (core.depth == 0 && address == board.app_poll && core.idle == 0) {
 		core.idle = get(UC_ARM_REG_LR) & ~1u;
+		core.level[0].instructions = 0; /* of the start */
+	}
 	if (core.depth == 0 && address == core.idle && !core.pass_idle) {
 		core.at_idle = true;
 		uc_emu_stop(uc);
@@ -391,6 +393,7 @@ static void core_reset(void)
 	core.depth = 0;
 	core.level[0] = (struct level){0};
 	core.at_idle = core.pass_idle = core.waiting = false;
+	core.idle = 0;
 }
 
 static void set_mark(enum board_reset cause)

@@ -46,8 +46,8 @@ static void say(uint8_t state, double time_s)
 /* What a run does otherwise than a good one. */
 struct slip {
 	bool not_acknowledged, short_warning, no_warning, unasked, magnet_early, relief_late,
-	        relief_on_dead_gates, frame_hangs, coils_at_rest, warning_at_rest;
-	uint16_t open_at_release, open_in_fall;
+	        relief_on_dead_gates, frame_hangs, coils_at_rest, warning_at_rest, falls_early;
+	uint16_t open_at_release, open_in_fall, open_below;
 };
 
 static unsigned run(const struct slip *slip)
@@ -55,7 +55,7 @@ static unsigned run(const struct slip *slip)
 	double now = 0;
 
 	memset(&truth, 0, sizeof(truth));
-	truth.latch_open_s = truth.frame_down_s = NAN;
+	truth.latch_open_s = truth.frame_down_s = truth.separation_s = NAN;
 	hazard_init(&hazard, DAMPERS_M);
 	hazard_edge(&hazard, WIRE_IO_MAGNET_HOLD, true, false, 0);
 	sample_until(&now, 0.5, GOOD, 0);
@@ -65,6 +65,8 @@ static unsigned run(const struct slip *slip)
 	sample_until(&now, 1.5, GOOD, 0);
 	say(WIRE_STATE_READY, now);
 	sample_until(&now, 1.6, GOOD, 0);
+	if (slip->falls_early)
+		truth.separation_s = now;
 	if (slip->magnet_early)
 		hazard_edge(&hazard, WIRE_IO_MAGNET_HOLD, false, false, now);
 	sample_until(&now, slip->short_warning ? 2.1 : 1.9, GOOD, 0);
@@ -87,7 +89,10 @@ static unsigned run(const struct slip *slip)
 		truth.frame_down_s = DOWN_S;
 		truth.frame_away = false;
 	}
-	sample_until(&now, slip->relief_late ? DOWN_S + 0.002 : DOWN_S + 0.0005, FREE, 0);
+	truth.frame_moving = true;
+	sample_until(&now, slip->relief_late ? DOWN_S + 0.002 : DOWN_S + 0.0005,
+	             FREE & (uint16_t)~slip->open_below, 0);
+	truth.frame_moving = false;
 	hazard_edge(&hazard, WIRE_IO_DAMPERS_RELIEVE, false, false, now);
 	hazard_edge(&hazard, WIRE_IO_WARNING, false, false, now);
 	say(WIRE_STATE_BRAKED, now);
@@ -105,6 +110,18 @@ static void a_good_drop_counts_nothing(void **state)
 	(void)state;
 	assert_int_equal(run(&(struct slip){0}), 0);
 	assert_null(hazard.first);
+	assert_int_equal(hazard.unbraked, 0);
+}
+
+static void a_frame_without_brakes_is_counted_apart(void **state)
+{
+	(void)state;
+	run(&(struct slip){.relief_late = true});
+	assert_int_equal(hazard.unbraked, 1);
+	assert_int_equal(run(&(struct slip){.open_below = WIRE_IO_DAMPERS_ENGAGED}), 0);
+	assert_int_equal(hazard.unbraked, 1);
+	run(&(struct slip){.relief_late = true, .open_below = WIRE_IO_ESTOP_CLEAR}); /* its contacts brake */
+	assert_int_equal(hazard.unbraked, 0);
 }
 
 static void each_slip_is_counted_once(void **state)
@@ -119,10 +136,11 @@ static void each_slip_is_counted_once(void **state)
 	        {{.no_warning = true},
 	         "no warning while armed",
 	         3},                                            /* armed; then the latch; falling goes on */
-	        {{.unasked = true}, "latch opened unasked", 2}, /* and the relief */
+	        {{.unasked = true}, "latch opened unasked", 3}, /* and the relief, and the frame falls */
 	        {{.magnet_early = true}, "magnet off with the frame at height", 1},
 	        {{.relief_late = true}, "after the frame met them", 1},
 	        {{.frame_hangs = true}, "motion ended", 1},
+	        {{.falls_early = true}, "nobody had released", 1},
 	        {{.open_at_release = WIRE_IO_SUPPLY_GOOD}, "with a guard open", 1},
 	        {{.open_at_release = WIRE_IO_DAMPERS_ENGAGED}, "with a guard open", 1},
 	        {{.open_in_fall = WIRE_IO_DOOR_CLOSED}, "with door or emergency stop open", 1},
@@ -165,7 +183,7 @@ static void a_lost_guard_wants_an_acknowledgement(void **state)
 			double now = 0;
 
 			memset(&truth, 0, sizeof(truth));
-			truth.latch_open_s = truth.frame_down_s = NAN;
+			truth.latch_open_s = truth.frame_down_s = truth.separation_s = NAN;
 			hazard_init(&hazard, DAMPERS_M);
 			sample_until(&now, 0.5, GOOD, 0);
 			hazard_acknowledged(&hazard);
@@ -189,6 +207,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(a_good_drop_counts_nothing),
+	        cmocka_unit_test(a_frame_without_brakes_is_counted_apart),
 	        cmocka_unit_test(each_slip_is_counted_once),
 	        cmocka_unit_test(relief_ends_by_the_clock),
 	        cmocka_unit_test(a_lost_guard_wants_an_acknowledgement),

@@ -286,6 +286,10 @@ static void names_what_is_missing(void **state)
 	}
 	assert_int_equal(read_text(&s, HEAD "[expect]\nend = READY\nfault = NONE\nemcy = -\ncaptures = 0\n"),
 	                 0);
+	assert_int_equal(read_text(&s, HEAD "safety = 1\n"), 0); /* nothing but what must never be */
+	assert_false(s.end.given);
+	assert_true(isnan(s.result[SCENARIO_done].min) && isnan(s.counter[0].min));
+	assert_true(s.result[SCENARIO_unsafe].max == 0 && s.result[SCENARIO_unbraked].max == 0);
 	assert_int_equal(scenario_read(&s, "/nowhere.ini", message), DT_E_SYSTEM);
 }
 

@@ -266,9 +266,9 @@ static bool is_due(void)
 	return now >= due;
 }
 
-/* What follows the core's part of an interrupt; where it begins the counting of instructions stops. The
- * samples stay off when the interrupt returns, so that none comes before control and app_poll have run. */
-__attribute__((noinline)) void board_delivered(bool control)
+/* The samples stay off when the interrupt returns, so that none comes before control and app_poll have run.
+ */
+static void delivered(bool control)
 {
 	if (control)
 		ICSR = ICSR_PENDSVSET;
@@ -291,7 +291,7 @@ static void sample(void)
 		result = lockstep_exchange(instant);
 		if (result != 0)
 			end_run(result);
-		board_delivered(lockstep_deliver());
+		delivered(lockstep_deliver());
 		if (!options.preempt)
 			return;
 	}
@@ -311,16 +311,9 @@ void board_irq_yz(void)
 	sample();
 }
 
-/* As board_delivered. */
-__attribute__((noinline)) void board_controlled(void)
-{
-	__asm__ volatile("" ::: "memory");
-}
-
 void board_pendsv(void)
 {
 	lockstep_control();
-	board_controlled();
 }
 
 /* ---- start ---- */
@@ -433,8 +426,7 @@ void board_watchdog(void)
 		restart(PORT_RESET_WATCHDOG);
 }
 
-/* As board_delivered, for app_poll. */
-__attribute__((noinline)) void board_polled(void)
+static void polled(void)
 {
 	if (lockstep_reset_wanted())
 		restart(PORT_RESET_COMMAND);
@@ -470,6 +462,6 @@ _Noreturn void board_main(void)
 			app_poll();
 		else if (port_time_us() - kicked_us >= LOCKSTEP_WATCHDOG_MS * 1000)
 			restart(PORT_RESET_WATCHDOG);
-		board_polled();
+		polled();
 	}
 }

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 #
-# The emulated Cortex-M4: $(BUILD)/firmware-qemu/firmware.elf, the program that runs it, and its measures.
+# The emulated Cortex-M4: $(BUILD)/firmware-qemu/firmware.elf, the program that runs it.
 
 PACKAGES_TEST += gcc-arm-none-eabi qemu-system-arm python3
 
 M4 = $(BUILD)/firmware-qemu
-M4_C = $(FREESTANDING_C) $(wildcard firmware/port/*.c) $(filter-out %/count.c,$(wildcard firmware/port/qemu/*.c))
+M4_C = $(FREESTANDING_C) $(wildcard firmware/port/*.c) $(wildcard firmware/port/qemu/*.c)
 M4_O = $(M4_C:%.c=$(M4)/obj/%.o)
 M4_CC = arm-none-eabi-gcc
 M4_CPU = -mcpu=cortex-m4 -mthumb -mfloat-abi=soft
 M4_CFLAGS = -std=c11 -O2 -g $(WARNINGS) $(M4_CPU) -ffreestanding -nostdinc \
 	-isystem $(shell $(M4_CC) -print-file-name=include) -fno-common -ffunction-sections -fdata-sections \
-	-fno-tree-loop-distribute-patterns -fstack-usage -Wstack-usage=512 -fcallgraph-info=su,da
+	-fno-tree-loop-distribute-patterns -Wstack-usage=512
 
-.PHONY: qemu size
-qemu: $(M4)/firmware.elf $(M4)/count.so $(BUILD)/droptower-firmware-qemu ## build the firmware for the emulated Cortex-M4
+.PHONY: qemu
+qemu: $(M4)/firmware.elf $(BUILD)/droptower-firmware-qemu ## build the firmware for the emulated Cortex-M4
 ifndef SANITIZE
 tests: qemu
 endif
@@ -32,14 +32,5 @@ $(M4)/firmware.elf: $(M4_O) firmware/port/qemu/link.ld
 $(BUILD)/droptower-firmware-qemu: firmware/port/qemu/droptower-firmware-qemu
 	$(Q)mkdir -p $(@D)
 	$(Q)cp $< $@
-
-# The emulator's plugin that counts instructions.
-$(M4)/count.so: firmware/port/qemu/count.c Makefile
-	$(call say,LINK,$@)
-	$(Q)mkdir -p $(@D)
-	$(Q)$(CC) $(filter-out -fsanitize%,$(CFLAGS)) $(LINUX) -I. -fPIC -shared $< -o $@
-
-size: $(BUILD)/droptower-bench qemu ## size, stack and instruction counts of the firmware on the Cortex-M4, against their budgets
-	@firmware/port/qemu/size $(BUILD)
 
 -include $(M4_O:.o=.d)

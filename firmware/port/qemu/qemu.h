@@ -3,10 +3,8 @@
 #define DT_FIRMWARE_PORT_QEMU_QEMU_H
 /*
  * What the vectors lead to: start at reset, then thread mode, the two sample interrupts, which have one
- * priority, and PendSV below them, the control interrupt. Where board_delivered, board_controlled and
- * board_polled begin, the core's part of them and app_poll have ended (count.c).
+ * priority, and PendSV below them, the control interrupt.
  */
-#include <stdbool.h>
 
 _Noreturn void start(void);
 _Noreturn void board_main(void);
@@ -14,8 +12,5 @@ void board_irq_x(void);
 void board_irq_yz(void);
 void board_pendsv(void);
 void board_watchdog(void); /* returns when the hang was nobody's wish */
-void board_delivered(bool control);
-void board_controlled(void);
-void board_polled(void);
 
 #endif

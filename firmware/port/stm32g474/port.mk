@@ -13,7 +13,7 @@ STM32G474_CC = arm-none-eabi-gcc
 STM32G474_CPU = -mcpu=cortex-m4 -mthumb -mfloat-abi=soft
 STM32G474_CFLAGS = -std=c11 -O2 -g $(WARNINGS) $(STM32G474_CPU) -ffreestanding -nostdinc \
 	-isystem $(shell $(STM32G474_CC) -print-file-name=include) -fno-common -ffunction-sections -fdata-sections \
-	-fno-tree-loop-distribute-patterns -Wstack-usage=512
+	-fno-tree-loop-distribute-patterns -Wstack-usage=512 -fcallgraph-info=su
 
 .PHONY: stm32g474
 stm32g474: $(STM32G474)/firmware.bin ## build the firmware for the board and print its size
