@@ -10,7 +10,7 @@
 /* Over the sensor's own. */
 static const double noises[] = {0.3, 1, 3, 10};
 
-enum { NOISES = sizeof(noises) / sizeof(noises[0]), WIDTH = 1500, HEIGHT = 560 };
+enum { NOISES = sizeof(noises) / sizeof(noises[0]), WIDTH = 1000, HEIGHT = 470 };
 
 /* Colours that the colour-blind tell apart, and marks: open for others' methods, filled for ours. */
 static const struct {
@@ -99,11 +99,11 @@ static void draw_bounds(FILE *out, const struct panel *p, size_t i)
 static void accuracy_draw_panel(FILE *out, const struct panel *p, size_t i)
 {
 	size_t kind = 0, drawn = 0;
-	double left = 0.055 + 0.198 * (double)i;
+	double left = 0.072 + 0.178 * (double)i;
 
 	fprintf(out, "unset arrow\nunset label\nset lmargin at screen %.4f\nset rmargin at screen %.4f\n",
-	        left, left + 0.186);
-	fprintf(out, "set title 'noise %g g' font ',15' offset 0,-0.5\n", p->compare->cells[i].scene.noise_g);
+	        left, left + 0.168);
+	fprintf(out, "set title 'noise %g g' font ',14' offset 0,-0.5\n", p->compare->cells[i].scene.noise_g);
 	if (i > 0)
 		fputs("set format y ''\nunset ylabel\n", out);
 	draw_bounds(out, p, i);
@@ -152,21 +152,22 @@ static bool has_pair(const struct panel *p)
 static void accuracy_draw_legend(FILE *out, const struct panel *p)
 {
 	size_t kind = 0;
-	double y = 0.80;
+	double y = 0.77;
 
-	fputs("reset\nset lmargin at screen 0.855\nset rmargin at screen 0.99\nunset border\nunset tics\n"
-	      "set xrange [0:1]\nset yrange [0:1]\nset tmargin at screen 0.85\nset bmargin at screen 0.13\n",
+	fputs("reset\nset lmargin at screen 0.785\nset rmargin at screen 0.99\nunset border\nunset tics\n"
+	      "set xrange [0:1]\nset yrange [0:1]\nset tmargin at screen 0.80\nset bmargin at screen 0.13\n",
 	      out);
-	fprintf(out, "set label \"%s: error against cost\" at screen 0.012,0.965 font ',18'\n",
+	fprintf(out, "set label \"%s: error against cost\" at screen 0.012,0.955 font ',17'\n",
 	        quantity_text(p->quantity)->title);
 	fprintf(out,
-	        "set label \"Root mean square error over %u drops of known truth: %s. Down and left is "
-	        "better; no "
-	        "unbiased method lies below the line.\" at screen 0.012,0.92 font ',12'\n",
+	        "set label \"Root mean square error over %u drops of known truth: %s.\" at screen "
+	        "0.012,0.91 font ',12'\n"
+	        "set label \"Down and left is better; no unbiased method lies below the line.\" at screen "
+	        "0.012,0.87 font ',12'\n",
 	        p->compare->drops, p->options->about);
 	for (int ours = 1; ours >= 0; ours--) {
 		kind = 0;
-		fprintf(out, "set label '%s' at screen 0.858,%.3f font ',14'\n",
+		fprintf(out, "set label '%s' at screen 0.790,%.3f font ',14'\n",
 		        ours ? "droptower" : "other methods", y);
 		for (size_t m = 0; m < p->methods; m++) {
 			size_t k = kind % MARKS;
@@ -178,7 +179,7 @@ static void accuracy_draw_legend(FILE *out, const struct panel *p)
 				continue;
 			y -= 0.05;
 			fprintf(out,
-			        "set label \"%s%s\" at screen 0.875,%.3f font ',12' point pt %d ps %s lw 2 "
+			        "set label \"%s%s\" at screen 0.808,%.3f font ',12' point pt %d ps %s lw 2 "
 			        "lc "
 			        "rgb '%s' "
 			        "offset 0.8,0\n",
@@ -188,15 +189,15 @@ static void accuracy_draw_legend(FILE *out, const struct panel *p)
 		}
 		y -= 0.08;
 	}
-	fprintf(out, "set arrow from screen 0.862,%.3f to screen 0.885,%.3f nohead lw 2 lc rgb '#000000'\n",
+	fprintf(out, "set arrow from screen 0.795,%.3f to screen 0.822,%.3f nohead lw 2 lc rgb '#000000'\n",
 	        y, y);
-	fprintf(out, "set label 'Cramer-Rao bound' at screen 0.893,%.3f font ',12'\n", y);
+	fprintf(out, "set label 'Cramer-Rao bound' at screen 0.832,%.3f font ',12'\n", y);
 	if (has_pair(p))
-		fprintf(out, "set label '(lower: of X and Y)' at screen 0.893,%.3f font ',12'\n", y -= 0.04);
+		fprintf(out, "set label '(lower: of X and Y)' at screen 0.832,%.3f font ',12'\n", y -= 0.04);
 	if (is_told(p))
 		fprintf(out,
-		        "set label '* is told that it' at screen 0.858,%.3f font ',12'\n"
-		        "set label 'is a half-sine' at screen 0.858,%.3f font ',12'\n",
+		        "set label '* is told that it' at screen 0.790,%.3f font ',12'\n"
+		        "set label 'is a half-sine' at screen 0.790,%.3f font ',12'\n",
 		        y - 0.06, y - 0.10);
 	fputs("plot 2 notitle\n", out);
 }
@@ -213,12 +214,12 @@ static int accuracy_draw(const struct chart_options *options, struct panel *p, c
 	find_ranges(p);
 	fprintf(out,
 	        "set terminal svg size %d,%d dynamic noenhanced font 'sans-serif,13' background '#ffffff'\n"
-	        "set multiplot\nset samples 2\nset logscale xy\nset tmargin at screen 0.85\n"
+	        "set multiplot\nset samples 2\nset logscale xy\nset tmargin at screen 0.80\n"
 	        "set bmargin at screen 0.13\nset grid back lc rgb '#dddddd' lw 1\n",
 	        WIDTH, HEIGHT);
 	fprintf(out, "set xrange [%.4g:%.4g]\nset yrange [%.4g:%.4g]\n", p->cheapest / 2, p->dearest * 2,
 	        p->low / 1.5, p->high * 1.5);
-	fprintf(out, "set xlabel 'us per call'\nset ylabel 'error, %s'\n", text->unit);
+	fprintf(out, "set xlabel 'us per call'\nset ylabel 'error, %s' offset 1,0\n", text->unit);
 	fputs("set xtics (0.01,0.1,1,10,100,1000,10000)\n", out);
 	for (size_t i = 0; i < NOISES; i++)
 		accuracy_draw_panel(out, p, i);

@@ -186,7 +186,7 @@ static void model_accuracy_fill_panel(struct plot_panel *panel, const struct lad
 	        .title = title[q],
 	        .x = {"us a drop", "cost_us", across[0], across[1], true, NULL},
 	        .y = {q ? "" : "mean deviation of peaks, %", "deviation_percent", 1, 3000, true, NULL},
-	        .key = q == LADDER_S2 ? "top right" : NULL,
+	        .key = q == LADDER_BOX ? "at screen 0.55,0.36 left top" : NULL, /* beside it */
 	};
 	for (size_t rung = 0; rung < LADDER_RUNGS; rung++)
 		panel->series[n++] = (struct plot_series){.name = rungs[rung].name,

@@ -216,7 +216,7 @@ static void model_integrators_fill_panel(struct plot_panel *panel, struct curve 
 	*panel = (struct plot_panel){
 	        .title = planar ? "planar: 10 equations, frictionless" : "coupled: 4 equations",
 	        .x = {"us a drop", "cost_us", 2, 3000, true, NULL},
-	        .y = {"largest error of a reading, part of the peak", "error", 1e-14, 1, true, "1e%T"},
+	        .y = {"largest error of a reading, part of the peak", "error", 1e-19, 1, true, "1e%T"},
 	        .region = {{2, 3000, 0.02, 1}},
 	        .label = {{"worse than the model itself is", 200, 0.15, false, false}},
 	        .key = planar ? NULL : "bottom right",

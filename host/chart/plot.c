@@ -6,7 +6,21 @@
 
 #include "host/chart/file.h"
 
-enum { WIDTH = 1320, LEFT = 80, GAP = 95, RIGHT = 25, TOP = 118, PLOT = 400, BOTTOM = 64, LEGEND = 42 };
+/* Shown 838 px wide, as a README is, the smallest text (12) still has 10 px. */
+enum {
+	WIDTH = 1000,
+	LEFT = 76,
+	GAP = 90,
+	RIGHT = 20,
+	HEAD = 94, /* down to the first panel's title, with one line of notes */
+	LINE = 20,
+	TITLE = 46,
+	PLOT = 340,
+	BOTTOM = 60,
+	LEGEND = 40,
+	COLUMNS = 2,
+	NOTE_MOST = 150 /* letters of a line */
+};
 
 /* Pale to dark in one hue: the colour-blind tell by lightness. */
 static const char *const shades[PLOT_SHADES] = {"#f7fbff", "#d3e4f3", "#9ecae1", "#4a90c4", "#08519c"};
@@ -260,18 +274,20 @@ static void plot_panel(FILE *out, const struct plot_panel *p, size_t number)
 	fputs("\n", out);
 }
 
-static void plot_draw_panel(FILE *out, const struct plot *plot, size_t number, double height)
+/* top: of the first panel, from the picture's upper edge. */
+static void plot_draw_panel(FILE *out, const struct plot *plot, size_t number, double top, double height)
 {
 	const struct plot_panel *p = &plot->panel[number];
-	double each = (WIDTH - LEFT - RIGHT - GAP * ((double)plot->panels - 1)) / (double)plot->panels;
-	double left = LEFT + (double)number * (each + GAP);
+	double each = (WIDTH - LEFT - RIGHT - GAP * (COLUMNS - 1.0)) / COLUMNS;
+	double left = LEFT + (double)(number % COLUMNS) * (each + GAP);
 
+	top += (double)(number / COLUMNS) * (TITLE + PLOT + BOTTOM);
 	write_data(out, plot, p, number);
 	fprintf(out,
 	        "unset label\nset lmargin at screen %.4f\nset rmargin at screen %.4f\nset tmargin at screen "
 	        "%.4f\n"
 	        "set bmargin at screen %.4f\nset title \"%s\" font ',14' offset 0,-0.4\n",
-	        left / WIDTH, (left + each) / WIDTH, 1 - TOP / height, (height - TOP - PLOT) / height,
+	        left / WIDTH, (left + each) / WIDTH, 1 - top / height, (height - top - PLOT) / height,
 	        p->title);
 	set_axis(out, 'x', &p->x);
 	set_axis(out, 'y', &p->y);
@@ -287,47 +303,80 @@ static void plot_draw_panel(FILE *out, const struct plot *plot, size_t number, d
 /* ---- the picture ------------------------------------------------------------------------------------------
  */
 
+static void plot_draw_shade(FILE *out, const char *style, const char *text, double x, double y, double height)
+{
+	fprintf(out,
+	        "set object rectangle from screen %.4f,%.4f to screen %.4f,%.4f fc rgb %s\n"
+	        "set label \"%s\" at screen %.4f,%.4f font ',12'\n",
+	        x, y - 8 / height, x + 0.024, y + 8 / height, style, text, x + 0.029, y);
+}
+
 static void plot_draw_legend(FILE *out, const struct plot *plot, double height)
 {
-	double y = 22 / height, x = 0.01;
+	double y = 20 / height, x = 0.01;
+	char style[64];
 
 	fprintf(out, "set label \"%s:\" at screen %.4f,%.4f font ',12'\n", plot->value, x, y);
-	x += 0.0062 * (double)strlen(plot->value) + 0.012;
-	for (int i = 0; i < PLOT_SHADES; i++) {
-		fprintf(out,
-		        "set object rectangle from screen %.4f,%.4f to screen %.4f,%.4f fc rgb '%s' fs solid "
-		        "border lc "
-		        "rgb '#888888'\nset label \"%s\" at screen %.4f,%.4f font ',12'\n",
-		        x, y - 8 / height, x + 0.02, y + 8 / height, shades[i], plot->shade_text[i],
-		        x + 0.024, y);
-		x += 0.085;
+	x += 0.0082 * (double)strlen(plot->value) + 0.012;
+	for (int i = 0; i < PLOT_SHADES; i++, x += 0.1) {
+		snprintf(style, sizeof(style), "'%s' fs solid border lc rgb '#888888'", shades[i]);
+		plot_draw_shade(out, style, plot->shade_text[i], x, y, height);
 	}
-	fprintf(out,
-	        "set object rectangle from screen %.4f,%.4f to screen %.4f,%.4f fc rgb '" NO_VALUE
-	        "' fs solid border lc rgb '#888888'\nset label 'no value' at screen %.4f,%.4f font ',12'\n",
-	        x, y - 8 / height, x + 0.02, y + 8 / height, x + 0.024, y);
-	x += 0.085;
-	fprintf(out,
-	        "set object rectangle from screen %.4f,%.4f to screen %.4f,%.4f fc rgb '" FAIL
-	        "' fs transparent pattern 4 border lc rgb '" FAIL
-	        "' lw 2\nset label 'fails' at screen %.4f,%.4f font ',12'\n",
-	        x, y - 8 / height, x + 0.02, y + 8 / height, x + 0.024, y);
+	plot_draw_shade(out, "'" NO_VALUE "' fs solid border lc rgb '#888888'", "no value", x, y, height);
+	plot_draw_shade(out, "'" FAIL "' fs transparent pattern 4 border lc rgb '" FAIL "' lw 2", "fails",
+	                x + 0.115, y, height);
+}
+
+/* Letters of a note's first line. */
+static size_t plot_fit(const char *note)
+{
+	size_t most = strlen(note);
+
+	if (most > NOTE_MOST)
+		for (most = NOTE_MOST; most > 1 && note[most] != ' '; most--)
+			;
+	return most;
+}
+
+static const char *plot_next_line(const char *note)
+{
+	note += plot_fit(note);
+	return note + strspn(note, " ");
+}
+
+static double plot_height_of(const char *note)
+{
+	double height = 0;
+
+	for (; *note; note = plot_next_line(note))
+		height += LINE;
+	return height;
+}
+
+/* From y down, px from the upper edge. */
+static void plot_draw_note(FILE *out, const char *note, const char *colour, double y, double height)
+{
+	for (; *note; note = plot_next_line(note), y += LINE)
+		fprintf(out, "set label \"%.*s\" at screen 0.01,%.4f font ',12' tc rgb '%s'\n",
+		        (int)plot_fit(note), note, 1 - y / height, colour);
 }
 
 static void plot_draw_heads(FILE *out, const struct plot *plot, double height)
 {
-	fprintf(out,
-	        "set label \"%s\" at screen 0.01,%.4f font ',18'\nset label \"%s\" at screen 0.01,%.4f font "
-	        "',13'\n"
-	        "set label \"%s\" at screen 0.01,%.4f font ',13' tc rgb '#08519c'\n",
-	        plot->title, 1 - 22 / height, plot->note[0], 1 - 47 / height, plot->note[1], 1 - 68 / height);
+	double y = 48;
+
+	fprintf(out, "set label \"%s\" at screen 0.01,%.4f font ',17'\n", plot->title, 1 - 22 / height);
+	plot_draw_note(out, plot->note[0], "#000000", y, height);
+	plot_draw_note(out, plot->note[1], "#08519c", y + plot_height_of(plot->note[0]), height);
 	if (plot->value)
 		plot_draw_legend(out, plot, height);
 }
 
 int plot_write(const struct plot *plot, const char *folder, const char *kind, char *message)
 {
-	double height = TOP + PLOT + BOTTOM + (plot->value ? LEGEND : 0);
+	double rows = (double)((plot->panels + COLUMNS - 1) / COLUMNS);
+	double top = HEAD - LINE + plot_height_of(plot->note[0]) + plot_height_of(plot->note[1]);
+	double height = top + rows * (TITLE + PLOT + BOTTOM) - TITLE + (plot->value ? LEGEND : 0);
 	struct text script;
 	int status = write_table(plot, folder, kind, message);
 
@@ -349,7 +398,7 @@ int plot_write(const struct plot *plot, const char *folder, const char *kind, ch
 	      "1\n",
 	      script.out);
 	for (size_t i = 0; i < plot->panels; i++)
-		plot_draw_panel(script.out, plot, i, height);
+		plot_draw_panel(script.out, plot, i, top, height);
 	fputs("unset multiplot\n", script.out);
 	status = file_draw(&script, folder, kind, plot->name, message);
 	file_drop(&script);

@@ -9,7 +9,8 @@
 /* A failing method: so far above the bound (struct quantity_text), or gross errors in more than this. */
 #define GROSS_MOST 0.01
 
-enum { VALUES_MAX = 7, ROW = 36, COLUMN = 15, LEFT = 235, TOP = 150, BOTTOM = 120, RIGHT = 20 };
+/* px; shown 838 px wide, as a README is, the smallest text (12) still has 10 px. */
+enum { VALUES_MAX = 7, ROW = 32, COLUMN = 17, LEFT = 230, TOP = 150, BOTTOM = 185, RIGHT = 35 };
 
 #define PLAY_S 1e-3 /* of a drop's onset */
 
@@ -200,14 +201,37 @@ static int stability_shade_of(const struct tally *t)
 	return i;
 }
 
-/* x of a sweep's first column: half a column between sweeps. */
-static double column(size_t s)
+/* The map has two bands, one below the other; one row of each method in both. */
+enum { BANDS = 2, BAND = SWEEPS / BANDS };
+#define BETWEEN 5.6 /* rows: the values of a band, the names of the next */
+
+/* x of a sweep's first column in its band: half a column between sweeps. s may be the band's end. */
+static double column(size_t band, size_t s)
 {
 	double x = 0;
 
-	for (size_t i = 0; i < s; i++)
+	for (size_t i = band * BAND; i < s; i++)
 		x += (double)sweeps[i].count + 0.6;
 	return x;
+}
+
+static size_t stability_band_end(size_t band)
+{
+	return band + 1 < BANDS ? (band + 1) * BAND : SWEEPS;
+}
+
+static size_t stability_band_of(size_t s)
+{
+	return s / BAND < BANDS ? s / BAND : BANDS - 1;
+}
+
+static double stability_columns(void)
+{
+	double most = 0;
+
+	for (size_t band = 0; band < BANDS; band++)
+		most = fmax(most, column(band, stability_band_end(band)));
+	return most;
 }
 
 /* What a data block holds of each cell. */
@@ -222,14 +246,16 @@ static bool stability_in_layer(const struct map *map, const struct tally *t, int
 	return stability_shade_of(t) == layer;
 }
 
-static void write_cells(FILE *out, const struct map *map, size_t m, double row, int layer)
+/* row: in the first band; drop: how far below the next one is. */
+static void write_cells(FILE *out, const struct map *map, size_t m, double row, double drop, int layer)
 {
 	const struct compare_cell *cell = map->compare->cells;
 
 	for (size_t s = 0; s < SWEEPS; s++)
 		for (size_t i = 0; i < sweeps[s].count; i++, cell++)
 			if (stability_in_layer(map, &cell->tally[m], layer))
-				fprintf(out, "%.1f %.1f\n", column(s) + (double)i, row);
+				fprintf(out, "%.1f %.1f\n", column(stability_band_of(s), s) + (double)i,
+				        row - drop * (double)stability_band_of(s));
 }
 
 /* Ours above the others', in the table's order. */
@@ -246,19 +272,33 @@ static double stability_row_of(const struct map *map, size_t m)
 	return row + (map->method[m].ours ? 0.2 : 0);
 }
 
-static void stability_draw_heads(FILE *out, double rows)
+static double stability_rows(const struct map *map)
+{
+	double rows = 0;
+
+	for (size_t m = 0; m < map->methods; m++)
+		if (map->method[m].quantity == map->quantity)
+			rows = fmax(rows, stability_row_of(map, m) + 1);
+	return rows;
+}
+
+/* What a sweep's columns are called, above and below them. */
+static void stability_draw_heads(FILE *out, double rows, double drop)
 {
 	for (size_t s = 0; s < SWEEPS; s++) {
-		fprintf(out, "set label \"%s\" at %.2f,%g font ',12' left rotate by 35\n", sweeps[s].name,
-		        column(s) + 0.3 * (double)sweeps[s].count, rows + 0.15);
-		fprintf(out, "set label '%s' at %.2f,-1.75 font ',10' center\n", sweeps[s].unit,
-		        column(s) + (double)sweeps[s].count / 2);
+		size_t band = stability_band_of(s);
+		double x = column(band, s), y = -drop * (double)band;
+
+		fprintf(out, "set label \"%s\" at %.2f,%g font ',13' left rotate by 35\n", sweeps[s].name,
+		        x + 0.3 * (double)sweeps[s].count, y + rows + 0.15);
+		fprintf(out, "set label '%s' at %.2f,%g font ',12' center\n", sweeps[s].unit,
+		        x + (double)sweeps[s].count / 2, y - 2.55);
 		for (size_t i = 0; i < sweeps[s].count; i++) {
 			char text[32];
 			const char *value = value_text(&sweeps[s], i, text);
 
-			fprintf(out, "set label '%.9s' at %.2f,-0.12 font ',10' right rotate by 90\n", value,
-			        column(s) + (double)i + 0.5);
+			fprintf(out, "set label '%.9s' at %.2f,%g font ',12' right rotate by 90\n", value,
+			        x + (double)i + 0.5, y - 0.12);
 		}
 	}
 }
@@ -266,62 +306,53 @@ static void stability_draw_heads(FILE *out, double rows)
 /* Below the map, in units of its own: shades, the cross, the dot. */
 static void stability_draw_legend(FILE *out, const struct map *map, double height)
 {
-	double y = 30 / height;
+	double y = 50 / height, x = 0.12;
+	char text[32];
 
-	for (int i = 0; i < SHADES; i++) {
-		double x = 0.15 + 0.062 * i;
-
+	fprintf(out, "set label 'error / bound' at screen 0.01,%.4f font ',12'\n", y);
+	for (int i = 0; i <= SHADES; i++, x += 0.085) {
+		snprintf(text, sizeof(text),
+		         i + 1 < SHADES ? "to %g"
+		         : i < SHADES   ? "more"
+		                        : "no value",
+		         i + 1 < SHADES ? shades[i].ratio : 0.0);
 		fprintf(out,
 		        "set object rectangle from screen %.3f,%.4f to screen %.3f,%.4f fc rgb '%s' fs solid "
-		        "border "
-		        "lc rgb '#888888' lw 1\n",
-		        x, y - 8 / height, x + 0.02, y + 8 / height, shades[i].colour);
-		if (i + 1 < SHADES)
-			fprintf(out, "set label 'to %g' at screen %.3f,%.4f font ',11'\n", shades[i].ratio,
-			        x + 0.023, y);
-		else
-			fprintf(out, "set label 'more' at screen %.3f,%.4f font ',11'\n", x + 0.023, y);
+		        "border lc rgb '#888888' lw 1\nset label '%s' at screen %.3f,%.4f font ',12'\n",
+		        x, y - 8 / height, x + 0.02, y + 8 / height, i < SHADES ? shades[i].colour : NO_VALUE,
+		        text, x + 0.025, y);
 	}
-	fprintf(out, "set label 'error / bound' at screen 0.01,%.4f font ',12'\n", y);
+	y = 22 / height;
+	for (int up = -1; up <= 1; up += 2)
+		fprintf(out,
+		        "set arrow from screen 0.122,%.4f to screen 0.138,%.4f nohead lw 1.6 lc rgb '" CROSS
+		        "'\n",
+		        y - up * 7 / height, y + up * 7 / height);
 	fprintf(out,
-	        "set object rectangle from screen 0.53,%.4f to screen 0.55,%.4f fc rgb '" NO_VALUE
-	        "' fs solid "
-	        "border lc "
-	        "rgb '#888888' lw 1\nset label 'no value' at screen 0.553,%.4f font ',11'\n",
-	        y - 8 / height, y + 8 / height, y);
-	fprintf(out,
-	        "set arrow from screen 0.622,%.4f to screen 0.634,%.4f nohead lw 1.6 lc rgb '" CROSS "'\n",
-	        y - 7 / height, y + 7 / height);
-	fprintf(out,
-	        "set arrow from screen 0.622,%.4f to screen 0.634,%.4f nohead lw 1.6 lc rgb '" CROSS "'\n",
-	        y + 7 / height, y - 7 / height);
-	fprintf(out,
-	        "set label 'fails: above %g, or gross errors in over 1 %%' at screen 0.639,%.4f font ',11'\n",
-	        quantity_text(map->quantity)->fails, y);
-	fprintf(out,
-	        "set label 'it says so itself' at screen 0.873,%.4f font ',11' point pt 7 ps 0.75 lc rgb "
-	        "'#000000' "
-	        "offset 0.6,0\n",
-	        y);
+	        "set label 'fails: above %g, or gross errors in over 1 %%' at screen 0.145,%.4f font ',12'\n"
+	        "set label 'it says so itself' at screen 0.56,%.4f font ',12' point pt 7 ps 0.75 lc rgb "
+	        "'#000000' offset 0.6,0\n",
+	        quantity_text(map->quantity)->fails, y, y);
 }
 
-static void draw_names(FILE *out, const struct map *map)
+static void draw_names(FILE *out, const struct map *map, double drop)
 {
 	for (size_t m = 0; m < map->methods; m++)
-		if (map->method[m].quantity == map->quantity)
+		for (int band = 0; band < BANDS && map->method[m].quantity == map->quantity; band++)
 			fprintf(out, "set label \"%s%s%s\" at -0.6,%g right\n",
 			        map->method[m].ours ? "droptower: " : "", map->method[m].name,
-			        map->method[m].told ? " *" : "", stability_row_of(map, m) + 0.5);
+			        map->method[m].told ? " *" : "",
+			        stability_row_of(map, m) + 0.5 - drop * band);
 }
 
 /* A data block for each layer, with one point out of sight so that none is empty. */
-static void draw_cells(FILE *out, const struct map *map)
+static void draw_cells(FILE *out, const struct map *map, double drop)
 {
 	for (int layer = 0; layer < LAYERS; layer++) {
-		fprintf(out, "$layer%d << EOD\n-9 -9\n", layer);
+		fprintf(out, "$layer%d << EOD\n-99 -99\n", layer);
 		for (size_t m = 0; m < map->methods; m++)
 			if (map->method[m].quantity == map->quantity)
-				write_cells(out, map, m, stability_row_of(map, m), layer);
+				write_cells(out, map, m, stability_row_of(map, m), drop, layer);
 		fputs("EOD\n", out);
 	}
 	fputs("plot ", out);
@@ -343,38 +374,36 @@ static void draw_cells(FILE *out, const struct map *map)
 static int stability_draw(const struct chart_options *options, const struct map *map, char *message)
 {
 	const struct quantity_text *text = quantity_text(map->quantity);
-	double columns = column(SWEEPS), rows = 0, width, height;
+	double columns = stability_columns(), rows = stability_rows(map), drop = rows + BETWEEN;
+	double deep = drop * (BANDS - 1), width, height;
 	struct text script;
 	int status = file_begin(&script, message);
 	FILE *out = script.out;
 
 	if (status)
 		return status;
-	for (size_t m = 0; m < map->methods; m++)
-		if (map->method[m].quantity == map->quantity)
-			rows = fmax(rows, stability_row_of(map, m) + 1);
 	width = LEFT + RIGHT + columns * COLUMN;
-	height = TOP + BOTTOM + rows * ROW;
+	height = TOP + BOTTOM + (rows + deep) * ROW;
 	fprintf(out,
 	        "set terminal svg size %.0f,%.0f dynamic noenhanced font 'sans-serif,13' background "
 	        "'#ffffff'\n"
 	        "unset border\nunset tics\nunset key\nset lmargin at screen %.4f\nset rmargin at screen "
 	        "%.4f\n"
 	        "set tmargin at screen %.4f\nset bmargin at screen %.4f\nset xrange [0:%g]\nset yrange "
-	        "[0:%g]\n",
+	        "[%g:%g]\n",
 	        width, height, LEFT / width, 1 - RIGHT / width, 1 - TOP / height, BOTTOM / height, columns,
-	        rows);
-	fprintf(out, "set label \"%s: where methods fail\" at screen 0.01,%.4f font ',18'\n", text->title,
+	        -deep, rows);
+	fprintf(out, "set label \"%s: where methods fail\" at screen 0.01,%.4f font ',17'\n", text->title,
 	        1 - 24 / height);
 	fprintf(out,
-	        "set label \"One trouble at a time on a drop of %s, noise %g g; %u drops a cell. * is told "
-	        "that it is "
-	        "a half-sine.\" at screen 0.01,%.4f font ',12'\n",
-	        options->about, options->drop.noise_g, map->compare->drops, 1 - 50 / height);
-	draw_names(out, map);
-	stability_draw_heads(out, rows);
+	        "set label \"One trouble at a time on a drop of %s, noise %g g.\" at screen 0.01,%.4f font "
+	        "',12'\nset label \"%u drops a cell. * is told that it is a half-sine.\" at screen "
+	        "0.01,%.4f font ',12'\n",
+	        options->about, options->drop.noise_g, 1 - 48 / height, map->compare->drops, 1 - 68 / height);
+	draw_names(out, map, drop);
+	stability_draw_heads(out, rows, drop);
 	stability_draw_legend(out, map, height);
-	draw_cells(out, map);
+	draw_cells(out, map, drop);
 	status = file_draw(&script, options->folder, "stability", text->name, message);
 	file_drop(&script);
 	return status;
