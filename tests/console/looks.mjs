@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Whether everybody can use the page as it stands: sideways scrolling on a phone, contrast in both schemes, names for
-// those who cannot see it. Each view is looked at in passing; what was found is judged at the end.
+// Whether everybody can use the page as it stands: sideways scrolling on a phone, contrast in both schemes, and the rules
+// of axe-core at full size, 200 % and 390 px in turn. Each view is looked at in passing; what was found is judged at the end.
+
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
+import { build } from "./programs.mjs";
 
 const PHONE = { width: 390, height: 844 };
+const DOUBLED = { width: 683, height: 316 }; // a laptop's window at 200 %
 const CONTRAST = 4.5; // WCAG 2.1, 1.4.3
-const NAMED = new Set(["button", "textbox", "searchbox", "combobox", "listbox", "checkbox", "radio", "spinbutton", "switch", "tab",
-	"link", "menuitem", "option"]);
-
-export const found = { views: 0, wide: [], faint: [], nameless: [] };
+export const found = { views: 0, wide: [], faint: [], broken: [] };
 
 /* In the page: what is wider than the window. */
 function tooWide() {
@@ -61,12 +63,17 @@ function tooFaint(least) {
 	return [...faint];
 }
 
-async function nameless(page) {
-	const session = await page.context().newCDPSession(page);
-	const { nodes } = await session.send("Accessibility.getFullAXTree");
-	await session.detach();
-	return nodes.filter((node) => !node.ignored && NAMED.has(node.role?.value) && !node.name?.value?.trim())
-		.map((node) => `${node.role.value} ${node.nodeId}`);
+/* Names, roles, headings, order, what is hidden and what can be reached: all rules of axe-core but that of contrast,
+ * which is worked out above for both schemes and behind stripes, too. */
+const axe = readFileSync(join(build, "tests/npm/node_modules/axe-core/axe.min.js"), "utf8");
+
+async function broken(page) {
+	await page.evaluate(`window.axe || (() => { ${axe} })()`);
+	return page.evaluate(async () => {
+		const rules = { "color-contrast": { enabled: false } };
+		const { violations } = await window.axe.run(document, { resultTypes: ["violations"], rules });
+		return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target).join(", ").slice(0, 200)}`);
+	});
 }
 
 /* view: its name in what is told. picture: also on the phone and in the dark. */
@@ -77,13 +84,15 @@ export async function look(desk, view) {
 
 	found.views++;
 	await desk.picture(view);
-	tell(found.nameless, await nameless(page));
 	for (const colorScheme of ["dark", "light"]) {
 		await page.emulateMedia({ colorScheme });
 		tell(found.faint, await page.evaluate(tooFaint, CONTRAST), ` ${colorScheme}`);
 		if (colorScheme === "dark")
 			await desk.picture(`${view}-dark`);
 	}
+	const [width, at] = [[size, ""], [DOUBLED, " 200 %"], [PHONE, " 390 px"]][found.views % 3]; // in turn: it takes a second
+	await page.setViewportSize(width);
+	tell(found.broken, await broken(page), at);
 	await page.setViewportSize(PHONE);
 	tell(found.wide, await page.evaluate(tooWide));
 	await desk.picture(`${view}-phone`);

@@ -57,7 +57,7 @@ function buttons(drop) {
 		button(text, (event) => f(event.target.closest("tr")), {
 			class: `small ${kind}`,
 			"data-command": true,
-			"aria-label": `${kind} ${name}`,
+			"aria-label": `${text} ${name}`,
 		});
 	const write = (row) => ask(row, `Note on ${name}`, false, drop.note, (text) => note(name, text));
 	const refuse = (row) =>
@@ -110,7 +110,8 @@ function numberOrChoice(drop, { choose, chosen }) {
 
 function dropRow(drop, options) {
 	const name = nameOf(drop);
-	const link = { class: "link", "aria-label": `show ${name}` };
+	const when = time(drop.time);
+	const link = { class: "link", "aria-label": `${when}: show ${name}` };
 	const flags = drop.flags ? drop.flags.split(" ").map(plain).join(", ") : "–";
 	return el(
 		"tr",
@@ -119,7 +120,7 @@ function dropRow(drop, options) {
 		el(
 			"td",
 			{ "data-label": "time" },
-			button(time(drop.time), () => options.open(name), link),
+			button(when, () => options.open(name), link),
 		),
 		...COLUMNS.map((column) => valueCell(drop, column)),
 		el("td", { "data-label": "flags", class: "flags" }, flags),
@@ -143,7 +144,7 @@ function meanRow(kind, head, means) {
 /* answer: of /api/drops. options: {open(name), choose(name, on), chosen: Set}. */
 export function dropTable(answer, options) {
 	const columns = COLUMNS.map((column) => [column.head, el("small", {}, column.shown)]);
-	const head = ["drop", "time", ...columns, "flags", "decision", ""];
+	const head = ["drop", "time", ...columns, "flags", "decision", "what to do"];
 	const drops = table(
 		head,
 		answer.drops.map((drop) => dropRow(drop, options)),
