@@ -13,6 +13,7 @@
 #include "common/base/text.h"
 #include "host/base/whole.h"
 #include "host/report/pdf.h"
+#include "host/report/pdf_attach.h"
 #include "host/report/series.h"
 
 struct arguments {
@@ -59,58 +60,53 @@ static int failed(const char *message)
 	return COMMAND_INPUT;
 }
 
-static int report_write_csv(const struct series_report *request, const char *file)
+/* The table of the series' drops, which goes into each of the files. */
+static int report_make_data(const struct series_report *request, struct text *data)
 {
 	struct archive_filter filter = archive_filter_none();
-	char message[ARCHIVE_MESSAGE_MAX];
-	struct whole whole;
-	int result = whole_open(&whole, file, message, sizeof(message));
+	int result = text_open(data);
 
 	filter.series = request->series;
 	if (result == 0)
-		result = whole_close(
-		        &whole,
-		        print_drops(request->archive, &filter, request->undecided, TABLE_CSV, whole.out),
-		        message, sizeof(message));
-	return result == 0 ? COMMAND_DONE : failed(message);
+		result = text_close(data, print_drops(request->archive, &filter, request->undecided,
+		                                      TABLE_CSV, data->out));
+	return result == 0 ? COMMAND_DONE : failed(error_text(result));
 }
 
-/* The page's evidence as comments of the PDF, before the word that says where its table is, which does not
- * move. */
-static int put_evidence(const char *page, const char *pdf, size_t length, FILE *out)
+/* The PDF, the table of drops as an attachment, and the page's evidence as comments. */
+static int put_evidence(const char *page, const char *pdf, size_t length, const struct pdf_file *data,
+                        FILE *out)
 {
-	static const char word[] = "startxref";
-	const char *line = strstr(page, SERIES_EVIDENCE), *at = pdf + length, *end;
+	const char *line = strstr(page, SERIES_EVIDENCE), *end;
+	size_t start;
 
-	while (at > pdf &&
-	       (pdf + length - at < (ptrdiff_t)strlen(word) || memcmp(at, word, strlen(word)) != 0))
-		at--;
-	if (at == pdf || line == NULL)
+	if (line == NULL || pdf_attach(pdf, length, data, out, &start) != 0)
 		return DT_E_FORMAT;
-	fwrite(pdf, 1, (size_t)(at - pdf), out);
 	fputs("%droptower evidence\n", out);
 	for (line += strlen(SERIES_EVIDENCE); (end = strchr(line, '\n')) != NULL && *line != '-';
 	     line = end + 1)
 		if (strncmp(line, SEAL_WORD, strlen(SEAL_WORD)) != 0)
 			fprintf(out, "%%%.*s\n", (int)(end - line), line);
 	fputs("%" SEAL_BLANK "\n", out);
-	fwrite(at, 1, length - (size_t)(at - pdf), out);
+	pdf_attach_end(out, start);
 	return 0;
 }
 
-static int write_pdf(const struct text *page, const char *file)
+static int write_pdf(const struct series_report *request, const struct text *page, const char *file)
 {
-	char message[ARCHIVE_MESSAGE_MAX] = "no PDF: the browser's is none that a comment fits into",
-	     *pdf = NULL;
+	char message[ARCHIVE_MESSAGE_MAX] = "no PDF: the browser's is none that an attachment fits into",
+	     *pdf = NULL, name[ARCHIVE_NAME_MAX + 8];
+	struct pdf_file data = {.name = name, .bytes = request->data, .size = request->data_size};
 	struct text sealed = {.bytes = NULL};
 	size_t length = 0;
 	int result =
 	        pdf_print(page->bytes, page->size, interrupt_came, &pdf, &length, message, sizeof(message));
 
+	snprintf(name, sizeof(name), "%s.csv", request->series);
 	if (result == 0)
 		result = text_open(&sealed);
 	if (result == 0)
-		result = text_close(&sealed, put_evidence(page->bytes, pdf, length, sealed.out));
+		result = text_close(&sealed, put_evidence(page->bytes, pdf, length, &data, sealed.out));
 	if (result == 0)
 		result = seal_fill(sealed.bytes, sealed.size);
 	if (result == 0)
@@ -153,13 +149,14 @@ static int report_make(const struct series_report *request, struct text *page)
 	return result == 0 ? COMMAND_DONE : failed(message[0] != '\0' ? message : error_text(result));
 }
 
-static int report_write_page(const struct arguments *a, const struct text *page)
+static int report_write_page(const struct series_report *request, const struct arguments *a,
+                             const struct text *page)
 {
 	char message[ARCHIVE_MESSAGE_MAX];
 
 	if (a->html != NULL && whole_write(a->html, page->bytes, page->size, message, sizeof(message)) != 0)
 		return failed(message);
-	return a->pdf != NULL ? write_pdf(page, a->pdf) : COMMAND_DONE;
+	return a->pdf != NULL ? write_pdf(request, page, a->pdf) : COMMAND_DONE;
 }
 
 static int report_write_all(struct archive *archive, const char *series, const struct arguments *a)
@@ -175,19 +172,26 @@ static int report_write_all(struct archive *archive, const char *series, const s
 	                                .partial = a->partial,
 	                                .lacking = report_tell};
 	struct scene scene;
-	struct text page = {.bytes = NULL};
+	struct text page = {.bytes = NULL}, data = {.bytes = NULL};
 	int code;
 
 	if (a->laboratory != NULL && laboratory_read(&laboratory, a->laboratory, message) != 0)
 		return failed(message);
 	if (archive_scene(archive, series, &scene) != 0)
 		return archived_failed(archive);
-	code = a->html != NULL || a->pdf != NULL ? report_make(&request, &page) : report_look(&request);
-	if (code == COMMAND_DONE && a->csv != NULL)
-		code = report_write_csv(&request, a->csv);
+	code = report_make_data(&request, &data);
+	request.data = data.bytes;
+	request.data_size = data.size;
 	if (code == COMMAND_DONE)
-		code = report_write_page(a, &page);
+		code = a->html != NULL || a->pdf != NULL ? report_make(&request, &page)
+		                                         : report_look(&request);
+	if (code == COMMAND_DONE && a->csv != NULL &&
+	    whole_write(a->csv, data.bytes, data.size, message, sizeof(message)) != 0)
+		code = failed(message);
+	if (code == COMMAND_DONE)
+		code = report_write_page(&request, a, &page);
 	free(page.bytes);
+	free(data.bytes);
 	return code;
 }
 

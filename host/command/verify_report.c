@@ -7,9 +7,14 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include <nettle/base64.h>
+
+#include "common/base/text.h"
+#include "host/archive/print.h"
 #include "host/command/archived.h"
 #include "host/command/command.h"
 #include "host/command/verify.h"
+#include "host/command/verify_data.h"
 #include "host/record/seal.h"
 
 struct evidence {
@@ -18,7 +23,8 @@ struct evidence {
 	size_t size;
 	char series[ARCHIVE_NAME_MAX + 1], head[65];
 	long long entry;
-	char *first; /* line behind the mark */
+	char *first;  /* line behind the mark */
+	bool altered; /* by its own SHA-256, so that what it says is only looked at for what was altered */
 	struct archive *archive;
 	unsigned logs, wrong;
 };
@@ -90,14 +96,17 @@ static int load(struct evidence *e)
 		return COMMAND_INPUT;
 	}
 	sealed = seal_check(&source, message);
-	e->text = sealed > 0 ? calloc(1, source.size + 1) : NULL;
+	e->altered = sealed < 0;
+	e->text = sealed != 0 ? calloc(1, source.size + 1) : NULL;
 	e->size = source.size;
-	if (sealed > 0 && e->text != NULL)
+	if (e->text != NULL)
 		memcpy(e->text, source.bytes, source.size);
 	source_free(&source);
-	if (sealed < 0)
+	if (sealed < 0) {
 		command_error("%s", message);
-	else if (sealed == 0)
+		return e->text != NULL && verify_report_split(e) ? COMMAND_DONE : COMMAND_INPUT;
+	}
+	if (sealed == 0)
 		command_error("%s: not sealed: no report of a series, or one of an older version", e->file);
 	else if (e->text != NULL && verify_report_split(e))
 		return COMMAND_DONE;
@@ -153,6 +162,45 @@ static unsigned verify_report_named(const struct evidence *e)
 	return count;
 }
 
+/* The table that it carries along, in words of its own memory; NULL when it has none that can be read. */
+static char *verify_report_table(const struct evidence *e)
+{
+	char *at = e->first, *line, *table = NULL;
+	struct base64_decode_ctx decoder;
+	size_t size = 0;
+
+	while ((line = next_line(e, &at)) != NULL && strncmp(line, "data ", 5) != 0)
+		;
+	if (line != NULL) {
+		size = BASE64_DECODE_LENGTH(strlen(line + 5));
+		table = calloc(1, size + 1);
+	}
+	if (table == NULL)
+		return NULL;
+	base64_decode_init(&decoder);
+	if (base64_decode_update(&decoder, &size, (uint8_t *)table, strlen(line + 5), line + 5) == 1 &&
+	    base64_decode_final(&decoder) == 1 && strlen(table) == size)
+		return table;
+	free(table);
+	return NULL;
+}
+
+/* That table against the archive's; one that cannot be read is wrong. */
+static int verify_report_data(struct evidence *e, const struct archive_filter *filter)
+{
+	char *was = verify_report_table(e);
+	struct text is = {.bytes = NULL};
+	int result = text_open(&is);
+
+	if (result == 0)
+		result = text_close(&is, print_drops(e->archive, filter, false, TABLE_CSV, is.out));
+	if (result == 0 && (was == NULL || verify_data(was, is.bytes, verify_report_tell, e) < 0))
+		wrong(e, "its table of drops cannot be read");
+	free(is.bytes);
+	free(was);
+	return result;
+}
+
 static int verify_report_hold(struct evidence *e)
 {
 	struct archive_filter filter = archive_filter_none();
@@ -161,7 +209,8 @@ static int verify_report_hold(struct evidence *e)
 
 	filter.series = e->series;
 	if (reaches < 0 || archive_each_drop(e->archive, &filter, hold_drop, e) != 0 ||
-	    archive_verify(e->archive, e->series, 0, verify_report_tell, e) < 0)
+	    archive_verify(e->archive, e->series, 0, verify_report_tell, e) < 0 ||
+	    verify_report_data(e, &filter) != 0)
 		return archived_failed(e->archive);
 	if (reaches == 0) {
 		snprintf(text, sizeof(text), "%s in %.400s: no entry %lld with the head %s",
@@ -174,10 +223,11 @@ static int verify_report_hold(struct evidence *e)
 		         verify_report_named(e), e->series, archive_folder(e->archive), e->logs);
 		wrong(e, text);
 	}
-	if (e->wrong > 0)
+	if (e->wrong > 0 || e->altered)
 		return COMMAND_INPUT;
-	printf("%s: proven: as it was written, %u logs as the archive has them, its chain reaches entry "
-	       "%lld\n",
+	printf("%s: proven: as it was written, %u logs and its table as the archive has them, its chain "
+	       "reaches "
+	       "entry %lld\n",
 	       e->file, e->logs, e->entry);
 	return COMMAND_DONE;
 }

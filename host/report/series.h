@@ -16,13 +16,15 @@
 #include "host/report/laboratory.h"
 
 /* How the last comment of the page begins: what it rests on, a line each, for `droptower verify`:
- * "series NAME", "log PLACE SHA-256" for each drop, "chain ENTRY HEAD", and an empty seal
- * (host/record/seal.h). */
+ * "series NAME", "log PLACE SHA-256" for each drop, "chain ENTRY HEAD", "data TABLE", and an empty seal
+ * (host/record/seal.h). TABLE is request->data in base64. */
 #define SERIES_EVIDENCE "<!-- droptower evidence\n"
 
 struct series_report {
 	struct archive *archive;
 	const char *series;
+	const char *data; /* the table of its drops as CSV, which the page carries along; data_size bytes */
+	size_t data_size;
 	bool undecided;      /* drops that are not decided count, too */
 	const char *version; /* of the program, for the page's foot; NULL: not said */
 	bool partial;        /* even when a trace cannot be drawn or a file is not what was recorded */

@@ -17,7 +17,7 @@ static const char style[] =
         ".drop h3{font-size:1rem;margin:0 0 4px;font-weight:600}"
         ".drop h3 span{font-weight:400;color:var(--soft)}"
         ".drop.out{border-left:5px solid var(--bad);padding-left:12px}"
-        "@media print{body{font-size:9.5pt;line-height:1.4}h1{font-size:15pt}"
+        "@media print{.screen{display:none}body{font-size:9.5pt;line-height:1.4}h1{font-size:15pt}"
         "h2{font-size:11.5pt;margin:18px 0 4px}.verdict{margin:6px 0 2px}"
         ".cards{gap:6px;grid-template-columns:repeat(5,1fr)}.card{padding:6px 8px}"
         ".card .value{font-size:13pt}.label,.note,.legend,figcaption,footer{font-size:8pt}"

@@ -78,6 +78,6 @@ void series_records(struct series_page *page);
 bool series_is_overdue(const struct series_page *page);
 
 /* Behind the page. */
-void series_evidence(const struct series_page *page);
+void series_evidence(struct series_page *page);
 
 #endif

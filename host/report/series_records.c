@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <nettle/base64.h>
+
 #include "host/record/seal.h"
 #include "host/report/series_private.h"
 
@@ -244,7 +246,34 @@ static void logs(const struct series_page *page)
 		fputs("<p class=\"note\">Not sealed: recorded before the archive had a chain.</p>\n", out);
 }
 
-void series_evidence(const struct series_page *page)
+/* The table of drops in base64: no letter of it means anything to HTML or PDF. */
+static int put_data(const struct series_page *page)
+{
+	size_t size = page->request->data_size;
+	char *text = malloc(BASE64_ENCODE_RAW_LENGTH(size) + 1);
+
+	if (!text)
+		return DT_E_MEMORY;
+	base64_encode_raw(text, size, (const uint8_t *)page->request->data);
+	fwrite(text, 1, BASE64_ENCODE_RAW_LENGTH(size), page->page.out);
+	free(text);
+	return 0;
+}
+
+static void series_data(struct series_page *page)
+{
+	FILE *out = page->page.out;
+
+	fprintf(out,
+	        "<p class=\"screen\">The table of these drops goes along with this file: <a "
+	        "download=\"%s.csv\" "
+	        "href=\"data:text/csv;base64,",
+	        page->series.name);
+	page->page.error = put_data(page);
+	fputs("\">save it as CSV</a>.</p>\n", out);
+}
+
+void series_evidence(struct series_page *page)
 {
 	FILE *out = page->page.out;
 
@@ -254,7 +283,10 @@ void series_evidence(const struct series_page *page)
 			fprintf(out, "log %s %s\n", page->drop[i]->a.raw, page->drop[i]->a.sha256);
 	if (page->seal.entry > 0)
 		fprintf(out, "chain %" PRId64 " %s\n", page->seal.entry, page->seal.head);
-	fputs(SEAL_BLANK "\n-->\n", out);
+	fputs("data ", out);
+	if (!page->page.error)
+		page->page.error = put_data(page);
+	fputs("\n" SEAL_BLANK "\n-->\n", out);
 }
 
 /* ---- decisions ---- */
@@ -336,6 +368,8 @@ void series_records(struct series_page *page)
 	               "them.</p>\n"
 	             : "<p class=\"soft\">None.</p>\n",
 	      h.out);
+	if (!page->page.error)
+		series_data(page);
 	fprintf(h.out, "<footer><p>Series made ");
 	series_time(h.out, page->series.created);
 	fputs(" UTC. Every raw log whose trace is drawn was read again and has the SHA-256 above.</p>\n",

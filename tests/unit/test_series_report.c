@@ -195,8 +195,12 @@ static void make_series(void)
 
 static int report_to(char **page, bool undecided)
 {
-	struct series_report request = {archive, "by-hand", undecided, "1.0-test", true,
-	                                NULL,    NULL,      NULL,      false};
+	struct series_report request = {.archive = archive,
+	                                .series = "by-hand",
+	                                .data = "",
+	                                .undecided = undecided,
+	                                .version = "1.0-test",
+	                                .partial = true};
 	size_t length = 0;
 	FILE *out = open_memstream(page, &length);
 	int result;
@@ -610,7 +614,7 @@ static void test_all_on_a_simulated_tower(void **state)
 
 static void test_unknown_series(void **state)
 {
-	struct series_report request = {archive, "nobody", false, NULL, true, NULL, NULL, NULL, false};
+	struct series_report request = {.archive = archive, .series = "nobody", .data = "", .partial = true};
 	FILE *out = fopen("/dev/null", "w");
 
 	(void)state;
@@ -639,7 +643,7 @@ static void test_no_gnuplot(void **state)
 
 static void test_full_disk(void **state)
 {
-	struct series_report request = {archive, "by-hand", false, NULL, true, NULL, NULL, NULL, false};
+	struct series_report request = {.archive = archive, .series = "by-hand", .data = "", .partial = true};
 	FILE *out = fopen("/dev/full", "w");
 
 	(void)state;
