@@ -7,46 +7,78 @@
 
 enum {
 	EQUAL_EXTREMES = 3,
+	WALL_STEPS = 8,          /* that level samples of a round top do not fall at once */
 	EQUAL_APART = 3,         /* noise may keep samples between them below the limit */
 	COARSENESS_WINDOW = 256, /* samples the step of the numbers is looked for in */
 };
 
-/* Where samples tremble by so many steps of their numbers, two do not come out equal by chance. */
+/* Where samples tremble by so many steps of their numbers, two or three do not come out equal by chance. */
 #define TREMBLE_STEPS 200.0
+#define TREMBLE_THREE 20.0
 
-/* Whether samples tremble by many steps of the numbers they come in. */
-static bool trembles(const struct trace *trace)
+/* Of a step: numbers that are no nearer to whole ones have none. */
+#define STEP_WHOLE 1e-3
+
+/* The step of the numbers that samples come in: the least rise; 0 where none rises. */
+static double clip_step(const struct trace *trace)
 {
 	double least = INFINITY;
+
+	for (size_t k = 1; k < trace->count && k < COARSENESS_WINDOW; k++) {
+		double rise = fabs(trace->value_g[k] - trace->value_g[k - 1]);
+
+		if (trace_good(trace, k) && trace_good(trace, k - 1) && rise > 0)
+			least = fmin(least, rise);
+	}
+	return isfinite(least) ? least : 0;
+}
+
+/* Whether samples tremble by many steps of the numbers they come in. */
+static bool trembles(const struct trace *trace, double steps)
+{
+	double least = clip_step(trace);
 	size_t n = 0, wide = 0;
 
-	for (int pass = 0; pass < 2; pass++) {
-		for (size_t k = 1; k < trace->count && k < COARSENESS_WINDOW; k++) {
-			double rise;
-
-			if (!trace_good(trace, k) || !trace_good(trace, k - 1))
-				continue;
-			rise = fabs(trace->value_g[k] - trace->value_g[k - 1]);
-			if (pass == 0) {
-				least = rise > 0 ? fmin(least, rise) : least;
-				n++;
-			} else if (rise > TREMBLE_STEPS * least) {
-				wide++;
-			}
-		}
+	for (size_t k = 1; k < trace->count && k < COARSENESS_WINDOW; k++) {
+		if (!trace_good(trace, k) || !trace_good(trace, k - 1))
+			continue;
+		n++;
+		wide += fabs(trace->value_g[k] - trace->value_g[k - 1]) > steps * least;
 	}
 	return 2 * wide > n;
 }
 
-/* Whether so many equal extremes make a limit: one at the known range, two where chance cannot make them
- * equal. */
-static bool enough(const struct trace *trace, double extreme_g, size_t n)
+static bool clip_whole(double steps)
 {
-	if (n >= EQUAL_EXTREMES)
+	return fabs(steps - round(steps)) < STEP_WHOLE;
+}
+
+/* Whether they are coarse numbers and do not end in a wall on either side: a round top may be so level. */
+static bool clip_level(const struct trace *trace, size_t first, size_t last)
+{
+	const double *v = trace->value_g;
+	double step = clip_step(trace), before, after;
+
+	if (first < 2 || last + 1 >= trace->count)
+		return false;
+	before = fabs(v[first] - v[first - 1]) / step;
+	after = fabs(v[last] - v[last + 1]) / step;
+	return fmin(before, after) <= WALL_STEPS && clip_whole(before) && clip_whole(after) &&
+	       clip_whole((v[first] - v[first - 2]) / step);
+}
+
+/* Whether n equal extremes make a limit: one at the known range, others where chance cannot make them equal,
+ * or has done so before. */
+static bool enough(const struct trace *trace, size_t first, size_t last, size_t n)
+{
+	double extreme = fabs(trace->value_g[first]);
+
+	if (trace->range_g > 0 && fabs(extreme - trace->range_g) <= 1e-9 * trace->range_g)
 		return true;
-	if (trace->range_g > 0 && fabs(fabs(extreme_g) - trace->range_g) <= 1e-9 * trace->range_g)
-		return true;
-	return n == EQUAL_EXTREMES - 1 && trembles(trace);
+	if (n < EQUAL_EXTREMES)
+		return n == EQUAL_EXTREMES - 1 && trembles(trace, TREMBLE_STEPS);
+	return trembles(trace, TREMBLE_THREE) || trace->twins < trace->count ||
+	       !clip_level(trace, first, last);
 }
 
 static bool at_extreme(const struct trace *trace, size_t k, double extreme_g)
@@ -80,10 +112,15 @@ static void mark_groups(struct trace *trace, double extreme_g)
 			last = k;
 			n++;
 		}
-		if (n == 2 && last - first == 1)
-			trace->twins = first;
-		if (!enough(trace, extreme_g, n) || 2 * n <= last - first)
+		if (2 * n <= last - first)
 			continue;
+		if (!enough(trace, first, last, n)) {
+			if (n >= EQUAL_EXTREMES || (n == 2 && last - first == 1)) {
+				trace->twins = first;
+				trace->twins_last = last;
+			}
+			continue;
+		}
 		trace->flags |= RECORD_FLAG_CLIPPED;
 		for (size_t i = first; i <= last; i++)
 			if (at_extreme(trace, i, extreme_g))
@@ -108,22 +145,43 @@ void clip_mark(struct trace *trace)
 		mark_groups(trace, low);
 }
 
+/* The samples to either side that foretell: the next, and some further out than half of what they are about.
+ */
+static size_t clip_aside(size_t first, size_t last)
+{
+	return 2 + (last - first) / 4;
+}
+
+/* Whether they foretell more than the equal ones show: a parabola through them, about their middle. */
+static bool clip_foretold(const struct trace *trace, size_t first, size_t last, double noise_g)
+{
+	const double *v = trace->value_g;
+	size_t aside = clip_aside(first, last);
+	double half = (double)(last - first) / 2, square = (half + 1) * (half + 1);
+	double reach = square / ((half + (double)aside) * (half + (double)aside) - square);
+	double near = (v[first - 1] + v[last + 1]) / 2, far = (v[first - aside] + v[last + aside]) / 2;
+	double beyond = near + reach * (near - far) - v[first];
+	double spread = sqrt(((1 + reach) * (1 + reach) + reach * reach) / 2 + 0.5);
+	double noise = hypot(noise_g, clip_step(trace) / sqrt(12.0));
+
+	return beyond * (v[first] - near) > 0 && fabs(beyond) > LIMIT_AGREE * spread * noise;
+}
+
 void clip_judge_twins(struct trace *trace, double noise_g)
 {
-	size_t k = trace->twins;
-	const double *v = trace->value_g + k;
-	double near, far, beyond;
+	size_t first = trace->twins, last = trace->twins_last;
+	size_t aside = clip_aside(first, last);
+	bool limit = last - first >= EQUAL_EXTREMES - 1;
 
-	if (k < 2 || k + 4 > trace->count || trace->sample[k] & TRACE_LIMIT || !trace_good(trace, k - 2) ||
-	    !trace_good(trace, k - 1) || !trace_good(trace, k + 2) || !trace_good(trace, k + 3))
+	if (first == trace->count || trace->sample[first] & TRACE_LIMIT)
 		return;
-	/* Means of the pairs 1.5 and 2.5 samples from the middle; the twins are 0.5 from it. */
-	near = (v[-1] + v[2]) / 2;
-	far = (v[-2] + v[3]) / 2;
-	beyond = near + (near - far) / 2 - v[0];
-	if (!(beyond * (v[0] - near) > 0) || !(fabs(beyond) > LIMIT_AGREE * sqrt(1.75) * noise_g))
+	if (first >= aside && last + aside < trace->count && trace_good(trace, first - aside) &&
+	    trace_good(trace, first - 1) && trace_good(trace, last + 1) && trace_good(trace, last + aside))
+		limit = clip_foretold(trace, first, last, noise_g);
+	if (!limit)
 		return;
 	trace->flags |= RECORD_FLAG_CLIPPED;
-	trace->sample[k] |= SAMPLE_CLIPPED | TRACE_LIMIT;
-	trace->sample[k + 1] |= SAMPLE_CLIPPED | TRACE_LIMIT;
+	for (size_t k = first; k <= last; k++)
+		if (at_extreme(trace, k, trace->value_g[first]))
+			trace->sample[k] |= SAMPLE_CLIPPED | TRACE_LIMIT;
 }

@@ -4,12 +4,12 @@
 /*
  * A sensor at its limit repeats its extreme. Groups of samples that equal the trace's extreme are marked
  * SAMPLE_CLIPPED and TRACE_LIMIT: three, no further than three samples apart and at least half of what they
- * span; two where chance does not make samples equal; one at the channel's known range. Only extremes on the
- * outside count: half the largest magnitude or more, so that the small side of a one-sided shock is not taken
- * for one. trace_open calls it.
+ * span, that fall off beside by more than a few steps of their numbers; two where chance does not make
+ * samples equal; one at the channel's known range. Only extremes on the outside count: half the largest
+ * magnitude or more, so that the small side of a one-sided shock is not taken for one. trace_open calls it.
  *
- * Two neighbours that may be equal by chance (trace->twins) are marked by clip_judge_twins, once the noise is
- * known, if the two samples to either side foretell more than they show.
+ * Others may be equal by chance (trace->twins): coarse numbers make a round top level. clip_judge_twins marks
+ * them, once the noise is known, if the samples to either side foretell more than they show.
  */
 #include "host/estimate/trace.h"
 

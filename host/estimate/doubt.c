@@ -9,17 +9,34 @@
 
 enum {
 	PLATEAU_SAMPLES = 3,
-	REST_SAMPLES = 4,  /* at rest after a step */
-	WIDTH_SAMPLES = 8, /* of a pulse whose width straight lines and curves tell without a bias */
-	BATCHES_MIN = 8,   /* of the quiet part, for the scatter of their means */
+	REST_SAMPLES = 4,   /* at rest after a step */
+	WIDTH_SAMPLES = 12, /* of a pulse whose width straight lines and curves tell without a bias */
+	BATCHES_MIN = 8,    /* of the quiet part, for the scatter of their means */
+	ROUGH_SAMPLES = 12,
+	ROUGH_WIDTHS = 4,
 	AFTER_BLOCKS = 12, /* of half a width, that follow the pulse */
 };
 
 /* A limit trembles less than noise would in so many of as many tops. */
-#define PLATEAU_CHANCE 1e-4
+#define PLATEAU_CHANCE 1e-5
+
+/* Variance of a parabola's samples about their mean, over the square of its height. */
+#define ROUND_SPREAD (4.0 / 45)
 
 /* A fall to rest over the steepest of the three steps before it: 1.2 at the end of a half-sine. */
 #define STEP_STEEPER 3.0
+
+/* Noise of what is missing at a step, and of third differences, over that of samples. */
+#define JUMP_NOISE 3.23
+#define DIFFERENCES_NOISE 4.47
+
+/* Of a jump, between two samples. */
+#define JUMP_MOST 0.5
+
+/* Third differences of a ring over its height, and over the swing they are of. A plate at 500 Hz has 0.09 at
+ * 7 kHz, a loose sensor at 1.5 kHz 2.0. */
+#define ROUGH_HEIGHT 0.03
+#define ROUGH_SWING 0.13
 
 /* A pulse's force has faded this part of its width after its 10 % point. */
 #define AFTER_FROM 0.3
@@ -59,33 +76,74 @@ static size_t plateau_largest(const struct trace *trace)
 	return at;
 }
 
-/* Whether more than noise falls off beside them, on both sides within two samples, and a round top that falls
- * off so would be as round between them that it shows. */
-static bool plateau_ends(const struct trace *trace, double sign, const struct plateau *top, double noise_g)
+/* How much it falls off on either side, at least, within two samples. */
+static double plateau_fall(const struct trace *trace, const struct plateau *top)
 {
-	double left = sign * (trace->value_g[top->from] - trace->value_g[top->from - 2]);
-	double right = sign * (trace->value_g[top->until] - trace->value_g[top->until + 2]);
-	double fall = fmin(left, right), half = (double)(top->until - top->from) / 2;
+	const double *v = trace->value_g;
+	double sign = v[top->from] < 0 ? -1 : 1;
+
+	return fmin(sign * (v[top->from] - v[top->from - 2]), sign * (v[top->until] - v[top->until + 2]));
+}
+
+/* Whether more than noise falls off beside them, and a round top that falls off so would be as round between
+ * them that it shows. */
+static bool plateau_ends(const struct trace *trace, const struct plateau *top, double noise_g)
+{
+	double fall = plateau_fall(trace, top), half = (double)(top->until - top->from) / 2;
 
 	return fall > LIMIT_NOISE * noise_g && fall * half * half / (4 * half + 4) > LIMIT_AGREE * noise_g;
 }
 
-/* Chance, at most, that noise trembles no more than the samples do about their mean: the first term of
- * chi-square's distribution. */
-static double plateau_chance(const struct trace *trace, const struct plateau *top, double noise_g)
+/* About a straight line through the samples of a top. */
+struct tremble {
+	double square, slope; /* sum of squares about their mean; of the line, in its standard deviations */
+	double count;
+};
+
+static struct tremble plateau_tremble(const struct trace *trace, const struct plateau *top, double noise_g)
 {
-	double n = (double)(top->until - top->from + 1), sum = 0, square = 0, half = (n - 1) / 2;
+	double n = (double)(top->until - top->from + 1), mean = 0, along = 0;
+	struct tremble tremble = {0, 0, n};
 
 	for (size_t k = top->from; k <= top->until; k++)
-		sum += trace->value_g[k];
-	for (size_t k = top->from; k <= top->until; k++)
-		square += pow(trace->value_g[k] - sum / n, 2);
-	return pow(square / (2 * noise_g * noise_g), half) / tgamma(half + 1);
+		mean += trace->value_g[k] / n;
+	for (size_t k = top->from; k <= top->until; k++) {
+		double off = trace->value_g[k] - mean;
+
+		tremble.square += off * off;
+		along += off * ((double)(k - top->from) - (n - 1) / 2);
+	}
+	tremble.slope = fabs(along) / (noise_g * sqrt(n * (n * n - 1) / 12));
+	return tremble;
 }
 
-/* Sample by sample outward from the largest one, to the ends of what noise hardly leaves as flat.
- */
-static bool plateau_find(const struct trace *trace, double noise_g, struct plateau *top)
+/* Whether noise trembles no more than the samples do but once in many tops: the first term of chi-square's
+ * distribution. */
+static bool plateau_cut(const struct trace *trace, const struct plateau *top, double noise_g)
+{
+	struct tremble tremble = plateau_tremble(trace, top, noise_g);
+	double half = (tremble.count - 1) / 2;
+
+	return pow(tremble.square / (2 * noise_g * noise_g), half) / tgamma(half + 1) < PLATEAU_CHANCE;
+}
+
+/* Whether they tremble as noise about a level top, and a round one as high would show by far. */
+static bool plateau_flat(const struct trace *trace, const struct plateau *top, double noise_g)
+{
+	double half = (double)(top->until - top->from) / 2;
+	double round_g = plateau_fall(trace, top) * half * half / (4 * half + 4);
+	struct tremble tremble = plateau_tremble(trace, top, noise_g);
+	double freedom = tremble.count - 1, square = pow(round_g / noise_g, 2);
+
+	return tremble.count > PLATEAU_SAMPLES && tremble.slope < LIMIT_AGREE &&
+	       tremble.square < noise_g * noise_g * freedom * (1 + LIMIT_CHI * sqrt(2 / freedom)) &&
+	       ROUND_SPREAD * tremble.count * square > LIMIT_SIGNIFICANT * LIMIT_SIGNIFICANT;
+}
+
+/* Sample by sample outward from the largest one, to the ends of what is flat by that. */
+static bool plateau_find(const struct trace *trace, double noise_g,
+                         bool (*is_flat)(const struct trace *, const struct plateau *, double),
+                         struct plateau *top)
 {
 	size_t at = plateau_largest(trace);
 	double high, low, sign;
@@ -99,9 +157,8 @@ static bool plateau_find(const struct trace *trace, double noise_g, struct plate
 		double before = sign * trace->value_g[top->from - 1];
 		double after = sign * trace->value_g[top->until + 1];
 
-		if (top->until - top->from + 1 >= PLATEAU_SAMPLES &&
-		    plateau_ends(trace, sign, top, noise_g) &&
-		    plateau_chance(trace, top, noise_g) < PLATEAU_CHANCE)
+		if (top->until - top->from + 1 >= PLATEAU_SAMPLES && plateau_ends(trace, top, noise_g) &&
+		    is_flat(trace, top, noise_g))
 			return true;
 		low = fmin(low, fmax(before, after));
 		top->from -= before > after;
@@ -123,7 +180,7 @@ void doubt_plateau(struct trace *trace, double noise_g)
 {
 	struct plateau top;
 
-	if (!plateau_find(trace, plateau_noise(trace, noise_g), &top))
+	if (!plateau_find(trace, plateau_noise(trace, noise_g), plateau_cut, &top))
 		return;
 	trace->flags |= RECORD_FLAG_CLIPPED;
 	for (size_t k = top.from; k <= top.until; k++)
@@ -149,6 +206,77 @@ static bool doubt_step(const struct trace *trace, const struct peak *peak, const
 	for (size_t k = last - 3; k < last; k++)
 		steepest = fmax(steepest, fabs(trace->value_g[k + 1] - trace->value_g[k]));
 	return step > LIMIT_EDGE * height && step > STEP_STEEPER * steepest + rest;
+}
+
+/* What is missing between samples k and k + 1 when parabolas through three to either side are led to their
+ * middle; NAN where one of the six is missing or below level_g. */
+static double doubt_jump(const struct trace *trace, size_t k, double sign, double level_g)
+{
+	const double *v = trace->value_g + k;
+
+	if (k < 2 || k + 3 >= trace->count)
+		return NAN;
+	for (size_t i = k - 2; i <= k + 3; i++)
+		if (!trace_usable(trace, i) || sign * trace->value_g[i] < level_g)
+			return NAN;
+	return (15 * (v[1] - v[0]) - 10 * (v[2] - v[-1]) + 3 * (v[3] - v[-2])) / 8;
+}
+
+/* Whether samples k and k + 1 are further apart than either is from its other neighbour, by most of a jump; a
+ * kink is not. */
+static bool doubt_apart(const struct trace *trace, size_t k, double jump_g)
+{
+	const double *v = trace->value_g + k;
+	double rise = v[1] - v[0], before = rise - (v[0] - v[-1]), after = rise - (v[2] - v[1]);
+
+	return before * after > 0 && fmin(fabs(before), fabs(after)) > JUMP_MOST * jump_g;
+}
+
+/* Whether there is a step under the pulse, whose like is not beside it: of a gain or of a contact. */
+static bool doubt_step_inside(const struct trace *trace, const struct peak *peak,
+                              const struct estimate_pulse *pulse)
+{
+	double level = LIMIT_AGAIN * fabs(peak->result.value_g), most = 0, beside = 0;
+	size_t from = trace_index(trace, pulse->start_s), until = trace_index(trace, pulse->end_s), at = from;
+
+	for (size_t k = from; k < until; k++) {
+		double jump = fabs(doubt_jump(trace, k, peak->sign, level));
+
+		if (jump > most) {
+			most = jump;
+			at = k;
+		}
+	}
+	if (!(most > LIMIT_EDGE * fabs(peak->result.value_g)) ||
+	    !(most > LIMIT_SIGNIFICANT * JUMP_NOISE * trace->noise_g) || !doubt_apart(trace, at, most))
+		return false;
+	for (size_t k = from; k < until; k++)
+		if (k + 2 < at || k > at + 2)
+			beside = fmax(beside, fabs(doubt_jump(trace, k, peak->sign, level)));
+	return most > STEP_STEEPER * beside;
+}
+
+/* Whether it rings on after the pulse, faster than a plate does, by third differences. */
+static bool doubt_rough(const struct trace *trace, const struct peak *peak,
+                        const struct estimate_pulse *pulse)
+{
+	size_t k = trace_index(trace, pulse->end_s + AFTER_FROM * pulse->duration_s);
+	size_t until = trace_index(trace, pulse->end_s + (AFTER_FROM + ROUGH_WIDTHS) * pulse->duration_s),
+	       n = 0;
+	double rough = 0, swing = 0, height = fabs(peak->result.value_g);
+	const double *v = trace->value_g;
+
+	for (; k + 3 < until; k++) {
+		if (!trace_usable(trace, k) || !trace_usable(trace, k + 1) || !trace_usable(trace, k + 2) ||
+		    !trace_usable(trace, k + 3))
+			continue;
+		rough += pow(v[k + 3] - v[k] - 3 * (v[k + 2] - v[k + 1]), 2);
+		swing += v[k] * v[k];
+		n++;
+	}
+	rough = sqrt(rough / (double)n);
+	return n >= ROUGH_SAMPLES && rough > 2 * DIFFERENCES_NOISE * trace->noise_g &&
+	       rough > ROUGH_HEIGHT * height && rough > ROUGH_SWING * sqrt(swing / (double)n);
 }
 
 /* Mean of n samples from k on; false where one of them is missing. */
@@ -208,24 +336,30 @@ static void after_find(const struct trace *trace, const struct estimate_baseline
 		if (!doubt_mean(trace, k, after->samples, mean))
 			break;
 		*mean *= peak->sign;
-		if (after->n > 0 && *mean > mean[-1] + again)
+		if (after->n > 0 && *mean > fmax(mean[-1], 0) + again)
 			break;
 	}
 }
 
 /* By how much zero after differs from zero before: of a supply or a sensor that was shifted; a plate that the
- * case feels swings about it. */
+ * case feels swings about it. Behind a high-pass all of it lies below, most at first. */
 static double after_shift(const struct after *after)
 {
-	double mean = 0, square = 0, n = (double)after->n, sigma;
+	double mean = 0, first = 0, square = 0, n = (double)after->n, sigma;
+	bool below = true;
 
 	if (after->n < AFTER_BLOCKS / 2)
 		return 0;
-	for (size_t i = 0; i < after->n; i++)
+	for (size_t i = 0; i < after->n; i++) {
 		mean += after->mean_g[i] / n;
+		first += i < AFTER_BLOCKS / 2 ? after->mean_g[i] / (AFTER_BLOCKS / 2) : 0;
+		below = below && after->mean_g[i] < 0;
+	}
 	for (size_t i = 0; i < after->n; i++)
 		square += pow(after->mean_g[i] - mean, 2) / (n - 1);
 	sigma = fmax(after->sigma_g, sqrt(square)) / sqrt(n);
+	if (below && -first > LIMIT_SIGNIFICANT * after->sigma_g / sqrt(AFTER_BLOCKS / 2.0))
+		return -first;
 	return fabs(mean) > LIMIT_SIGNIFICANT * sigma ? fabs(mean) : 0;
 }
 
@@ -269,15 +403,28 @@ static void doubt_after(const struct trace *trace, const struct estimate_baselin
 	}
 }
 
+static void doubt_flag(struct peak *peak, struct estimate_pulse *pulse, unsigned flag)
+{
+	peak->result.how.flags |= flag;
+	pulse->flags |= flag;
+}
+
 void doubt_channel(const struct trace *trace, const struct estimate_baseline *baseline, struct peak *peak,
                    struct estimate_pulse *pulse)
 {
 	double samples = pulse->duration_s * trace->rate_hz;
+	struct plateau top;
 
 	if (!isfinite(pulse->duration_s))
 		return;
 	if (doubt_step(trace, peak, pulse))
 		pulse->flags |= ESTIMATE_FLAG_STEP;
+	if (doubt_step_inside(trace, peak, pulse))
+		doubt_flag(peak, pulse, ESTIMATE_FLAG_STEP);
+	if (doubt_rough(trace, peak, pulse))
+		doubt_flag(peak, pulse, ESTIMATE_FLAG_ROUGH);
+	if (plateau_find(trace, trace->noise_g, plateau_flat, &top))
+		doubt_flag(peak, pulse, ESTIMATE_FLAG_FLAT);
 	if (samples < WIDTH_SAMPLES)
 		pulse->sigma_duration_s =
 		        hypot(pulse->sigma_duration_s, WIDTH_BIAS / (samples * samples) * pulse->duration_s);

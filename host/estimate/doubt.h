@@ -8,9 +8,13 @@
  * doubt_plateau: a top that falls off on both sides and trembles less than the noise is a cut of unknown
  * range.
  *
- * doubt_channel: a fall to rest within one sample is "step". A zero after the pulse that is not the one
- * before is "tail", and widens peak and velocity change. A force that fades on is "tail", and widens the
- * velocity change. The width of a pulse of fewer than eight samples is widened.
+ * doubt_channel: a fall to rest within one sample, or a step under the pulse, is "step". A zero after the
+ * pulse that is not the one before is "tail", and widens peak and velocity change. A force that fades on is
+ * "tail", and widens the velocity change. A top that trembles as the noise about a level is "flat_top". What
+ * rings on after the pulse faster than a plate is "rough". The width of a pulse of fewer than twelve samples
+ * is widened.
+ *
+ * doubt_axes: what two sensors of two axes say against each other is "axes_disagree".
  */
 #include "host/estimate/estimate.h"
 #include "host/estimate/peak.h"
@@ -27,7 +31,8 @@ void doubt_channel(const struct trace *trace, const struct estimate_baseline *ba
  */
 double doubt_slap_s(const struct trace *trace);
 
-/* X and Y of S1, then of S2; all four are there. True where any is flagged. */
-bool doubt_axes(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2]);
+/* X and Y of S1, then of S2; all four are there. Flags that any of them got: their resultants have them too.
+ */
+unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2]);
 
 #endif

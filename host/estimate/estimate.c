@@ -13,6 +13,7 @@
 #include "host/estimate/filter.h"
 #include "host/estimate/iepe.h"
 #include "host/estimate/pulse.h"
+#include "host/estimate/quiet.h"
 #include "host/estimate/rebound.h"
 
 /* Around the trigger, what belongs to the impact that fired it: the product comes back for another. */
@@ -26,6 +27,7 @@ static int estimate_prepare(const struct desk *desk, size_t i, struct estimate_b
 
 	clean_find(trace, desk->scratch, baseline);
 	baseline_remove(trace, baseline);
+	trace->noise_g *= quiet_colour(trace, baseline);
 	if (options->iepe_time_constant_s > 0)
 		iepe_undo(trace, baseline->from_s, options->iepe_time_constant_s);
 	if (options->cfc > 0) {
@@ -42,6 +44,8 @@ static void analyse_channel(const struct desk *desk, size_t i, struct estimate_c
 	struct work *work = &desk->work[i];
 
 	peak_find(&work->trace, desk->options, &work->peak);
+	if (work->first_of_two)
+		work->peak.result.how.flags |= ESTIMATE_FLAG_FIRST;
 	if (out->baseline.unsettled && work->peak.result.how.status == ESTIMATE_OK)
 		work->peak.result.how.status = ESTIMATE_AMBIGUOUS;
 	pulse_measure(&work->trace, &work->peak, &out->baseline, desk->options->family, &out->pulse);
@@ -129,6 +133,7 @@ static void estimate_first_contact(const struct desk *desk)
 		struct trace *trace = &desk->work[i].trace;
 
 		trace->last = trace_index(trace, until);
+		desk->work[i].first_of_two = true;
 	}
 }
 
@@ -137,6 +142,7 @@ static void estimate_compare(const struct desk *desk, struct analysis *analysis)
 {
 	struct estimate_channel *channel[2][2] = {{NULL}};
 	const struct trace *trace[2][2] = {{NULL}};
+	unsigned flags;
 
 	for (unsigned i = 0; i < 4; i++) {
 		size_t at = estimate_find(desk, i < 2 ? "S1" : "S2", i % 2 == 0 ? 'X' : 'Y');
@@ -146,12 +152,14 @@ static void estimate_compare(const struct desk *desk, struct analysis *analysis)
 		channel[i / 2][i % 2] = &analysis->channels[at];
 		trace[i / 2][i % 2] = &desk->work[at].trace;
 	}
-	if (!doubt_axes(trace, channel))
-		return;
+	flags = doubt_axes(trace, channel);
 	for (size_t i = 0; i < analysis->resultant_count; i++)
-		analysis->resultants[i].how.flags |= ESTIMATE_FLAG_AXES;
-	if (analysis->has_lag && analysis->lag.status == ESTIMATE_OK)
+		analysis->resultants[i].how.flags |= flags;
+	if (!(flags & ESTIMATE_FLAG_AXES))
+		return;
+	if (analysis->lag.status == ESTIMATE_OK)
 		analysis->lag.status = ESTIMATE_AMBIGUOUS;
+	analysis->lag.driven.flags |= ESTIMATE_FLAG_AXES;
 }
 
 static void analyse_rebound(const struct desk *desk, struct analysis *analysis)

@@ -41,9 +41,12 @@ enum {
 	ESTIMATE_FLAG_NOT_SEPARABLE = 1u << 9, /* "not_separable": two modes nearer than their width */
 	ESTIMATE_FLAG_ZERO = 1u << 10,         /* "zero_unsure": the baseline is doubtful */
 	ESTIMATE_FLAG_RIVAL = 1u << 11, /* "rival": another extreme is as high, as far as noise lets tell */
-	ESTIMATE_FLAG_STEP = 1u << 12,  /* "step": the pulse ends within one sample, as no sensor does */
+	ESTIMATE_FLAG_STEP = 1u << 12,  /* "step": within one sample, as no sensor makes */
 	ESTIMATE_FLAG_TAIL = 1u << 13,  /* "tail": more than noise follows the pulse; sigma is widened */
-	ESTIMATE_FLAG_AXES = 1u << 14,  /* "axes_disagree": S1 and S2 do not see one shock on this axis */
+	ESTIMATE_FLAG_AXES = 1u << 14,  /* "axes_disagree": S1 and S2, or X and Y, do not see one shock */
+	ESTIMATE_FLAG_FLAT = 1u << 15,  /* "flat_top": as a cut one; how high it went is not known then */
+	ESTIMATE_FLAG_ROUGH = 1u << 16, /* "rough": rings on faster than a plate: a loose sensor */
+	ESTIMATE_FLAG_FIRST = 1u << 17, /* "larger_follows": of the first contact; a later one is larger */
 };
 
 /* Name of the lowest flag bit in flags; "" for 0. */

@@ -35,7 +35,10 @@ const char *estimate_flag_name(unsigned flags)
 	                                    "rival",
 	                                    "step",
 	                                    "tail",
-	                                    "axes_disagree"};
+	                                    "axes_disagree",
+	                                    "flat_top",
+	                                    "rough",
+	                                    "larger_follows"};
 
 	for (unsigned i = 0; i < sizeof(names) / sizeof(names[0]); i++)
 		if (flags & 1u << i)

@@ -15,6 +15,7 @@
 
 struct work {
 	struct trace trace;
+	bool first_of_two; /* contacts, the second of which is larger and left out */
 	struct peak peak;
 	const struct peak *strong; /* whose shape peak has (peak_weak); NULL: its own */
 	struct ringdown_span span;

@@ -15,6 +15,12 @@
 #define SKEW_MAX 0.06
 #define SKEW_NOISE 2.0
 
+/* A top that stands aside of the middle at half its height by this part of what it is wide there is flatter
+ * on one side than a polynomial tells: saw-tooths of 0.25 to 0.75 have 0.25 and are 0.02 of a width off; an
+ * impact has 0.1. */
+#define ASIDE 0.18
+#define ASIDE_TIME 0.01
+
 /* A half-sine is two thirds of its base wide at half height. */
 #define BASE_PER_HALF_WIDTH 1.5
 
@@ -196,6 +202,8 @@ static bool take_crest(const struct trace *trace, struct peak *peak)
 	result->sigma_g = crest.sigma_g;
 	result->time_s = crest.time_s;
 	result->sigma_time_s = crest.sigma_time_s;
+	if (fabs(crest.time_s - peak->start.peak_s) > ASIDE * peak->start.half_width_s)
+		result->sigma_time_s = hypot(result->sigma_time_s, ASIDE_TIME * peak->width_s);
 	peak->model = PEAK_MODEL_LOCAL;
 	peak->local = crest.axis[0];
 	peak->noise_g = crest_noise(&peak->local, trace);
@@ -351,8 +359,6 @@ static bool has_rival(const struct trace *trace, const struct peak *peak)
 	double level = (1 - LIMIT_PART) * height - LIMIT_AGREE * noise;
 	size_t from = trace_index(trace, peak->span.from_s), until = trace_index(trace, peak->span.until_s);
 
-	if (!(height > PEAK_WEAK_SIGMAS * noise))
-		return false;
 	return (trace->first < from && trace_reaches(trace, trace->first, from, level) < from) ||
 	       (until < trace->last && trace_reaches(trace, until, trace->last, level) < trace->last);
 }

@@ -7,6 +7,9 @@
 #include "host/estimate/guide.h"
 #include "host/estimate/limits.h"
 
+/* Samples. */
+enum { AGAIN_WITHIN = 4 };
+
 struct edge {
 	double time_s;
 	double slope_g_s; /* magnitude */
@@ -42,6 +45,23 @@ static double parabola_spread(double u)
 	            beyond * beyond);
 }
 
+/* On a slow edge noise crosses the level before the pulse does, and after: how much later the last time, at
+ * most so many samples after the one before. */
+static double crossed_again(const struct trace *trace, const struct peak *peak, size_t at, int step,
+                            double level_g)
+{
+	size_t last = at;
+
+	for (size_t n = 0, k = at; n < AGAIN_WITHIN && k > 0 && k + 1 < trace->count; n++) {
+		k = step < 0 ? k - 1 : k + 1;
+		if (!trace_good(trace, k) || !(peak->sign * trace->value_g[k] > level_g))
+			continue;
+		last = k;
+		n = 0;
+	}
+	return (double)(step < 0 ? at - last : last - at) / trace->rate_hz;
+}
+
 /* Where the pulse meets level_g on one side, by the parabola through the two samples as bent as both their
  * neighbourhoods say; and how well that is known: noise, the bend that they do not agree on, and the hole
  * when they are no neighbours. */
@@ -73,7 +93,8 @@ static bool find_edge(const struct trace *trace, const struct peak *peak, int st
 	edge->time_s += gap * fmin(fmax(bent * place * (1 - place) / (2 * rise), -0.5), 0.5);
 	noise = trace->noise_g * (fabs(bent) > 0 ? parabola_spread(place) : hypot(place, 1 - place));
 	edge->sigma_s = hypot(noise, fmax(fabs(bend0 - bent), fabs(bend1 - bent)) / 16) / edge->slope_g_s;
-	edge->sigma_s = hypot(edge->sigma_s, missing);
+	edge->sigma_s = hypot(hypot(edge->sigma_s, missing),
+	                      crossed_again(trace, peak, step < 0 ? before : after, step, level_g));
 	return true;
 }
 

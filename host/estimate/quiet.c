@@ -14,6 +14,14 @@
 enum { GLANCE = 31 }; /* samples that tell roughly where the middle is, and how wide */
 enum { SECOND_DIFFERENCES = 255 };
 
+/* Noise is coloured when samples side by side tremble by less than this part of it: white noise does once in
+ * a million quiet parts. Its colour is that of means so long, of no fewer, and believed up to so much. */
+#define COLOURED 0.7
+#define COLOUR_S 2e-3
+#define COLOUR_MOST 5.0
+
+enum { COLOUR_MEANS = 16 };
+
 /* Of a decay's quarters the last step against the first. */
 #define DECAYS_ON 1.2
 
@@ -267,6 +275,34 @@ double quiet_noise(const struct trace *trace, size_t from, size_t until)
 			seen[n++] =
 			        fabs(trace->value_g[k] - 2 * trace->value_g[k + 1] + trace->value_g[k + 2]);
 	return n < GLANCE / 2 ? NAN : MAD_TO_SIGMA * median_find(seen, n) / sqrt(6.0);
+}
+
+double quiet_colour(const struct trace *trace, const struct estimate_baseline *baseline)
+{
+	size_t from = trace_index(trace, baseline->from_s), until = trace_index(trace, baseline->until_s);
+	size_t length = (size_t)ceil(COLOUR_S * trace->rate_hz), means = 0;
+	double square = 0, colour;
+
+	if (baseline->samples == 0 || !(quiet_noise(trace, from, until) < COLOURED * trace->noise_g))
+		return 1;
+	for (; from + length <= until; from += length) {
+		double sum = 0;
+		size_t n = 0;
+
+		for (size_t k = from; k < from + length; k++)
+			if (trace_good(trace, k)) {
+				sum += trace->value_g[k];
+				n++;
+			}
+		if (n < length)
+			continue;
+		square += sum * sum / (double)n;
+		means++;
+	}
+	if (means < COLOUR_MEANS)
+		return 1;
+	colour = sqrt(square / (double)means) / trace->noise_g;
+	return fmin(fmax(colour, 1), COLOUR_MOST);
 }
 
 /* Whether the means of its quarters fall, or rise, each by more than noise and no faster at the end. */

@@ -42,7 +42,8 @@ struct trace {
 	                 */
 	unsigned flags; /* RECORD_FLAG_* */
 	double range_g; /* the channel's */
-	size_t twins;   /* the first of two extremes that are equal, perhaps by chance; count if none */
+	size_t twins;   /* the first of a few extremes that are equal, perhaps by chance; count if none */
+	size_t twins_last;
 	struct trace_block *block; /* [trace_blocks] */
 	void *memory;              /* of trace_open */
 };

@@ -284,11 +284,19 @@ const char *report_note_words(unsigned flag)
 	case ESTIMATE_FLAG_RIVAL:
 		return "another extreme is as high, as far as noise lets tell";
 	case ESTIMATE_FLAG_STEP:
-		return "it ends within one sample, as no sensor does: look for a broken cable";
+		return "a step within one sample, as no sensor makes: look for a broken cable";
 	case ESTIMATE_FLAG_TAIL:
 		return "more than noise follows the pulse; the uncertainty holds it";
 	case ESTIMATE_FLAG_AXES:
-		return "S1 and S2 do not see one shock: an axis is reversed, exchanged or dead";
+		return "S1 and S2, or X and Y, do not see one shock: an axis is reversed, exchanged, dead, "
+		       "late or behind a filter of its own";
+	case ESTIMATE_FLAG_FLAT:
+		return "its top is flat: a cut one of a range that is not known looks like this; it may have "
+		       "gone higher";
+	case ESTIMATE_FLAG_ROUGH:
+		return "it rings on faster than a plate does: look for a loose sensor";
+	case ESTIMATE_FLAG_FIRST:
+		return "of the first contact; a later one is larger";
 	default:
 		return estimate_flag_name(flag);
 	}
@@ -316,6 +324,7 @@ static void facts_note(struct noting *noting, double value, unsigned flags, cons
 size_t report_notes(const struct report *report, struct report_note notes[REPORT_NOTES_MAX])
 {
 	const struct analysis *a = report->analysis;
+	/* Others are said of the peak. */
 	const unsigned of_pulse = ESTIMATE_FLAG_ZERO | ESTIMATE_FLAG_STEP | ESTIMATE_FLAG_TAIL;
 	struct noting noting = {.notes = notes, .flag = 1};
 
@@ -370,17 +379,17 @@ bool report_video(const struct report *report, const struct report_zero *zero, c
 
 const char *report_channel_status(const struct estimate_channel *estimate, char *text, size_t size)
 {
-	const unsigned doubts = (estimate->peak.how.flags | estimate->pulse.flags) &
-	                        (ESTIMATE_FLAG_STEP | ESTIMATE_FLAG_TAIL | ESTIMATE_FLAG_AXES);
+	/* Of how a value was got, not of what is wrong with it. */
+	const unsigned told = ESTIMATE_FLAG_HUM | ESTIMATE_FLAG_SPIKE;
+	const unsigned doubts = (estimate->peak.how.flags | estimate->pulse.flags) & ~told;
+	const unsigned late = doubts & ~(unsigned)ESTIMATE_FLAG_TOLERANCE;
 
 	if (estimate->peak.how.status != ESTIMATE_OK)
 		snprintf(text, size, "%s", estimate_status_name(estimate->peak.how.status));
 	else if (estimate->pulse.status != ESTIMATE_OK)
 		snprintf(text, size, "width %s", estimate_status_name(estimate->pulse.status));
-	else if (doubts)
-		snprintf(text, size, "%s", estimate_flag_name(doubts));
 	else
-		snprintf(text, size, "ok");
+		snprintf(text, size, "%s", doubts ? estimate_flag_name(late ? late : doubts) : "ok");
 	return text;
 }
 

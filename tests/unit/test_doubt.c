@@ -154,7 +154,7 @@ static struct drop draw(enum form form, enum spoil spoil, struct synth_random *r
 
 struct count {
 	unsigned peak, velocity, width; /* silently wrong */
-	unsigned clipped, step, tail;
+	unsigned clipped, flat, step, tail;
 };
 
 static unsigned wrong(double value, double truth, double sigma, unsigned flags, enum estimate_status status)
@@ -188,6 +188,7 @@ static struct count repeat(enum form form, enum spoil spoil, unsigned drops)
 		count.width += wrong(c->pulse.duration_s, truth.width_s, c->pulse.sigma_duration_s,
 		                     c->pulse.flags, c->pulse.status);
 		count.clipped += (c->flags & RECORD_FLAG_CLIPPED) != 0;
+		count.flat += !(c->flags & RECORD_FLAG_CLIPPED) && c->peak.how.flags & ESTIMATE_FLAG_FLAT;
 		count.step += (c->pulse.flags & ESTIMATE_FLAG_STEP) != 0;
 		count.tail += (c->pulse.flags & ESTIMATE_FLAG_TAIL) != 0;
 		estimate_free(&analysis);
@@ -198,9 +199,9 @@ static struct count repeat(enum form form, enum spoil spoil, unsigned drops)
 
 static void print_count(enum form form, enum spoil spoil, const struct count *c)
 {
-	printf("%-10s %-10s of %u: silent peak %u dv %u width %u; clipped %u step %u tail %u\n",
+	printf("%-10s %-10s of %u: silent peak %u dv %u width %u; clipped %u flat %u step %u tail %u\n",
 	       spoil_names[spoil], form_names[form], DOUBT_DROPS, c->peak, c->velocity, c->width, c->clipped,
-	       c->step, c->tail);
+	       c->flat, c->step, c->tail);
 }
 
 /* Nothing is said against a whole record. */
@@ -228,7 +229,7 @@ static void spoilt(void **state)
 	for (int s = WHOLE + 1; s < SPOILS; s++)
 		for (int f = 0; f < FORMS; f++) {
 			struct count c = repeat((enum form)f, (enum spoil)s, DOUBT_DROPS);
-			unsigned n = s == CABLE ? c.step : s >= SHIFT ? c.tail : c.clipped;
+			unsigned n = s == CABLE ? c.step : s >= SHIFT ? c.tail : c.clipped + c.flat;
 
 			print_count((enum form)f, (enum spoil)s, &c);
 			assert_true(n >= seen[s] * DOUBT_DROPS);
