@@ -23,7 +23,7 @@
 #define PAGE "<!DOCTYPE html><title>a page</title>"
 
 /* bin has the browsers, temporary is where their folders are made, and seen what they say of themselves. */
-static char folder[SCRATCH_MAX], bin[80], temporary[80], seen[80];
+static char folder[SCRATCH_MAX], bin[80], temporary[80], seen[80], home[128];
 static char message[512];
 
 static int set_up(void **state)
@@ -31,6 +31,7 @@ static int set_up(void **state)
 	char path[256];
 
 	(void)state;
+	snprintf(home, sizeof(home), "%s", getenv("TMPDIR") ? getenv("TMPDIR") : "/tmp");
 	if (!mkdtemp(scratch_name(folder, "pdf-test")))
 		return 1;
 	snprintf(bin, sizeof(bin), "%s/bin", folder);
@@ -47,7 +48,7 @@ static int tear_down(void **state)
 
 	(void)state;
 	snprintf(command, sizeof(command), "/bin/rm -rf '%s'", folder);
-	return system(command);
+	return system(command) || setenv("TMPDIR", home, 1);
 }
 
 static void browser(const char *name, const char *script)

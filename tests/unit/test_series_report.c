@@ -411,7 +411,7 @@ static void test_hostile_texts_are_escaped(void **state)
 	free(page);
 }
 
-/* A reference leads within the page; "http" stands only where SVG names itself. */
+/* A reference leads within the page or carries its data itself; "http" stands only where SVG names itself. */
 static void test_nothing_outside_is_referred_to(void **state)
 {
 	char *page;
@@ -420,7 +420,7 @@ static void test_nothing_outside_is_referred_to(void **state)
 	make_series();
 	page = report();
 	for (const char *at = strstr(page, "href="); at; at = strstr(at + 1, "href="))
-		assert_int_equal(at[6], '#');
+		assert_true(at[6] == '#' || !strncmp(at + 6, "data:text/csv;base64,", 21));
 	for (const char *at = strstr(page, "http"); at; at = strstr(at + 1, "http")) {
 		if (!strncmp(at, "http-equiv", 10))
 			continue;
