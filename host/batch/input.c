@@ -11,6 +11,7 @@
 #include "common/base/process.h"
 #include "common/base/text.h"
 #include "host/record/digest.h"
+#include "host/record/mme.h"
 #include "host/record/profile.h"
 
 enum { SETTLED_S = 2 };
@@ -99,24 +100,58 @@ bool input_stayed(const struct input *input, const struct noted *noted)
 	return now.size == noted->size && now.mtime_ns == noted->mtime_ns && now.ctime_ns == noted->ctime_ns;
 }
 
-/* The profile that lies beside a recording changes how it is read. */
-static bool input_add_profile(const char *path, char key[INPUT_KEY_CHARS])
+/* A profile that lies beside a recording. */
+static bool put_profile(FILE *out, const char *path)
 {
 	char profile[PROFILE_PATH_MAX], digest[DIGEST_CHARS];
-	struct text text;
 	int64_t size;
 
 	if (!profile_beside(path, profile))
 		return true;
-	if (digest_file(profile, digest, &size, -1) != 0 || text_open(&text) != 0)
+	if (digest_file(profile, digest, &size, -1) != 0)
 		return false;
-	fprintf(text.out, "%s %s", digest, profile);
-	if (text_close(&text, 0) != 0)
+	fprintf(out, "%s %s", digest, profile);
+	return true;
+}
+
+/* The channels of a test of ISO 13499. */
+static bool put_channels(FILE *out, const char *path)
+{
+	char folder[PATH_MAX], name[PATH_MAX], digest[DIGEST_CHARS];
+	struct dirent **entry;
+	int count = mme_is_test(path) ? mme_channels(path, folder, &entry) : 0;
+	bool right = true;
+	int64_t size;
+
+	for (int i = 0; i < count; i++) {
+		right = right && snprintf(name, sizeof(name), "%s/%s", folder, entry[i]->d_name) < PATH_MAX &&
+		        digest_file(name, digest, &size, -1) == 0;
+		fprintf(out, "%s %s\n", right ? digest : "", entry[i]->d_name);
+		free(entry[i]);
+	}
+	if (count > 0)
+		free(entry);
+	return right;
+}
+
+/* What lies beside a recording and changes what is read. */
+static bool input_add_beside(const char *path, char key[INPUT_KEY_CHARS])
+{
+	char digest[DIGEST_CHARS];
+	struct text text;
+	bool right;
+
+	if (text_open(&text) != 0)
 		return false;
-	digest_of(text.bytes, text.size, digest);
+	right = put_profile(text.out, path) && put_channels(text.out, path);
+	if (text_close(&text, right ? 0 : DT_E_SYSTEM) != 0)
+		return false;
+	if (text.size > 0) {
+		digest_of(text.bytes, text.size, digest);
+		strcat(key, "-");
+		strcat(key, digest);
+	}
 	free(text.bytes);
-	strcat(key, "-");
-	strcat(key, digest);
 	return true;
 }
 
@@ -127,7 +162,7 @@ bool input_is_noted(const struct input *input)
 	if (input->noted.key[0] == '\0' || !input_stayed(input, &input->noted))
 		return false;
 	snprintf(key, sizeof(key), "%.*s", (int)strcspn(input->noted.key, "-"), input->noted.key);
-	return input_add_profile(input->path, key) && strcmp(key, input->noted.key) == 0;
+	return input_add_beside(input->path, key) && strcmp(key, input->noted.key) == 0;
 }
 
 int input_look(const struct input *input, struct noted *noted)
@@ -140,7 +175,7 @@ int input_look(const struct input *input, struct noted *noted)
 		return DT_E_SYSTEM;
 	note_status(noted, &status);
 	if (digest_file(input->path, noted->key, &size, -1) != 0 ||
-	    !input_add_profile(input->path, noted->key))
+	    !input_add_beside(input->path, noted->key))
 		return DT_E_SYSTEM;
 	return 0;
 }

@@ -3,7 +3,8 @@
 #define DT_HOST_BATCH_INPUT_H
 /*
  * The recordings of a batch, and which content each has. A key is the SHA-256 of a file's content, and where
- * an import.ini beside it says how it is read, a dash and the SHA-256 of that and its place.
+ * an import.ini beside it says how it is read, or channels of ISO 13499 lie beside it, a dash and a SHA-256
+ * of those.
  *
  * So that a content is not read again to know it, a run notes what it found: a line
  *

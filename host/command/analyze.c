@@ -14,7 +14,6 @@
 #include "host/record/log_capture.h"
 #include "host/record/profile.h"
 #include "host/record/read.h"
-#include "host/shock/window.h"
 
 static int take_class(const struct option_table *table, const char *name, const char *text, void *class)
 {
@@ -35,24 +34,6 @@ static int take_family(const struct option_table *table, const char *name, const
 	                    text);
 }
 
-static int take_window(const struct option_table *table, const char *name, const char *text, void *window)
-{
-	double *window_s = window, from, to;
-	char head[NUMBER_CHARS + 8];
-	const char *colon = strchr(text, ':');
-
-	if (colon != NULL && colon - text < (int)sizeof(head)) {
-		snprintf(head, sizeof(head), "%.*s", (int)(colon - text), text);
-		if (number_read(head, -1e9, 1e9, &from) && number_read(colon + 1, -1e9, 1e9, &to) &&
-		    from < to) {
-			window_s[0] = from;
-			window_s[1] = to;
-			return OPTIONS_READ;
-		}
-	}
-	return option_wrong(table, "--%s is '%s', expected FROM:TO in seconds", name, text);
-}
-
 static int take_limits(const struct option_table *table, const char *name, const char *text, void *into)
 {
 	struct analyze_arguments *arguments = into;
@@ -70,12 +51,7 @@ static const struct option_row rows[] = {
                     "FILE.index"),
         OPTION_UNSIGNED("drop", "N", struct analyze_arguments, drop, 1, 1e9,
                         "only the N-th drop of the log, counted from 1 (one FILE only)"),
-        OPTION_UNSIGNED("shock", "N", struct analyze_arguments, shock, 1, 1e9,
-                        "only the stretch about the N-th shock of a long record, in the order of time"),
-        OPTION_FLAG("every-shock", struct analyze_arguments, every_shock,
-                    "a result for each shock of a long record"),
-        OPTION_TAKEN("window", "FROM:TO", struct analyze_arguments, window_s, take_window,
-                     "only so much of the record, s"),
+        STRETCH_ROWS(struct analyze_arguments, stretch),
         OPTION_FLAG("repeats", struct analyze_arguments, repeats,
                     "instead of a result each: one table over all FILEs, drops or shocks as repeats of one "
                     "thing, "
@@ -134,8 +110,9 @@ static const struct option_table known_options = {
         .command = "analyze",
         .head = "usage: droptower analyze FILE|FOLDER|PATTERN... [OPTIONS]\n"
                 "\n"
-                "Analyses logged drops (candump text, LCM event log, our CSV), UFF58, HDF5 and LabVIEW .lvm "
-                "files,\n"
+                "Analyses logged drops (candump text, Vector ASC, pcapng, LCM event log, our CSV), UFF58, "
+                "ISO "
+                "13499, HDF5 and LabVIEW .lvm files,\n"
                 "and any delimited text, compressed or not. The format is found from the content, and so are "
                 "columns,\n"
                 "units and rate of text; what can be read in two ways is refused. A log of several drops "
@@ -149,63 +126,20 @@ static const struct option_table known_options = {
 
 /* ---- one record ---- */
 
-static int analyze_cut(const struct record *record, double from_s, double to_s, unsigned shock,
-                       unsigned shocks, const struct evaluate_options *options)
+static int analyze_stretch(struct record *cut, void *context)
 {
-	struct record cut;
-	int code, result = shock_window_cut(record, from_s, to_s, &cut);
-
-	if (result != 0) {
-		command_error("%s: %g s to %g s: %s", record->file, from_s, to_s,
-		              result == DT_E_EMPTY ? "no samples there" : error_text(result));
-		return COMMAND_INPUT;
-	}
-	cut.shock = shock;
-	cut.shocks = shocks;
-	code = evaluate(&cut, options);
-	record_free(&cut);
-	return code;
-}
-
-static int analyze_shocks(const struct record *record, const struct analyze_arguments *arguments)
-{
+	const struct analyze_arguments *arguments = context;
 	const struct evaluate_options *options = &arguments->evaluate;
-	struct shock_windows windows;
-	int code = COMMAND_DONE;
 
-	if (shock_windows_find(record, &options->events, &windows) != 0) {
-		command_error("%s: %s", record->file, error_text(DT_E_MEMORY));
-		return COMMAND_INPUT;
-	}
-	if (windows.count == 0 || arguments->shock > windows.count) {
-		command_error("%s: no shock %u, %zu are there", record->file, arguments->shock,
-		              windows.count);
-		code = COMMAND_INPUT;
-	}
-	for (size_t i = 0; i < windows.count && !interrupt_came(); i++) {
-		const struct shock_window *w = &windows.window[i];
-		int one;
-
-		if (arguments->shock > 0 && arguments->shock != i + 1)
-			continue;
-		if (i > 0 && arguments->shock == 0 && !options->json && options->repeats == NULL)
-			putchar('\n');
-		one = analyze_cut(record, w->from_s, w->to_s, (unsigned)i + 1, (unsigned)windows.count,
-		                  options);
-		code = one != COMMAND_DONE ? one : code;
-	}
-	shock_windows_free(&windows);
-	return code;
+	if (cut->shock > 1 && arguments->stretch.shock == 0 && !options->json && options->repeats == NULL)
+		putchar('\n');
+	return evaluate(cut, options);
 }
 
 static int analyze_record(struct record *record, const struct analyze_arguments *arguments)
 {
-	if (arguments->every_shock || arguments->shock > 0)
-		return analyze_shocks(record, arguments);
-	if (!isnan(arguments->window_s[0]))
-		return analyze_cut(record, arguments->window_s[0], arguments->window_s[1], 0, 0,
-		                   &arguments->evaluate);
-	return evaluate(record, &arguments->evaluate);
+	return stretch_each(record, &arguments->stretch, &arguments->evaluate.events, analyze_stretch,
+	                    (struct analyze_arguments *)(uintptr_t)arguments);
 }
 
 static int analyze_one(const char *file, const struct analyze_arguments *arguments)
@@ -274,7 +208,7 @@ static int analyze_check(const struct analyze_arguments *arguments, int argc, ch
 		return command_usage("analyze", "--html takes one FILE, %d are given", argc - optind);
 	if (arguments->drop != 0 && optind + 1 != argc)
 		return command_usage("analyze", "--drop takes one FILE, %d are given", argc - optind);
-	if (arguments->evaluate.html != NULL && (arguments->every_shock || arguments->repeats))
+	if (arguments->evaluate.html != NULL && (arguments->stretch.every_shock || arguments->repeats))
 		return command_usage("analyze", "--html goes without --every-shock and --repeats");
 	if (arguments->profile != NULL && arguments->save_profile != NULL)
 		return command_usage("analyze", "--profile goes without --save-profile");
@@ -287,7 +221,7 @@ static int analyze_check(const struct analyze_arguments *arguments, int argc, ch
 
 static int analyze_agree(const struct analyze_arguments *arguments, const char *command)
 {
-	if (arguments->every_shock + (arguments->shock > 0) + !isnan(arguments->window_s[0]) > 1)
+	if (stretch_is_twofold(&arguments->stretch))
 		return command_usage(command, "expected one of --shock, --every-shock and --window");
 	if (arguments->profile != NULL && arguments->columns != NULL)
 		return command_usage(command, "--profile goes without --columns");
@@ -314,7 +248,7 @@ static int read_band(struct limit_curve *curve, const char *file)
 void analyze_begin(struct analyze_arguments *arguments)
 {
 	*arguments = (struct analyze_arguments){
-	        .angle_deg = NAN, .window_s = {NAN, NAN}, .evaluate = {.iepe_time_constant_s = NAN}};
+	        .angle_deg = NAN, .stretch = STRETCH_ALL, .evaluate = {.iepe_time_constant_s = NAN}};
 }
 
 int analyze_rows(struct option_row into[OPTION_ROWS_MAX])

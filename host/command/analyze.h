@@ -7,15 +7,15 @@
  */
 #include "common/base/option.h"
 #include "host/command/evaluate.h"
+#include "host/command/stretch.h"
 
 struct analyze_arguments {
 	const char *columns, *profile, *save_profile, *scene_file, *band_file;
 	char profile_as_columns[4096];
 	double angle_deg;
 	unsigned drop; /* of the log; 0: all */
-	bool list, every_shock, repeats, presets;
-	unsigned shock; /* of a long record; 0: none by its number */
-	double window_s[2];
+	bool list, repeats, presets;
+	struct stretch stretch;
 	struct evaluate_options evaluate;
 	struct limit_curve band; /* these two are what the options name */
 	struct scene scene;

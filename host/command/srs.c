@@ -7,6 +7,7 @@
 #include "common/base/number.h"
 #include "host/command/command.h"
 #include "host/command/files.h"
+#include "host/command/stretch.h"
 #include "host/record/read.h"
 #include "host/base/whole.h"
 #include "host/report/spectrum.h"
@@ -18,6 +19,8 @@ struct arguments {
 	const char *columns, *limit_file, *csv, *svg;
 	double frequency_hz[FREQUENCIES_MOST]; /* asked for one by one */
 	unsigned drop;                         /* of a log of several; 0: the only one */
+	struct stretch stretch;
+	struct events_options events;
 	double q;
 	struct spectrum_options spectrum;
 	bool json, strict;
@@ -81,6 +84,11 @@ static const struct option_row rows[] = {
                     "for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\""),
         OPTION_UNSIGNED("drop", "N", struct arguments, drop, 1, 1e9,
                         "the N-th drop of a log of several, counted from 1"),
+        STRETCH_ROWS(struct arguments, stretch),
+        OPTION_NUMBER("event-level", "G", struct arguments, events.level_g, 1e-6, 1e9,
+                      "what leaves its rest by more than this is a shock; without it, 8 sigma of the noise"),
+        OPTION_NUMBER("hold-off", "S", struct arguments, events.hold_off_s, 1e-9, 1e3,
+                      "a shock is over when nothing has left that level for so long (0.02)"),
         OPTION_NUMBER("q", "Q", struct arguments, q, 0.500001, 1e6, "quality factor (10)"),
         OPTION_NUMBER("damping", "RATIO", struct arguments, spectrum.srs.damping, 0, 0.999999,
                       "damping ratio instead, 0 to below 1"),
@@ -129,6 +137,10 @@ static int srs_check(struct arguments *arguments, int argc, char **argv)
 	if ((arguments->csv != NULL || arguments->svg != NULL || arguments->drop > 0) && optind + 1 != argc)
 		return command_usage("srs", "--csv, --svg and --drop take one FILE, %d are given",
 		                     argc - optind);
+	if (stretch_is_twofold(&arguments->stretch))
+		return command_usage("srs", "expected one of --shock, --every-shock and --window");
+	if (arguments->stretch.every_shock && (arguments->csv != NULL || arguments->svg != NULL))
+		return command_usage("srs", "--csv and --svg go without --every-shock, --shock N takes one");
 	if (arguments->spectrum.frequency_hz != NULL &&
 	    (arguments->spectrum.from_hz > 0 || arguments->spectrum.to_hz > 0))
 		return command_usage("srs", "--frequencies goes without --from and --to");
@@ -233,14 +245,19 @@ static int check_reach(const struct record *record, const struct spectrum_option
 	return COMMAND_INPUT;
 }
 
-static int spectrum_of(const struct record *record, const struct arguments *arguments)
+static int spectrum_of(struct record *record, void *context)
 {
+	const struct arguments *arguments = context;
 	struct spectrum spectrum;
-	struct spectrum_report report = {record->file, &arguments->spectrum, &spectrum};
+	struct spectrum_report report = {record->file, &arguments->spectrum, &spectrum, record->shock,
+	                                 record->shocks};
 	int code = check_reach(record, &arguments->spectrum), result;
 
 	if (code != COMMAND_DONE)
 		return code;
+	if (record->shock > 0 && !arguments->json)
+		printf("%sshock %u of %u\n", record->shock > 1 && arguments->stretch.shock == 0 ? "\n" : "",
+		       record->shock, record->shocks);
 	result = spectrum_compute(record, &arguments->spectrum, &spectrum);
 	if (result != 0)
 		return srs_refuse(record->file, result, &arguments->spectrum);
@@ -258,7 +275,8 @@ static int srs_file(const char *file, const struct arguments *arguments)
 
 	if (code != COMMAND_DONE)
 		return code;
-	code = spectrum_of(&record, arguments);
+	code = stretch_each(&record, &arguments->stretch, &arguments->events, spectrum_of,
+	                    (struct arguments *)(uintptr_t)arguments);
 	record_free(&record);
 	return code;
 }
@@ -282,6 +300,7 @@ static int srs_files(char **words, int count, const struct arguments *arguments)
 int command_srs(int argc, char **argv)
 {
 	struct arguments arguments = {
+	        .stretch = STRETCH_ALL,
 	        .spectrum = {
 	                .srs = {.damping = -1}, .side = SRS_MAXIMAX, .part = SRS_TOTAL, .per_octave = 12}};
 	struct limit_curve limit = {0};

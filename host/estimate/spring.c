@@ -8,7 +8,6 @@
 #include "host/estimate/gram.h"
 #include "host/estimate/limits.h"
 #include "host/estimate/modes.h"
-#include "host/estimate/pair.h"
 
 /* Q, of a swing as large as the start's: beyond is no spring any more. */
 #define SOFT_MAX 1e4
@@ -18,7 +17,20 @@
 /* Of spring_at's steps and those of the first cycles. */
 #define STEPS_PER_CYCLE 64.0
 
-enum { PLACE_Q = MODES_LAW, PLACE_B = MODES_LAW + 1, PAIRS = (SPRING_SIZE + 1) / 2 };
+enum { PLACE_Q = MODES_LAW, PLACE_B = MODES_LAW + 1, LANES = 4, QUADS = (SPRING_SIZE + LANES - 1) / LANES };
+
+/* Where the processor has registers of four they are used. The numbers are the same, as nothing is fused or
+ * reordered. */
+#if defined(__x86_64__) && defined(__gnu_linux__)
+#define WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define WIDE
+#endif
+#define INSIDE static inline __attribute__((always_inline)) void
+
+/* Four numbers side by side: element by element like one number. By pointers, since how they are passed hangs
+ * on the processor. */
+#define QUAD double __attribute__((vector_size(LANES * sizeof(double))))
 
 /* In units of g: x is w0^2 of the deflection, v is w0 of the speed, time is in 1/w0. */
 struct state {
@@ -136,77 +148,87 @@ static void start_all(struct spring *s, double *difference, const double *p, con
 	}
 }
 
-/* Two solutions. */
-struct pair {
-	PAIR loss, q, b, share, step; /* share: 1 / (1 + b); step in 1/w0 */
-	PAIR x, v;
+/* Four solutions. */
+struct quad {
+	QUAD loss, q, b, share, step; /* share: 1 / (1 + b); step in 1/w0 */
+	QUAD x, v;
 };
 
-static struct pair pair_of(const struct spring *one, const struct spring *other, double step_s)
+static void quad_set(struct quad *quad, const struct spring *s, double step_s)
 {
-	const PAIR b = {one->b, other->b};
-
-	return (struct pair){.loss = {one->loss, other->loss},
-	                     .q = {one->q, other->q},
-	                     .b = b,
-	                     .share = 1 / (1 + b),
-	                     .step = {one->omega0 * step_s, other->omega0 * step_s},
-	                     .x = {one->at.x, other->at.x},
-	                     .v = {one->at.v, other->at.v}};
+	for (unsigned i = 0; i < LANES; i++) {
+		quad->loss[i] = s[i].loss;
+		quad->q[i] = s[i].q;
+		quad->b[i] = s[i].b;
+		quad->share[i] = 1 / (1 + s[i].b);
+		quad->step[i] = s[i].omega0 * step_s;
+		quad->x[i] = s[i].at.x;
+		quad->v[i] = s[i].at.v;
+	}
 }
 
-static inline PAIR push_pair(const struct pair *s, PAIR x, PAIR v)
+INSIDE push_quad(const struct quad *s, const QUAD *x, const QUAD *v, QUAD *a)
 {
-	return -s->loss * v - x * (1 + s->b / (1 + s->q * x * x)) * s->share;
+	*a = -s->loss * *v - *x * (1 + s->b / (1 + s->q * *x * *x)) * s->share;
 }
 
-/* As spring_step; returns the accelerations before it. */
-static inline PAIR pair_step(struct pair *s)
+/* As spring_step. */
+INSIDE quad_step(struct quad *s, QUAD *a1)
 {
-	const PAIR x = s->x, v = s->v, h = s->step;
-	const PAIR a1 = push_pair(s, x, v), v2 = v + h / 2 * a1, a2 = push_pair(s, x + h / 2 * v, v2);
-	const PAIR v3 = v + h / 2 * a2, a3 = push_pair(s, x + h / 2 * v2, v3), v4 = v + h * a3;
-	const PAIR a4 = push_pair(s, x + h * v3, v4);
+	const QUAD x = s->x, v = s->v, h = s->step;
+	QUAD x2, v2, a2, x3, v3, a3, x4, v4, a4;
 
+	push_quad(s, &x, &v, a1);
+	x2 = x + h / 2 * v;
+	v2 = v + h / 2 * *a1;
+	push_quad(s, &x2, &v2, &a2);
+	x3 = x + h / 2 * v2;
+	v3 = v + h / 2 * a2;
+	push_quad(s, &x3, &v3, &a3);
+	x4 = x + h * v3;
+	v4 = v + h * a3;
+	push_quad(s, &x4, &v4, &a4);
 	s->x = x + h / 6 * (v + 2 * v2 + 2 * v3 + v4);
-	s->v = v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
-	return a1;
+	s->v = v + h / 6 * (*a1 + 2 * a2 + 2 * a3 + a4);
 }
 
-/* The next block's mean of each solution. */
-static void spring_block_means(struct pair pair[PAIRS], unsigned block, double mean[2 * PAIRS])
+/* The next block's mean of each solution: of the accelerations before its steps. */
+WIDE static void spring_block_means(struct quad quad[QUADS], unsigned block, double mean[QUADS * LANES])
 {
-	for (unsigned i = 0; i < PAIRS; i++) {
-		struct pair here = pair[i];
-		PAIR sum = {0, 0};
+	for (unsigned i = 0; i < QUADS; i++) {
+		struct quad here = quad[i];
+		QUAD sum = {0}, a;
 
-		for (unsigned j = 0; j < block; j++)
-			sum += pair_step(&here);
-		pair[i] = here;
-		mean[2 * i] = sum[0] / block;
-		mean[2 * i + 1] = sum[1] / block;
+		for (unsigned j = 0; j < block; j++) {
+			quad_step(&here, &a);
+			sum += a;
+		}
+		quad[i] = here;
+		sum /= block;
+		memcpy(mean + LANES * i, &sum, sizeof(sum));
 	}
 }
 
 size_t spring_normal(const struct series *series, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
                      double right[CHOLESKY_MAX], double *squares)
 {
-	struct spring s[2 * PAIRS];
-	struct pair pair[PAIRS];
+	struct spring s[QUADS * LANES];
+	struct quad quad[QUADS];
 	double difference[SPRING_SIZE];
 	struct gram gram;
 
 	if (!spring_possible(p))
 		return 0;
 	start_all(s, difference, p, series);
-	s[SPRING_SIZE] = s[0]; /* one too few for pairs */
-	for (unsigned i = 0; i < PAIRS; i++)
-		pair[i] = pair_of(&s[2 * i], &s[2 * i + 1], series->step_s / series->block);
+	for (unsigned i = SPRING_SIZE; i < QUADS * LANES; i++)
+		s[i] = s[0]; /* one too few */
+	for (unsigned i = 0; i < QUADS; i++)
+		quad_set(&quad[i], &s[LANES * i], series->step_s / series->block);
 	gram_start(&gram, SPRING_SIZE);
 	for (unsigned k = 0; k < series->count; k++) {
-		double mean[2 * PAIRS], row[SPRING_SIZE + 1];
+		double mean[QUADS * LANES], row[SPRING_SIZE + 1];
 
-		spring_block_means(pair, series->block, mean);
+		spring_block_means(quad, series->block, mean);
 		for (unsigned i = 0; i < SPRING_SIZE; i++)
 			row[i] = (mean[i] - mean[MODES_OFFSET]) / difference[i];
 		row[MODES_OFFSET] = 1;

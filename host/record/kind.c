@@ -13,16 +13,13 @@ static const struct {
         {0, "\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", 8,
          "a spreadsheet or other Office file: save the sheet as CSV"},
         {257, "ustar", 5, "a tar archive: unpack it"},
-        {0, "MATLAB 5.0 ", 11, "a MATLAB 5 file: save the matrix as text, or as .npy"},
+        {0, "MATLAB 5.0 ", 11, "a MATLAB 5 file: save the matrix with writematrix as text, or as .npy"},
         {0, "MATLAB 7.3 ", 11, "a MATLAB 7.3 file: save the matrix with -v6 or -v7, or as text"},
         {0, "RF64", 4, "a WAV file of more than 4 GiB (RF64): cut it"},
         {0, "\x1a\x45\xdf\xa3", 4, "an EBML file, as the IDE files of enDAQ are: export it as CSV"},
         {0, "MDF     ", 8, "an MDF file of ASAM: export it as CSV"},
         {0, "LOGG", 4, "a CAN log of Vector (BLF): save it as ASC or candump text"},
         {0, ";$FILEVERSION", 13, "a CAN trace of PEAK (TRC): save it as ASC or candump text"},
-        {0, "\n\r\r\n", 4, "a pcapng capture"},
-        {0, "\xd4\xc3\xb2\xa1", 4, "a pcap capture"},
-        {0, "\xa1\xb2\xc3\xd4", 4, "a pcap capture"},
         {0, "%PDF", 4, "a PDF"},
         {0, "\x89PNG", 4, "a picture"},
         {0, "PAR1", 4, "a Parquet file: export it as CSV"},
@@ -37,10 +34,5 @@ int kind_refuse(const struct source *source, char message[READ_MESSAGE_MAX])
 		    memcmp(source->bytes + kinds[i].at, kinds[i].magic, kinds[i].length) == 0)
 			return source_refuse(message, DT_E_UNKNOWN, source->file, 0, "this is %s",
 			                     kinds[i].name);
-	if (source->size > 5 && memcmp(source->bytes, "date ", 5) == 0 &&
-	    memmem(source->bytes, source->size < 200 ? source->size : 200, "\nbase ", 6) != NULL)
-		return source_refuse(
-		        message, DT_E_UNKNOWN, source->file, 0,
-		        "this is a CAN log of Vector (ASC): asc2log of can-utils makes candump text of it");
 	return 0;
 }

@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "host/record/can_text.h"
 #include "host/record/unpack.h"
 
 enum { WINDOW_BYTES = 1 << 20 };
@@ -44,15 +45,16 @@ static void log_file_skip_mark(struct log_file *log)
 		log->begin = 3;
 }
 
+/* Compressed, or a CAN log of others. */
 static bool log_file_is_packed(struct log_file *log)
 {
 	size_t held;
-	const char *head = log_file_get(log, 0, 8, &held);
+	const char *head = log_file_get(log, log->begin, 512, &held);
 
-	return unpack_program(head, held) != NULL;
+	return unpack_program(head, held) != NULL || can_text_is(head, held);
 }
 
-/* What is no regular file, or compressed, is held whole. */
+/* What is no regular file, or has to be made text of, is held whole. */
 static int open_whole(struct log_file *log, char *message)
 {
 	int error;
@@ -61,6 +63,8 @@ static int open_whole(struct log_file *log, char *message)
 	error = source_load(&log->whole, log->file, log->expected, message);
 	if (!error)
 		error = unpack(&log->whole, message);
+	if (!error)
+		error = can_text(&log->whole, message);
 	log->size = log->whole.size;
 	return error;
 }

@@ -291,5 +291,5 @@ table_reader *table_reader_of(const struct source *source)
 		if (source->size > readers[i].length &&
 		    memcmp(source->bytes, readers[i].magic, readers[i].length) == 0)
 			return readers[i].reader;
-	return at2_is(source) ? read_at2 : NULL;
+	return at2_is(source) ? read_at2 : mme_is(source) ? read_mme : NULL;
 }

@@ -33,12 +33,14 @@ DT_MUST_USE int table_data_record(const struct table_data *table, struct record 
                                   const struct source *source, const char *columns,
                                   char message[READ_MESSAGE_MAX]);
 
-/* The formats that end as a table: NumPy array, WAV, TDMS, ground motion of PEER. NULL where it is none. */
+/* The formats that end as a table: NumPy array, WAV, TDMS, ground motion of PEER, ISO 13499. NULL where it is
+ * none. */
 typedef int table_reader(struct table_data *table, const struct source *source,
                          char message[READ_MESSAGE_MAX]);
 table_reader *table_reader_of(const struct source *source);
-table_reader read_npy, read_wav, read_tdms, read_at2;
+table_reader read_npy, read_wav, read_tdms, read_at2, read_mme;
 bool at2_is(const struct source *source);
+bool mme_is(const struct source *source);
 
 /* Numbers as they stand in files. */
 enum bytes_kind {

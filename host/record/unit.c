@@ -48,6 +48,7 @@ static const struct {
         {"kilo-g", {"kilo-g", UNIT_ACCELERATION, 1e-3, 0}},
         {"kgn", {"kilo-g", UNIT_ACCELERATION, 1e-3, 0}},
         {"m/s2", {"m/s2", UNIT_ACCELERATION, G, 0}},
+        {"m/ss", {"m/s2", UNIT_ACCELERATION, G, 0}}, /* m/(s*s) */
         {"m/s/s", {"m/s2", UNIT_ACCELERATION, G, 0}},
         {"m/sec2", {"m/s2", UNIT_ACCELERATION, G, 0}},
         {"m/sec/sec", {"m/s2", UNIT_ACCELERATION, G, 0}},

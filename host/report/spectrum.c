@@ -133,6 +133,12 @@ int spectrum_json(const struct spectrum_report *report, FILE *out)
 	struct builder b = {.failed = !root};
 
 	put_text(&b, root, "file", report->file);
+	if (report->shock > 0) {
+		cJSON *shock = put_object(&b, root, "shock");
+
+		put_number(&b, shock, "number", report->shock);
+		put_number(&b, shock, "of", report->shocks);
+	}
 	put_text(&b, root, "quantity", srs_quantity_names[o->srs.quantity]);
 	put_text(&b, root, "side", srs_side_names[o->side]);
 	put_text(&b, root, "part", srs_part_names[o->part]);

@@ -16,6 +16,7 @@ struct spectrum_report {
 	const char *file;
 	const struct spectrum_options *options;
 	const struct spectrum *spectrum;
+	unsigned shock, shocks; /* which of how many of the record; 0: not cut by shocks */
 };
 
 DT_MUST_USE int spectrum_text(const struct spectrum_report *report, FILE *out);

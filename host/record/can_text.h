@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_CAN_TEXT_H
+#define DT_HOST_RECORD_CAN_TEXT_H
+/*
+ * CAN logs of other programs as candump text, in memory, before anything else looks at them: all that is done
+ * with candump text is done with them.
+ *
+ *     ASC      Vector's text: base hex or dec, absolute or relative times, CAN and CAN FD, logs of CANoe,
+ *              python-can and log2asc; what is no frame (statistics, J1939TP, error frames) is left out
+ *     pcapng   (draft-ietf-opsawg-pcapng) and pcap: frames of interfaces of link type 227, SocketCAN
+ *              (tcpdump.org/linktypes/LINKTYPE_CAN_SOCKETCAN.html)
+ *
+ * A line of a frame, or a block, that does not make sense becomes a line that is none, and counts as corrupt.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "host/record/source.h"
+
+/* Whether a file with this head is one of them; 512 bytes or more will do. */
+bool can_text_is(const char *head, size_t length);
+
+/* Puts candump text in place of the bytes, if it is one of them. 0, or an error told in message: the source
+ * is as it was, then. */
+DT_MUST_USE int can_text(struct source *source, char message[READ_MESSAGE_MAX]);
+
+#endif
