@@ -247,11 +247,10 @@ double body_lets_go(const struct body *b, unsigned touching, const double y[], i
 	struct load l;
 	double rate;
 
-	if (touch->hold != BODY_SLIPS) {
-		double over = fabs(y[body_grip(corner)]) - limit_of(b, touch, &f);
-
-		return touch->hold == BODY_STICKS ? over : -over;
-	}
+	if (touch->hold == BODY_STICKS)
+		return fabs(y[body_grip(corner)]) - limit_of(b, touch, &f);
+	if (touch->hold == BODY_LAGS) /* of its own side: one step may carry it through to the other limit */
+		return limit_of(b, touch, &f) - touch->side * y[body_grip(corner)];
 	load_of(b, touching, y, true, &l);
 	rate = limit_rate(b, touch, &f, &l, y[BODY_SPIN]);
 	return fmax(rate - touch->side * f.sliding, -rate);

@@ -13,6 +13,7 @@ enum { OFF_ACROSS, OFF_UP, OFF_V_ACROSS, OFF_V_UP, OFF_STATES };
 
 /* A corner that has not left the mat after this many contact times will not. */
 #define CONTACTS_MAX 3.0
+#define CONTACTS_USUAL 1.5
 
 /* First step, in times the box needs at impact speed for the largest depth. */
 #define FIRST_STEP 1e-3
@@ -26,6 +27,9 @@ enum { OFF_ACROSS, OFF_UP, OFF_V_ACROSS, OFF_V_UP, OFF_STATES };
 
 /* Plate over box up to which the box cannot be shaken harder by the plate than by the mat. */
 #define LIGHT_PLATE 0.25
+
+/* A corner that comes this near the mat, in half widths of the box, may strike it. */
+#define STRIKE_SHARE 0.05
 
 /* A resultant that fell below this share of its peak does not rise above it again. */
 #define PASSED_SHARE 0.7
@@ -54,6 +58,8 @@ struct run {
 	int second_corner;
 	struct event event;
 	double contact_end_s; /* whoever has not left the mat by then will not */
+	double window_s;      /* the peaks of a box that leaves are looked for up to here, or so */
+	bool strikes;         /* another touch may come before that */
 	double period_s;      /* of the plate, 0 without one */
 };
 
@@ -96,14 +102,15 @@ static void course_scale(const struct run *c, double depth, double scale[])
 	scale[BODY_OFF_V_UP] = scale[BODY_OFF_V_ACROSS] = p->speed_m_s * sqrt(stiff);
 	scale[BODY_TURN] = depth / reach;
 	scale[BODY_SPIN] = p->speed_m_s / reach;
-	for (int i = 0; i < BODY_CORNERS; i++)
-		scale[body_grip(i)] = depth;
+	for (int i = 0; i < BODY_CORNERS; i++) /* friction lets it come no further */
+		scale[body_grip(i)] =
+		        depth * (p->grip > 0.0 ? fmin(1.0, p->friction / (1.5 * p->grip)) : 1.0);
 }
 
 static void course_start(struct run *c, const struct course *in)
 {
 	const struct body *p = &in->body;
-	double stiffness, depth, y[BODY_STATES];
+	double stiffness, depth, duration, y[BODY_STATES];
 
 	*c = (struct run){.in = in,
 	                  .body = *p,
@@ -116,9 +123,9 @@ static void course_start(struct run *c, const struct course *in)
 	depth = contact_depth(&p->law, p->case_mass_kg, p->speed_m_s, stiffness);
 	if (p->plate_mass_kg > 0.0)
 		c->period_s = 2.0 * UNITS_PI / sqrt(p->mount_n_m * c->body.per_mass);
-	c->contact_end_s =
-	        CONTACTS_MAX * contact_duration(&p->law, p->case_mass_kg, p->speed_m_s, stiffness) +
-	        FLIGHT_SHARE * c->period_s;
+	duration = contact_duration(&p->law, p->case_mass_kg, p->speed_m_s, stiffness);
+	c->contact_end_s = CONTACTS_MAX * duration + FLIGHT_SHARE * c->period_s;
+	c->window_s = CONTACTS_USUAL * duration + FLIGHT_SHARE * c->period_s;
 	c->ode.count = p->turns ? BODY_ONE_CORNER : BODY_UPRIGHT;
 	c->ode.rates = course_rates;
 	c->ode.context = c;
@@ -355,6 +362,27 @@ static int ring_down(struct run *c, struct course_result *r)
 	return error;
 }
 
+/* Whether a corner that is above the mat may come down on it within a time. What still presses lifts the box
+ * and can at most double its spin. */
+static bool course_may_strike(const struct run *c, double within_s)
+{
+	double most = (c->touching ? 2.0 : 1.0) * c->ode.y[BODY_SPIN] * within_s, y[BODY_STATES];
+	int count = 8 + (int)fmin(fabs(most) / TURN_MAX, 100.0);
+
+	memcpy(y, c->ode.y, sizeof(y));
+	for (int i = 1; i <= count && c->body.turns; i++) {
+		double t = within_s * i / count;
+
+		y[BODY_UP] = c->ode.y[BODY_UP] + (c->ode.y[BODY_V_UP] - 0.5 * c->body.gravity_m_s2 * t) * t;
+		y[BODY_TURN] = c->ode.y[BODY_TURN] + most * i / count;
+		for (int k = 0; k < BODY_CORNERS; k++)
+			if (!(c->touching >> k & 1u) &&
+			    body_depth(&c->body, y, k) > -STRIKE_SHARE * c->body.lever_y_m)
+				return true;
+	}
+	return false;
+}
+
 /* Whether anything asked for may peak after the release. Of the box's signals none does above a light plate
  * that leaves it alone. */
 static bool course_peaks_in_flight(const struct course *in)
@@ -382,15 +410,19 @@ static int follow(struct run *c, struct watch *watch, struct course_result *r)
 		if (error)
 			break;
 		watch_step(watch, &c->ode);
-		if (in->rough && !heavy && watch_passed(watch, COURSE_DEPTH, 1.0) && all_passed(in, watch)) {
-			r->cut_short = isnan(c->released_s);
-			break;
+		if (in->rough && !heavy && !c->strikes && watch_passed(watch, COURSE_DEPTH, 1.0) &&
+		    all_passed(in, watch)) {
+			c->strikes = c->touching > BODY_FIRST || course_may_strike(c, c->window_s - c->ode.t);
+			r->cut_short = !c->strikes && isnan(c->released_s);
+			if (!c->strikes)
+				break;
 		}
 		if (c->event.corner < 0)
 			continue;
 		watch_end(watch, &c->ode);
 		if (course_turn_over(c)) {
 			conclude_contact(c, r);
+			flies = flies || course_may_strike(c, FLIGHT_SHARE * c->period_s);
 			end = flies ? c->ode.t + FLIGHT_SHARE * c->period_s : c->ode.t;
 			if (in->count_ring)
 				error = ring_down(c, r);

@@ -10,15 +10,18 @@
 #include "common/units.h"
 #include "host/model/course.h"
 
-/* What one step may miss, for all of them together to stay within the tolerance of peaks. */
+/* What one step may miss, for all of them together to stay within the tolerance of peaks; of a body that
+ * turns, whose axes are differences of larger terms, it is less. */
 #define STEP_SHARE 0.05
+#define STEP_SHARE_TURNING 0.025
 
 /* From this tolerance of peaks on a parabola is as good as the steps are. */
 #define ROUGH_TOLERANCE 2e-3
 
-static double step_tolerance(const struct model_options *options)
+static double step_tolerance(const struct model_options *options, bool turns)
 {
-	return STEP_SHARE * (options->tolerance > 0.0 ? options->tolerance : MODEL_TOLERANCE);
+	return (turns ? STEP_SHARE_TURNING : STEP_SHARE) *
+	       (options->tolerance > 0.0 ? options->tolerance : MODEL_TOLERANCE);
 }
 
 /* One that was not looked for is 0. */
@@ -178,7 +181,7 @@ static int course_of(const struct drop *drop, const struct model_options *option
 	                 .mount_damping_n_s_m = drop->mount_damping_n_s_m,
 	                 .s2_offset_m = s->sensor_s2_offset_m,
 	                 .s1_yaw_rad = UNITS_RAD(s->sensor_s1_yaw_deg)},
-	        .tolerance = step_tolerance(options),
+	        .tolerance = step_tolerance(options, turns),
 	        .skipped = skipped_of(options, turns),
 	        .rough = rough(options),
 	};

@@ -5,11 +5,13 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "host/model/root.h"
+
 /* Parabolas through ever closer points, in shares of the samples' distance: their vertex closes in on a
  * smooth peak to the seventh digit and beyond. Two rounds do; where the vertex escaped the second, it gets
  * two more, and where it escapes these there is a kink. */
 static const double round_share[] = {0.05, 2e-3, 0.01, 2e-3};
-enum { ROUNDS = sizeof(round_share) / sizeof(round_share[0]), KINK_STEPS = 60, CROSSING_STEPS = 60 };
+enum { ROUNDS = sizeof(round_share) / sizeof(round_share[0]), KINK_STEPS = 60 };
 
 #define GOLDEN 0.6180339887498949
 #define ROUGH_SHARE 0.2
@@ -233,31 +235,24 @@ void watch_end(struct watch *w, const struct ode *ode)
 			watch_look_at_end(w, ode, i);
 }
 
+struct crossing {
+	const struct ode *ode;
+	size_t state;
+};
+
+static double crossing_at(double t, void *context)
+{
+	const struct crossing *c = context;
+	double y[ODE_STATES_MAX];
+
+	ode_at(c->ode, t, y);
+	return y[c->state];
+}
+
 double watch_crossing(const struct ode *ode, size_t state)
 {
-	double low = ode->last.from, high = ode->last.end, y[ODE_STATES_MAX];
-	double at_low = ode->last.term[0][state], at_high = ode->y[state], t = high;
-	int side = 0;
+	struct crossing c = {ode, state};
+	double t = ode->last.end;
 
-	/* the Illinois form of regula falsi */
-	for (int i = 0; i < CROSSING_STEPS && at_low != at_high; i++) {
-		double before = t;
-
-		t = (low * at_high - high * at_low) / (at_high - at_low);
-		if (fabs(t - before) <= 1e-15 * fabs(high))
-			break;
-		ode_at(ode, t, y);
-		if ((y[state] < 0.0) == (at_high < 0.0)) {
-			high = t;
-			at_high = y[state];
-			at_low *= side == 1 ? 0.5 : 1.0;
-			side = 1;
-		} else {
-			low = t;
-			at_low = y[state];
-			at_high *= side == -1 ? 0.5 : 1.0;
-			side = -1;
-		}
-	}
-	return t;
+	return root_find(crossing_at, &c, ode->last.from, ode->last.end, &t) == 0 ? t : ode->last.end;
 }

@@ -200,6 +200,31 @@ static void test_widest_questions(void **unused)
 	check_tally(&t, 1.0);
 }
 
+/* The default's steps find each slip, hold and second touch: nothing that finer steps would change. */
+static void test_steps_are_fine_enough(void **unused)
+{
+	(void)unused;
+	state = SEED + 3;
+	for (int i = 0; i < 1500; i++) {
+		struct model_options o = model_defaults;
+		struct model_prediction p, fine;
+		struct scene s = random_scene();
+
+		s.drop_angle_deg = uniform(8.0, 60.0);
+		s.contact_restitution = uniform(0.01, 0.99);
+		s.contact_mat_thickness_m = 10.0;
+		s.contact_friction = uniform(0.05, 1.2);
+		s.contact_tangential_ratio = uniform(0.2, 5.0);
+		o.ring = false;
+		assert_int_equal(model_solve(&s, MODEL_PLANAR, &o, &p, NULL), 0);
+		o.tolerance = 1e-8;
+		assert_int_equal(model_solve(&s, MODEL_PLANAR, &o, &fine, NULL), 0);
+		if (!(auto_apart(&p, &fine, MODEL_ASK_AXES | MODEL_ASK_BOX | MODEL_ASK_S2, 0.0) < 2e-4))
+			fail_msg("drop %d: %.3g of a peak", i,
+			         auto_apart(&p, &fine, MODEL_ASK_AXES | MODEL_ASK_BOX | MODEL_ASK_S2, 0.0));
+	}
+}
+
 static struct model_prediction ask(const struct scene *s, unsigned asked, double accuracy)
 {
 	struct model_options o = model_defaults;
@@ -291,7 +316,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(test_random_questions),   cmocka_unit_test(test_widest_questions),
 	        cmocka_unit_test(test_the_study),          cmocka_unit_test(test_partial_answers),
-	        cmocka_unit_test(test_names_and_refusals),
+	        cmocka_unit_test(test_names_and_refusals), cmocka_unit_test(test_steps_are_fine_enough),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
