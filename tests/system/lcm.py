@@ -93,6 +93,7 @@ class Receiver(threading.Thread):
         super().__init__(daemon=True)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4194304)  # this thread may wait for its turn
         self.socket.bind(("", PORT))
         self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(GROUP) + bytes(4))
         self.messages, self.ended = [], False
@@ -118,7 +119,7 @@ class Receiver(threading.Thread):
         self.socket.close()
 
 
-def wait_for(condition, what, patience_s=30):
+def wait_for(condition, what, patience_s=600):
     end = time.monotonic() + patience_s
     while time.monotonic() < end:
         value = condition()
