@@ -3,6 +3,7 @@
 #include "common/scenes/scene.h"
 #include "common/plain.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -63,9 +64,9 @@ static int scene_read_text(struct reading *reading, const char *name, const char
 	size_t room = to == reading->scene.name ? sizeof(reading->scene.name) : sizeof(reading->scene.title);
 
 	if (strcmp(name, "name") != 0 && strcmp(name, "title") != 0)
-		return settings_fail(settings, DT_E_FORMAT,
-		                     "unknown key '%.60s', expected name or title before the first section",
-		                     name);
+		return settings_fail(
+		        settings, DT_E_FORMAT,
+		        "unknown key '%.60s', expected name, title or chain before the first section", name);
 	if (value[0] == '\0' || strlen(value) >= room)
 		return settings_fail(settings, DT_E_FORMAT, "%.60s is empty or too long", name);
 	if (!plain_is_line(value, strlen(value)))
@@ -76,6 +77,33 @@ static int scene_read_text(struct reading *reading, const char *name, const char
 	if (to == reading->scene.name)
 		reading->name_line = settings->line;
 	return 1;
+}
+
+/* Files of sensors, with commas or blanks between; those without a folder lie beside the scene. The scene
+ * keeps where they are, so that it may be read from elsewhere. */
+static int scene_read_chain(struct reading *reading, const char *value)
+{
+	struct settings *settings = &reading->settings;
+	const char *slash = strrchr(settings->file, '/');
+	int folder = slash != NULL ? (int)(slash + 1 - settings->file) : 0;
+	char *chain = reading->scene.chain, name[PATH_MAX], whole[PATH_MAX];
+	size_t room = sizeof(reading->scene.chain), used = 0, length;
+
+	if (chain[0] != '\0')
+		return settings_fail(settings, DT_E_FORMAT, "chain is given twice");
+	for (const char *at = value + strspn(value, " ,"); *at != '\0' && used < room;
+	     at += length + strspn(at + length, " ,")) {
+		length = strcspn(at, " ,");
+		snprintf(name, sizeof(name), "%.*s%.*s", at[0] != '/' ? folder : 0, settings->file,
+		         (int)length, at);
+		used += (size_t)snprintf(chain + used, room - used, "%s%s", used > 0 ? "," : "",
+		                         realpath(name, whole) != NULL ? whole : name);
+	}
+	if (used > 0 && used < room && plain_is_line(value, strlen(value)))
+		return 1;
+	chain[0] = '\0';
+	return settings_fail(settings, DT_E_FORMAT, "chain is '%.60s', expected names of sensor files",
+	                     value);
 }
 
 static int scene_read_number(struct reading *reading, size_t index, const char *text)
@@ -147,6 +175,8 @@ static int scene_read_entry(struct settings *settings, const char *section, cons
 	struct reading *reading = (struct reading *)settings;
 	int known_section = 0;
 
+	if (section[0] == '\0' && strcmp(name, "chain") == 0)
+		return scene_read_chain(reading, value);
 	if (section[0] == '\0')
 		return scene_read_text(reading, name, value);
 	if (strcmp(section, "fit") == 0)
@@ -249,6 +279,8 @@ void scene_write(const struct scene *scene, FILE *out)
 	place_tower(&placed);
 	fprintf(out, "; SPDX-License-Identifier: GPL-3.0-or-later\nname = %s\ntitle = %s\n", scene->name,
 	        scene->title);
+	if (scene->chain[0] != '\0')
+		fprintf(out, "chain = %s\n", scene->chain);
 	for (size_t i = 0; i < KEYS; i++) {
 		double value = value_in(scene, &keys[i]);
 		bool by_height = keys[i].initial == 0.0 && strcmp(keys[i].section, "tower") == 0;

@@ -19,8 +19,10 @@ enum { SCENE_MESSAGE_MAX = SETTINGS_MESSAGE_MAX, SCENE_FITTED = 9, SCENE_LIMITS_
 extern const char *const scene_fitted[SCENE_FITTED];
 
 struct scene {
-	char name[64];   /* key `name` before any section, e.g. "geometry-2A" */
-	char title[128]; /* key `title`, for reports */
+	char name[64];    /* key `name` before any section, e.g. "geometry-2A" */
+	char title[128];  /* key `title`, for reports */
+	char chain[1024]; /* key `chain`: files of its sensors (transducer.h), seen from the scene's; "": none
+	                   */
 #define SCENE_KEY(section, key, min, max, initial, doc) double section##_##key;
 #include "common/scenes/scene.def"
 #undef SCENE_KEY

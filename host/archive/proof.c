@@ -535,7 +535,11 @@ int archive_open_log(struct archive *archive, const char *drop, struct archive_l
 	strcpy(opened.raw, place.raw);
 	opened.number = place.number;
 	snprintf(opened.file, sizeof(opened.file), "/proc/self/fd/%d", opened.copy);
-	result = proof_open_log(archive, &place, &opened);
+	result = sql_number(archive, &opened.time_s,
+	                    "SELECT CAST(strftime('%s', time) AS INTEGER) FROM drops WHERE id = ?", "i",
+	                    place.drop);
+	if (result == 0)
+		result = proof_open_log(archive, &place, &opened);
 	if (result == 0)
 		*log = opened;
 	else

@@ -22,15 +22,16 @@ static const cJSON *walk(const cJSON *from, const char *path)
 
 bool said_at(const cJSON *result, const struct quantity_home *home, int i, struct said *said)
 {
-	const cJSON *whose = result, *name, *at;
+	static const char *const keys[] = {"name", "sensor", "what"};
+	const cJSON *whose = result, *name = NULL, *at;
 	bool listed = home->array[0] != '\0';
 
 	if (listed)
 		whose = cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(result, home->array), i);
 	if (whose == NULL || (!listed && i > 0))
 		return false;
-	name = cJSON_GetObjectItemCaseSensitive(whose,
-	                                        strcmp(home->array, "channels") == 0 ? "name" : "sensor");
+	for (size_t k = 0; k < sizeof(keys) / sizeof(keys[0]) && !cJSON_IsString(name); k++)
+		name = cJSON_GetObjectItemCaseSensitive(whose, keys[k]);
 	at = walk(whose, home->path);
 	*said = (struct said){.object = cJSON_IsObject(at) ? at : NULL,
 	                      .subject = listed && cJSON_IsString(name) ? name->valuestring : "",

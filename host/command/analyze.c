@@ -69,6 +69,9 @@ static const struct option_row rows[] = {
                     "keep how the first FILE was read as a profile, which may be edited"),
         OPTION_TEXT("scene", "FILE", struct analyze_arguments, scene_file,
                     "compare with the model's prediction for this scene"),
+        OPTION_TEXT("chain", "FILE,...", struct analyze_arguments, evaluate.chain,
+                    "the sensors' files: what their certificates say is applied, and each number has its "
+                    "expanded uncertainty; in place of the scene's"),
         OPTION_TAKEN("angle", "DEG", struct analyze_arguments, angle_deg, command_angle,
                      "contact angle, instead of the scene's"),
         OPTION_NUMBER("lowpass", "HZ", struct analyze_arguments, evaluate.lowpass_hz, 1e-3, 1e9,
@@ -281,6 +284,8 @@ int analyze_ready(struct analyze_arguments *arguments, const char *command)
 		code = evaluate_read_scene(&arguments->scene, arguments->scene_file, arguments->angle_deg);
 		arguments->evaluate.scene = &arguments->scene;
 	}
+	if (code == COMMAND_DONE && arguments->evaluate.chain != NULL)
+		code = evaluate_check_chain(arguments->evaluate.chain);
 	if (code == COMMAND_DONE && arguments->band_file != NULL) {
 		code = read_band(&arguments->band, arguments->band_file);
 		arguments->evaluate.band.curve = &arguments->band;

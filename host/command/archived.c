@@ -96,6 +96,7 @@ int archived_read(struct archive *archive, const char *drop, struct record *reco
 		return DT_E_CORRUPT;
 	}
 	result = read_record(record, log.file, NULL, said);
+	record->time_s = log.time_s;
 	if (result == 0)
 		snprintf(record->file, sizeof(record->file), "%s", log.raw);
 	else
@@ -118,8 +119,7 @@ static int command_archived_analyse(struct archive *archive, const char *drop, c
 		         record->file);
 		return DT_E_FORMAT;
 	}
-	said = result_of(record, &e.analysis, &e.report.options);
-	said.verdict = e.report.verdict != NULL ? &e.verdict : NULL;
+	said = evaluate_said(&e);
 	result = archive_result(archive, drop, DT_VERSION, &said, json);
 	if (result != 0)
 		snprintf(message, ARCHIVE_MESSAGE_MAX, "%s", archive_message(archive));

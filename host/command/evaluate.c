@@ -7,6 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <time.h>
 
 #include "common/units.h"
 #include "host/base/beside.h"
@@ -185,10 +187,7 @@ static int judge(struct evaluated *e, const struct evaluate_options *options)
 {
 	const char *file = options->limits != NULL ? "--limits" : options->scene ? options->scene->name : "";
 	const char *limits = options->scene ? options->scene->limits : "";
-	struct result said = {.record = (struct record *)(uintptr_t)e->report.record,
-	                      .analysis = &e->analysis,
-	                      .options = &e->report.options,
-	                      .measured = measured_of(e->report.record)};
+	struct result said = evaluate_said(e);
 	char message[SCENE_MESSAGE_MAX], named[160];
 	struct plan plan;
 	int result;
@@ -242,18 +241,117 @@ static bool refuses_lowpass(const struct record *record, double lowpass_hz)
 	return true;
 }
 
+/* ---- the sensors' files ---- */
+
+/* Days after 1970: as the record knows it, else its file; what has neither is made now. */
+static double day_of(const struct record *record)
+{
+	struct stat status;
+	time_t made = record->time_s != 0 ? (time_t)record->time_s : time(NULL);
+
+	if (record->time_s == 0 && stat(record->file, &status) == 0 && S_ISREG(status.st_mode))
+		made = status.st_mtime;
+	return (double)made / 86400.0;
+}
+
+/* The record as the files that list names put it right, instead of *record. */
+static int apply_chain(struct evaluated *e, const char *list, const struct record **record)
+{
+	char message[SETTINGS_MESSAGE_MAX];
+	int result = sensors_read(&e->sensors, list, day_of(*record), message);
+
+	if (result == 0 && e->sensors.count > 0)
+		result = sensors_correct(&e->sensors, *record, &e->corrected, message);
+	if (result != 0) {
+		command_error("%s", message);
+		e->sensors.count = 0;
+		return EVALUATE_TOLD;
+	}
+	if (e->sensors.count > 0)
+		*record = &e->corrected;
+	return 0;
+}
+
+/* The supply's high-pass that the estimates undo: the sensors' own where their files give one; then a channel
+ * without a file is left as told, by told_s. */
+static double highpass_of(struct record *corrected, double told_s)
+{
+	double of_files_s = 0.0;
+
+	if (told_s > 0.0)
+		return told_s;
+	for (size_t i = 0; i < corrected->channel_count; i++)
+		of_files_s = fmax(of_files_s, corrected->channels[i].highpass_s);
+	for (size_t i = 0; i < corrected->channel_count; i++)
+		if (!(corrected->channels[i].highpass_s > 0.0))
+			corrected->channels[i].highpass_s = (double)INFINITY; /* no high-pass at all */
+	return of_files_s;
+}
+
+int evaluate_check_chain(const char *list)
+{
+	char message[SETTINGS_MESSAGE_MAX];
+	struct sensors sensors;
+
+	if (sensors_read(&sensors, list, 0.0, message) == 0)
+		return COMMAND_DONE;
+	command_error("%s", message);
+	return COMMAND_INPUT;
+}
+
+struct result evaluate_said(struct evaluated *e)
+{
+	bool chained = e->sensors.count > 0;
+
+	return (struct result){.record = (struct record *)(uintptr_t)e->report.record,
+	                       .analysis = &e->analysis,
+	                       .options = &e->report.options,
+	                       .measured = measured_of(e->report.record),
+	                       .verdict = e->report.verdict != NULL ? &e->verdict : NULL,
+	                       .sensors = chained ? &e->sensors : NULL,
+	                       .budget = chained ? &e->budget : NULL};
+}
+
+/* ---- all of it ---- */
+
+/* What follows from the estimates. */
+static int evaluate_on(struct evaluated *e, const struct evaluate_options *options)
+{
+	int result = 0;
+
+	if (e->sensors.count > 0) {
+		result = budget_make(&e->budget, &e->sensors, e->report.record, &e->analysis);
+		e->report.sensors = &e->sensors;
+		e->report.budget = &e->budget;
+	}
+	if (result == 0)
+		result = find_shocks(e, options, &e->report.options);
+	return result == 0 ? judge(e, options) : result;
+}
+
 int evaluate_open(struct evaluated *e, const struct record *record, const struct evaluate_options *options)
 {
+	const char *chain = options->chain != NULL ? options->chain
+	                    : options->scene       ? options->scene->chain
+	                                           : "";
 	struct estimate_options estimate = estimate_options_of(record, options);
 	const struct scene *scene = options->scene;
 	char message[MODEL_MESSAGE_MAX];
 	int result;
 
-	if (refuses_cfc(record, options->cfc) || refuses_lowpass(record, options->lowpass_hz))
+	e->sensors.count = 0;
+	e->budget = (struct budget){.count = 0};
+	record_init(&e->corrected);
+	if (refuses_cfc(record, options->cfc) || refuses_lowpass(record, options->lowpass_hz) ||
+	    apply_chain(e, chain, &record) != 0)
 		return EVALUATE_TOLD;
+	if (e->sensors.count > 0)
+		estimate.iepe_time_constant_s = highpass_of(&e->corrected, estimate.iepe_time_constant_s);
 	result = estimate_record(record, &estimate, &e->analysis);
-	if (result != 0)
+	if (result != 0) {
+		record_free(&e->corrected);
 		return result;
+	}
 	e->report = (struct report){.record = record,
 	                            .analysis = &e->analysis,
 	                            .options = estimate,
@@ -262,9 +360,7 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 	                            .simulated = options->simulated,
 	                            .unattended = options->unattended,
 	                            .tolerance_asked = options->tolerance > 0};
-	result = find_shocks(e, options, &estimate);
-	if (result == 0)
-		result = judge(e, options);
+	result = evaluate_on(e, options);
 	if (result != 0) {
 		evaluate_close(e);
 		return result;
@@ -292,16 +388,17 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 void evaluate_close(struct evaluated *e)
 {
 	estimate_free(&e->analysis);
+	budget_free(&e->budget);
+	record_free(&e->corrected);
 }
 
-static int evaluate_repeat(struct evaluated *e, struct record *record, const struct evaluate_options *options)
+static int evaluate_repeat(struct evaluated *e, const struct evaluate_options *options)
 {
-	struct estimate_options estimate = e->report.options;
-	struct result said = result_of(record, &e->analysis, &estimate);
+	struct result said = evaluate_said(e);
 
 	if (repeats_add(options->repeats, &said) == 0)
 		return COMMAND_DONE;
-	command_error("%s: %s", record->file, error_text(DT_E_MEMORY));
+	command_error("%s: %s", e->report.record->file, error_text(DT_E_MEMORY));
 	return COMMAND_INPUT;
 }
 
@@ -317,13 +414,13 @@ int evaluate(struct record *record, const struct evaluate_options *options)
 		              result == DT_E_EMPTY ? "no good sample in any channel" : error_text(result));
 		return COMMAND_INPUT;
 	}
-	code = options->repeats != NULL ? evaluate_repeat(&e, record, options)
+	code = options->repeats != NULL ? evaluate_repeat(&e, options)
 	                                : evaluate_write_out(&e.report, options);
 	if (code == COMMAND_DONE && options->strict && e.report.band != NULL && !e.band.verdict.pass) {
 		command_error("%s: outside its band, and --strict was asked for", record->file);
 		code = COMMAND_INPUT;
 	}
-	if (code == COMMAND_DONE && options->strict && any_flag(record, &e.analysis)) {
+	if (code == COMMAND_DONE && options->strict && any_flag(e.report.record, &e.analysis)) {
 		command_error("%s: flagged, and --strict was asked for", record->file);
 		code = COMMAND_INPUT;
 	}
@@ -364,7 +461,7 @@ int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg)
 		result = scene_check(scene, "--angle", message);
 	}
 	if (result == 0)
-		return COMMAND_DONE;
+		return evaluate_check_chain(scene->chain);
 	command_error("%s", message);
 	return COMMAND_INPUT;
 }

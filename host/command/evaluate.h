@@ -16,6 +16,7 @@
 
 struct evaluate_options {
 	const struct scene *scene;   /* NULL: no model */
+	const char *chain;           /* files of the sensors, in place of the scene's; NULL: those */
 	double lowpass_hz;           /* 0 = raw */
 	double iepe_time_constant_s; /* 0 = not undone, NAN = the scene's */
 	unsigned cfc;                /* channel frequency class; 0 = none */
@@ -44,15 +45,23 @@ struct evaluated {
 	struct band band;
 	struct verdict verdict;
 	char refused[FIT_MESSAGE_MAX]; /* what analysis.motion.refused says */
+	struct sensors sensors;
+	struct record corrected; /* by them */
+	struct budget budget;
 };
 
 enum { EVALUATE_TOLD = 1 };
 
 /* Estimates and predicts; e stays where it is until evaluate_close, and so do record and scene. Why there is
- * no prediction is printed. 0, DT_E_*, or EVALUATE_TOLD when what was wrong was printed: cfc or band. */
+ * no prediction is printed. What is estimated and reported is the record as its sensors' files put it right,
+ * where there are any. 0, DT_E_*, or EVALUATE_TOLD when what was wrong was printed: sensors' files, cfc or
+ * band. */
 DT_MUST_USE int evaluate_open(struct evaluated *e, const struct record *record,
                               const struct evaluate_options *options);
 void evaluate_close(struct evaluated *e);
+
+/* All that was found, for the table of quantities. */
+struct result evaluate_said(struct evaluated *e);
 
 /* Prints and writes what was asked for. Returns a COMMAND_* exit code; errors were printed. */
 int evaluate(struct record *record, const struct evaluate_options *options);
@@ -64,6 +73,9 @@ char *evaluate_json(struct evaluated *e, const struct record *record, const stru
 /* A drop of the tower as a fit wants it; borrows record's samples. NULL, or the channel that is missing. */
 const char *evaluate_fit_drop(const struct record *record, double angle_deg, double height_m,
                               struct fit_drop *drop);
+
+/* Whether the files that list names can be used. 0 or a COMMAND_* code, errors printed. */
+int evaluate_check_chain(const char *list);
 
 /* Reads a scene and lays angle_deg over it when that is not NAN. 0 or a COMMAND_* code, errors printed. */
 int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg);

@@ -27,6 +27,8 @@ static const struct option_row rows[] = {
         OPTION_TEXT("scene", "FILE", struct run, scene_file,
                     "what is dropped: a file, or one of those that come along by its name (for a simulated "
                     "tower geometry-2A without it)"),
+        OPTION_TEXT("chain", "FILE,...", struct run, chain,
+                    "the sensors' files, in place of the scene's; a series knows its own"),
         OPTION_TAKEN("angle", "DEG", struct run, angle_deg, command_angle,
                      "contact angle, instead of the scene's"),
         OPTION_TEXT("out", "DIR", struct run, out, "where the files go (default .)"),
@@ -65,8 +67,9 @@ static int check_archive(struct run *run)
 {
 	if (run->series == NULL && (run->archive_folder != NULL || run->operator_name != NULL))
 		return command_usage("run", "--archive and --operator go with --series NAME");
-	if (run->series != NULL && (run->out != NULL || run->scene_file != NULL || !isnan(run->angle_deg)))
-		return command_usage("run", "--series excludes --out, --scene and --angle");
+	if (run->series != NULL &&
+	    (run->out != NULL || run->scene_file != NULL || run->chain != NULL || !isnan(run->angle_deg)))
+		return command_usage("run", "--series excludes --out, --scene, --chain and --angle");
 	run->archive_folder = archived_folder(run->archive_folder);
 	run->operator_name = archived_operator(run->operator_name);
 	if (run->out == NULL)

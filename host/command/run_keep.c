@@ -48,6 +48,8 @@ static int begin_in_folder(struct run *run)
 {
 	int code = evaluate_read_scene(&run->scene, run->scene_file, run->angle_deg);
 
+	if (code == COMMAND_DONE && run->chain != NULL)
+		code = evaluate_check_chain(run->chain);
 	if (code == COMMAND_DONE)
 		code = choose_stem(run);
 	if (code != COMMAND_DONE)
@@ -158,6 +160,7 @@ static int report_files(struct run *run, struct record *record)
 {
 	char csv[4200], json[4200], html[4200], message[READ_MESSAGE_MAX];
 	struct evaluate_options options = {.scene = &run->scene,
+	                                   .chain = run->chain,
 	                                   .iepe_time_constant_s = NAN,
 	                                   .json = run->json,
 	                                   .html = html,

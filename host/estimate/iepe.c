@@ -3,7 +3,8 @@
 
 void iepe_undo(struct trace *trace, double from_s, double time_constant_s)
 {
-	double part = 1 / (2 * time_constant_s * trace->rate_hz), integral = 0, before = 0;
+	double tau = trace->highpass_s > 0 ? trace->highpass_s : time_constant_s;
+	double part = 1 / (2 * tau * trace->rate_hz), integral = 0, before = 0;
 	size_t at = trace_index(trace, from_s);
 
 	for (size_t k = at; k < trace->count; k++) {

@@ -12,7 +12,8 @@
  */
 #include "host/estimate/trace.h"
 
-/* In place, after baseline_remove. */
+/* In place, after baseline_remove. The channel's own time constant, where its sensor's file gives one, goes
+ * before time_constant_s. */
 void iepe_undo(struct trace *trace, double from_s, double time_constant_s);
 
 #endif

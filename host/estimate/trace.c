@@ -156,7 +156,8 @@ void trace_lay(struct trace *trace, const struct channel *channel, double from_s
 	                        .noise_g = NAN,
 	                        .hum_hz = NAN,
 	                        .flags = channel->flags,
-	                        .range_g = channel->range_g};
+	                        .range_g = channel->range_g,
+	                        .highpass_s = channel->highpass_s};
 	trace->value_g = memory;
 	trace->block = (struct trace_block *)(void *)(trace->value_g + trace->count);
 	trace->sample = (uint8_t *)(trace->block + trace_blocks(trace));

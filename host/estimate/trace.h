@@ -31,6 +31,7 @@ struct trace_block {
 };
 
 struct trace {
+	double highpass_s; /* the channel's */
 	double rate_hz;
 	double start_s;
 	size_t count;

@@ -29,6 +29,7 @@ install: man $(CONSOLE) ## install below PREFIX (/usr/local), all of it below DE
 	$(call put,755,$(INSTALLED_PROGRAMS),$(BINDIR))
 	$(call put,644,$(INSTALLED_SCENES),$(SHARE)/droptower/scenes)
 	$(call put,644,host/batch/droptower.sbatch,$(SHARE)/droptower)
+	$(call put,644,$(wildcard common/scenes/sensors/*.ini),$(SHARE)/droptower/scenes/sensors)
 	$(call put,644,$(MAN)/*.1,$(SHARE)/man/man1)
 	$(call put,644,$(INSTALL_IN)/80-can0.network,$(LIBDIR)/systemd/network)
 	$(call put,644,$(INSTALL_IN)/80-droptower-slcan.rules,$(LIBDIR)/udev/rules.d)

@@ -183,6 +183,8 @@ const char *record_flag_name(unsigned flags)
 	        "dropout_changed",
 	        "frame_not_down",
 	        "assumed",
+	        "overdue",
+	        "default_used",
 	};
 
 	for (size_t bit = 0; bit < sizeof(names) / sizeof(names[0]); bit++)

@@ -60,20 +60,24 @@ enum {
 	RECORD_FLAG_DROPOUT_CHANGED = 1u << 27, /* "dropout_changed": of the magnet */
 	RECORD_FLAG_FRAME_NOT_DOWN = 1u << 28,  /* "frame_not_down" */
 	RECORD_FLAG_ASSUMED = 1u << 29, /* "assumed": of foreign text, the unit of time; read_as says which */
+	/* of the sensors' files */
+	RECORD_FLAG_OVERDUE = 1u << 30,      /* "overdue": a calibration was due before the drop */
+	RECORD_FLAG_DEFAULT_USED = 1u << 31, /* "default_used": an uncertainty is not in the file */
 };
 
 struct channel {
-	char name[32];   /* "S1X", or the name given in --columns */
-	uint8_t sensor;  /* of our tower: 1 or 2; 0 of another, whatever its name (drop_set_axes) */
-	char axis;       /* of it: 'X' 'Y' 'Z'; else 0 */
-	double rate_hz;  /* native rate */
-	double start_s;  /* time of sample 0, s after the record's first instant; sample k is at start_s +
-	                    k/rate_hz */
-	size_t count;    /* samples */
-	double *value_g; /* [count]; NAN where SAMPLE_LOST or SAMPLE_BAD */
-	uint8_t *sample; /* [count], SAMPLE_* bits */
-	double range_g;  /* sensor range when known, else 0 */
-	unsigned flags;  /* RECORD_FLAG_* */
+	char name[32];     /* "S1X", or the name given in --columns */
+	uint8_t sensor;    /* of our tower: 1 or 2; 0 of another, whatever its name (drop_set_axes) */
+	char axis;         /* of it: 'X' 'Y' 'Z'; else 0 */
+	double rate_hz;    /* native rate */
+	double start_s;    /* time of sample 0, s after the record's first instant; sample k is at start_s +
+	                      k/rate_hz */
+	size_t count;      /* samples */
+	double *value_g;   /* [count]; NAN where SAMPLE_LOST or SAMPLE_BAD */
+	uint8_t *sample;   /* [count], SAMPLE_* bits */
+	double range_g;    /* sensor range when known, else 0 */
+	double highpass_s; /* time constant of its supply by its sensor's file; 0: not known */
+	unsigned flags;    /* RECORD_FLAG_* */
 };
 
 struct record_gap {
@@ -101,6 +105,7 @@ struct record {
 	char file[4096];        /* as given on the command line, or the link's URL */
 	char format[16];        /* "live" "candump" "lcm" "csv" "uff58" "hdf5" "delimited" "lvm" ... */
 	char read_as[400];      /* of a foreign file, what was understood of it without --columns; else "" */
+	int64_t time_s;         /* when it was made, since 1970; 0: not known */
 	unsigned shock, shocks; /* of a long record: which of its shocks this is a stretch about; else 0 */
 	bool file_sealed;       /* the file says its own SHA-256, and that is so */
 	struct channel *channels;

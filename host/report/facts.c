@@ -240,6 +240,10 @@ const char *report_flag_words(unsigned flag)
 		return "more than noise before the pulse: zero, and what hangs on it, is unsure";
 	case RECORD_FLAG_UNFILTERED:
 		return "sampled too slowly for the low-pass asked for; left as it was";
+	case RECORD_FLAG_OVERDUE:
+		return "a sensor's calibration was due before: nothing of it is under accreditation";
+	case RECORD_FLAG_DEFAULT_USED:
+		return "a sensor's file lacks an uncertainty: one from the manual's table was used";
 	case RECORD_FLAG_SETTLING:
 		return "zero decays from the record's beginning on; its exponential was taken off: let the "
 		       "supply settle";

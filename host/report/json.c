@@ -251,6 +251,25 @@ static void put_verdict(struct builder *b, cJSON *root, const struct verdict *ve
 	free(items.bytes);
 }
 
+/* Of sensors with files; both empty: the uncertainties are noise only. */
+static void put_chain(struct builder *b, cJSON *root, const struct report *report)
+{
+	cJSON *sensors = put_array(b, root, "sensors"), *budget = put_array(b, root, "budget");
+
+	for (size_t i = 0; report->sensors && i < report->sensors->count; i++) {
+		cJSON *item = put_append(b, sensors);
+
+		put_text(b, item, "sensor", report->sensors->used[i].name);
+		put_all(b, item, QUANTITY_SENSOR, &report->sensors->used[i]);
+	}
+	for (size_t i = 0; report->budget && i < report->budget->count; i++) {
+		cJSON *item = put_append(b, budget);
+
+		put_text(b, item, "what", report->budget->item[i].what);
+		put_all(b, item, QUANTITY_BUDGET, &report->budget->item[i]);
+	}
+}
+
 static cJSON *build(struct builder *b, const struct report *report)
 {
 	const struct record *r = report->record;
@@ -287,6 +306,7 @@ static cJSON *build(struct builder *b, const struct report *report)
 	put_if(b, root, "plate", a->has_plate, QUANTITY_RINGDOWN, &a->plate);
 	put_if(b, root, "rebound", a->has_rebound, QUANTITY_REBOUND, &a->rebound);
 	put_if(b, root, "motion", a->has_motion, QUANTITY_MOTION, &a->motion);
+	put_chain(b, root, report);
 	put_model(b, root, report);
 	put_verdict(b, root, report->verdict);
 	shock_put(b, root, report);

@@ -27,11 +27,13 @@ struct report {
 	const struct free_falls *falls;            /* as events */
 	const struct band *band;                   /* NULL: no band was given */
 	const struct verdict *verdict;             /* NULL: no limits were given */
-	bool show_events;                          /* in the table too */
-	bool simulated;                            /* no product fell: the page says so */
-	bool unattended;                           /* nobody was asked before it fell */
-	bool tolerance_asked;                      /* what is less certain than it gets a note */
-	const char *version;                       /* of the program, for the page's foot; NULL: not said */
+	const struct sensors *sensors; /* NULL: none has a file, the uncertainties are noise only */
+	const struct budget *budget;   /* NULL: as sensors */
+	bool show_events;              /* in the table too */
+	bool simulated;                /* no product fell: the page says so */
+	bool unattended;               /* nobody was asked before it fell */
+	bool tolerance_asked;          /* what is less certain than it gets a note */
+	const char *version;           /* of the program, for the page's foot; NULL: not said */
 };
 
 /* The result table. 0 or DT_E_SYSTEM. */

@@ -145,7 +145,8 @@ static void write_channels(const struct report *report, const struct report_zero
 			        r->axes_apart_s * 1e3);
 		fputc('\n', out);
 	}
-	fprintf(out, "Time 0: %s. Width at 10 %% of the peak; dv from foot to foot.\n", zero->name);
+	fprintf(out, "Time 0: %s. Width at 10 %% of the peak; dv from foot to foot.%s\n", zero->name,
+	        report->sensors == NULL ? " +- is noise only." : "");
 	if (report_video(report, zero, video, sizeof(video)))
 		fprintf(out, "%s.\n", video);
 }
@@ -296,6 +297,56 @@ static void text_write_verdict(const struct verdict *verdict, FILE *out)
 	fputc('\n', out);
 }
 
+struct budget_row {
+	struct budget_item item;
+	const char *unit;
+};
+
+#define BUDGET_COLUMN(KIND, member, ...) TABLE_COLUMN(KIND, struct budget_row, member, __VA_ARGS__)
+static const struct table_column budget_columns[] = {
+        BUDGET_COLUMN(CHARS, item.what, .title = "uncertainty of", .width = -32),
+        BUDGET_COLUMN(NUMBER, item.value, .title = "value", .width = 11, .digits = -7),
+        BUDGET_COLUMN(NUMBER, item.expanded, .title = "U", .width = 9, .digits = -2),
+        BUDGET_COLUMN(NUMBER, item.k, .title = "k", .width = 5, .digits = 2),
+        BUDGET_COLUMN(WORDS, unit, .title = "", .width = -4),
+        BUDGET_COLUMN(CHARS, item.largest, .title = "largest parts of u^2", .gap = "  "),
+};
+
+/* What the table above shows; decays of single channels and instants are in JSON. */
+static bool is_shown(const struct budget_item *item)
+{
+	return strstr(item->what, ".ringdown.") == NULL && strstr(item->what, ".contact.") == NULL &&
+	       strstr(item->what, "natural") == NULL;
+}
+
+static void text_write_chain(const struct report *report, FILE *out)
+{
+	struct table table = {.out = out};
+
+	if (report->sensors == NULL)
+		return;
+	fputc('\n', out);
+	for (size_t i = 0; i < report->sensors->count; i++) {
+		const struct sensor_used *s = &report->sensors->used[i];
+
+		fprintf(out, "sensor %s: %s, certificate %s of %s, due %s%s\n", s->name, s->serial,
+		        s->certificate, s->date, s->due, s->overdue ? ": OVERDUE" : "");
+	}
+	table_begin(&table, budget_columns, TABLE_COUNT(budget_columns));
+	for (size_t i = 0; i < report->budget->count; i++) {
+		struct budget_row row = {.item = report->budget->item[i]};
+		double scale = strcmp(row.item.unit, "s") == 0 ? 1e3 : 1.0;
+
+		row.unit = scale > 1.0 ? "ms" : row.item.unit;
+		row.item.value *= scale;
+		row.item.expanded *= scale;
+		if (is_shown(&row.item))
+			table_row(&table, &row);
+	}
+	(void)table_end(&table);
+	fputs("U = k u covers 95.45 %; +- above is one standard uncertainty of noise and fit.\n", out);
+}
+
 static void text_write_frames(const struct record *r, FILE *out)
 {
 	const struct record_counters *c = &r->counters;
@@ -330,6 +381,7 @@ int report_text(const struct report *report, FILE *out)
 	write_channels(report, &zero, out);
 	write_joint(report, out);
 	write_notes(report, out);
+	text_write_chain(report, out);
 	text_write_model(report, out);
 	text_write_verdict(report->verdict, out);
 	shock_write(report, zero.time_s, out);

@@ -128,7 +128,7 @@ static bool plan_find(const char *name, struct plan_limit *limit)
 		const struct quantity *q = NULL;
 
 		while ((q = quantity_next(quantity_homes[p].object, q)) != NULL) {
-			if (q->kind != QUANTITY_NUMBER || p == QUANTITY_AT_VERDICT ||
+			if (q->kind != QUANTITY_NUMBER || p >= QUANTITY_AT_VERDICT ||
 			    !is_at(name, &quantity_homes[p], q, limit->subject))
 				continue;
 			limit->place = (enum quantity_place)p;

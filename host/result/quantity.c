@@ -239,7 +239,7 @@ void quantity_clear(enum quantity_object which, void *object)
 
 struct result result_of(struct record *record, struct analysis *analysis, struct estimate_options *options)
 {
-	return (struct result){record, analysis, options, measured_of(record), NULL};
+	return (struct result){record, analysis, options, measured_of(record), NULL, NULL, NULL};
 }
 
 static void *of_channel(struct result *result, enum quantity_place place, size_t i, const char **subject)
@@ -289,11 +289,24 @@ static void *of_drop(struct result *result, enum quantity_place place)
 	}
 }
 
+static void *of_chain(struct result *result, enum quantity_place place, size_t i, const char **subject)
+{
+	size_t count = place == QUANTITY_AT_SENSOR ? (result->sensors ? result->sensors->count : 0)
+	                                           : (result->budget ? result->budget->count : 0);
+
+	if (i >= count)
+		return NULL;
+	*subject = place == QUANTITY_AT_SENSOR ? result->sensors->used[i].name : result->budget->item[i].what;
+	return place == QUANTITY_AT_SENSOR ? (void *)&result->sensors->used[i] : &result->budget->item[i];
+}
+
 void *result_at(struct result *result, enum quantity_place place, size_t i, const char **subject)
 {
 	*subject = "";
 	if (!strcmp(quantity_homes[place].array, "channels"))
 		return of_channel(result, place, i, subject);
+	if (place == QUANTITY_AT_SENSOR || place == QUANTITY_AT_BUDGET)
+		return of_chain(result, place, i, subject);
 	if (place != QUANTITY_AT_RESULTANT)
 		return i ? NULL : of_drop(result, place);
 	if (i >= result->analysis->resultant_count)

@@ -7,6 +7,7 @@
  */
 #include "host/estimate/estimate.h"
 #include "host/result/measured.h"
+#include "host/sensor/budget.h"
 
 enum quantity_object {
 #define QUANTITY_OBJECT(OBJECT, type) QUANTITY_##OBJECT,
@@ -106,6 +107,8 @@ struct result {
 	struct estimate_options *options;
 	struct measured measured;
 	struct verdict *verdict; /* NULL: none */
+	struct sensors *sensors; /* whose files were applied; NULL: none */
+	struct budget *budget;   /* by them; NULL: none */
 };
 struct result result_of(struct record *record, struct analysis *analysis, struct estimate_options *options);
 

@@ -64,6 +64,7 @@ static void verdict_flags(const struct judging *j, struct verdict_item *item, co
 	for (size_t i = 0; i < record->channel_count; i++)
 		if (touches(&record->channels[i], subject))
 			flags |= j->result->analysis->channels[i].flags;
+	flags &= ~(unsigned)RECORD_FLAG_DEFAULT_USED; /* the uncertainty is there, and no smaller */
 	for (; flags != 0; flags &= flags - 1)
 		verdict_because(item, "", record_flag_name(flags));
 	for (; of_value != 0; of_value &= of_value - 1)
@@ -97,21 +98,46 @@ static struct verdict_item *verdict_new(struct judging *j, const char *subject, 
 	return item;
 }
 
-static double chain_of(const struct plan *plan)
+/* Half of U by the sensors' files, in the unit of the budget; NAN: there is none. */
+static double half_of(const struct judging *j, const char *what)
 {
-	return isfinite(plan->chain) ? plan->chain : 0.0;
+	const struct budget_item *item = budget_find(j->result->budget, what);
+
+	return item != NULL ? item->expanded / DECIDE_COVERAGE : (double)NAN;
+}
+
+/* Share of a value that all samples of the plan's channel have in common: by its sensor's file, else as the
+ * plan states it. */
+static double chain_of(const struct judging *j)
+{
+	const struct record *record = j->result->record;
+	const struct budget_item *peak = NULL;
+	char what[64];
+
+	if (j->channel < record->channel_count) {
+		snprintf(what, sizeof(what), "%s.peak.value_g", record->channels[j->channel].name);
+		peak = budget_find(j->result->budget, what);
+	}
+	if (peak != NULL)
+		return sqrt(fmax(0.0, pow(peak->expanded / DECIDE_COVERAGE, 2) -
+		                              pow(peak->part[BUDGET_NOISE], 2))) /
+		       fabs(peak->value);
+	return isfinite(j->plan->chain) ? j->plan->chain : 0.0;
 }
 
 /* ---- a value ---- */
 
-/* The numbers are in the unit that people read. The chain's gain cancels in times, frequencies and damping.
- */
-static void judge_number(struct judging *j, struct verdict_item *item, double value, double sigma,
+/* The numbers are in the unit that people read. whole: sigma is of all parts, the chain's among them. Its
+ * gain cancels in times, frequencies and damping. */
+static void judge_number(struct judging *j, struct verdict_item *item, double value, double sigma, bool whole,
                          double lower, double upper)
 {
 	bool gains = strcmp(item->unit, "g") == 0 || strcmp(item->unit, "m/s") == 0 || item->unit[0] == '%';
-	double u = gains ? hypot(sigma, chain_of(j->plan) * value) : sigma;
+	bool lacks = gains && !whole;
+	double u = lacks && isfinite(j->plan->chain) ? hypot(sigma, j->plan->chain * value) : sigma;
 
+	if (lacks && j->result->budget != NULL && !isfinite(j->plan->chain))
+		verdict_because(item, "", "its sensor has no file");
 	item->value = value;
 	item->sigma = u;
 	item->lower = lower;
@@ -160,12 +186,14 @@ static void judge_limit(struct judging *j, const struct plan_limit *limit)
 	if (object != NULL) {
 		value = quantity_number(q, object) * scale;
 		sigma = quantity_sigma(q, object) * scale;
+		if (isfinite(half_of(j, item->what)))
+			sigma = half_of(j, item->what) * scale;
 		if (quantity_status(q, object) != ESTIMATE_OK)
 			verdict_because(item, "status ", estimate_status_name(quantity_status(q, object)));
 		verdict_flags(j, item, subject, flags_of_value(q, object));
 	}
-	judge_number(j, item, has_direction(limit->place) ? fabs(value) : value, sigma, limit->lower * scale,
-	             limit->upper * scale);
+	judge_number(j, item, has_direction(limit->place) ? fabs(value) : value, sigma,
+	             isfinite(half_of(j, item->what)), limit->lower * scale, limit->upper * scale);
 }
 
 /* ---- other axes of the plan's sensor ---- */
@@ -184,8 +212,11 @@ static void judge_transverse(struct judging *j)
 	const struct channel *main = &record->channels[j->channel];
 	const struct estimate_peak *peak = &j->result->analysis->channels[j->channel].peak, *most = NULL;
 	struct verdict_item *item = verdict_new(j, main->name, "transverse_ratio");
+	char main_what[64], other_what[64] = "";
 	double ratio, sigma;
+	bool whole;
 
+	snprintf(main_what, sizeof(main_what), "%s.peak.value_g", main->name);
 	for (size_t i = 0; i < record->channel_count; i++) {
 		const struct estimate_peak *other = &j->result->analysis->channels[i].peak;
 
@@ -193,8 +224,10 @@ static void judge_transverse(struct judging *j)
 			continue;
 		verdict_flags(j, item, record->channels[i].name,
 		              other->how.flags & ~(unsigned)ESTIMATE_FLAG_WEAK);
-		if (most == NULL || fabs(other->value_g) > fabs(most->value_g))
+		if (most == NULL || fabs(other->value_g) > fabs(most->value_g)) {
 			most = other;
+			snprintf(other_what, sizeof(other_what), "%s.peak.value_g", record->channels[i].name);
+		}
 	}
 	item->unit = "%";
 	verdict_flags(j, item, main->name, peak->how.flags);
@@ -202,7 +235,12 @@ static void judge_transverse(struct judging *j)
 	sigma = most != NULL ? 100.0 * hypot(most->sigma_g, peak->sigma_g * most->value_g / peak->value_g) /
 	                               fabs(peak->value_g)
 	                     : (double)NAN;
-	judge_number(j, item, ratio, sigma, (double)-INFINITY, 100.0 * j->plan->transverse);
+	whole = most != NULL && isfinite(half_of(j, other_what)) && isfinite(half_of(j, main_what));
+	if (whole)
+		sigma = 100.0 *
+		        hypot(half_of(j, other_what), half_of(j, main_what) * most->value_g / peak->value_g) /
+		        fabs(peak->value_g);
+	judge_number(j, item, ratio, sigma, whole, (double)-INFINITY, 100.0 * j->plan->transverse);
 }
 
 /* ---- a pulse in its band ---- */
@@ -210,7 +248,7 @@ static void judge_transverse(struct judging *j)
 struct pulse_band {
 	const struct plan *plan;
 	const struct trace *trace;
-	double sign, duration_s, own;
+	double sign, duration_s, own, chain;
 	struct decide_point *point; /* room for all samples */
 	double *time_s;
 	size_t count, missing, worst;
@@ -256,8 +294,8 @@ static double band_lay(struct pulse_band *b, double start_s)
 			b->worst = b->count;
 		}
 		b->time_s[b->count] = t * b->duration_s;
-		b->point[b->count++] = (struct decide_point){at.upper - value, value - at.lower, b->own,
-		                                             chain_of(b->plan) * value};
+		b->point[b->count++] =
+		        (struct decide_point){at.upper - value, value - at.lower, b->own, b->chain * value};
 	}
 	return least;
 }
@@ -310,6 +348,7 @@ static int judge_band_of(struct judging *j, struct verdict_item *item, const str
 	                       .sign = e->peak.value_g < 0.0 ? -1.0 : 1.0,
 	                       .duration_s = p->duration_ms * 1e-3,
 	                       .own = e->baseline.noise_g,
+	                       .chain = chain_of(j),
 	                       .point = malloc(trace->count * sizeof(struct decide_point)),
 	                       .time_s = malloc(trace->count * sizeof(double))};
 
@@ -378,7 +417,7 @@ static void judge_spectrum_of(struct judging *j, struct verdict_item *item, cons
 		margin = log(fmin(at.upper / value, value / at.lower));
 		point[i] = (struct decide_point){at.upper - value, value - at.lower,
 		                                 noise_of_spectrum(e, s->channel[0].rate_hz, j->plan->q, f),
-		                                 chain_of(j->plan) * value};
+		                                 chain_of(j) * value};
 		if (!(margin >= least)) {
 			least = margin;
 			worst = i;
@@ -438,19 +477,20 @@ int verdict_judge(struct verdict *v, const struct plan *plan, struct result *res
 	struct judging j = {.plan = plan, .result = result, .verdict = v};
 	int code = 0;
 
-	*v = (struct verdict){.decision = DECIDE_NONE,
-	                      .by = plan->preset != NULL ? plan->preset->name : "",
-	                      .rule = "ILAC-G8:09/2019, 4.2: pass up to the limit less the guard band r U, "
-	                              "conditional up to "
-	                              "the limit; U = 2 u",
-	                      .rests_on =
-	                              isfinite(plan->chain)
-	                                      ? "noise and fit of each value, and the measuring chain"
-	                                      : "noise and fit of each value; the measuring chain's is not "
-	                                        "stated, so that this is no statement of conformity",
-	                      .verified = plan->preset == NULL || plan->preset->verified,
-	                      .guard = plan->guard,
-	                      .risk = decide_risk(plan->guard)};
+	*v = (struct verdict){
+	        .decision = DECIDE_NONE,
+	        .by = plan->preset != NULL ? plan->preset->name : "",
+	        .rule = "ILAC-G8:09/2019, 4.2: pass up to the limit less the guard band r U, "
+	                "conditional up to "
+	                "the limit; U = 2 u",
+	        .rests_on = result->budget != NULL ? "noise and fit of each value, and its sensor's file"
+	                    : isfinite(plan->chain)
+	                            ? "noise and fit of each value, and the measuring chain"
+	                            : "noise and fit of each value; the measuring chain's is not "
+	                              "stated, so that this is no statement of conformity",
+	        .verified = plan->preset == NULL || plan->preset->verified,
+	        .guard = plan->guard,
+	        .risk = decide_risk(plan->guard)};
 	j.channel = band_channel(record, result->analysis, plan->channel[0] != '\0' ? plan->channel : NULL);
 	for (size_t i = 0; i < plan->count; i++)
 		judge_limit(&j, &plan->limit[i]);

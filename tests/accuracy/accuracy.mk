@@ -34,6 +34,8 @@ DROPS ?= 10000
 accuracy: setup ## every estimate against its Cramer-Rao bound, thousands of drops of known truth (DROPS=)
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(BUILD)/tests/accuracy
 	@$(BUILD)/tests/accuracy --drops $(DROPS)
+	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(BUILD)/tests/test_budget
+	@DROPS=$(DROPS) $(BUILD)/tests/test_budget
 
 ADVERSARIAL_DROPS ?= 1750
 

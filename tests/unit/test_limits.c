@@ -418,6 +418,35 @@ static void test_spectrum_between_curves(void **state)
 	trial_end(&t);
 }
 
+/* A sensor's file puts its U in the place of the value's noise; a value of a sensor without one is undecided.
+ */
+static void test_a_budget_decides(void **state)
+{
+	struct budget_item item = {.what = "aX.peak.value_g", .value = 500, .part = {1}};
+	struct budget budget = {.count = 1, .item = &item};
+	struct trial t;
+	struct result said;
+	struct plan plan;
+
+	(void)state;
+	judge(&t, 500, 1, 1.0, "1:channel=aX\n2:peak.value_g=400 600\n");
+	said = result_of(&t.record, &t.analysis, &t.options);
+	said.budget = &budget;
+	reads(&plan, "1:channel=aX\n2:peak.value_g=400 600\n");
+	item.expanded = 99;
+	assert_int_equal(verdict_judge(&t.verdict, &plan, &said), 0);
+	assert_int_equal(t.verdict.decision, DECIDE_PASS);
+	assert_near(t.verdict.item[0].guard, 99, 1e-9);
+	item.expanded = 101;
+	assert_int_equal(verdict_judge(&t.verdict, &plan, &said), 0);
+	assert_int_equal(t.verdict.decision, DECIDE_CONDITIONAL_PASS);
+	item.what[0] = 'b';
+	assert_int_equal(verdict_judge(&t.verdict, &plan, &said), 0);
+	assert_int_equal(t.verdict.decision, DECIDE_UNDECIDED);
+	assert_string_equal(t.verdict.item[0].reason, "its sensor has no file");
+	trial_end(&t);
+}
+
 static void test_what_is_flagged_or_unknown_never_passes(void **state)
 {
 	struct trial t;
@@ -435,8 +464,11 @@ static void test_what_is_flagged_or_unknown_never_passes(void **state)
 	for (unsigned bit = 1; record_flag_name(bit)[0] != '\0'; bit <<= 1) { /* of the channel */
 		t.analysis.channels[0].flags = bit;
 		assert_int_equal(verdict_judge(&t.verdict, &plan, &said), 0);
-		assert_int_equal(t.verdict.decision, DECIDE_UNDECIDED);
-		assert_string_equal(t.verdict.item[0].reason, record_flag_name(bit));
+		/* a default is an uncertainty, too */
+		assert_int_equal(t.verdict.decision,
+		                 bit == RECORD_FLAG_DEFAULT_USED ? DECIDE_PASS : DECIDE_UNDECIDED);
+		assert_string_equal(t.verdict.item[0].reason,
+		                    bit == RECORD_FLAG_DEFAULT_USED ? "" : record_flag_name(bit));
 	}
 	t.analysis.channels[0].flags = 0;
 	for (unsigned bit = 1; estimate_flag_name(bit)[0] != '\0'; bit <<= 1) { /* of the value */
@@ -501,6 +533,7 @@ int main(void)
 	        cmocka_unit_test(test_each_limit_can_fail),
 	        cmocka_unit_test(test_a_limit_at_the_edge),
 	        cmocka_unit_test(test_spectrum_between_curves),
+	        cmocka_unit_test(test_a_budget_decides),
 	        cmocka_unit_test(test_what_is_flagged_or_unknown_never_passes),
 	        cmocka_unit_test(test_a_channel_that_is_not_there),
 	};

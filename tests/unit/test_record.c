@@ -130,7 +130,9 @@ static void test_names(void **state)
 	        {RECORD_FLAG_SAME_NAMES, "same_names"},
 	        {RECORD_FLAG_SETTLING, "settling"},
 	        {0, ""},
-	        {1u << 31, ""},
+	        {RECORD_FLAG_ASSUMED, "assumed"},
+	        {RECORD_FLAG_OVERDUE, "overdue"},
+	        {RECORD_FLAG_DEFAULT_USED, "default_used"},
 	};
 
 	(void)state;

@@ -1,0 +1,565 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/sensor/budget.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/units.h"
+#include "host/sensor/lowpass.h"
+
+#define NOT_NORMAL 0.3        /* of the variance: from there on the linear rule does not do */
+#define WIDTH_SHARE 0.936     /* of a half-sine's foot to foot: its width at 10 % */
+#define OTHERS_SHARE 0.5      /* of a value: what an axis that is not recorded is taken for */
+#define NEIGHBOUR_SHARE 0.125 /* of the duration: how far slopes are taken from */
+#define PERCENT 0.01
+
+static const char *const part_names[BUDGET_PARTS] = {"noise",     "definition", "sensitivity", "transverse",
+                                                     "linearity", "response",   "zero",        "filter",
+                                                     "clock",     "mounting"};
+
+/* One number while its parts are put together. */
+struct collecting {
+	double part[BUDGET_PARTS];
+	struct coverage coverage; /* without noise */
+	double degrees;           /* of the noise */
+};
+
+struct desk {
+	const struct sensors *sensors;
+	const struct record *record;
+	const struct analysis *analysis;
+	struct budget *budget;
+	bool failed;
+};
+
+/* One axis of a sensor in the record. */
+struct axis {
+	const struct sensor_used *used;
+	unsigned axis;
+	size_t channel;
+	const struct estimate_channel *e;
+};
+
+static void collect(struct collecting *c, enum budget_part part, enum coverage_law law, double u)
+{
+	u = fabs(u);
+	if (!(u > 0.0) || !isfinite(u))
+		return;
+	c->part[part] = hypot(c->part[part], u);
+	coverage_add(&c->coverage, law, u);
+}
+
+/* Half of what is anywhere within +-half. */
+static void within(struct collecting *c, enum budget_part part, double half)
+{
+	collect(c, part, COVERAGE_RECTANGULAR, half / sqrt(3.0));
+}
+
+/* ---- an item ---- */
+
+static void largest_of(struct budget_item *item)
+{
+	bool taken[BUDGET_PARTS] = {false};
+	size_t used = 0;
+
+	for (int n = 0; n < 3; n++) {
+		int most = -1;
+
+		for (int p = 0; p < BUDGET_PARTS; p++)
+			if (!taken[p] && item->part[p] > 0.0 &&
+			    (most < 0 || item->part[p] > item->part[most]))
+				most = p;
+		if (most < 0)
+			break;
+		taken[most] = true;
+		used += (size_t)snprintf(item->largest + used, sizeof(item->largest) - used, "%s%s %.0f %%",
+		                         used > 0 ? ", " : "", part_names[most],
+		                         100.0 * pow(item->part[most] / item->u, 2));
+	}
+}
+
+static void settle(struct budget_item *item, const struct collecting *collected)
+{
+	struct collecting c = *collected;
+	double noise = c.part[BUDGET_NOISE], rest = sqrt(c.coverage.normal + c.coverage.other);
+	const double u[2] = {noise, rest}, degrees[2] = {c.degrees, (double)INFINITY};
+
+	memcpy(item->part, c.part, sizeof(item->part));
+	item->u = hypot(noise, rest);
+	item->degrees = coverage_degrees(u, degrees, 2);
+	item->k = coverage_factor(item->degrees);
+	item->expanded = item->k * item->u;
+	item->method = "linear";
+	if (c.coverage.other > NOT_NORMAL * item->u * item->u) {
+		/* the noise as Student's t, by its variance */
+		coverage_add(
+		        &c.coverage, COVERAGE_NORMAL,
+		        noise * sqrt(isfinite(c.degrees) ? c.degrees / fmax(1.0, c.degrees - 2.0) : 1.0));
+		item->expanded = coverage_expanded(&c.coverage);
+		item->k = item->expanded / item->u;
+		item->method = "distribution";
+	}
+	largest_of(item);
+}
+
+/* subject "" for what is of no channel. Nothing without a value and its noise. */
+static void item_add(struct desk *d, const char *subject, const char *what, const char *unit, double value,
+                     double noise, struct collecting *c)
+{
+	struct budget *b = d->budget;
+	struct budget_item *item;
+
+	if (!isfinite(value) || !(noise > 0.0) || !isfinite(noise) || d->failed)
+		return;
+	if (b->count == b->room) {
+		size_t room = b->room > 0 ? 2 * b->room : 64;
+		struct budget_item *more = realloc(b->item, room * sizeof(*more));
+
+		d->failed = more == NULL;
+		if (d->failed)
+			return;
+		b->item = more;
+		b->room = room;
+	}
+	item = &b->item[b->count++];
+	*item = (struct budget_item){.unit = unit, .value = value};
+	snprintf(item->what, sizeof(item->what), "%.30s%s%s", subject, subject[0] != '\0' ? "." : "", what);
+	c->part[BUDGET_NOISE] = noise;
+	settle(item, c);
+}
+
+/* ---- what each source does ---- */
+
+/* A relative uncertainty of each axis, correlated, on what has the absolute effect w[i] of each. */
+static void correlated(struct collecting *c, enum budget_part part, enum coverage_law law, double u, double r,
+                       const double w[3])
+{
+	double sum = w[0] + w[1] + w[2];
+	bool one = fabs(fabs(sum) - fmax(fabs(w[0]), fmax(fabs(w[1]), fabs(w[2])))) <= 0.0;
+
+	if (one) {
+		collect(c, part, law, u * sum);
+		return;
+	}
+	collect(c, part, law, u * sqrt(r) * sum);
+	for (int i = 0; i < 3; i++)
+		collect(c, part, law, u * sqrt(1.0 - r) * w[i]);
+}
+
+/* w: change of the value for a gain that is all of it larger, of each axis. */
+static void gains(struct collecting *c, const struct sensor_used *used, const double w[3])
+{
+	const struct transducer *t = &used->transducer;
+	double r = t->calibration_correlation, root = sqrt(3.0);
+
+	correlated(c, BUDGET_SENSITIVITY, COVERAGE_NORMAL,
+	           t->calibration_expanded_percent * PERCENT / t->calibration_coverage_factor, r, w);
+	correlated(c, BUDGET_SENSITIVITY, COVERAGE_RECTANGULAR,
+	           t->calibration_drift_percent_year * PERCENT * used->age_years / root, 1.0, w);
+	correlated(c, BUDGET_SENSITIVITY, COVERAGE_RECTANGULAR,
+	           fabs(t->calibration_temperature_percent_k) * PERCENT * t->chain_temperature_range_k / root,
+	           1.0, w);
+	correlated(c, BUDGET_SENSITIVITY, COVERAGE_NORMAL, t->chain_gain_u_percent * PERCENT, 0.0, w);
+	correlated(c, BUDGET_LINEARITY, COVERAGE_RECTANGULAR,
+	           t->calibration_linearity_percent * PERCENT / root, r, w);
+	correlated(c, BUDGET_RESPONSE, COVERAGE_RECTANGULAR, t->calibration_response_percent * PERCENT / root,
+	           r, w);
+	correlated(c, BUDGET_MOUNTING, COVERAGE_RECTANGULAR, t->chain_mount_percent * PERCENT / root, 1.0, w);
+}
+
+/* What an axis reads of the others, times weight; a: all three, in the value's unit. */
+static void transverse(struct collecting *c, const struct sensor_used *used, unsigned axis, const double a[3],
+                       double weight)
+{
+	const struct transducer *t = &used->transducer;
+	double others = weight * hypot(a[(axis + 1) % 3], a[(axis + 2) % 3]);
+
+	if (t->has_matrix)
+		collect(c, BUDGET_TRANSVERSE, COVERAGE_NORMAL, t->calibration_matrix_u * others);
+	else
+		collect(c, BUDGET_TRANSVERSE, COVERAGE_ARCSINE,
+		        t->calibration_transverse_percent * PERCENT * others / sqrt(2.0));
+	within(c, BUDGET_MOUNTING, t->chain_align_deg * UNITS_PI / 180.0 * others);
+}
+
+static double zero_of(const struct axis *x)
+{
+	return x->used->transducer.calibration_zero_shift_percent * PERCENT * fabs(x->e->peak.value_g);
+}
+
+/* Where the filter puts an instant, times weight. */
+static void late(struct collecting *c, const struct axis *x, double weight)
+{
+	const struct transducer *t = &x->used->transducer;
+	double filter_s = lowpass_delay_s(t->filter, (unsigned)t->chain_order,
+	                                  TRANSDUCER_OF(t, chain_cutoff_x_hz, x->axis));
+
+	collect(c, BUDGET_FILTER, COVERAGE_NORMAL, t->chain_cutoff_u_percent * PERCENT * filter_s * weight);
+	collect(c, BUDGET_FILTER, COVERAGE_NORMAL, t->chain_skew_u_us * 1e-6 * weight);
+}
+
+/* Foot to foot of a pulse by its width. */
+static double duration_of(const struct axis *x)
+{
+	return x->e->pulse.duration_s / WIDTH_SHARE;
+}
+
+/* Times value: what the supply's high-pass is off, by part of T / tau. */
+static void supply(struct collecting *c, const struct axis *x, double value, double part)
+{
+	const struct transducer *t = &x->used->transducer;
+
+	if (t->chain_tau_s > 0.0)
+		within(c, BUDGET_FILTER,
+		       t->chain_tau_percent * PERCENT * value * part * duration_of(x) / t->chain_tau_s);
+}
+
+static double clock_of(const struct sensor_used *used)
+{
+	return used->transducer.chain_clock_ppm * 1e-6;
+}
+
+/* ---- the other axes ---- */
+
+/* The signal without its zero at t, between two samples; NAN where there is none. */
+static double signal_at(const struct desk *d, size_t channel, double t)
+{
+	const struct channel *x = &d->record->channels[channel];
+	double at = (t - x->start_s) * x->rate_hz, s = at - floor(at);
+	size_t k = at >= 0.0 ? (size_t)at : x->count;
+
+	if (k + 1 >= x->count)
+		return (double)NAN;
+	return x->value_g[k] + s * (x->value_g[k + 1] - x->value_g[k]) -
+	       d->analysis->channels[channel].baseline.offset_g;
+}
+
+static size_t channel_of(const struct desk *d, const struct sensor_used *used, unsigned axis)
+{
+	size_t i = 0;
+
+	while (i < d->record->channel_count &&
+	       strcmp(d->record->channels[i].name, used->transducer.channel[axis]) != 0)
+		i++;
+	return i;
+}
+
+/* All axes of x's sensor at t; one that is not there is a share of own. */
+static void others_at(const struct desk *d, const struct axis *x, double t, double own, double a[3])
+{
+	for (unsigned i = 0; i < 3; i++) {
+		size_t channel = channel_of(d, x->used, i);
+
+		a[i] = channel < d->record->channel_count ? signal_at(d, channel, t) : (double)NAN;
+		if (!isfinite(a[i]))
+			a[i] = OTHERS_SHARE * own;
+	}
+}
+
+/* The same integrated over x's pulse, m/s. */
+static void others_area(const struct desk *d, const struct axis *x, double own, double a[3])
+{
+	const struct estimate_pulse *p = &x->e->pulse;
+
+	for (unsigned i = 0; i < 3; i++) {
+		size_t channel = channel_of(d, x->used, i);
+		const struct channel *other = &d->record->channels[channel];
+		double sum = 0.0;
+
+		if (channel == d->record->channel_count) {
+			a[i] = OTHERS_SHARE * own;
+			continue;
+		}
+		for (double t = p->start_s; t < p->end_s; t += 1.0 / other->rate_hz) {
+			double value = signal_at(d, channel, t);
+
+			sum += isfinite(value) ? value : 0.0;
+		}
+		a[i] = sum * UNITS_G_M_S2 / other->rate_hz;
+	}
+}
+
+/* ---- a channel's numbers ---- */
+
+static struct collecting begin(const struct axis *x)
+{
+	double samples = (double)x->e->baseline.samples;
+
+	return (struct collecting){.degrees = fmax(1.0, samples - 2.0)};
+}
+
+static void of_peak(struct desk *d, const struct axis *x, const char *name)
+{
+	const struct estimate_peak *p = &x->e->peak;
+	const struct transducer *t = &x->used->transducer;
+	struct collecting c = begin(x);
+	double w[3] = {0.0, 0.0, 0.0}, a[3], fc = TRANSDUCER_OF(t, chain_cutoff_x_hz, x->axis);
+
+	w[x->axis] = p->value_g;
+	others_at(d, x, p->time_s, p->value_g, a);
+	gains(&c, x->used, w);
+	transverse(&c, x->used, x->axis, a, 1.0);
+	within(&c, BUDGET_ZERO, zero_of(x));
+	supply(&c, x, p->value_g, 1.0 / UNITS_PI);
+	if (t->filter != TRANSDUCER_NO_FILTER)
+		within(&c, BUDGET_FILTER, p->value_g * lowpass_peak_share(fc * duration_of(x)));
+	item_add(d, name, "peak.value_g", "g", p->value_g, p->sigma_g, &c);
+}
+
+/* How far what it reads of the others moves an extreme: their slope over its own bend. */
+static void moved(struct desk *d, struct collecting *c, const struct axis *x, double weight)
+{
+	double half = NEIGHBOUR_SHARE * duration_of(x), bend = pow(UNITS_PI / duration_of(x), 2), before[3],
+	       after[3];
+	const struct estimate_peak *p = &x->e->peak;
+
+	others_at(d, x, p->time_s - half, 0.0, before);
+	others_at(d, x, p->time_s + half, 0.0, after);
+	for (int i = 0; i < 3; i++)
+		after[i] -= before[i];
+	transverse(c, x->used, x->axis, after, weight / (2.0 * half * bend * fabs(p->value_g)));
+}
+
+static void of_instant(struct desk *d, const struct axis *x, const char *name)
+{
+	const struct estimate_peak *p = &x->e->peak;
+	struct collecting c = begin(x);
+
+	late(&c, x, 1.0);
+	moved(d, &c, x, 1.0);
+	supply(&c, x, duration_of(x), 1.0 / (UNITS_PI * UNITS_PI));
+	within(&c, BUDGET_CLOCK, clock_of(x->used) * p->time_s);
+	item_add(d, name, "peak.time_s", "s", p->time_s, p->sigma_time_s, &c);
+}
+
+static void of_width(struct desk *d, const struct axis *x, const char *name, const char *what, double width_s,
+                     double noise_s)
+{
+	const struct estimate_pulse *p = &x->e->pulse;
+	const struct transducer *t = &x->used->transducer;
+	struct collecting c = begin(x);
+	double duration = duration_of(x), slope = UNITS_PI * fabs(x->e->peak.value_g) / duration;
+	double periods = duration * TRANSDUCER_OF(t, chain_cutoff_x_hz, x->axis), a[3][3];
+
+	within(&c, BUDGET_ZERO, 2.0 * zero_of(x) / slope);
+	others_at(d, x, p->start_s, 0.0, a[0]);
+	others_at(d, x, p->end_s, 0.0, a[1]);
+	others_at(d, x, x->e->peak.time_s, 0.0, a[2]);
+	for (int i = 0; i < 3; i++)
+		a[0][i] += a[1][i] - 2.0 * 0.1 * a[2][i];
+	transverse(&c, x->used, x->axis, a[0], 1.0 / slope);
+	if (t->filter != TRANSDUCER_NO_FILTER)
+		within(&c, BUDGET_FILTER, width_s * lowpass_width_share(periods));
+	within(&c, BUDGET_CLOCK, clock_of(x->used) * width_s);
+	item_add(d, name, what, "s", width_s, noise_s, &c);
+}
+
+static void of_velocity(struct desk *d, const struct axis *x, const char *name, const char *what,
+                        double value, double noise)
+{
+	struct collecting c = begin(x);
+	double w[3] = {0.0, 0.0, 0.0}, a[3];
+
+	w[x->axis] = value;
+	others_area(d, x, value, a);
+	gains(&c, x->used, w);
+	transverse(&c, x->used, x->axis, a, 1.0);
+	within(&c, BUDGET_ZERO, UNITS_G_M_S2 * zero_of(x) * duration_of(x));
+	supply(&c, x, value, 0.5);
+	within(&c, BUDGET_CLOCK, clock_of(x->used) * value);
+	item_add(d, name, what, "m/s", value, noise, &c);
+}
+
+static void of_decay(struct desk *d, const struct sensor_used *used, const char *name, const char *what,
+                     const struct estimate_ringdown *r, double degrees)
+{
+	const struct {
+		const char *key, *unit;
+		double value, noise, follows;
+	} number[] = {{"frequency_hz", "Hz", r->frequency_hz, r->sigma_hz, 1.0},
+	              {"natural_frequency_hz", "Hz", r->natural_frequency_hz, r->sigma_natural_hz, 1.0},
+	              {"damping_ratio", "1", r->damping_ratio, r->sigma_damping, 0.0}};
+	/* the mean of three cycles, fitted or counted: one definition as good as the other */
+	double apart = (r->how.flags & ESTIMATE_FLAG_AMPLITUDE) != 0
+	                       ? fabs(r->three_cycle_frequency_hz - r->frequency_hz)
+	                       : 0.0;
+
+	for (size_t i = 0; i < sizeof(number) / sizeof(number[0]); i++) {
+		struct collecting c = {.degrees = degrees};
+		char key[40];
+
+		within(&c, BUDGET_CLOCK, clock_of(used) * number[i].value * number[i].follows);
+		within(&c, BUDGET_DEFINITION, 0.5 * apart * number[i].follows);
+		snprintf(key, sizeof(key), "%s.%s", what, number[i].key);
+		item_add(d, name, key, number[i].unit, number[i].value, number[i].noise, &c);
+	}
+}
+
+static void of_channel(struct desk *d, size_t i)
+{
+	const char *name = d->record->channels[i].name;
+	struct axis x = {.channel = i, .e = &d->analysis->channels[i]};
+	const struct estimate_pulse *p = &x.e->pulse;
+
+	x.used = sensors_of(d->sensors, name, &x.axis);
+	if (x.used == NULL)
+		return;
+	of_peak(d, &x, name);
+	of_instant(d, &x, name);
+	of_width(d, &x, name, "pulse.duration_s", p->duration_s, p->sigma_duration_s);
+	of_velocity(d, &x, name, "pulse.velocity_change_m_s", p->velocity_change_m_s, p->sigma_velocity_m_s);
+	of_width(d, &x, name, "pulse.contact.duration_s", p->contact_time_s, p->sigma_contact_s);
+	of_velocity(d, &x, name, "pulse.contact.velocity_change_m_s", p->fitted_velocity_m_s,
+	            p->sigma_fitted_velocity_m_s);
+	of_decay(d, x.used, name, "ringdown", &x.e->ringdown, begin(&x).degrees);
+}
+
+/* ---- of X and Y together ---- */
+
+/* X and Y of one sensor, "S1" or "S2"; false: not both are there, of one file. */
+static bool pair_of(const struct desk *d, const char *sensor, struct axis pair[2])
+{
+	for (unsigned i = 0; i < 2; i++) {
+		char name[12];
+		size_t k = 0;
+
+		snprintf(name, sizeof(name), "%.7s%c", sensor, "XY"[i]);
+		while (k < d->record->channel_count && strcmp(d->record->channels[k].name, name) != 0)
+			k++;
+		pair[i] = (struct axis){.channel = k};
+		pair[i].used = sensors_of(d->sensors, name, &pair[i].axis);
+		if (pair[i].used == NULL || k == d->record->channel_count)
+			return false;
+		pair[i].e = &d->analysis->channels[k];
+	}
+	return pair[0].used == pair[1].used;
+}
+
+/* Scale times the length of a's components along X and Y. */
+static void of_length(struct collecting *c, const struct axis pair[2], const double a[3], double scale)
+{
+	double length = hypot(a[pair[0].axis], a[pair[1].axis]), w[3] = {0.0, 0.0, 0.0};
+
+	for (int i = 0; i < 2; i++) {
+		double along = a[pair[i].axis];
+
+		w[pair[i].axis] = scale * along * along / length;
+		transverse(c, pair[i].used, pair[i].axis, a, scale * fabs(along) / length);
+		within(c, BUDGET_ZERO,
+		       scale * pair[i].used->transducer.calibration_zero_shift_percent * PERCENT * along *
+		               along / length);
+	}
+	gains(c, pair[0].used, w);
+	supply(c, &pair[0], scale * length, 1.0 / UNITS_PI);
+}
+
+/* The instant of the length's maximum: each axis counts by its share. */
+static void late_length(struct desk *d, struct collecting *c, const struct axis pair[2], const double a[3])
+{
+	double length = hypot(a[pair[0].axis], a[pair[1].axis]);
+
+	for (int i = 0; i < 2; i++) {
+		double share = pow(a[pair[i].axis] / length, 2);
+
+		late(c, &pair[i], share);
+		moved(d, c, &pair[i], share);
+	}
+}
+
+static void of_resultant(struct desk *d, const struct estimate_resultant *r)
+{
+	struct axis pair[2];
+	struct collecting height, instant;
+	double a[3];
+
+	if (!pair_of(d, r->sensor, pair))
+		return;
+	others_at(d, &pair[0], r->time_s, r->peak_g, a);
+	height = instant = begin(&pair[0]);
+	of_length(&height, pair, a, 1.0);
+	item_add(d, r->sensor, "peak_g", "g", r->peak_g, r->sigma_g, &height);
+	late_length(d, &instant, pair, a);
+	within(&instant, BUDGET_CLOCK, clock_of(pair[0].used) * r->time_s);
+	item_add(d, r->sensor, "time_s", "s", r->time_s, r->sigma_time_s, &instant);
+}
+
+static void of_lag(struct desk *d)
+{
+	const struct estimate_lag *lag = &d->analysis->lag;
+	struct collecting c = {.degrees = (double)INFINITY};
+
+	for (size_t i = 0; i < d->analysis->resultant_count; i++) {
+		const struct estimate_resultant *r = &d->analysis->resultants[i];
+		struct axis pair[2];
+		double a[3];
+
+		if (!pair_of(d, r->sensor, pair))
+			return;
+		others_at(d, &pair[0], r->time_s, r->peak_g, a);
+		late_length(d, &c, pair, a);
+	}
+	item_add(d, "", "lag.largest_peak_s", "s", lag->largest_peak_s, lag->sigma_s, &c);
+	item_add(d, "", "lag.driven.lag_s", "s", lag->driven_s, lag->sigma_driven_s, &c);
+}
+
+static void of_rebound(struct desk *d)
+{
+	const struct estimate_rebound *r = &d->analysis->rebound;
+	struct collecting c, flight = {.degrees = (double)INFINITY};
+	struct axis pair[2];
+	double a[3], v[2];
+
+	if (!pair_of(d, "S2", pair))
+		return;
+	others_area(d, &pair[0], 0.0, a);
+	for (int i = 0; i < 2; i++)
+		v[i] = a[pair[i].axis] = pair[i].e->pulse.velocity_change_m_s;
+	c = begin(&pair[0]);
+	of_length(&c, pair, a, (1.0 + r->velocity_ratio) / hypot(v[0], v[1]));
+	item_add(d, "", "rebound.velocity_ratio", "1", r->velocity_ratio, r->sigma_velocity_ratio, &c);
+	within(&flight, BUDGET_CLOCK, clock_of(pair[0].used) * r->flight_ratio);
+	item_add(d, "", "rebound.flight_ratio", "1", r->flight_ratio, r->sigma_flight_ratio, &flight);
+}
+
+/* ---- all of it ---- */
+
+int budget_make(struct budget *budget, const struct sensors *sensors, const struct record *record,
+                const struct analysis *analysis)
+{
+	struct desk d = {.sensors = sensors, .record = record, .analysis = analysis, .budget = budget};
+	struct axis pair[2];
+
+	*budget = (struct budget){.count = 0};
+	for (size_t i = 0; i < analysis->channel_count; i++)
+		of_channel(&d, i);
+	for (size_t i = 0; i < analysis->resultant_count; i++)
+		of_resultant(&d, &analysis->resultants[i]);
+	if (analysis->has_lag)
+		of_lag(&d);
+	if (analysis->has_plate && pair_of(&d, "S1", pair))
+		of_decay(&d, pair[0].used, "", "plate", &analysis->plate, begin(&pair[0]).degrees);
+	if (analysis->has_rebound)
+		of_rebound(&d);
+	for (size_t i = 0; i < budget->count; i++)
+		budget->item[i].largest_parts = budget->item[i].largest;
+	if (!d.failed)
+		return 0;
+	budget_free(budget);
+	return DT_E_MEMORY;
+}
+
+void budget_free(struct budget *budget)
+{
+	free(budget->item);
+	*budget = (struct budget){.count = 0};
+}
+
+const struct budget_item *budget_find(const struct budget *budget, const char *what)
+{
+	for (size_t i = 0; budget != NULL && i < budget->count; i++)
+		if (strcmp(budget->item[i].what, what) == 0)
+			return &budget->item[i];
+	return NULL;
+}

@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_SENSOR_BUDGET_H
+#define DT_HOST_SENSOR_BUDGET_H
+/*
+ * The uncertainty of each reported number by its parts (GUM), for the channels whose sensors have files.
+ * Noise is what the estimate says of itself; the rest follows from the sensor's file and the value's
+ * measurement equation:
+ *
+ *     peak         gain 1:1; what it reads of the other axes, as they stand at its instant; zero 1:1
+ *     resultant    the axes' parts, those of one sensor correlated
+ *     instant      filter, skew, clock; the supply
+ *     lag          both sensors' filters and skews; the clock cancels
+ *     width        zero over the slopes at its ends; what it reads of the other axes there
+ *     velocity     gain 1:1; zero over the pulse; the supply
+ *     frequency    clock; where it follows the swing, how far its definitions are apart
+ *     damping      nothing more: gain cancels, a linear filter moves no pole
+ *     rebound      as the velocity change, or the clock
+ *
+ * U covers 95.45 %: k u with Student's k of the effective degrees of freedom, or, where more than 30 % of the
+ * variance is not normal, by the distribution of the sum (coverage.h).
+ */
+#include "host/estimate/estimate.h"
+#include "host/sensor/coverage.h"
+#include "host/sensor/sensors.h"
+
+enum budget_part {
+	BUDGET_NOISE,
+	BUDGET_DEFINITION,
+	BUDGET_SENSITIVITY, /* certificate, drift since, temperature, electronics */
+	BUDGET_TRANSVERSE,
+	BUDGET_LINEARITY,
+	BUDGET_RESPONSE,
+	BUDGET_ZERO,
+	BUDGET_FILTER, /* low-pass and high-pass, skew */
+	BUDGET_CLOCK,
+	BUDGET_MOUNTING, /* and alignment */
+	BUDGET_PARTS
+};
+
+struct budget_item {
+	char what[48]; /* "S2X.peak.value_g" */
+	const char *unit;
+	double value;
+	double part[BUDGET_PARTS]; /* standard uncertainties; u: of all */
+	double u, degrees, k, expanded;
+	const char *method; /* "linear" or "distribution" */
+	char largest[96];   /* "transverse 68 %, sensitivity 16 %, linearity 5 %" */
+	const char *largest_parts;
+};
+
+struct budget {
+	size_t count, room;
+	struct budget_item *item;
+};
+
+/* record: as corrected, with its analysis. 0 or DT_E_MEMORY; to be freed. */
+DT_MUST_USE int budget_make(struct budget *budget, const struct sensors *sensors, const struct record *record,
+                            const struct analysis *analysis);
+void budget_free(struct budget *budget);
+
+/* NULL: that number has none. */
+const struct budget_item *budget_find(const struct budget *budget, const char *what);
+
+#endif
