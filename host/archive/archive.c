@@ -222,6 +222,9 @@ static int open_in(struct archive *archive, enum archive_mode mode)
 			                      "%.250s: raw files, but no index; 'droptower series --archive "
 			                      "%.250s --rebuild' makes it again",
 			                      archive->folder, archive->folder);
+		if (errno != ENOENT && errno != ENOTDIR)
+			return archive_refuse(archive, DT_E_SYSTEM, "%.400s: %s", archive->folder,
+			                      strerror(errno));
 		if (mode != ARCHIVE_CREATE)
 			return archive_refuse(archive, DT_E_EMPTY,
 			                      "%.400s: no archive there; 'droptower series new' makes one",

@@ -100,16 +100,26 @@ static char utf16_order(const unsigned char *bytes, size_t size)
 	return (double)even > ZEROS * (double)looked && odd == 0 ? 'b' : '\0';
 }
 
+static uint64_t line_of(const struct source *source, const char *byte)
+{
+	uint64_t line = 1;
+
+	for (const char *at = source->bytes; at < byte; at++)
+		line += *at == '\n';
+	return line;
+}
+
 int encoding_settle(struct source *source, const char **name, char message[READ_MESSAGE_MAX])
 {
 	const unsigned char *bytes = (const unsigned char *)source->bytes;
 	char order = utf16_order(bytes, source->size), *text;
+	const char *zero = source->size > 0 ? memchr(source->bytes, '\0', source->size) : NULL;
 	size_t used;
 
 	*name = "utf-8";
-	if (order == '\0' && memchr(bytes, '\0', source->size) != NULL)
-		return source_refuse(message, DT_E_FORMAT, source->file, 0,
-		                     "binary file of no kind that is known here");
+	if (order == '\0' && zero != NULL)
+		return source_refuse(message, DT_E_FORMAT, source->file, line_of(source, zero),
+		                     "a zero byte: binary file of no kind that is known here, expected text");
 	if (order == '\0' && is_utf8(bytes, source->size))
 		return 0;
 	if (order != '\0' && source->size % 2 != 0)

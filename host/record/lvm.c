@@ -135,6 +135,7 @@ int lvm_read(struct lvm *lvm, const struct source *source, struct source_line *l
 			                     "%u headers of a LabVIEW file end above, expected 2", ends);
 		ends += starts(line, "***End_of_Header***");
 		lvm->multi |= starts(line, "X_Columns") && line->length > 10 && line->text[10] == 'M';
+		lvm->has_x |= starts(line, "X_Columns") && line->length > 10 && line->text[10] != 'N';
 		if (ends == 0)
 			take_style(lvm, line);
 		else

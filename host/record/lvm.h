@@ -22,7 +22,8 @@ struct lvm_column {
 
 struct lvm {
 	struct cells_style style;
-	bool multi; /* a time column before each channel's */
+	bool has_x; /* a time column stands first */
+	bool multi; /* and one before each channel's */
 	double x_divisor;
 	struct lvm_column column[COLUMNS_MAX];
 	size_t columns;

@@ -44,7 +44,8 @@ struct reading {
 	size_t bad[COLUMNS_MAX];  /* by column */
 	size_t used[COLUMNS_MAX]; /* rows up to the last that is not empty */
 	struct cells row;
-	size_t tail[COLUMNS_MAX]; /* of the row before */
+	size_t tail[COLUMNS_MAX];   /* of the row before */
+	size_t length[COLUMNS_MAX]; /* of its cells, without a sign */
 
 	/* of the time column, in its own unit: the finest place of all rows, most digits, the largest number
 	 */
@@ -202,6 +203,11 @@ static int check_oddity(struct reading *reading, size_t i)
 	return 0;
 }
 
+static size_t unsigned_length(struct piece cell)
+{
+	return cell.length - (cell.length > 0 && (cell.text[0] == '-' || cell.text[0] == '+'));
+}
+
 /* Notes of a number what tells a decimal comma from a thousands separator, and one that the file's end has
  * cut. */
 static void note_number(struct reading *reading, size_t i)
@@ -209,6 +215,7 @@ static void note_number(struct reading *reading, size_t i)
 	struct piece cell = reading->row.cell[i];
 
 	reading->tail[i] = cells_tail(&reading->row, i);
+	reading->length[i] = unsigned_length(cell);
 	if ((reading->style.decimal && reading->sniff == NULL) || reading->is_lvm ||
 	    reading->row.decimal != ',' || cell.length == 0)
 		return;
@@ -219,14 +226,19 @@ static void note_number(struct reading *reading, size_t i)
 }
 
 /* Whether the last cell of a line without an end is no number, or one without digits that the row before has.
- */
+ * A whole number loses its last digits first. */
 static bool read_delimited_is_cut(const struct reading *reading, size_t i)
 {
+	size_t tail = cells_tail(&reading->row, i);
 	double value;
 
-	return reading->unterminated && i + 1 == reading->row.count &&
-	       (!cells_number(&reading->row, i, &value) ||
-	        (reading->rows > 0 && cells_tail(&reading->row, i) < reading->tail[i]));
+	if (!reading->unterminated || i + 1 != reading->row.count)
+		return false;
+	if (!cells_number(&reading->row, i, &value))
+		return true;
+	return reading->rows > 0 &&
+	       (tail < reading->tail[i] ||
+	        (tail == 0 && unsigned_length(reading->row.cell[i]) < reading->length[i]));
 }
 
 static int take_clock(struct reading *reading, size_t i)
@@ -547,6 +559,41 @@ static bool any_delta(const struct reading *reading)
 	return false;
 }
 
+static bool is_x_value(struct piece name)
+{
+	return name.length == 7 && memcmp(name.text, "X_Value", 7) == 0;
+}
+
+/* A value of the headers that stands below a time column is another channel's. */
+static int check_x_columns(struct reading *reading, const struct source_line *names)
+{
+	const struct sniff *sniff = reading->sniff;
+
+	for (size_t i = 0; i < sniff->columns.count; i++)
+		if (is_x_value(sniff->name[i]) && sniff->columns.column[i].kind == COLUMN_CHANNEL)
+			return source_refuse(
+			        reading->message, DT_E_FORMAT, reading->source->file, names->number,
+			        "column %zu is X_Value, but Y_Unit_Label in line %llu gives it "
+			        "\"%.*s\", expected each value of the headers below its channel",
+			        i + 1, (unsigned long long)reading->lvm.unit_line,
+			        (int)reading->lvm.column[i].unit.length, reading->lvm.column[i].unit.text);
+	return 0;
+}
+
+/* The step is the header's, and the first time column has to agree with it. */
+static void take_x_column(struct reading *reading)
+{
+	struct column *column = &reading->columns.column[0];
+
+	if (!reading->lvm.has_x || reading->columns.has_time || column->kind != COLUMN_SKIP ||
+	    !is_x_value(reading->sniff->name[0]))
+		return;
+	column->kind = COLUMN_TIME;
+	column->unit = unit_find("s", 1);
+	column->divisor = reading->lvm.x_divisor;
+	reading->columns.has_time = true;
+}
+
 /* Channels of a LabVIEW file are columns labelled with a unit of acceleration; each has a step of its own. */
 static int sniff_lvm(struct reading *reading)
 {
@@ -554,6 +601,7 @@ static int sniff_lvm(struct reading *reading)
 	struct source_line line = reading->line;
 	struct piece units[COLUMNS_MAX] = {{0}};
 	size_t count = 0;
+	int error;
 
 	if (source_next_line(reading->source, &line))
 		cells_split(reading->style, line.text, line.length, &reading->row);
@@ -566,7 +614,8 @@ static int sniff_lvm(struct reading *reading)
 	if (count > 1 && sniff->name[count - 1].length == 7 &&
 	    memcmp(sniff->name[count - 1].text, "Comment", 7) == 0)
 		count--;
-	return sniff_names(sniff, count, units, any_delta(reading), reading->source->file, reading->message);
+	error = sniff_names(sniff, count, units, any_delta(reading), reading->source->file, reading->message);
+	return error ? error : check_x_columns(reading, &line);
 }
 
 /* A file of other names is of another origin than the profile. */
@@ -601,7 +650,9 @@ static int read_headers(struct reading *reading)
 		                        : sniff_text(reading->sniff, source, reading->message);
 	if (!error && reading->sniff != NULL) {
 		reading->columns = reading->sniff->columns;
-		if (!reading->is_lvm) {
+		if (reading->is_lvm) {
+			take_x_column(reading);
+		} else {
 			reading->style = reading->sniff->style;
 			reading->rows_only = *source;
 			reading->rows_only.size = reading->sniff->end;

@@ -629,7 +629,8 @@ static bool has_letter(const struct source_line *line)
 	return false;
 }
 
-/* Lines with words behind the last row are a footer; others are rows that something is wrong with. */
+/* Lines with words behind the last row are a footer; others are rows that something is wrong with, and so is
+ * one that begins with a number and has no end: "0.1,1.5e". */
 static void find_footer(struct work *work, struct sniff *sniff)
 {
 	const char *bytes = work->source->bytes;
@@ -648,7 +649,9 @@ static void find_footer(struct work *work, struct sniff *sniff)
 		if (is_idle(&line))
 			continue;
 		split(sniff->style, &line, &work->cells);
-		if (is_row(&work->cells) || !has_letter(&line))
+		if (is_row(&work->cells) || !has_letter(&line) ||
+		    (sniff->footer_lines == 0 && bytes[work->source->size - 1] != '\n' &&
+		     kind_of(&work->cells, 0) == CELL_NUMBER))
 			return;
 		sniff->footer_lines++;
 		sniff->end = end;
