@@ -41,6 +41,16 @@ struct transducer_reading {
 	int line_of[TEXTS + NUMBERS]; /* 0: not given */
 };
 
+double transducer_reads(const struct transducer *t, unsigned axis, unsigned other)
+{
+	const double m[TRANSDUCER_AXES][TRANSDUCER_AXES] = {
+	        {1.0, t->calibration_matrix_xy, t->calibration_matrix_xz},
+	        {t->calibration_matrix_yx, 1.0, t->calibration_matrix_yz},
+	        {t->calibration_matrix_zx, t->calibration_matrix_zy, 1.0}};
+
+	return m[axis][other];
+}
+
 bool transducer_day(const char *text, double *days)
 {
 	struct tm day = {.tm_isdst = 0}, back;

@@ -33,6 +33,9 @@ DT_MUST_USE int transducer_read(struct transducer *transducer, const char *file,
 /* Of the key's three values that of an axis: sensitivity, scaled, polarity, cutoff, skew. */
 #define TRANSDUCER_OF(transducer, first, axis) ((&(transducer)->first)[axis])
 
+/* What an axis reads of another, by the matrix. */
+double transducer_reads(const struct transducer *transducer, unsigned axis, unsigned other);
+
 /* Days after 1970-01-01 of YYYY-MM-DD, whatever follows; false: it is no day of the calendar. */
 bool transducer_day(const char *text, double *days);
 

@@ -218,6 +218,8 @@ static void recall_line(struct inputs *inputs, char *line, bool own)
 	if (sscanf(line, "%129s %" SCNd64 " %" SCNd64 " %" SCNd64 " %" SCNd64 " %d", noted.key, &noted.size,
 	           &noted.mtime_ns, &noted.ctime_ns, &noted.noted_s, &noted.code) != 6)
 		return;
+	if (strcmp(noted.key, "-") == 0) /* of no content */
+		noted.key[0] = '\0';
 	if (!own && noted.noted_s * 1000000000 < noted.ctime_ns + (int64_t)SETTLED_S * 1000000000)
 		return;
 	key.path = path;

@@ -159,9 +159,25 @@ static char *setting(const char *name, const char *value)
 	return asprintf(&line, "%s %s\n", name, value) < 0 ? NULL : line;
 }
 
-/* In one order, however they were given. */
-static char *settings_of(const struct option_words *given)
+/* The sensors' files, of --chain or of the scene, by their contents. */
+static int put_sensors(const struct analyze_arguments *arguments, FILE *out)
 {
+	const char *chain = arguments->evaluate.chain != NULL   ? arguments->evaluate.chain
+	                    : arguments->evaluate.scene != NULL ? arguments->scene.chain
+	                                                        : "";
+	char message[SETTINGS_MESSAGE_MAX];
+	struct sensors sensors;
+	int result = sensors_read(&sensors, chain, 0.0, message);
+
+	for (size_t i = 0; result == 0 && i < sensors.count; i++)
+		fprintf(out, "sensor %s\n", sensors.used[i].file_sha256);
+	return result;
+}
+
+/* In one order, however they were given. */
+static char *settings_of(const struct batch_arguments *arguments)
+{
+	const struct option_words *given = &arguments->given;
 	char *line[OPTION_WORDS_ROOM] = {NULL};
 	size_t count = 0;
 	struct text text;
@@ -169,7 +185,11 @@ static char *settings_of(const struct option_words *given)
 
 	if (result == 0)
 		fprintf(text.out, "droptower %s\nquantities %s\n", DT_VERSION, quantity_version());
+	if (result == 0)
+		result = put_sensors(&arguments->analyze, text.out);
 	for (int i = 0; i < given->count && result == 0; i += 2) {
+		if (strcmp(given->word[i], "chain") == 0)
+			continue;
 		line[count] = setting(given->word[i], given->word[i + 1]);
 		result = line[count++] != NULL ? 0 : DT_E_MEMORY;
 	}
@@ -312,7 +332,8 @@ static int batch_files(struct batch_arguments *arguments, const struct files *fi
 	} else {
 		tell_refused(&batch.inputs, batch.crew.progress.refused);
 		tell_summary(&batch, &told);
-		code = batch.stopped ? COMMAND_REFUSED : batch.crew.progress.code;
+		code = batch.collected.refused > 0 ? COMMAND_INPUT : batch.crew.progress.code;
+		code = batch.stopped ? COMMAND_REFUSED : code;
 	}
 	batch_end(&batch);
 	return code;
@@ -328,7 +349,7 @@ static int batch_words(struct batch_arguments *arguments, char **words, int coun
 		return code;
 	if (arguments->list != NULL)
 		code = read_names(&files, arguments->list);
-	settings = code == COMMAND_DONE ? settings_of(&arguments->given) : NULL;
+	settings = code == COMMAND_DONE ? settings_of(arguments) : NULL;
 	if (settings != NULL)
 		code = batch_files(arguments, &files, settings);
 	else if (code == COMMAND_DONE) {

@@ -273,11 +273,15 @@ static int apply_chain(struct evaluated *e, const char *list, const struct recor
 }
 
 /* The supply's high-pass that the estimates undo: the sensors' own where their files give one; then a channel
- * without a file is left as told, by told_s. */
-static double highpass_of(struct record *corrected, double told_s)
+ * without a file is left as told, by told_s. asked: of all by told_s, whatever the files say. */
+static double highpass_of(struct record *corrected, double told_s, bool asked)
 {
 	double of_files_s = 0.0;
 
+	for (size_t i = 0; i < corrected->channel_count && asked; i++)
+		corrected->channels[i].highpass_s = 0.0;
+	if (asked)
+		return told_s;
 	if (told_s > 0.0)
 		return told_s;
 	for (size_t i = 0; i < corrected->channel_count; i++)
@@ -326,6 +330,8 @@ static int evaluate_on(struct evaluated *e, const struct evaluate_options *optio
 	}
 	if (result == 0)
 		result = find_shocks(e, options, &e->report.options);
+	if (result == 0 && options->scene != NULL)
+		result = find_motion(e, options->scene);
 	return result == 0 ? judge(e, options) : result;
 }
 
@@ -346,7 +352,8 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 	    apply_chain(e, chain, &record) != 0)
 		return EVALUATE_TOLD;
 	if (e->sensors.count > 0)
-		estimate.iepe_time_constant_s = highpass_of(&e->corrected, estimate.iepe_time_constant_s);
+		estimate.iepe_time_constant_s = highpass_of(&e->corrected, estimate.iepe_time_constant_s,
+		                                            !isnan(options->iepe_time_constant_s));
 	result = estimate_record(record, &estimate, &e->analysis);
 	if (result != 0) {
 		record_free(&e->corrected);
@@ -367,9 +374,7 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 	}
 	if (scene == NULL)
 		return 0;
-	result = find_motion(e, scene);
-	if (result == 0)
-		result = model_solve(scene, MODEL_AUTO, NULL, &e->prediction, message);
+	result = model_solve(scene, MODEL_AUTO, NULL, &e->prediction, message);
 	if (result != 0 && result != DT_E_MEMORY) {
 		command_error("%s: no prediction: %s", scene->name, message);
 		return 0;

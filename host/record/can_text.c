@@ -176,7 +176,7 @@ static void asc_line(struct asc *asc, const struct source_line *line)
 		return; /* of something else */
 	if (!fd && !word_is(asc, 4, "d") && !word_is(asc, 4, "r"))
 		return;
-	frame.time_us = llround(asc->time_s * 1e6);
+	frame.time_us = asc->time_s < 9e12 ? llround(asc->time_s * 1e6) : 0;
 	right = fd ? asc_fd(asc, &frame) : asc_classic(asc, &frame);
 	if (right && link_frame_valid(&frame))
 		put_frame(asc->text, &frame, (unsigned)channel);
@@ -319,10 +319,14 @@ static double resolution_us(const struct pcap *pcap, size_t at, size_t end)
 
 static void take_interface(struct pcap *pcap, size_t at, size_t size)
 {
-	if (size < 20 || pcap->interfaces == INTERFACES_MAX)
+	if (size < 20) {
+		put_corrupt(pcap->text, at);
+		size = 0; /* it counts: packets name interfaces by number */
+	}
+	if (pcap->interfaces == INTERFACES_MAX)
 		return;
-	pcap->link[pcap->interfaces] = u16(pcap, at + 8);
-	pcap->tick_us[pcap->interfaces] = resolution_us(pcap, at + 16, at + size - 4);
+	pcap->link[pcap->interfaces] = size > 0 ? u16(pcap, at + 8) : 0;
+	pcap->tick_us[pcap->interfaces] = size > 0 ? resolution_us(pcap, at + 16, at + size - 4) : 1;
 	if (pcap->link[pcap->interfaces] != LINK_CAN)
 		pcap->other = pcap->link[pcap->interfaces];
 	pcap->interfaces++;

@@ -21,7 +21,8 @@ enum { LOOK_BYTES = 1 << 14 };
 struct mme_header {
 	char name[64], unit[32];
 	double interval_s, start_s, samples; /* 0 or less where not told; start_s 0 */
-	bool has_interval, explicit_times;
+	bool has_interval, explicit_times, has_no_start;
+	char status[32]; /* of its data, where that is no measurement */
 };
 
 /* "key   :value" of a line, without blanks around; false where there is no such value. */
@@ -77,6 +78,17 @@ bool mme_is(const struct source *source)
 
 /* ---- a channel ---- */
 
+/* What its laboratory says of a channel that gave nothing, or whose numbers are not in its unit. */
+static bool is_no_measurement(const char *status)
+{
+	static const char *const none[] = {"fail", "meaningless", "no data", "not applied"};
+
+	for (size_t i = 0; i < sizeof(none) / sizeof(none[0]); i++)
+		if (strcasestr(status, none[i]) != NULL)
+			return true;
+	return false;
+}
+
 static void take_line(struct mme_header *header, const struct source_line *line)
 {
 	char value[128];
@@ -91,7 +103,9 @@ static void take_line(struct mme_header *header, const struct source_line *line)
 	else if (mme_line(line, "Sampling interval", value, sizeof(value)))
 		header->has_interval = number_read(value, 1e-9, 1e3, &header->interval_s);
 	else if (mme_line(line, "Time of first sample", value, sizeof(value)))
-		(void)number_read(value, -1e6, 1e6, &header->start_s);
+		header->has_no_start = !number_read(value, -1e6, 1e6, &header->start_s);
+	else if (mme_line(line, "Data status", value, sizeof(value)) && is_no_measurement(value))
+		snprintf(header->status, sizeof(header->status), "%.31s", value);
 	else if (mme_line(line, "Number of samples", value, sizeof(value)))
 		(void)number_read(value, 0, 1e9, &header->samples);
 }
@@ -127,6 +141,13 @@ static int check_head(const struct mme_header *header, const struct source *sour
 		                     "a channel of ISO 13499 %s, expected a Sampling interval in seconds",
 		                     header->explicit_times ? "with times in another channel"
 		                                            : "without its interval");
+	if (header->has_no_start)
+		return source_refuse(message, DT_E_FORMAT, source->file, 0,
+		                     "a channel of ISO 13499 whose Time of first sample is no number");
+	if (header->status[0] != '\0')
+		return source_refuse(message, DT_E_FORMAT, source->file, 0,
+		                     "a channel of ISO 13499 with Data status \"%s\", expected a measurement",
+		                     header->status);
 	if (header->unit[0] == '\0')
 		return source_refuse(message, DT_E_FORMAT, source->file, 0,
 		                     "a channel of ISO 13499 without its Unit, expected one");

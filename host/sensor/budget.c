@@ -24,6 +24,7 @@ struct collecting {
 	double part[BUDGET_PARTS];
 	struct coverage coverage; /* without noise */
 	double degrees;           /* of the noise */
+	bool unknown;             /* a part cannot be told: there is no budget */
 };
 
 struct desk {
@@ -45,6 +46,7 @@ struct axis {
 static void collect(struct collecting *c, enum budget_part part, enum coverage_law law, double u)
 {
 	u = fabs(u);
+	c->unknown |= !isfinite(u);
 	if (!(u > 0.0) || !isfinite(u))
 		return;
 	c->part[part] = hypot(c->part[part], u);
@@ -104,14 +106,14 @@ static void settle(struct budget_item *item, const struct collecting *collected)
 	largest_of(item);
 }
 
-/* subject "" for what is of no channel. Nothing without a value and its noise. */
+/* subject "" for what is of no channel. Nothing without a value, its noise and all that adds to it. */
 static void item_add(struct desk *d, const char *subject, const char *what, const char *unit, double value,
                      double noise, struct collecting *c)
 {
 	struct budget *b = d->budget;
 	struct budget_item *item;
 
-	if (!isfinite(value) || !(noise > 0.0) || !isfinite(noise) || d->failed)
+	if (!isfinite(value) || !(noise > 0.0) || !isfinite(noise) || c->unknown || d->failed)
 		return;
 	if (b->count == b->room) {
 		size_t room = b->room > 0 ? 2 * b->room : 64;
@@ -125,7 +127,7 @@ static void item_add(struct desk *d, const char *subject, const char *what, cons
 	}
 	item = &b->item[b->count++];
 	*item = (struct budget_item){.unit = unit, .value = value};
-	snprintf(item->what, sizeof(item->what), "%.30s%s%s", subject, subject[0] != '\0' ? "." : "", what);
+	snprintf(item->what, sizeof(item->what), "%.31s%s%s", subject, subject[0] != '\0' ? "." : "", what);
 	c->part[BUDGET_NOISE] = noise;
 	settle(item, c);
 }
@@ -169,9 +171,21 @@ static void gains(struct collecting *c, const struct sensor_used *used, const do
 	correlated(c, BUDGET_MOUNTING, COVERAGE_RECTANGULAR, t->chain_mount_percent * PERCENT / root, 1.0, w);
 }
 
-/* What an axis reads of the others, times weight; a: all three, in the value's unit. */
-static void transverse(struct collecting *c, const struct sensor_used *used, unsigned axis, const double a[3],
-                       double weight)
+/* channel_count: not recorded. */
+static size_t channel_of(const struct desk *d, const struct sensor_used *used, unsigned axis)
+{
+	size_t i = 0;
+
+	while (i < d->record->channel_count &&
+	       strcmp(d->record->channels[i].name, used->transducer.channel[axis]) != 0)
+		i++;
+	return i;
+}
+
+/* What an axis reads of the others, times weight; a: all three, in the value's unit. By the matrix it was
+ * taken off, but of those that are not recorded. */
+static void transverse(const struct desk *d, struct collecting *c, const struct sensor_used *used,
+                       unsigned axis, const double a[3], double weight)
 {
 	const struct transducer *t = &used->transducer;
 	double others = weight * hypot(a[(axis + 1) % 3], a[(axis + 2) % 3]);
@@ -181,6 +195,9 @@ static void transverse(struct collecting *c, const struct sensor_used *used, uns
 	else
 		collect(c, BUDGET_TRANSVERSE, COVERAGE_ARCSINE,
 		        t->calibration_transverse_percent * PERCENT * others / sqrt(2.0));
+	for (unsigned j = 0; j < 3 && t->has_matrix; j++)
+		if (j != axis && channel_of(d, used, j) == d->record->channel_count)
+			within(c, BUDGET_TRANSVERSE, transducer_reads(t, axis, j) * a[j] * weight);
 	within(c, BUDGET_MOUNTING, t->chain_align_deg * UNITS_PI / 180.0 * others);
 }
 
@@ -234,16 +251,6 @@ static double signal_at(const struct desk *d, size_t channel, double t)
 		return (double)NAN;
 	return x->value_g[k] + s * (x->value_g[k + 1] - x->value_g[k]) -
 	       d->analysis->channels[channel].baseline.offset_g;
-}
-
-static size_t channel_of(const struct desk *d, const struct sensor_used *used, unsigned axis)
-{
-	size_t i = 0;
-
-	while (i < d->record->channel_count &&
-	       strcmp(d->record->channels[i].name, used->transducer.channel[axis]) != 0)
-		i++;
-	return i;
 }
 
 /* All axes of x's sensor at t; one that is not there is a share of own. */
@@ -300,7 +307,7 @@ static void of_peak(struct desk *d, const struct axis *x, const char *name)
 	w[x->axis] = p->value_g;
 	others_at(d, x, p->time_s, p->value_g, a);
 	gains(&c, x->used, w);
-	transverse(&c, x->used, x->axis, a, 1.0);
+	transverse(d, &c, x->used, x->axis, a, 1.0);
 	within(&c, BUDGET_ZERO, zero_of(x));
 	supply(&c, x, p->value_g, 1.0 / UNITS_PI);
 	if (t->filter != TRANSDUCER_NO_FILTER)
@@ -319,7 +326,7 @@ static void moved(struct desk *d, struct collecting *c, const struct axis *x, do
 	others_at(d, x, p->time_s + half, 0.0, after);
 	for (int i = 0; i < 3; i++)
 		after[i] -= before[i];
-	transverse(c, x->used, x->axis, after, weight / (2.0 * half * bend * fabs(p->value_g)));
+	transverse(d, c, x->used, x->axis, after, weight / (2.0 * half * bend * fabs(p->value_g)));
 }
 
 static void of_instant(struct desk *d, const struct axis *x, const char *name)
@@ -349,7 +356,7 @@ static void of_width(struct desk *d, const struct axis *x, const char *name, con
 	others_at(d, x, x->e->peak.time_s, 0.0, a[2]);
 	for (int i = 0; i < 3; i++)
 		a[0][i] += a[1][i] - 2.0 * 0.1 * a[2][i];
-	transverse(&c, x->used, x->axis, a[0], 1.0 / slope);
+	transverse(d, &c, x->used, x->axis, a[0], 1.0 / slope);
 	if (t->filter != TRANSDUCER_NO_FILTER)
 		within(&c, BUDGET_FILTER, width_s * lowpass_width_share(periods));
 	within(&c, BUDGET_CLOCK, clock_of(x->used) * width_s);
@@ -365,7 +372,7 @@ static void of_velocity(struct desk *d, const struct axis *x, const char *name, 
 	w[x->axis] = value;
 	others_area(d, x, value, a);
 	gains(&c, x->used, w);
-	transverse(&c, x->used, x->axis, a, 1.0);
+	transverse(d, &c, x->used, x->axis, a, 1.0);
 	within(&c, BUDGET_ZERO, UNITS_G_M_S2 * zero_of(x) * duration_of(x));
 	supply(&c, x, value, 0.5);
 	within(&c, BUDGET_CLOCK, clock_of(x->used) * value);
@@ -438,7 +445,8 @@ static bool pair_of(const struct desk *d, const char *sensor, struct axis pair[2
 }
 
 /* Scale times the length of a's components along X and Y. */
-static void of_length(struct collecting *c, const struct axis pair[2], const double a[3], double scale)
+static void of_length(const struct desk *d, struct collecting *c, const struct axis pair[2],
+                      const double a[3], double scale)
 {
 	double length = hypot(a[pair[0].axis], a[pair[1].axis]), w[3] = {0.0, 0.0, 0.0};
 
@@ -446,7 +454,7 @@ static void of_length(struct collecting *c, const struct axis pair[2], const dou
 		double along = a[pair[i].axis];
 
 		w[pair[i].axis] = scale * along * along / length;
-		transverse(c, pair[i].used, pair[i].axis, a, scale * fabs(along) / length);
+		transverse(d, c, pair[i].used, pair[i].axis, a, scale * fabs(along) / length);
 		within(c, BUDGET_ZERO,
 		       scale * pair[i].used->transducer.calibration_zero_shift_percent * PERCENT * along *
 		               along / length);
@@ -478,7 +486,7 @@ static void of_resultant(struct desk *d, const struct estimate_resultant *r)
 		return;
 	others_at(d, &pair[0], r->time_s, r->peak_g, a);
 	height = instant = begin(&pair[0]);
-	of_length(&height, pair, a, 1.0);
+	of_length(d, &height, pair, a, 1.0);
 	item_add(d, r->sensor, "peak_g", "g", r->peak_g, r->sigma_g, &height);
 	late_length(d, &instant, pair, a);
 	within(&instant, BUDGET_CLOCK, clock_of(pair[0].used) * r->time_s);
@@ -517,7 +525,7 @@ static void of_rebound(struct desk *d)
 	for (int i = 0; i < 2; i++)
 		v[i] = a[pair[i].axis] = pair[i].e->pulse.velocity_change_m_s;
 	c = begin(&pair[0]);
-	of_length(&c, pair, a, (1.0 + r->velocity_ratio) / hypot(v[0], v[1]));
+	of_length(d, &c, pair, a, (1.0 + r->velocity_ratio) / hypot(v[0], v[1]));
 	item_add(d, "", "rebound.velocity_ratio", "1", r->velocity_ratio, r->sigma_velocity_ratio, &c);
 	within(&flight, BUDGET_CLOCK, clock_of(pair[0].used) * r->flight_ratio);
 	item_add(d, "", "rebound.flight_ratio", "1", r->flight_ratio, r->sigma_flight_ratio, &flight);

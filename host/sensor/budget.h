@@ -38,7 +38,7 @@ enum budget_part {
 };
 
 struct budget_item {
-	char what[48]; /* "S2X.peak.value_g" */
+	char what[80]; /* "S2X.peak.value_g" */
 	const char *unit;
 	double value;
 	double part[BUDGET_PARTS]; /* standard uncertainties; u: of all */

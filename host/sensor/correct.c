@@ -91,15 +91,6 @@ static bool invert(const double m[3][3], double inverse[3][3])
 	return fabs(determinant) > MATRIX_LEAST;
 }
 
-static void matrix_of(const struct transducer *t, double m[3][3])
-{
-	const double given[3][3] = {{1.0, t->calibration_matrix_xy, t->calibration_matrix_xz},
-	                            {t->calibration_matrix_yx, 1.0, t->calibration_matrix_yz},
-	                            {t->calibration_matrix_zx, t->calibration_matrix_zy, 1.0}};
-
-	memcpy(m, given, sizeof(given));
-}
-
 static bool is_there(const struct trace *trace, ptrdiff_t k)
 {
 	return k >= 0 && (size_t)k < trace->count && trace_good(trace, (size_t)k);
@@ -125,8 +116,16 @@ static double correct_at(const struct trace *trace, double t, bool *clipped)
 	       v[1] * -(s + 1.0) * s * (s - 2.0) / 2.0 + v[2] * (s + 1.0) * s * (s - 1.0) / 6.0;
 }
 
-/* A cut top stays marked, of this axis and of those that are taken off; where another axis is not known, the
- * sample is bad. */
+/* Well between its ends: what is not known there was lost. */
+static bool is_within(const struct trace *trace, double t)
+{
+	double at = (t - trace->start_s) * trace->rate_hz;
+
+	return at >= 1.0 && at + 2.0 <= (double)trace->count;
+}
+
+/* A cut top stays marked, of this axis and of those that are taken off; where a sample of another axis is
+ * lost, the sample is bad. */
 static void correct_axis(struct channel *channel, const struct trace trace[3], const bool known[3],
                          size_t axis, const double row[3])
 {
@@ -142,9 +141,14 @@ static void correct_axis(struct channel *channel, const struct trace trace[3], c
 			if (j != axis && known[j] && fabs(row[j]) > 0.0) {
 				double other = correct_at(&trace[j], trace_time(own, k), &clipped);
 
-				value += isnan(other) ? 0.0 : row[j] * other;
+				if (!isnan(other) || is_within(&trace[j], trace_time(own, k)))
+					value += row[j] * other;
 			}
 		channel->value_g[k] = value;
+		if (isnan(value)) {
+			channel->sample[k] |= SAMPLE_BAD;
+			channel->flags |= RECORD_FLAG_BAD;
+		}
 		if (clipped) {
 			channel->sample[k] |= SAMPLE_CLIPPED;
 			channel->flags |= RECORD_FLAG_CLIPPED;
@@ -159,7 +163,9 @@ static int correct_matrix(struct record *record, const struct transducer *t, con
 	bool known[3] = {false, false, false};
 	int result = 0;
 
-	matrix_of(t, m);
+	for (unsigned i = 0; i < 3; i++)
+		for (unsigned j = 0; j < 3; j++)
+			m[i][j] = transducer_reads(t, i, j);
 	if (!invert((const double(*)[3])m, inverse))
 		return DT_E_ARGUMENT;
 	for (size_t i = 0; i < 3 && result == 0; i++)

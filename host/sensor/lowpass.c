@@ -54,14 +54,14 @@ double lowpass_delay_s(enum transducer_filter filter, unsigned order, double cut
 
 double lowpass_peak_share(double periods)
 {
-	if (!(periods < PERIODS_MANY))
+	if (periods >= PERIODS_MANY)
 		return 0.0035;
-	return periods < PERIODS_LEAST ? ANOTHER_PULSE : 0.009;
+	return periods >= PERIODS_LEAST ? 0.009 : ANOTHER_PULSE;
 }
 
 double lowpass_width_share(double periods)
 {
-	if (!(periods < PERIODS_MANY))
+	if (periods >= PERIODS_MANY)
 		return 0.0045;
-	return periods < PERIODS_LEAST ? ANOTHER_PULSE : 0.018;
+	return periods >= PERIODS_LEAST ? 0.018 : ANOTHER_PULSE;
 }

@@ -213,6 +213,75 @@ static void catalogue_peak(void **state)
 	record_free(&b.record);
 }
 
+/* Y is not recorded: 10 % of it is not taken off, and it is taken for half of X. Half-width 25 g of 500 g. */
+static void matrix_without_axis(void **state)
+{
+	const struct budget_item *item;
+	struct budget budget;
+	struct by_hand b;
+	double before;
+
+	(void)state;
+	by_hand_open(&b);
+	snprintf(b.record.channels[1].name, sizeof(b.record.channels[1].name), "else");
+	read_sensor(&b.sensors, "[calibration]\nmatrix_xz = 0.1\n");
+	assert_int_equal(budget_make(&budget, &b.sensors, &b.record, &b.analysis), 0);
+	before = budget_find(&budget, "S2X.peak.value_g")->part[BUDGET_TRANSVERSE];
+	budget_free(&budget);
+	read_sensor(&b.sensors, "[calibration]\nmatrix_xy = 0.1\n");
+	assert_int_equal(budget_make(&budget, &b.sensors, &b.record, &b.analysis), 0);
+	item = budget_find(&budget, "S2X.peak.value_g");
+	assert_near(item->part[BUDGET_TRANSVERSE], hypot(before, 25 / sqrt(3)), 1e-6);
+	budget_free(&budget);
+	record_free(&b.record);
+}
+
+/* Without a width nobody knows what a filter does to the height: no budget rather than one without it. */
+static void peak_without_width(void **state)
+{
+	struct budget budget;
+	struct by_hand b;
+
+	(void)state;
+	by_hand_open(&b);
+	b.channels[0].pulse.duration_s = NAN;
+	read_sensor(&b.sensors, "tau_s = 0.5\n");
+	assert_int_equal(budget_make(&budget, &b.sensors, &b.record, &b.analysis), 0);
+	assert_null(budget_find(&budget, "S2X.peak.value_g"));
+	assert_non_null(budget_find(&budget, "S2Y.peak.value_g"));
+	budget_free(&budget);
+	read_sensor(&b.sensors,
+	            "filter = bessel\ncutoff_x_hz = 9000\ncutoff_y_hz = 9000\ncutoff_z_hz = 9000\n");
+	assert_int_equal(budget_make(&budget, &b.sensors, &b.record, &b.analysis), 0);
+	assert_near(budget_find(&budget, "S2X.peak.value_g")->part[BUDGET_FILTER], 500 * 0.2 / sqrt(3), 1e-6);
+	budget_free(&budget);
+	record_free(&b.record);
+}
+
+/* Names as long as a channel may have keep each number's own. */
+static void long_name(void **state)
+{
+	static const char name[] = "11HEADLEFT00ACXA-of-the-dummy-X";
+	char what[100];
+	struct budget budget;
+	struct by_hand b;
+
+	(void)state;
+	by_hand_open(&b);
+	assert_int_equal(sizeof(name), sizeof(b.record.channels[0].name));
+	memcpy(b.record.channels[0].name, name, sizeof(name));
+	b.channels[0].pulse.fitted_velocity_m_s = 5;
+	b.channels[0].pulse.sigma_fitted_velocity_m_s = 0.01;
+	read_sensor(&b.sensors, "");
+	snprintf(b.sensors.used[0].transducer.channel[0], sizeof(b.sensors.used[0].transducer.channel[0]),
+	         "%s", b.record.channels[0].name);
+	assert_int_equal(budget_make(&budget, &b.sensors, &b.record, &b.analysis), 0);
+	snprintf(what, sizeof(what), "%s.pulse.contact.velocity_change_m_s", b.record.channels[0].name);
+	assert_non_null(budget_find(&budget, what));
+	budget_free(&budget);
+	record_free(&b.record);
+}
+
 /* Nothing but 2 % of each axis at 30 deg. */
 static void resultant(void **state)
 {
@@ -405,7 +474,7 @@ static double truth_of(const struct made *m, const struct truths *t, const char 
 }
 
 struct cell {
-	char what[48];
+	char what[80];
 	unsigned count, covered, by_noise;
 };
 
@@ -517,9 +586,11 @@ static void covers(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(distributions), cmocka_unit_test(factors),
-	                                   cmocka_unit_test(catalogue_peak), cmocka_unit_test(resultant),
-	                                   cmocka_unit_test(covers)};
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(distributions),      cmocka_unit_test(factors),
+	        cmocka_unit_test(catalogue_peak),     cmocka_unit_test(matrix_without_axis),
+	        cmocka_unit_test(peak_without_width), cmocka_unit_test(long_name),
+	        cmocka_unit_test(resultant),          cmocka_unit_test(covers)};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

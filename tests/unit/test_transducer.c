@@ -382,8 +382,17 @@ static void matrix(void **state)
 	correct_by("[calibration]\nmatrix_xy = .03\nmatrix_xz = -.01\nmatrix_yx = -.02\nmatrix_yz = .04\n"
 	           "matrix_zx = .015\nmatrix_zy = -.03\n",
 	           day_of("2026-06-01"), &record, &corrected);
-	assert_true(isnan(corrected.channels[1].value_g[300]));
-	corrected.channels[1].value_g[300] = truth(1, 0.03); /* zero, as it is there */
+	for (unsigned i = 0; i < 3;
+	     i++) { /* nobody knows what X and Z read of it then: bad, and zero it was */
+		size_t at = i == 0 ? 210 : 300;
+
+		assert_true(isnan(corrected.channels[i].value_g[at]));
+		assert_true(i == 1 || corrected.channels[i].sample[at] == SAMPLE_BAD);
+		assert_true(i == 1 || corrected.channels[i].flags & RECORD_FLAG_BAD);
+		corrected.channels[i].value_g[at] = truth(i, 0.03);
+		assert_false(isnan(corrected.channels[i].value_g[0]) ||
+		             isnan(corrected.channels[i].value_g[corrected.channels[i].count - 1]));
+	}
 	check_truth(&corrected, 0.02); /* of interpolation between samples of Y: 4 % of some tenths of a g */
 	record_free(&corrected);
 }
