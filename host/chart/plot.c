@@ -212,9 +212,11 @@ static void write_data(FILE *out, const struct plot *plot, const struct plot_pan
 
 static void set_axis(FILE *out, char which, const struct plot_axis *axis)
 {
-	fprintf(out, "set %crange [%.6g:%.6g]\nset %clabel \"%s\"\n%s logscale %c\nset format %c \"%s\"\n",
-	        which, axis->from, axis->to, which, axis->label, axis->log ? "set" : "unset", which, which,
-	        axis->format ? axis->format : "%g");
+	fprintf(out,
+	        "set %crange [%.6g:%.6g]\nset %clabel \"%s\" offset %d\n%s logscale %c\nset format %c "
+	        "\"%s\"\n",
+	        which, axis->from, axis->to, which, axis->label, which == 'y', axis->log ? "set" : "unset",
+	        which, which, axis->format ? axis->format : "%g");
 }
 
 static void set_labels(FILE *out, const struct plot_panel *p)
