@@ -83,9 +83,7 @@ int main(int argc, char **argv)
 	gsl_set_error_handler_off();
 	code = main_run(argc, argv);
 	/* a command that failed has said why */
-	if ((fflush(stdout) != 0 || ferror(stdout)) && code == COMMAND_DONE && !command_nobody_reads()) {
-		command_error("standard output: not all of it could be written");
-		code = COMMAND_INPUT;
-	}
+	if ((fflush(stdout) != 0 || ferror(stdout)) && code == COMMAND_DONE)
+		code = command_output_failed("not all of it could be written");
 	return code;
 }

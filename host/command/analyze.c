@@ -34,17 +34,6 @@ static int take_family(const struct option_table *table, const char *name, const
 	                    text);
 }
 
-static int take_limits(const struct option_table *table, const char *name, const char *text, void *into)
-{
-	struct analyze_arguments *arguments = into;
-
-	arguments->presets = strcmp(text, "list") == 0;
-	if (plan_preset_find(text) == NULL && !arguments->presets)
-		return option_wrong(table, "--%s is '%s', expected a preset, or list", name, text);
-	arguments->evaluate.limits = text;
-	return OPTIONS_READ;
-}
-
 static const struct option_row rows[] = {
         OPTION_FLAG("list", struct analyze_arguments, list,
                     "what drops a log holds, without analysing them; of a large log an index is kept as "
@@ -95,9 +84,7 @@ static const struct option_row rows[] = {
                     "hold a pulse against time_s,lower_g,upper_g; time 0 is where it leaves 10 %"),
         OPTION_FLAG("band-at-peak", struct analyze_arguments, evaluate.band.at_peak,
                     "time 0 of the band is the pulse's peak"),
-        OPTION_TAKEN_BY("limits", "PRESET", take_limits,
-                        "hold the drop against a test standard's pulse, in place of the scene's [limits]; "
-                        "'list' tells them"),
+        EVALUATE_LIMITS_ROW(struct analyze_arguments, evaluate.limits),
         OPTION_TEXT("channel", "NAME", struct analyze_arguments, evaluate.band.channel,
                     "the channel of --band and --limits; without it, the one with the largest peak"),
         OPTION_FLAG("json", struct analyze_arguments, evaluate.json,
@@ -396,7 +383,7 @@ int command_analyze(int argc, char **argv)
 	code = option_read(&known_options, &arguments, argc, argv);
 	if (code != OPTIONS_READ)
 		return code;
-	if (arguments.presets)
+	if (evaluate_is_list(arguments.evaluate.limits))
 		return analyze_presets(arguments.evaluate.json);
 	code = analyze_check(&arguments, argc, argv);
 	if (arguments.repeats)

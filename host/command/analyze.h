@@ -14,7 +14,7 @@ struct analyze_arguments {
 	char profile_as_columns[4096];
 	double angle_deg;
 	unsigned drop; /* of the log; 0: all */
-	bool list, repeats, presets;
+	bool list, repeats;
 	struct stretch stretch;
 	struct evaluate_options evaluate;
 	struct limit_curve band; /* these two are what the options name */

@@ -384,8 +384,8 @@ int command_batch(int argc, char **argv)
 		return command_usage("batch", "no --out FOLDER given");
 	if (optind == argc && arguments.list == NULL)
 		return command_usage("batch", "no FILE given");
-	if (arguments.analyze.presets)
-		return command_usage("batch", "--limits list: 'droptower analyze --limits list' tells them");
+	if (evaluate_is_list(arguments.analyze.evaluate.limits))
+		return command_usage("batch", EVALUATE_NO_LIST);
 	code = analyze_ready(&arguments.analyze, "batch");
 	if (code == COMMAND_DONE)
 		code = batch_words(&arguments, argv + optind, argc - optind);

@@ -33,11 +33,14 @@ int command_usage(const char *name, const char *format, ...)
 	return code;
 }
 
-bool command_nobody_reads(void)
+int command_output_failed(const char *why)
 {
 	struct pollfd out = {.fd = STDOUT_FILENO};
 
-	return poll(&out, 1, 0) > 0 && (out.revents & POLLERR) != 0;
+	if (poll(&out, 1, 0) > 0 && (out.revents & POLLERR) != 0)
+		return COMMAND_DONE;
+	command_error("standard output: %s", why);
+	return COMMAND_INPUT;
 }
 
 bool command_is_input(const char *name, const char *out, const char *in)

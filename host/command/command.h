@@ -48,8 +48,9 @@ void command_error(const char *format, ...) __attribute__((format(printf, 1, 2))
 /* Wrong usage: the line, then "try 'droptower NAME --help'"; returns COMMAND_USAGE. */
 int command_usage(const char *name, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-/* Whether standard output is a pipe that its reader has closed, as head does: no error. */
-bool command_nobody_reads(void);
+/* Standard output did not take all: says why and returns COMMAND_INPUT. That its reader has gone, as head
+ * does, is no error: nothing is said, and COMMAND_DONE returned. */
+int command_output_failed(const char *why);
 
 /* Whether out, which is to be written, is the file that is read: says so. NULL is none. */
 bool command_is_input(const char *name, const char *out, const char *in);

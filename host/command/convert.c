@@ -23,8 +23,7 @@ static int write_dbc(const char *file)
 	if (strcmp(file, "-") == 0) {
 		if (dbc_write(stdout) == 0 && fflush(stdout) == 0)
 			return COMMAND_DONE;
-		command_error("standard output: %s", strerror(errno));
-		return COMMAND_INPUT;
+		return command_output_failed(strerror(errno));
 	}
 	result = whole_open(&whole, file, message, sizeof(message));
 

@@ -36,10 +36,8 @@ static int evaluate_write_out(const struct report *report, const struct evaluate
 	char message[512];
 
 	if ((options->json ? report_json(report, stdout) : report_text(report, stdout)) != 0 &&
-	    !command_nobody_reads()) {
-		command_error("standard output: %s", strerror(errno));
+	    command_output_failed(strerror(errno)) != COMMAND_DONE)
 		return COMMAND_INPUT;
-	}
 	if ((options->json_file != NULL &&
 	     write_json_file(report, options->json_file, message, sizeof(message)) != 0) ||
 	    (options->html != NULL && report_html(report, options->html, message, sizeof(message)) != 0)) {
@@ -180,6 +178,19 @@ static int find_motion(struct evaluated *e, const struct scene *scene)
 	motion->refused = e->refused;
 	motion->status = ESTIMATE_NOT_CONVERGED;
 	return 0;
+}
+
+bool evaluate_is_list(const char *limits)
+{
+	return limits != NULL && strcmp(limits, "list") == 0;
+}
+
+int evaluate_take_limits(const struct option_table *table, const char *name, const char *text, void *field)
+{
+	if (plan_preset_find(text) == NULL && !evaluate_is_list(text))
+		return option_wrong(table, "--%s is '%s', expected a preset, or list", name, text);
+	*(const char **)field = text;
+	return OPTIONS_READ;
 }
 
 /* Against the scene's limits, or a preset's. */

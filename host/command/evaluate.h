@@ -7,6 +7,7 @@
  */
 #include <stdbool.h>
 
+#include "common/base/option.h"
 #include "common/scenes/scene.h"
 #include "host/estimate/estimate.h"
 #include "host/fit/fit.h"
@@ -34,6 +35,17 @@ struct evaluate_options {
 	bool unattended;              /* JSON says so */
 	struct repeats *repeats;      /* what is found goes there, and nothing is printed; NULL: printed */
 };
+
+/* The row of --limits; at: a const char * of the struct in, for evaluate_options' limits. The word list is
+ * taken, too; what prints no presets refuses it with EVALUATE_NO_LIST. */
+#define EVALUATE_LIMITS_ROW(in, at)                                                            \
+	OPTION_TAKEN("limits", "PRESET", in, at, evaluate_take_limits,                         \
+	             "hold the drop against a test standard's pulse, in place of the scene's " \
+	             "[limits]; 'list' tells them")
+#define EVALUATE_NO_LIST "--limits list: 'droptower analyze --limits list' tells them"
+
+option_take evaluate_take_limits;
+bool evaluate_is_list(const char *limits);
 
 /* A record with all that is found of it. */
 struct evaluated {

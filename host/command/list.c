@@ -219,10 +219,9 @@ int list_drops(const char *file, bool json)
 	int result = read_list(file, &visitor, message);
 
 	if (result != 0) {
-		if (message[0] != '\0')
-			command_error("%s", message);
-		else
-			command_error("standard output: %s", strerror(errno));
+		if (message[0] == '\0')
+			return command_output_failed(strerror(errno));
+		command_error("%s", message);
 		return COMMAND_INPUT;
 	}
 	if (!json)

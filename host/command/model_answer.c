@@ -19,8 +19,7 @@ enum { TIMINGS = 5 };
 
 static int not_written(void)
 {
-	command_error("standard output: %s", strerror(errno));
-	return COMMAND_INPUT;
+	return command_output_failed(strerror(errno));
 }
 
 static int no_drop(const struct model_arguments *a, const char *message)
@@ -139,10 +138,8 @@ static int many(const struct model_arguments *a)
 	int result = a->draws > 0 ? forecast_monte_carlo(e, points, a->json, stdout, &failed)
 	                          : forecast_sweep(e, a->json, stdout, &failed);
 
-	if (result != 0 && result != DT_E_EMPTY) {
-		command_error("standard output: %s", error_text(result));
-		return COMMAND_INPUT;
-	}
+	if (result != 0 && result != DT_E_EMPTY)
+		return command_output_failed(error_text(result));
 	if (failed > 0)
 		command_error("%s: %zu of %zu scenes make no drop", a->scene_file, failed, points);
 	return result == DT_E_EMPTY || failed == points ? COMMAND_INPUT : COMMAND_DONE;

@@ -11,6 +11,7 @@
 
 #include "host/base/beside.h"
 #include "host/command/command.h"
+#include "host/command/evaluate.h"
 #include "host/command/release.h"
 #include "host/command/run_private.h"
 #include "host/session/simulated.h"
@@ -31,6 +32,9 @@ static const struct option_row rows[] = {
                     "the sensors' files, in place of the scene's; a series knows its own"),
         OPTION_TAKEN("angle", "DEG", struct run, angle_deg, command_angle,
                      "contact angle, instead of the scene's"),
+        EVALUATE_LIMITS_ROW(struct run, limits),
+        OPTION_TEXT("channel", "NAME", struct run, channel,
+                    "the channel of --limits; without it, the one with the largest peak"),
         OPTION_TEXT("out", "DIR", struct run, out, "where the files go (default .)"),
         OPTION_TEXT("series", "NAME", struct run, series,
                     "into an archive, as the series' next drop; 'droptower series new' makes a series, which "
@@ -67,9 +71,10 @@ static int check_archive(struct run *run)
 {
 	if (run->series == NULL && (run->archive_folder != NULL || run->operator_name != NULL))
 		return command_usage("run", "--archive and --operator go with --series NAME");
-	if (run->series != NULL &&
-	    (run->out != NULL || run->scene_file != NULL || run->chain != NULL || !isnan(run->angle_deg)))
-		return command_usage("run", "--series excludes --out, --scene, --chain and --angle");
+	if (run->series != NULL && (run->out != NULL || run->scene_file != NULL || run->chain != NULL ||
+	                            run->limits != NULL || !isnan(run->angle_deg)))
+		return command_usage("run",
+		                     "--series excludes --out, --scene, --chain, --limits and --angle");
 	run->archive_folder = archived_folder(run->archive_folder);
 	run->operator_name = archived_operator(run->operator_name);
 	if (run->out == NULL)
@@ -106,6 +111,10 @@ static int run_check(struct run *run)
 		return command_usage("run", "--bench is for the simulated tower, --link for another one");
 	if (run->link == NULL && (run->unattended || run->key != NULL))
 		return command_usage("run", "--unattended and --key go with --link");
+	if (evaluate_is_list(run->limits))
+		return command_usage("run", EVALUATE_NO_LIST);
+	if (run->channel != NULL && run->limits == NULL)
+		return command_usage("run", "--channel needs --limits");
 	code = check_archive(run);
 	return code == COMMAND_DONE ? choose_scene(run) : code;
 }

@@ -161,6 +161,8 @@ static int report_files(struct run *run, struct record *record)
 	char csv[4200], json[4200], html[4200], message[READ_MESSAGE_MAX];
 	struct evaluate_options options = {.scene = &run->scene,
 	                                   .chain = run->chain,
+	                                   .limits = run->limits,
+	                                   .band.channel = run->channel,
 	                                   .iepe_time_constant_s = NAN,
 	                                   .json = run->json,
 	                                   .html = html,

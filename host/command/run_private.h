@@ -19,7 +19,7 @@
 enum { RUN_BENCH_WORDS_MAX = 24 };
 
 struct run {
-	const char *link, *scene_file, *out, *chain;
+	const char *link, *scene_file, *out, *chain, *limits, *channel;
 	const char *archive_folder, *series, *operator_name;
 	double angle_deg;
 	const char *key; /* for commands over LCM */

@@ -23,11 +23,8 @@ int series_must_be(struct archive *archive, const char *name)
 /* How a printing verb ends: to standard output, or into the file of --csv. */
 static int print_failed(const struct archive *archive, int result)
 {
-	if (result == DT_E_MEMORY || archive_message(archive)[0] == '\0') {
-		command_error("standard output: %s",
-		              result == DT_E_MEMORY ? error_text(result) : strerror(errno));
-		return COMMAND_INPUT;
-	}
+	if (result == DT_E_MEMORY || archive_message(archive)[0] == '\0')
+		return command_output_failed(result == DT_E_MEMORY ? error_text(result) : strerror(errno));
 	return archived_failed(archive);
 }
 
@@ -173,9 +170,7 @@ int series_verb_result(struct archive *archive, struct series_arguments *a)
 		return archived_failed(archive);
 	failed = fputs(json, stdout) < 0 || fflush(stdout) != 0;
 	free(json);
-	if (failed)
-		command_error("standard output: %s", strerror(errno));
-	return failed ? COMMAND_INPUT : COMMAND_DONE;
+	return failed ? command_output_failed(strerror(errno)) : COMMAND_DONE;
 }
 
 void series_tell_wrong(void *context, const char *text)

@@ -182,10 +182,9 @@ static int srs_write_out(const struct spectrum_report *report, const struct argu
 {
 	char message[2 * READ_MESSAGE_MAX];
 
-	if ((arguments->json ? spectrum_json(report, stdout) : spectrum_text(report, stdout)) != 0) {
-		command_error("standard output: %s", strerror(errno));
+	if ((arguments->json ? spectrum_json(report, stdout) : spectrum_text(report, stdout)) != 0 &&
+	    command_output_failed(strerror(errno)) != COMMAND_DONE)
 		return COMMAND_INPUT;
-	}
 	if ((arguments->csv && srs_write_csv(report, arguments->csv, message, sizeof(message)) != 0) ||
 	    (arguments->svg && write_svg(report, arguments->svg, message, sizeof(message)) != 0)) {
 		command_error("%s", message);

@@ -19,8 +19,6 @@ int command_version(void)
 
 int command_schema(void)
 {
-	if (report_schema(stdout) == 0)
-		return COMMAND_DONE;
-	command_error("standard output: the schema cannot be written");
-	return COMMAND_INPUT;
+	return report_schema(stdout) == 0 ? COMMAND_DONE
+	                                  : command_output_failed("the schema cannot be written");
 }
