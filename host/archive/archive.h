@@ -186,10 +186,10 @@ struct archive_filter {
 };
 struct archive_filter archive_filter_none(void);
 
-/* A day, a month or a year, or two of them with .. between, into from and to, which point into dates. False
- * when text is none of these. */
+/* A minute, a day, a month or a year of UTC, or two of them with .. between, into from and to, which point
+ * into dates. False when text is none of these. */
 struct archive_dates {
-	char from[12], to[12];
+	char from[18], to[18];
 };
 bool archive_parse_dates(const char *text, struct archive_dates *dates, struct archive_filter *filter);
 

@@ -23,8 +23,9 @@ bool archive_parse_dates(const char *text, struct archive_dates *dates, struct a
 	const char *dots = strstr(text, "..");
 	size_t length = dots != NULL ? (size_t)(dots - text) : strlen(text);
 
-	snprintf(dates->from, sizeof(dates->from), "%.*s", length < 11 ? (int)length : 11, text);
-	snprintf(dates->to, sizeof(dates->to), "%.11s", dots != NULL ? dots + 2 : dates->from);
+	/* one character more than the longest of them, so that what is too long is none */
+	snprintf(dates->from, sizeof(dates->from), "%.*s", length < 17 ? (int)length : 17, text);
+	snprintf(dates->to, sizeof(dates->to), "%.17s", dots != NULL ? dots + 2 : dates->from);
 	filter->from = dates->from;
 	filter->to = dates->to;
 	return date_is_period(dates->from) && date_is_period(dates->to);

@@ -6,12 +6,12 @@
  */
 #include <stdbool.h>
 
-enum { DATE_DAY_CHARS = 10 };
+enum { DATE_DAY_CHARS = 10, DATE_MINUTE_CHARS = 16 };
 
 /* YYYY-MM-DD. */
 bool date_is_day(const char *text);
 
-/* YYYY, YYYY-MM or YYYY-MM-DD. */
+/* YYYY, YYYY-MM, YYYY-MM-DD or YYYY-MM-DDTHH:MM. */
 bool date_is_period(const char *text);
 
 #endif

@@ -4,6 +4,7 @@
 // go into BUILD/tests/console. Ends at once, with 3, when a tab of Chromium crashes.
 import assert from "node:assert/strict";
 import bench from "./bench.mjs";
+import clocks from "./clocks.mjs";
 import { found } from "./looks.mjs";
 import restart from "./restart.mjs";
 import tabs from "./tabs.mjs";
@@ -21,4 +22,4 @@ const looks = {
 	],
 };
 
-process.exit(await run([workflow, bench, tabs, restart, looks]));
+process.exit(await run([clocks, workflow, bench, tabs, restart, looks]));

@@ -297,6 +297,44 @@ static void test_a_limit_takes_the_newest_and_tells_of_more(void **state)
 	archive_close(archive);
 }
 
+/* Drops in the minutes 23:00 and 23:01, and the next day 22:59. */
+static void test_minutes_are_a_filter(void **state)
+{
+	static const struct {
+		const char *text;
+		int count;
+		const char *first; /* its log */
+	} cases[] = {
+	        {"2026-01-01T23:00..2026-01-02T22:59", 3, "box/"},
+	        {"2026-01-01T23:01..2026-01-02T22:58", 1, "box/"},
+	        {"2026-01-01T23:00", 1, "box/"},
+	        {"2026-01-01", 2, "box/"},
+	        {"2026-01-01T23:02..2026-01-02", 1, "rig_b/"},
+	};
+	static const char *const none[] = {"2026-01-01T24:00", "2026-01-01T23:60",     "2026-01-01T23",
+	                                   "2026-02-29T08:00", "2026-01-01 23:00",     "2026-01-01T23:0",
+	                                   "2026-01T23:00",    "2026-01-01T23:00:00Z", "2026-01-01T23:00Z"};
+	struct archive *archive = with_words();
+	struct archive_dates dates;
+	struct archive_filter filter = archive_filter_none();
+
+	(void)state;
+	trial_sql("UPDATE drops SET time = '2026-01-01T23:00:59Z' WHERE id = 1;"
+	          "UPDATE drops SET time = '2026-01-01T23:01:00Z' WHERE id = 2;"
+	          "UPDATE drops SET time = '2026-01-02T22:59:59Z' WHERE id = 3");
+	for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+		struct trial_seen seen = {.count = 0};
+
+		assert_true(archive_parse_dates(cases[i].text, &dates, &filter));
+		assert_int_equal(archive_each_drop(archive, &filter, trial_see, &seen), 0);
+		assert_int_equal(seen.count, cases[i].count);
+		assert_non_null(strstr(seen.raw, cases[i].first));
+	}
+	for (size_t i = 0; i < sizeof(none) / sizeof(none[0]); i++)
+		assert_false(archive_parse_dates(none[i], &dates, &filter));
+	archive_close(archive);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -305,6 +343,7 @@ int main(void)
 	        IN_A_TRIAL(test_ten_thousand_drops),
 	        IN_A_TRIAL(test_json_of_nothing),
 	        IN_A_TRIAL(test_words_find_drops),
+	        IN_A_TRIAL(test_minutes_are_a_filter),
 	        IN_A_TRIAL(test_a_limit_takes_the_newest_and_tells_of_more),
 	};
 

@@ -5,7 +5,7 @@ import { COLUMNS } from "./columns.js";
 import { attempt, button, byId, el, setText, show, table } from "./dom.js";
 import { Overlay } from "./overlay.js";
 import { dropTable, isBusy } from "./table.js";
-import { degrees, number, time, withSigma } from "./words.js";
+import { degrees, number, time, utcOf, withSigma } from "./words.js";
 
 const ROWS = 100; /* of series, the newest, then a button for more */
 const PLATE = COLUMNS.filter(({ unit }) => unit !== "g"); /* what is not of one sensor */
@@ -19,7 +19,7 @@ const query = () => ({
 	campaign: byId("history-campaign").value.trim(),
 	scene: byId("history-scene").value,
 	angle_deg: byId("history-angle").value,
-	date: byId("history-date").value.trim(),
+	date: utcOf(byId("history-date").value.trim()),
 	text: byId("history-text").value.trim(),
 });
 

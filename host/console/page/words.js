@@ -164,6 +164,29 @@ export function time(iso) {
 	return date.toDateString() === new Date().toDateString() ? clock : `${day} ${clock}`;
 }
 
+const minuteOfUtc = (date) => date.toISOString().slice(0, 16);
+
+/* A year, a month or a day of the laboratory's clock: its beginning, and that of the next. */
+function periodOf(text) {
+	const [, year, month, day] = /^(\d{4})(?:-(\d\d)(?:-(\d\d))?)?$/.exec(text.trim()) ?? [];
+	if (year === undefined) return null;
+	const [y, m, d] = [Number(year), month === undefined ? 0 : month - 1, day === undefined ? 1 : Number(day)];
+	const from = new Date(y, m, d);
+	if (from.getFullYear() !== y || from.getMonth() !== m || from.getDate() !== d) return null;
+	if (month === undefined) return { from, next: new Date(y + 1, 0, 1) };
+	return { from, next: day === undefined ? new Date(y, m + 1, 1) : new Date(y, m, d + 1) };
+}
+
+/* The minutes of UTC, from the first to the last, of a year, month or day of the laboratory's clock, or of two
+ * with .. between. What is none of these stays as it was typed: the archive says what it expects. */
+export function utcOf(text) {
+	const [first, last = first, ...more] = text.split("..");
+	const from = periodOf(first);
+	const to = periodOf(last);
+	if (!from || !to || more.length) return text;
+	return `${minuteOfUtc(from.from)}..${minuteOfUtc(new Date(to.next.getTime() - 60000))}`;
+}
+
 export function clock() {
 	const now = new Date();
 	return [now.getHours(), now.getMinutes(), now.getSeconds()].map(two).join(":");
