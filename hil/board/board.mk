@@ -11,10 +11,14 @@ BOARD = $(if $(wildcard /usr/include/unicorn/unicorn.h),$(BUILD)/droptower-firmw
 
 $(call obj,$(BOARD_C)): CPPFLAGS += $(LINUX)
 
-.PHONY: board size
+.PHONY: board size mistakes
 board: $(BOARD) stm32g474 ## build the program that runs the board's image, if libunicorn is there
 size: $(BUILD)/droptower-bench board ## size, stack and instruction counts of the image that is flashed, against their budgets
 	@hil/board/size $(BUILD)
+
+MISTAKES ?=
+mistakes: $(BUILD)/droptower-bench board ## build the board's image with mistakes (MISTAKES= some) and see that a drop finds each
+	@hil/board/mistakes $(BUILD) '$(STM32G474_CC) $(STM32G474_CFLAGS)' $(MISTAKES)
 
 ifndef SANITIZE
 tests: $(BOARD)
