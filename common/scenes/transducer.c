@@ -103,6 +103,9 @@ static int transducer_number(struct transducer_reading *r, size_t i, const char 
 	if (strncmp(key->name, "polarity", 8) == 0 && fabs(*into) < 1.0)
 		return settings_fail(&r->settings, DT_E_RANGE, "%.60s is '%.60s', expected 1 or -1",
 		                     key->name, value);
+	if (strcmp(key->name, "order") == 0 && floor(*into) < *into)
+		return settings_fail(&r->settings, DT_E_RANGE, "%.60s is '%.60s', expected a whole number",
+		                     key->name, value);
 	r->line_of[TEXTS + i] = r->settings.line;
 	return 1;
 }
