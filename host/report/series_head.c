@@ -247,7 +247,7 @@ static void subject_product(const struct series_page *page)
 	fprintf(out, "on the box, %g mm along X from its centre of gravity", s->sensor_s2_offset_m * 1e3);
 	end_fact(out);
 	begin_fact(out, "sensors");
-	fprintf(out, "accurate to %g g, noise %g g", s->sensor_range_g, s->sensor_noise_g);
+	fprintf(out, "range %g g, noise %g g", s->sensor_range_g, s->sensor_noise_g);
 	end_fact(out);
 	begin_fact(out, "struck");
 	fprintf(out, "a mat of %g mm, with a corner at %g&deg; between the vertical and X",
