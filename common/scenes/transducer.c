@@ -4,13 +4,12 @@
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
-#include <time.h>
 
+#include "common/base/date.h"
 #include "common/base/number.h"
 #include "common/plain.h"
 
 enum need { PLAIN, TOLD, NEEDED };
-enum { DAY_CHARS = 10 };
 
 static const struct text_key {
 	const char *section, *name;
@@ -51,37 +50,19 @@ double transducer_reads(const struct transducer *t, unsigned axis, unsigned othe
 	return m[axis][other];
 }
 
-bool transducer_day(const char *text, double *days)
-{
-	struct tm day = {.tm_isdst = 0}, back;
-	const char *end = strptime(text, "%Y-%m-%d", &day);
-	time_t seconds;
-
-	if (end != text + DAY_CHARS)
-		return false;
-	back = day;
-	seconds = timegm(&back);
-	if (back.tm_mday != day.tm_mday || back.tm_mon != day.tm_mon) /* 30 February */
-		return false;
-	*days = (double)seconds / 86400.0;
-	return true;
-}
-
 /* ---- entries ---- */
 
 static int transducer_text(struct transducer_reading *r, size_t i, const char *value)
 {
 	struct settings *settings = &r->settings;
 	const char *name = texts[i].name;
-	double day;
 
 	if (r->line_of[i] != 0)
 		return settings_fail(settings, DT_E_FORMAT, "%.60s is given twice", name);
 	if (value[0] == '\0' || strlen(value) >= TRANSDUCER_TEXT_MAX || !plain_is_line(value, strlen(value)))
 		return settings_fail(settings, DT_E_FORMAT, "%.60s is no line of 1 to %d bytes of UTF-8",
 		                     name, TRANSDUCER_TEXT_MAX - 1);
-	if ((strcmp(name, "date") == 0 || strcmp(name, "due") == 0) &&
-	    (strlen(value) != DAY_CHARS || !transducer_day(value, &day)))
+	if ((strcmp(name, "date") == 0 || strcmp(name, "due") == 0) && !date_is_day(value))
 		return settings_fail(settings, DT_E_FORMAT, "%.60s is '%.60s', expected YYYY-MM-DD", name,
 		                     value);
 	memcpy((char *)&r->transducer + texts[i].offset, value, strlen(value) + 1);

@@ -36,7 +36,4 @@ DT_MUST_USE int transducer_read(struct transducer *transducer, const char *file,
 /* What an axis reads of another, by the matrix. */
 double transducer_reads(const struct transducer *transducer, unsigned axis, unsigned other);
 
-/* Days after 1970-01-01 of YYYY-MM-DD, whatever follows; false: it is no day of the calendar. */
-bool transducer_day(const char *text, double *days);
-
 #endif

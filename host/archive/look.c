@@ -9,7 +9,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-#include "host/base/date.h"
+#include "common/base/date.h"
 #include "host/record/digest.h"
 #include "host/archive/quantities.h"
 

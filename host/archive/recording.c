@@ -14,7 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "host/base/date.h"
+#include "common/base/date.h"
 #include "host/result/plan.h"
 #include "host/archive/proof.h"
 

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "common/plain.h"
-#include "host/base/date.h"
+#include "common/base/date.h"
 
 const struct laboratory_row laboratory_rows[LABORATORY_FIELDS] = {
 #define LABORATORY_FIELD(section, key, clause, need, label) {#section, #key, clause, need, label},

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/base/date.h"
 #include "host/sensor/lowpass.h"
 
 #define DAYS_A_YEAR 365.25
@@ -59,8 +60,8 @@ static int sensors_add(struct sensors *sensors, const char *file, double day,
 	used->date = t->calibration_date;
 	used->due = t->calibration_due;
 	used->file_sha256 = used->digest;
-	(void)transducer_day(used->date, &calibrated); /* checked on reading */
-	(void)transducer_day(used->due, &due);
+	(void)date_days(used->date, &calibrated); /* checked on reading */
+	(void)date_days(used->due, &due);
 	used->age_years = fmax(0.0, day - calibrated) / DAYS_A_YEAR;
 	used->overdue = floor(day) > due;
 	used->default_used = t->default_used;

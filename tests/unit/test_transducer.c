@@ -16,6 +16,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "common/base/date.h"
 #include "host/sensor/lowpass.h"
 #include "host/sensor/sensors.h"
 #include "tests/unit/near.h"
@@ -57,13 +58,13 @@ static void days(void **state)
 	double day = 0;
 
 	(void)state;
-	assert_true(transducer_day("2026-11-27", &day));
+	assert_true(date_days("2026-11-27", &day));
 	assert_near(day, 20784, 0); /* date -u -d 2026-11-27 +%s, over 86 400 */
-	assert_true(transducer_day("2028-02-29T10:00:00Z", &day));
-	assert_false(transducer_day("2026-02-29", &day));
-	assert_false(transducer_day("2026-13-01", &day));
-	assert_false(transducer_day("2026-1-01", &day));
-	assert_false(transducer_day("", &day));
+	assert_true(date_days("2028-02-29T10:00:00Z", &day));
+	assert_false(date_days("2026-02-29", &day));
+	assert_false(date_days("2026-13-01", &day));
+	assert_false(date_days("2026-1-01", &day));
+	assert_false(date_days("", &day));
 }
 
 static void reads(void **state)
@@ -349,7 +350,7 @@ static double day_of(const char *text)
 {
 	double day = NAN;
 
-	assert_true(transducer_day(text, &day));
+	assert_true(date_days(text, &day));
 	return day;
 }
 

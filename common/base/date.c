@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/base/date.h"
+#include "common/base/date.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 /* What follows the year is in the calendar, and on the clock. */
 static bool is_in_calendar(const char *text, size_t length)
@@ -33,4 +35,17 @@ bool date_is_period(const char *text)
 bool date_is_day(const char *text)
 {
 	return strlen(text) == DATE_DAY_CHARS && date_is_period(text);
+}
+
+bool date_days(const char *text, double *days)
+{
+	char day[DATE_DAY_CHARS + 1];
+	struct tm date = {.tm_mday = 0};
+
+	snprintf(day, sizeof(day), "%s", text);
+	if (!date_is_day(day))
+		return false;
+	strptime(day, "%Y-%m-%d", &date);
+	*days = (double)timegm(&date) / 86400.0;
+	return true;
 }
