@@ -9,7 +9,7 @@
 #include "common/base/number.h"
 #include "common/base/text.h"
 #include "host/archive/quantities.h"
-#include "host/archive/said.h"
+#include "host/result/said.h"
 
 /* What a column holds, for a message. */
 static const char *shown(const char *text)

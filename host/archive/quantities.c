@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "host/archive/quantities.h"
-#include "host/archive/said.h"
+#include "host/result/said.h"
 #include "common/base/text.h"
 
 const struct quantity *quantities_next(enum quantity_object object, const struct quantity *last)

@@ -220,9 +220,9 @@ static void whose(struct sheet *sheet, const cJSON *result, const char *file, co
 {
 	own_words(sheet, AT_FILE, file);
 	own_words(sheet, AT_SHA256, sha256);
-	cell_number(&sheet->columns, AT_LOG_NUMBER, member(member(result, "drop"), "log_number"));
-	cell_number(&sheet->columns, AT_SHOCK, member(member(result, "shock"), "number"));
-	cell_words(&sheet->columns, AT_FLAGS, member(result, "flags"));
+	cell_number(&sheet->columns, AT_LOG_NUMBER, member(result, "drop"), "log_number");
+	cell_number(&sheet->columns, AT_SHOCK, member(result, "shock"), "number");
+	cell_words(&sheet->columns, AT_FLAGS, result, "flags");
 }
 
 static int put_rows(struct collecting *c, const cJSON *result, const char *file, const char *sha256)
@@ -232,14 +232,14 @@ static int put_rows(struct collecting *c, const cJSON *result, const char *file,
 	int error;
 
 	whose(drops, result, file, sha256);
-	cell_number(&drops->columns, AT_DROP_ID, member(member(result, "drop"), "drop_id"));
-	cell_words(&drops->columns, AT_FORMAT, member(result, "format"));
+	cell_number(&drops->columns, AT_DROP_ID, member(result, "drop"), "drop_id");
+	cell_words(&drops->columns, AT_FORMAT, result, "format");
 	batch_columns_fill(&drops->columns, result);
 	error = row(c, drops);
 	whose(channels, result, file, sha256);
 	cJSON_ArrayForEach(channel, member(result, "channels"))
 	{
-		cell_words(&channels->columns, AT_CHANNEL, member(channel, "name"));
+		cell_words(&channels->columns, AT_CHANNEL, channel, "name");
 		batch_columns_fill(&channels->columns, channel);
 		if (error == 0)
 			error = row(c, channels);
@@ -248,8 +248,7 @@ static int put_rows(struct collecting *c, const cJSON *result, const char *file,
 }
 
 /* A line of a part, by the name that the file has here. */
-static int put_line(struct collecting *c, const char *line, const cJSON *result, const char *file,
-                    const char *sha256)
+static int put_line(struct collecting *c, const char *line, const char *file, const char *sha256)
 {
 	struct builder b = {.failed = false};
 	cJSON *head = cJSON_CreateObject();
@@ -269,7 +268,6 @@ static int put_line(struct collecting *c, const char *line, const cJSON *result,
 		line += *line == '\\' ? 2 : 1;
 	fprintf(c->jsonl.out, "%s%s", text, line + 1);
 	cJSON_free(text);
-	(void)result;
 	return 0;
 }
 
@@ -285,7 +283,7 @@ static int collect_line(struct collecting *c, char *line, const char *file, cons
 	if (strncmp(line, "{\"file\":\"", 9) != 0 || (tables && (result = cJSON_Parse(line)) == NULL))
 		error = fail(c, DT_E_FORMAT, file, "its part of the results is no JSON of droptower");
 	if (error == 0 && c->jsonl_open)
-		error = put_line(c, line, result, file, sha256);
+		error = put_line(c, line, file, sha256);
 	if (error == 0 && tables)
 		error = put_rows(c, result, file, sha256);
 	cJSON_Delete(result);

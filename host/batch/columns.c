@@ -2,9 +2,10 @@
 #include "host/batch/columns.h"
 
 #include <assert.h>
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
+
+#include "host/result/said.h"
 
 static bool quantity_is_words(const struct quantity *q)
 {
@@ -53,46 +54,16 @@ void batch_columns_add(struct batch_columns *columns, const char *array)
 	}
 }
 
-/* "a.b" of an object; NULL where it is not. */
-static const cJSON *at_path(const cJSON *object, const char *path)
-{
-	char key[64];
-
-	while (object != NULL && *path != '\0') {
-		size_t length = strcspn(path, ".");
-
-		snprintf(key, sizeof(key), "%.*s", (int)length, path);
-		object = cJSON_GetObjectItemCaseSensitive(object, key);
-		path += length + (path[length] == '.');
-	}
-	return object;
-}
-
-static void add_words(struct cell *cell, const char *words)
-{
-	size_t used = strlen(cell->text);
-
-	snprintf(cell->text + used, sizeof(cell->text) - used, "%s%s", used > 0 ? " " : "", words);
-}
-
-void cell_words(struct batch_columns *columns, size_t i, const cJSON *value)
+void cell_words(struct batch_columns *columns, size_t i, const cJSON *object, const char *key)
 {
 	struct cell *cell = &columns->cell[i];
 
-	cell->text[0] = '\0';
-	cell->words = cJSON_IsString(value) || cJSON_IsArray(value) ? cell->text : NULL;
-	if (cJSON_IsString(value))
-		add_words(cell, value->valuestring);
-	for (const cJSON *item = cJSON_IsArray(value) ? value->child : NULL; item != NULL; item = item->next)
-		if (cJSON_IsString(item))
-			add_words(cell, item->valuestring);
+	cell->words = said_words(object, key, cell->text) ? cell->text : NULL;
 }
 
-void cell_number(struct batch_columns *columns, size_t i, const cJSON *value)
+void cell_number(struct batch_columns *columns, size_t i, const cJSON *object, const char *key)
 {
-	columns->cell[i].number = cJSON_IsNumber(value) ? value->valuedouble
-	                          : cJSON_IsBool(value) ? (double)cJSON_IsTrue(value)
-	                                                : (double)NAN;
+	columns->cell[i].number = said_number(object, key);
 }
 
 void batch_columns_fill(struct batch_columns *columns, const cJSON *object)
@@ -101,18 +72,15 @@ void batch_columns_fill(struct batch_columns *columns, const cJSON *object)
 	const cJSON *home = NULL;
 
 	for (size_t i = 0; i < columns->count; i++) {
-		const cJSON *value;
-
 		if (columns->quantity[i] == NULL)
 			continue;
 		if (place != (int)columns->place[i]) {
 			place = (int)columns->place[i];
-			home = at_path(object, quantity_homes[place].path);
+			home = said_path(object, quantity_homes[place].path);
 		}
-		value = cJSON_GetObjectItemCaseSensitive(home, columns->quantity[i]->key);
 		if (columns->column[i].kind == TABLE_WORDS)
-			cell_words(columns, i, value);
+			cell_words(columns, i, home, columns->quantity[i]->key);
 		else
-			cell_number(columns, i, value);
+			cell_number(columns, i, home, columns->quantity[i]->key);
 	}
 }

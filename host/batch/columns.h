@@ -36,8 +36,8 @@ void batch_columns_add(struct batch_columns *columns, const char *array);
 /* Sets the cells behind the own ones from an object of the array, or the result itself. */
 void batch_columns_fill(struct batch_columns *columns, const cJSON *object);
 
-/* Sets the i-th cell; words are copied. */
-void cell_words(struct batch_columns *columns, size_t i, const cJSON *value);
-void cell_number(struct batch_columns *columns, size_t i, const cJSON *value);
+/* Sets the i-th cell to what a key of an object says; words are copied. */
+void cell_words(struct batch_columns *columns, size_t i, const cJSON *object, const char *key);
+void cell_number(struct batch_columns *columns, size_t i, const cJSON *object, const char *key);
 
 #endif

@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_ARCHIVE_SAID_H
-#define DT_HOST_ARCHIVE_SAID_H
+#ifndef DT_HOST_RESULT_SAID_H
+#define DT_HOST_RESULT_SAID_H
 /*
  * What the JSON of a result says, by the places and keys of quantity.def. Pure functions.
  */
 #include <cjson/cJSON.h>
 
 #include "host/result/quantity.h"
+
+/* Down a path of names with points between, "" stays where it is; NULL where it leads nowhere. */
+const cJSON *said_path(const cJSON *from, const char *path);
 
 /* The i-th of a place, and whose it is ("S1X", "S1", ""): false behind the last. object: NULL when that one
  * has none; null: the JSON says so itself. subject is of the JSON, or "". */

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/archive/said.h"
+#include "host/result/said.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-/* Down a path of names with points between; "" stays where it is. */
-static const cJSON *walk(const cJSON *from, const char *path)
+const cJSON *said_path(const cJSON *from, const char *path)
 {
 	char name[32];
 
@@ -32,7 +31,7 @@ bool said_at(const cJSON *result, const struct quantity_home *home, int i, struc
 		return false;
 	for (size_t k = 0; k < sizeof(keys) / sizeof(keys[0]) && !cJSON_IsString(name); k++)
 		name = cJSON_GetObjectItemCaseSensitive(whose, keys[k]);
-	at = walk(whose, home->path);
+	at = said_path(whose, home->path);
 	*said = (struct said){.object = cJSON_IsObject(at) ? at : NULL,
 	                      .subject = listed && cJSON_IsString(name) ? name->valuestring : "",
 	                      .null = cJSON_IsNull(at)};
