@@ -160,14 +160,11 @@ static char *setting(const char *name, const char *value)
 }
 
 /* The sensors' files, of --chain or of the scene, by their contents. */
-static int put_sensors(const struct analyze_arguments *arguments, FILE *out)
+static int put_sensors(const struct evaluate_options *options, FILE *out)
 {
-	const char *chain = arguments->evaluate.chain != NULL   ? arguments->evaluate.chain
-	                    : arguments->evaluate.scene != NULL ? arguments->scene.chain
-	                                                        : "";
 	char message[SETTINGS_MESSAGE_MAX];
 	struct sensors sensors;
-	int result = sensors_read(&sensors, chain, 0.0, message);
+	int result = sensors_read(&sensors, evaluate_chain(options), 0.0, message);
 
 	for (size_t i = 0; result == 0 && i < sensors.count; i++)
 		fprintf(out, "sensor %s\n", sensors.used[i].file_sha256);
@@ -186,7 +183,7 @@ static char *settings_of(const struct batch_arguments *arguments)
 	if (result == 0)
 		fprintf(text.out, "droptower %s\nquantities %s\n", DT_VERSION, quantity_version());
 	if (result == 0)
-		result = put_sensors(&arguments->analyze, text.out);
+		result = put_sensors(&arguments->analyze.evaluate, text.out);
 	for (int i = 0; i < given->count && result == 0; i += 2) {
 		if (strcmp(given->word[i], "chain") == 0)
 			continue;

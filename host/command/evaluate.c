@@ -291,9 +291,7 @@ static double highpass_of(struct record *corrected, double told_s, bool asked)
 
 	for (size_t i = 0; i < corrected->channel_count && asked; i++)
 		corrected->channels[i].highpass_s = 0.0;
-	if (asked)
-		return told_s;
-	if (told_s > 0.0)
+	if (asked || told_s > 0.0)
 		return told_s;
 	for (size_t i = 0; i < corrected->channel_count; i++)
 		of_files_s = fmax(of_files_s, corrected->channels[i].highpass_s);
@@ -301,6 +299,13 @@ static double highpass_of(struct record *corrected, double told_s, bool asked)
 		if (!(corrected->channels[i].highpass_s > 0.0))
 			corrected->channels[i].highpass_s = (double)INFINITY; /* no high-pass at all */
 	return of_files_s;
+}
+
+const char *evaluate_chain(const struct evaluate_options *options)
+{
+	if (options->chain != NULL)
+		return options->chain;
+	return options->scene != NULL ? options->scene->chain : "";
 }
 
 int evaluate_check_chain(const char *list)
@@ -348,9 +353,6 @@ static int evaluate_on(struct evaluated *e, const struct evaluate_options *optio
 
 int evaluate_open(struct evaluated *e, const struct record *record, const struct evaluate_options *options)
 {
-	const char *chain = options->chain != NULL ? options->chain
-	                    : options->scene       ? options->scene->chain
-	                                           : "";
 	struct estimate_options estimate = estimate_options_of(record, options);
 	const struct scene *scene = options->scene;
 	char message[MODEL_MESSAGE_MAX];
@@ -360,7 +362,7 @@ int evaluate_open(struct evaluated *e, const struct record *record, const struct
 	e->budget = (struct budget){.count = 0};
 	record_init(&e->corrected);
 	if (refuses_cfc(record, options->cfc) || refuses_lowpass(record, options->lowpass_hz) ||
-	    apply_chain(e, chain, &record) != 0)
+	    apply_chain(e, evaluate_chain(options), &record) != 0)
 		return EVALUATE_TOLD;
 	if (e->sensors.count > 0)
 		estimate.iepe_time_constant_s = highpass_of(&e->corrected, estimate.iepe_time_constant_s,

@@ -89,6 +89,9 @@ const char *evaluate_fit_drop(const struct record *record, double angle_deg, dou
 /* Whether the files that list names can be used. 0 or a COMMAND_* code, errors printed. */
 int evaluate_check_chain(const char *list);
 
+/* Those of the options, or of their scene; "": none. */
+const char *evaluate_chain(const struct evaluate_options *options);
+
 /* Reads a scene and lays angle_deg over it when that is not NAN. 0 or a COMMAND_* code, errors printed. */
 int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg);
 

@@ -39,7 +39,6 @@ struct desk {
 struct axis {
 	const struct sensor_used *used;
 	unsigned axis;
-	size_t channel;
 	const struct estimate_channel *e;
 };
 
@@ -172,14 +171,16 @@ static void gains(struct collecting *c, const struct sensor_used *used, const do
 }
 
 /* channel_count: not recorded. */
+static size_t channel_named(const struct desk *d, const char *name)
+{
+	const struct channel *channel = record_channel(d->record, name);
+
+	return channel != NULL ? (size_t)(channel - d->record->channels) : d->record->channel_count;
+}
+
 static size_t channel_of(const struct desk *d, const struct sensor_used *used, unsigned axis)
 {
-	size_t i = 0;
-
-	while (i < d->record->channel_count &&
-	       strcmp(d->record->channels[i].name, used->transducer.channel[axis]) != 0)
-		i++;
-	return i;
+	return channel_named(d, used->transducer.channel[axis]);
 }
 
 /* What an axis reads of the others, times weight; a: all three, in the value's unit. By the matrix it was
@@ -407,7 +408,7 @@ static void of_decay(struct desk *d, const struct sensor_used *used, const char 
 static void of_channel(struct desk *d, size_t i)
 {
 	const char *name = d->record->channels[i].name;
-	struct axis x = {.channel = i, .e = &d->analysis->channels[i]};
+	struct axis x = {.e = &d->analysis->channels[i]};
 	const struct estimate_pulse *p = &x.e->pulse;
 
 	x.used = sensors_of(d->sensors, name, &x.axis);
@@ -430,12 +431,10 @@ static bool pair_of(const struct desk *d, const char *sensor, struct axis pair[2
 {
 	for (unsigned i = 0; i < 2; i++) {
 		char name[12];
-		size_t k = 0;
+		size_t k;
 
 		snprintf(name, sizeof(name), "%.7s%c", sensor, "XY"[i]);
-		while (k < d->record->channel_count && strcmp(d->record->channels[k].name, name) != 0)
-			k++;
-		pair[i] = (struct axis){.channel = k};
+		k = channel_named(d, name);
 		pair[i].used = sensors_of(d->sensors, name, &pair[i].axis);
 		if (pair[i].used == NULL || k == d->record->channel_count)
 			return false;
