@@ -408,11 +408,10 @@ static void fit_text(const struct fitting *f)
 		       fit->widened);
 	printf("starts: %u of %u came to the same\n", fit->agreed, fit->starts);
 	if (fit->next.largest >= 0 && fit_holds(fit))
-		printf("next drop: %.0f deg from %.3f m tells most (%.1f in the log of the information); the "
-		       "weakest is then "
-		       "%s\n",
-		       fit->next.angle_deg, fit->next.height_m, fit->next.d_gain,
-		       scene_fitted[fit->next.largest]);
+		printf("next drop: %.0f deg from %.3f m tells most of %d to %d deg (%.1f in the log of the "
+		       "information); the weakest is then %s\n",
+		       fit->next.angle_deg, fit->next.height_m, FIT_JUDGED_FROM_DEG, FIT_JUDGED_TO_DEG,
+		       fit->next.d_gain, scene_fitted[fit->next.largest]);
 }
 
 static int fit_write(const struct fitting *f)

@@ -396,30 +396,18 @@ static void conclude_bars(struct fit *fit)
 
 static void conclude_scene(const struct solve *s, const struct scene *start, struct fit *fit)
 {
-	double value[MOTION_SHARED];
 	struct scene *to = &fit->scene;
 
-	for (size_t i = 0; i < MOTION_SHARED; i++)
-		value[i] = motion_value((enum motion_shared)i, s->common[i], NULL);
 	*to = *start;
-	to->contact_stiffness_n_m15 = value[MOTION_LN_STIFFNESS];
-	to->contact_restitution = value[MOTION_LOGIT_RESTITUTION];
-	to->product_balance_angle_deg = value[MOTION_BALANCE_DEG];
-	to->contact_tangential_ratio = value[MOTION_LN_GRIP];
+	motion_to_scene(s->common, to);
 	if (isfinite(fit->drop[0].derived[MOTION_CONTACT_S])) {
 		to->contact_duration_s = fit->drop[0].derived[MOTION_CONTACT_S];
 		to->contact_mass_kg = start->product_case_mass_kg;
 	}
 	conclude_bars(fit);
-	if (!(start->mount_plate_mass_kg > 0.0))
-		return;
-	to->mount_stiffness_n_m = value[MOTION_LN_MOUNT_K];
-	to->mount_softening = value[MOTION_SOFTENING];
-	to->mount_softening_strain = value[MOTION_LN_STRAIN];
-	to->mount_damping_n_s_m = value[MOTION_LN_MOUNT_C];
-	to->mount_damping_ratio =
-	        to->mount_damping_n_s_m / (2.0 * sqrt(to->mount_stiffness_n_m * start->mount_plate_mass_kg));
-	to->sensor_s1_yaw_deg = value[MOTION_YAW_DEG];
+	if (start->mount_plate_mass_kg > 0.0)
+		to->mount_damping_ratio = to->mount_damping_n_s_m /
+		                          (2.0 * sqrt(to->mount_stiffness_n_m * start->mount_plate_mass_kg));
 }
 
 static int fit_prepared(const struct scene *start, const struct fit_options *options, struct solve *s,

@@ -71,7 +71,9 @@ struct fit_doubt {
 	double window_z[MOTION_AXES][FIT_WINDOWS];
 	double periodogram, periodogram_hz;
 	int periodogram_axis;
-	double pull;  /* the largest of a drop */
+	double pull;   /* the largest of a drop */
+	double turned; /* the angle that is furthest from the one set, in its deviations */
+	double turned_deg, set_deg;
 	double group; /* of all drops' gains together; 0 with one drop */
 	double moved; /* of a later drop: how far the product would have to differ */
 	double chi2;  /* over samples */
@@ -79,6 +81,11 @@ struct fit_doubt {
 	char words[FIT_MESSAGE_MAX]; /* "" none: the residual is content */
 };
 
+/* Angles at which the model was held against drops: no other is proposed. */
+enum { FIT_JUDGED_FROM_DEG = 15, FIT_JUDGED_TO_DEG = 35, FIT_JUDGED_STEP_DEG = 5 };
+
+/* The drop that tells most, of these angles, from the first drop's height or, where the tower can, half of
+ * it. */
 struct fit_next {
 	double angle_deg, height_m;
 	double d_gain;     /* what it adds to the log of the information's determinant */

@@ -19,6 +19,9 @@ const char *const fit_window_names[FIT_WINDOWS] = {"before the touch", "0 to 1 m
 #define ALARM_GROUP 20.0
 #define ALARM_MOVED 30.0
 
+/* With any of those, an angle so many of its deviations from the one set is named first. */
+#define TURNED_FAR 4.0
+
 enum { PERIODOGRAM_LINES = 137 };
 
 static double periodogram_hz(size_t line)
@@ -126,6 +129,18 @@ static double judge_group(const struct solve *s, double widened)
 	return s->drops > 1 ? sum : 0.0;
 }
 
+static void judge_turned(const struct solve_drop *d, double widened, struct fit_doubt *doubt)
+{
+	double off = d->own[FIT_GAMMA_DEG] - d->centre[FIT_GAMMA_DEG],
+	       sds = off / (d->prior_sd[FIT_GAMMA_DEG] * sqrt(widened));
+
+	if (fabs(sds) <= fabs(doubt->turned))
+		return;
+	doubt->turned = sds;
+	doubt->turned_deg = d->own[FIT_GAMMA_DEG];
+	doubt->set_deg = d->centre[FIT_GAMMA_DEG];
+}
+
 static void judge_say(struct fit_doubt *d, unsigned axis, unsigned window, double z, unsigned drops)
 {
 	double level = ALARM_PERIODOGRAM + log((double)drops);
@@ -156,6 +171,20 @@ static void judge_say(struct fit_doubt *d, unsigned axis, unsigned window, doubl
 		         "the product would have to be another than the scene's (%.3g for 9)", d->moved);
 }
 
+/* What is not explained may be an angle that was set wrongly. */
+static void judge_angle(struct fit_doubt *d, unsigned drops)
+{
+	char rest[FIT_MESSAGE_MAX];
+
+	if (d->words[0] == '\0' || !(fabs(d->turned) > TURNED_FAR))
+		return;
+	memcpy(rest, d->words, sizeof(rest));
+	snprintf(d->words, sizeof(d->words),
+	         "the angle of %s goes from %.3g deg as set towards %.3g (%.1f deviations): is it right? "
+	         "%.300s",
+	         drops > 1 ? "a drop" : "the drop", d->set_deg, d->turned_deg, fabs(d->turned), rest);
+}
+
 int judge(struct solve *s, const struct fit_drop_result *drop, double widened, struct fit_doubt *doubt)
 {
 	struct sums sums = {.count = {{0}}};
@@ -168,6 +197,7 @@ int judge(struct solve *s, const struct fit_drop_result *drop, double widened, s
 		if (judge_drop(s, &s->drop[k], isfinite(release) ? release : 10e-3, &sums, doubt) != 0)
 			return DT_E_MEMORY;
 		doubt->pull = fmax(doubt->pull, drop[k].pull / widened);
+		judge_turned(&s->drop[k], widened, doubt);
 	}
 	for (unsigned a = 0; a < MOTION_AXES; a++)
 		for (unsigned w = 0; w < FIT_WINDOWS; w++) {
@@ -186,12 +216,11 @@ int judge(struct solve *s, const struct fit_drop_result *drop, double widened, s
 		}
 	doubt->group = judge_group(s, widened);
 	judge_say(doubt, worst[0], worst[1], most, s->drops);
+	judge_angle(doubt, s->drops);
 	return 0;
 }
 
 /* ---- the next drop ---- */
-
-enum { NEXT_FROM_DEG = 10, NEXT_TO_DEG = 60, NEXT_STEP_DEG = 5 };
 
 /* As much as the first drop, at another angle and height; what would clip tells nothing. */
 static void next_samples(struct solve *s, struct solve_drop *d)
@@ -268,7 +297,8 @@ void judge_next(struct solve *s, struct fit *fit)
 	next_start(s, information);
 	now = next_weigh(s, information, &largest, &sd);
 	for (unsigned half = 0; half < 2; half++)
-		for (int angle = NEXT_FROM_DEG; angle <= NEXT_TO_DEG; angle += NEXT_STEP_DEG) {
+		for (int angle = FIT_JUDGED_FROM_DEG; angle <= FIT_JUDGED_TO_DEG;
+		     angle += FIT_JUDGED_STEP_DEG) {
 			double more[FIT_COMMON][FIT_COMMON], gain;
 
 			memcpy(more, information, sizeof(more));

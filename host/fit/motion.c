@@ -5,7 +5,7 @@
 #include <stdbool.h>
 
 #include "common/units.h"
-#include "host/model/body.h"
+#include "host/model/drop.h"
 
 double motion_node_s(size_t node)
 {
@@ -45,46 +45,40 @@ double motion_value(enum motion_shared parameter, double p, double *slope)
 	return value;
 }
 
-static void motion_mounts(const struct scene *s, const double p[], struct body *b)
+void motion_to_scene(const double p[MOTION_SHARED], struct scene *s)
 {
-	double far = exp(p[MOTION_LN_STRAIN]) * s->mount_cube_m;
+	double value[MOTION_SHARED];
 
-	b->mount_n_m = exp(p[MOTION_LN_MOUNT_K]);
-	b->mount_damping_n_s_m = exp(p[MOTION_LN_MOUNT_C]);
-	b->softening = p[MOTION_SOFTENING];
-	b->softening_per_m2 = 1.0 / (far * far);
+	for (size_t i = 0; i < MOTION_SHARED; i++)
+		value[i] = motion_value((enum motion_shared)i, p[i], NULL);
+	s->contact_stiffness_n_m15 = value[MOTION_LN_STIFFNESS];
+	s->contact_restitution = value[MOTION_LOGIT_RESTITUTION];
+	s->product_balance_angle_deg = value[MOTION_BALANCE_DEG];
+	s->contact_tangential_ratio = value[MOTION_LN_GRIP];
+	if (!(s->mount_plate_mass_kg > 0.0))
+		return;
+	s->mount_stiffness_n_m = value[MOTION_LN_MOUNT_K];
+	s->mount_softening = value[MOTION_SOFTENING];
+	s->mount_softening_strain = value[MOTION_LN_STRAIN];
+	s->mount_damping_n_s_m = value[MOTION_LN_MOUNT_C];
+	s->sensor_s1_yaw_deg = value[MOTION_YAW_DEG];
 }
 
-static int motion_body(const struct scene *s, const double p[], struct body *b)
+static int motion_body(const struct scene *scene, const double p[], struct body *b)
 {
-	double angle = UNITS_RAD(p[MOTION_GAMMA_DEG]), balance = UNITS_RAD(p[MOTION_BALANCE_DEG]);
-	double length = s->product_length_m, width = s->product_width_m;
+	struct scene s = *scene;
 	struct contact_law law;
+	struct drop drop;
 
-	if (!(angle > 0.0 && angle < UNITS_PI / 2.0 && balance > 0.0 && balance < UNITS_PI / 2.0) ||
-	    contact_law_begin(&law, 1.0 / (1.0 + exp(-p[MOTION_LOGIT_RESTITUTION]))) != 0)
+	motion_to_scene(p, &s);
+	s.drop_angle_deg = p[MOTION_GAMMA_DEG];
+	if (drop_of_scene(&s, &drop, NULL) != 0 || drop_contact_law(&drop, &law, NULL) != 0)
 		return DT_E_NUMERIC;
-	*b = (struct body){.turns = true,
-	                   .clips = true,
-	                   .case_mass_kg = s->product_case_mass_kg,
-	                   .plate_mass_kg = s->mount_plate_mass_kg,
-	                   .inertia_kg_m2 = s->product_inertia_ratio * s->product_case_mass_kg *
-	                                    (length * length + width * width) / 12.0,
-	                   .angle_rad = angle,
-	                   .gravity_m_s2 = s->drop_gravity_m_s2,
-	                   .speed_m_s = exp(p[MOTION_LN_SPEED]),
-	                   .lever_x_m = width / 2.0 / tan(balance),
-	                   .lever_y_m = width / 2.0,
-	                   .stiffness_n_m15 = exp(p[MOTION_LN_STIFFNESS]),
-	                   .wedge = true,
-	                   .law = law,
-	                   .grip = exp(p[MOTION_LN_GRIP]),
-	                   .friction = s->contact_friction,
-	                   .mounts_turn = true,
-	                   .s2_offset_m = s->sensor_s2_offset_m,
-	                   .s1_yaw_rad = UNITS_RAD(p[MOTION_YAW_DEG])};
-	if (b->plate_mass_kg > 0.0)
-		motion_mounts(s, p, b);
+	drop.speed_m_s = exp(p[MOTION_LN_SPEED]);
+	drop_body(&drop, true, MODEL_REFINEMENTS, b);
+	b->law = law;
+	b->stiffness_n_m15 = s.contact_stiffness_n_m15;
+	b->clips = true;
 	body_prepare(b);
 	return 0;
 }

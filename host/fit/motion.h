@@ -64,6 +64,9 @@ double motion_node_s(size_t node);
  * and damping_n_s_m above 0 (fit.h sees to that). */
 void motion_of_scene(const struct scene *scene, double p[MOTION_PARAMETERS]);
 
+/* The other way round, of what drops share; mounts and yaw where there is a plate. */
+void motion_to_scene(const double p[MOTION_SHARED], struct scene *scene);
+
 /* A shared parameter as a scene has it, from the fit's coordinate p; slope, which may be NULL: its
  * derivative. */
 double motion_value(enum motion_shared parameter, double p, double *slope);

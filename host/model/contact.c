@@ -142,9 +142,8 @@ static double panels(double x, double from, double to, bool release,
 	return sum;
 }
 
-/* The integral of depth_power^-0.6 over h from 0 to `to`, which is either x or not beyond the largest depth.
- */
-static int contact_integral(double x, double to, double *value)
+/* The integral of depth_power^-0.6 over h from 0 to x. */
+static int contact_integral(double x, double *value)
 {
 	gsl_integration_glfixed_table *table = gsl_integration_glfixed_table_alloc(NODES);
 	double turn = log1p(contact_damping(x)); /* h at the largest depth */
@@ -152,16 +151,14 @@ static int contact_integral(double x, double to, double *value)
 
 	if (!table)
 		return DT_E_MEMORY;
-	*value = panels(x, 0.0, fmin(to, turn), false, table);
-	if (to > turn) {
-		if (after > REACH) { /* the slow way out: depth_power is a straight line */
-			double q = x / expm1(x);
+	*value = panels(x, 0.0, turn, false, table);
+	if (after > REACH) { /* the slow way out: depth_power is a straight line */
+		double q = x / expm1(x);
 
-			slow = after - REACH;
-			*value += (pow(slow + q, 0.4) - pow(q, 0.4)) / 0.4;
-		}
-		*value += panels(x, slow, after, true, table);
+		slow = after - REACH;
+		*value += (pow(slow + q, 0.4) - pow(q, 0.4)) / 0.4;
 	}
+	*value += panels(x, slow, after, true, table);
 	gsl_integration_glfixed_table_free(table);
 	return 0;
 }
@@ -192,40 +189,11 @@ int contact_law_init(struct contact_law *law, double restitution)
 	int error = contact_law_begin(&l, restitution);
 
 	if (!error)
-		error = contact_integral(l.spread, l.spread, &integral);
+		error = contact_integral(l.spread, &integral);
 	if (error)
 		return error;
 	l.duration = pow(l.damping, 0.2) * pow(2.5, -0.6) * integral;
 	*law = l;
-	return 0;
-}
-
-/* Zero where the force is largest: its slope over y = turn - h, the logarithm of 1 + D d'/v. */
-static double force_slope(double y, void *context)
-{
-	const struct contact_law *law = context;
-	double h = log1p(law->damping) - y;
-
-	return depth_power(law->spread, h, law->spread - h) - 0.6 * expm1(y);
-}
-
-int contact_law_peak(const struct contact_law *law, double *force, double *time_share)
-{
-	struct contact_law copy = *law;
-	double turn = log1p(law->damping), y, h, whole, part;
-	int error = root_find(force_slope, &copy, 0.0, turn, &y);
-
-	if (error)
-		return error;
-	h = turn - y;
-	error = contact_integral(law->spread, h, &part);
-	if (!error)
-		error = contact_integral(law->spread, law->spread, &whole);
-	if (error)
-		return error;
-	*force = exp(y) *
-	         pow(2.5 * depth_power(law->spread, h, law->spread - h) / (law->damping * law->damping), 0.6);
-	*time_share = part / whole;
 	return 0;
 }
 
@@ -273,10 +241,9 @@ int contact_hertz(const struct contact_hertz_input *in, struct contact_hertz *he
 	h.stiffness_n_m15 = h.modulus_pa * sqrt(in->radius_m);
 	h.depth_m = pow(1.25 * in->mass_kg * in->speed_m_s * in->speed_m_s / h.stiffness_n_m15, 0.4);
 	h.duration_s = shape * h.depth_m / in->speed_m_s;
-	h.force_n = 1.25 * in->mass_kg * in->speed_m_s * in->speed_m_s / h.depth_m;
 	h.depth_share = h.depth_m / in->mat_thickness_m;
 	h.validity = contact_validity(h.depth_m, in->mat_thickness_m);
-	if (!isfinite(h.duration_s) || !isfinite(h.force_n))
+	if (!isfinite(h.duration_s))
 		return DT_E_ARGUMENT;
 	*hertz = h;
 	return 0;

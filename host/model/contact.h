@@ -18,7 +18,7 @@
  * integrals over h = ln((1 + D)/(1 + D d'/v)), which runs from 0 at the touch to x at the release.
  *
  * Pure functions, any thread; SI units. Starred quantities are without dimension: T* = T (k^2 v/m^2)^(1/5),
- * d* = d (k/(m v^2))^(2/5), F* = F/(m^3 v^6 k^2)^(1/5).
+ * d* = d (k/(m v^2))^(2/5).
  */
 #include "common/error.h"
 
@@ -38,9 +38,6 @@ DT_MUST_USE int contact_law_init(struct contact_law *law, double restitution);
 
 /* The same without the integral for the duration, which is then good to a few percent above e = 0.2. */
 DT_MUST_USE int contact_law_begin(struct contact_law *law, double restitution);
-
-/* The largest F*, and the share of the contact time at which it comes. */
-DT_MUST_USE int contact_law_peak(const struct contact_law *law, double *force, double *time_share);
 
 /* k of a mass that strikes at this speed and stays for this long, N/m^1.5; and the other way round. */
 double contact_stiffness(const struct contact_law *law, double mass_kg, double speed_m_s, double duration_s);
@@ -71,7 +68,6 @@ struct contact_hertz {
 	double stiffness_n_m15; /* K sqrt(R) */
 	double depth_m;
 	double duration_s;
-	double force_n;
 	double depth_share; /* of the mat's thickness */
 	enum contact_validity validity;
 };

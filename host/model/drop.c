@@ -118,3 +118,42 @@ int drop_contact(const struct drop *drop, struct contact_law *law, double *stiff
 	*stiffness_n_m15 = contact_stiffness(law, mass, drop->speed_m_s, s->contact_duration_s);
 	return 0;
 }
+
+static void drop_refine(const struct drop *drop, unsigned refinements, struct body *b)
+{
+	const struct scene *s = drop->scene;
+
+	if (refinements & MODEL_GRIP) {
+		b->grip = s->contact_tangential_ratio;
+		b->friction = s->contact_friction;
+	}
+	if (!drop->has_plate || !(refinements & MODEL_MOUNTS))
+		return;
+	b->mounts_turn = true;
+	b->softening = s->mount_softening;
+	if (b->softening > 0.0)
+		b->softening_per_m2 = 1.0 / pow(s->mount_softening_strain * s->mount_cube_m, 2.0);
+	if (s->mount_damping_n_s_m > 0.0)
+		b->mount_damping_n_s_m = s->mount_damping_n_s_m;
+}
+
+void drop_body(const struct drop *drop, bool turns, unsigned refinements, struct body *body)
+{
+	const struct scene *s = drop->scene;
+
+	*body = (struct body){.turns = turns,
+	                      .case_mass_kg = s->product_case_mass_kg,
+	                      .plate_mass_kg = s->mount_plate_mass_kg,
+	                      .inertia_kg_m2 = drop->inertia_kg_m2,
+	                      .angle_rad = drop->angle,
+	                      .gravity_m_s2 = drop->gravity_m_s2,
+	                      .speed_m_s = drop->speed_m_s,
+	                      .lever_x_m = drop->lever_x_m,
+	                      .lever_y_m = drop->lever_y_m,
+	                      .wedge = refinements & MODEL_WEDGE,
+	                      .mount_n_m = s->mount_stiffness_n_m,
+	                      .mount_damping_n_s_m = drop->mount_damping_n_s_m,
+	                      .s2_offset_m = s->sensor_s2_offset_m,
+	                      .s1_yaw_rad = UNITS_RAD(s->sensor_s1_yaw_deg)};
+	drop_refine(drop, refinements, body);
+}

@@ -10,7 +10,7 @@
 
 #include "common/error.h"
 #include "common/scenes/scene.h"
-#include "host/model/contact.h"
+#include "host/model/body.h"
 #include "host/model/model.h"
 
 struct drop {
@@ -37,6 +37,10 @@ DT_MUST_USE int drop_contact_law(const struct drop *drop, struct contact_law *la
 /* The law of the scene's restitution, and the stiffness at which the scene's contact time follows from it. */
 DT_MUST_USE int drop_contact(const struct drop *drop, struct contact_law *law, double *stiffness_n_m15,
                              char *message);
+
+/* The body of a drop but for its contact's law and stiffness, with those of the refinements that change it.
+ */
+void drop_body(const struct drop *drop, bool turns, unsigned refinements, struct body *body);
 
 /* message, if wanted, says `format`; returns code. */
 __attribute__((format(printf, 3, 4))) int drop_refuse(char *message, int code, const char *format, ...);

@@ -202,12 +202,6 @@ int model_below(const struct scene *scene, const struct model_prediction *predic
 	return model_solve(scene, prediction->rung - 1, &options, below, NULL);
 }
 
-int model_predict(const struct scene *scene, enum model_fidelity fidelity,
-                  struct model_prediction *prediction)
-{
-	return model_solve(scene, fidelity, NULL, prediction, NULL);
-}
-
 int model_hertz(const struct scene *scene, struct contact_hertz *hertz, char message[MODEL_MESSAGE_MAX])
 {
 	struct contact_hertz_input in = {

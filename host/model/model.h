@@ -147,10 +147,6 @@ DT_MUST_USE int model_solve(const struct scene *scene, enum model_fidelity fidel
                             const struct model_options *options, struct model_prediction *prediction,
                             char message[MODEL_MESSAGE_MAX]);
 
-/* The same with the defaults and no message. */
-DT_MUST_USE int model_predict(const struct scene *scene, enum model_fidelity fidelity,
-                              struct model_prediction *prediction);
-
 /* What Hertz would predict of the scene's contact from its materials, for comparison: no rung uses it. Look
  * at hertz->validity first. 0 or DT_E_ARGUMENT. */
 DT_MUST_USE int model_hertz(const struct scene *scene, struct contact_hertz *hertz,

@@ -139,56 +139,23 @@ static int check_refinements(const struct scene *s, unsigned refinements, char *
 	return 0;
 }
 
-static void rungs_contact_refine(const struct drop *drop, unsigned refinements, struct body *b)
-{
-	const struct scene *s = drop->scene;
-
-	if (refinements & MODEL_GRIP) {
-		b->grip = s->contact_tangential_ratio;
-		b->friction = s->contact_friction;
-	}
-	if (!drop->has_plate || !(refinements & MODEL_MOUNTS))
-		return;
-	b->mounts_turn = true;
-	b->softening = s->mount_softening;
-	if (b->softening > 0.0)
-		b->softening_per_m2 = 1.0 / pow(s->mount_softening_strain * s->mount_cube_m, 2.0);
-	if (s->mount_damping_n_s_m > 0.0)
-		b->mount_damping_n_s_m = s->mount_damping_n_s_m;
-}
-
 static int course_of(const struct drop *drop, const struct model_options *options, bool turns,
                      struct course *c, char *message)
 {
-	const struct scene *s = drop->scene;
 	unsigned refinements = refinements_of(options, turns);
-	int error = check_refinements(s, refinements, message);
+	int error = check_refinements(drop->scene, refinements, message);
 
 	if (error)
 		return error;
 	*c = (struct course){
-	        .body = {.turns = turns,
-	                 .case_mass_kg = s->product_case_mass_kg,
-	                 .plate_mass_kg = s->mount_plate_mass_kg,
-	                 .inertia_kg_m2 = drop->inertia_kg_m2,
-	                 .angle_rad = drop->angle,
-	                 .gravity_m_s2 = drop->gravity_m_s2,
-	                 .speed_m_s = drop->speed_m_s,
-	                 .lever_x_m = drop->lever_x_m,
-	                 .lever_y_m = drop->lever_y_m,
-	                 .wedge = refinements & MODEL_WEDGE,
-	                 .mount_n_m = s->mount_stiffness_n_m,
-	                 .mount_damping_n_s_m = drop->mount_damping_n_s_m,
-	                 .s2_offset_m = s->sensor_s2_offset_m,
-	                 .s1_yaw_rad = UNITS_RAD(s->sensor_s1_yaw_deg)},
 	        .tolerance = step_tolerance(options, turns),
 	        .skipped = skipped_of(options, turns),
 	        .rough = rough(options),
 	};
+	drop_body(drop, turns, refinements, &c->body);
 	error = contact_of(drop, refinements, &c->body.law, &c->body.stiffness_n_m15, message);
 	if (error)
 		return error;
-	rungs_contact_refine(drop, refinements, &c->body);
 	c->count_ring = options->ring && c->body.softening > 0.0;
 	return 0;
 }

@@ -3,11 +3,6 @@
 
 #include <math.h>
 
-double steady_psi(double r, double damping_ratio)
-{
-	return atan2(2.0 * damping_ratio * r, (1.0 - r) * (1.0 + r));
-}
-
 int steady_response(double r, double damping_ratio, double *transmissibility, double *phase_rad)
 {
 	double damper = 2.0 * damping_ratio * r, below = hypot((1.0 - r) * (1.0 + r), damper);
@@ -17,6 +12,6 @@ int steady_response(double r, double damping_ratio, double *transmissibility, do
 	if (!(below > 0.0))
 		return DT_E_NUMERIC;
 	*transmissibility = hypot(1.0, damper) / below;
-	*phase_rad = steady_psi(r, damping_ratio) - atan(damper);
+	*phase_rad = atan2(damper, (1.0 - r) * (1.0 + r)) - atan(damper);
 	return 0;
 }

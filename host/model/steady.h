@@ -12,7 +12,4 @@
  * damping_ratio >= 0, finite; DT_E_NUMERIC at resonance without damping, where there is none. */
 DT_MUST_USE int steady_response(double r, double damping_ratio, double *transmissibility, double *phase_rad);
 
-/* The angle psi of (17), by which the response follows (1, 2 zeta r). */
-double steady_psi(double r, double damping_ratio);
-
 #endif

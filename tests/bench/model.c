@@ -94,7 +94,7 @@ static void prepare_questions(void)
 		struct model_prediction p;
 
 		ensemble_random_scene(&e, point, &questions[i].scene, value);
-		if (model_predict(&questions[i].scene, MODEL_PLANAR, &p) != 0)
+		if (model_solve(&questions[i].scene, MODEL_PLANAR, NULL, &p, NULL) != 0)
 			continue;
 		questions[i].options = model_defaults;
 		questions[i].options.asked = 1u << (i % 6);

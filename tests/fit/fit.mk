@@ -3,6 +3,7 @@
 # Fits of simulated drops by the hundred, too long for every test.
 
 FIT_CAMPAIGN_O = $(call obj,tests/fit/campaign.c tests/unit/fit_by_hand.c)
+-include $(FIT_CAMPAIGN_O:.o=.d)
 $(FIT_CAMPAIGN_O): CPPFLAGS += $(LINUX)
 $(BUILD)/tests/fit-campaign: $(FIT_CAMPAIGN_O) $(foreach l,hil host link common,$(call lib,$l))
 	$(call say,LINK,$@)

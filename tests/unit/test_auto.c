@@ -128,7 +128,7 @@ static void question(const struct scene *s, struct tally *t)
 	if (model_solve(s, MODEL_PLANAR, &fine, &truth, NULL) != 0)
 		return; /* through the mat */
 	t->questions++;
-	assert_int_equal(model_predict(s, MODEL_PLANAR, &full), 0);
+	assert_int_equal(model_solve(s, MODEL_PLANAR, NULL, &full, NULL), 0);
 	assert_int_equal(model_solve(s, MODEL_AUTO, &o, &least, NULL), 0);
 	apart = auto_apart(&least, &truth, o.asked, lag_s);
 	t->good += apart < o.accuracy;

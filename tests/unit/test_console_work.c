@@ -421,7 +421,7 @@ static void test_the_model_lies_on_the_trace(void **state)
 	start_with_drops();
 	assert_int_equal(scene_read(&scene, SCENE, message), 0);
 	scene.drop_angle_deg = 27;
-	assert_int_equal(model_predict(&scene, MODEL_AUTO, &prediction), 0);
+	assert_int_equal(model_solve(&scene, MODEL_AUTO, NULL, &prediction, NULL), 0);
 	c = ask_curves(work_model, "one/1");
 	t = ask_curves(work_trace, "one/1");
 	assert_string_equal(text_of(c.head, "zero"), text_of(t.head, "zero"));

@@ -24,30 +24,19 @@ static struct contact_law law_of(double restitution)
 }
 
 static const struct {
-	double e, damping, duration, depth, force, time_share;
+	double e, damping, duration, depth;
 } reference[] = {
-        {1e-3, 999.99999999999998, 91.136904105479815, 0.090776130205809263, 9.5374186536805392,
-         0.00076865728286737584},
-        {0.01, 99.999999999999998, 23.139119267491544, 0.22437156521801641, 3.8258166053314183,
-         0.007599331343513348},
-        {0.03, 33.333333333331929, 12.255828373815669, 0.33926830309907446, 2.5065268708631318,
-         0.022230366595742786},
-        {0.1, 9.9981593974956673, 6.4575394876068116, 0.51472499415614872, 1.6362271138935137,
-         0.067916869856252159},
-        {0.25, 3.8408060397780143, 4.3961611311645763, 0.68165959770884719, 1.2481263307366935,
-         0.14433935335854073},
-        {0.4, 2.0824981641470068, 3.8066536023345588, 0.78818670858636774, 1.1106595326287271,
-         0.20888497033485947},
-        {0.5, 1.432750533271375, 3.6035605840461364, 0.84799291297791089, 1.0628707219376534,
-         0.25124462024310612},
-        {0.6, 0.97487171081326537, 3.4684833324621794, 0.90276440687168501, 1.0380205495126072,
-         0.29536287008530569},
-        {0.75, 0.4959113182344873, 3.3371871182988381, 0.97852942470299701, 1.0384455760084895,
-         0.36765203682591672},
-        {0.9, 0.16648195068530806, 3.2554610060706117, 1.0488221456992377, 1.085186961810159,
-         0.44718080293585624},
-        {0.99, 0.015151362109441019, 3.2213311761210142, 1.0889809346688537, 1.1365054818123886,
-         0.49487877719269195},
+        {1e-3, 999.99999999999998, 91.136904105479815, 0.090776130205809263},
+        {0.01, 99.999999999999998, 23.139119267491544, 0.22437156521801641},
+        {0.03, 33.333333333331929, 12.255828373815669, 0.33926830309907446},
+        {0.1, 9.9981593974956673, 6.4575394876068116, 0.51472499415614872},
+        {0.25, 3.8408060397780143, 4.3961611311645763, 0.68165959770884719},
+        {0.4, 2.0824981641470068, 3.8066536023345588, 0.78818670858636774},
+        {0.5, 1.432750533271375, 3.6035605840461364, 0.84799291297791089},
+        {0.6, 0.97487171081326537, 3.4684833324621794, 0.90276440687168501},
+        {0.75, 0.4959113182344873, 3.3371871182988381, 0.97852942470299701},
+        {0.9, 0.16648195068530806, 3.2554610060706117, 1.0488221456992377},
+        {0.99, 0.015151362109441019, 3.2213311761210142, 1.0889809346688537},
 };
 
 static void the_law_to_twelve_digits(void **state)
@@ -55,14 +44,10 @@ static void the_law_to_twelve_digits(void **state)
 	(void)state;
 	for (size_t i = 0; i < sizeof(reference) / sizeof(reference[0]); i++) {
 		struct contact_law law = law_of(reference[i].e);
-		double force, share;
 
-		assert_int_equal(contact_law_peak(&law, &force, &share), 0);
 		assert_near_part(law.damping, reference[i].damping, 1e-13);
 		assert_near_part(law.duration, reference[i].duration, 1e-13);
 		assert_near_part(law.depth, reference[i].depth, 1e-13);
-		assert_near_part(force, reference[i].force, 1e-13);
-		assert_near_part(share, reference[i].time_share, 1e-12);
 	}
 }
 
@@ -97,7 +82,6 @@ static void from_sticking_to_bouncing(void **state)
 	(void)state;
 	for (double e = 1e-6; e < 1.0; e *= 1.01) {
 		struct contact_law law = law_of(e);
-		double force, share;
 
 		if (e > 0.1 && e < 0.9)
 			assert_near(log1p(law.damping) - log1p(-e * law.damping), law.damping * (1.0 + e),
@@ -107,23 +91,18 @@ static void from_sticking_to_bouncing(void **state)
 		if (!(law.duration < last) || !isfinite(law.depth))
 			fail_msg("T* %.15g after %.15g at e %g", law.duration, last, e);
 		last = law.duration;
-		assert_int_equal(contact_law_peak(&law, &force, &share), 0);
-		assert_true(isfinite(force) && share > 0.0 && share < 0.5);
 	}
 }
 
 static void the_study_s_contact(void **state)
 {
 	struct contact_law law = law_of(0.5);
-	double force, share, k = contact_stiffness(&law, 0.173, IMPACT_M_S, 0.003);
+	double k = contact_stiffness(&law, 0.173, IMPACT_M_S, 0.003);
 
 	(void)state;
-	assert_int_equal(contact_law_peak(&law, &force, &share), 0);
 	assert_near_part(k, 4227303.27134065, 1e-12);
 	assert_near_part(contact_duration(&law, 0.173, IMPACT_M_S, k), 0.003, 1e-14);
 	assert_near_part(contact_depth(&law, 0.173, IMPACT_M_S, k), 0.00295664995509965, 1e-12);
-	assert_near_part(force * pow(pow(0.173, 3) * pow(IMPACT_M_S, 6) * k * k, 0.2) / 0.173,
-	                 5346.98884644484, 1e-12);
 }
 
 static struct contact_hertz_input study(void)
@@ -148,7 +127,6 @@ static void hertz_predicts_and_does_not_hold(void **state)
 	assert_near_part(h.modulus_pa, 3331843.9799276, 1e-13);
 	assert_near_part(h.depth_m, 0.00971191652121225, 1e-13);
 	assert_near_part(h.duration_s, 0.00682523404824617, 1e-12);
-	assert_near_part(h.force_n, 390.559941667059, 1e-13);
 	assert_near_part(h.depth_share, 0.971191652121225, 1e-13);
 	assert_int_equal(h.validity, CONTACT_DEEP);
 	/* a slowly loaded Shore A 40: through the mat from 1.747 MPa down */

@@ -69,7 +69,7 @@ static struct model_prediction predict(const struct scene *scene)
 {
 	struct model_prediction p;
 
-	assert_int_equal(model_predict(scene, MODEL_SDOF, &p), 0);
+	assert_int_equal(model_solve(scene, MODEL_SDOF, NULL, &p, NULL), 0);
 	assert_string_equal(p.fidelity, "sdof");
 	assert_true(strlen(p.reason) > 40 && strlen(p.reason) < sizeof(p.reason) - 1);
 	return p;

@@ -153,7 +153,9 @@ static void response_as_printed(void **state)
 	assert_int_equal(
 	        steady_response(500.0 / 3.0 * sqrt(0.84) / (121.0 * sqrt(0.99)), 0.1, &right, &phase), 0);
 	assert_near_part(r.transmissibility, right, 1e-13);
-	assert_near(UNITS_DEG(steady_psi(500.0 / 3.0 * sqrt(0.84) / (121.0 * sqrt(0.99)), 0.1)), 157.4, 0.05);
+	/* psi of (17), by which it follows (1, 2 zeta r) */
+	assert_near(UNITS_DEG(phase + atan(0.2 * 500.0 / 3.0 * sqrt(0.84) / (121.0 * sqrt(0.99)))), 157.4,
+	            0.05);
 	assert_near_part(fabs(paper_plate(&in, &r, r.plate_time_s)), r.plate_m_s2, 1e-12);
 	after = paper_plate(&in, &r, 0.0071) / paper_plate(&in, &r, 0.0041);
 	assert_near(after, -0.796, 0.0005);
@@ -182,7 +184,6 @@ static void steady_to_twelve_digits(void **state)
 	for (size_t i = 0; i < sizeof(reference) / sizeof(reference[0]); i++) {
 		assert_int_equal(steady_response(reference[i].r, reference[i].zeta, &value, &phase), 0);
 		assert_near_part(value, reference[i].transmissibility, 1e-13);
-		assert_near_part(steady_psi(reference[i].r, reference[i].zeta), reference[i].psi, 1e-13);
 		assert_near_part(phase, reference[i].psi - atan(2 * reference[i].zeta * reference[i].r),
 		                 1e-11);
 	}
