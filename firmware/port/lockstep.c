@@ -11,6 +11,7 @@ enum {
 	RECEIVED = 32, /* what an answer brings at most */
 	ROOM = 8,      /* frames in a request that still leaves room for those of the instants ahead */
 	KEEPER = 2,    /* the capture behind those of the gates */
+	BIAS = WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2,
 };
 
 /* The sample instants of a millisecond. Those of X from 1 on are a fraction of a us after floor_us. */
@@ -39,6 +40,7 @@ static const struct instant {
 static struct machine {
 	uint32_t tick_ms, now_us;
 	uint16_t outputs, inputs;
+	uint16_t bias; /* bits of the inputs, and bias_high, of the last Y and Z before this instant */
 	uint8_t bias_high;
 	uint8_t edges;                       /* outputs that changed since the last request ... */
 	uint32_t edge_us[SENSORBUS_OUTPUTS]; /* ... and when */
@@ -75,7 +77,7 @@ uint32_t port_time_us(void)
 
 uint16_t port_io(void)
 {
-	return machine.inputs | machine.outputs;
+	return machine.inputs | machine.bias | machine.outputs;
 }
 
 void port_keep(uint8_t byte)
@@ -363,8 +365,7 @@ static int read_answer(void)
 	if (result != 0)
 		return result;
 	sensorbus_get_answer(bytes, answer);
-	machine.inputs = answer->inputs & (uint16_t)~WIRE_IO_OUTPUTS;
-	machine.bias_high = answer->bias_high;
+	machine.inputs = answer->inputs & (uint16_t) ~(WIRE_IO_OUTPUTS | BIAS);
 	machine.hung |= answer->hang != 0;
 	for (unsigned i = 0; i < SENSORBUS_CAPTURES; i++)
 		if (answer->captures & 1u << i) {
@@ -378,10 +379,20 @@ static int read_answer(void)
 	return result == 0 && answer->then == SENSORBUS_STOP ? LOCKSTEP_GONE : result;
 }
 
+/* The bias is converted with Y and Z, so that what came with them is known from the next instant on. */
+static void take_bias(void)
+{
+	if (!(instants[at].group & SENSORBUS_YZ))
+		return;
+	machine.bias = machine.answer.inputs & BIAS;
+	machine.bias_high = machine.answer.bias_high;
+}
+
 int lockstep_exchange(unsigned instant)
 {
 	int result = 0;
 
+	take_bias();
 	at = instant;
 	set_time(&instants[instant]);
 	if (machine.answer.then == SENSORBUS_MORE)

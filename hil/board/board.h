@@ -49,7 +49,12 @@ enum board_reset { BOARD_POWER_ON, BOARD_COMMAND, BOARD_WATCHDOG, BOARD_BROWN_OU
 
 struct board_options {
 	const char *bus, *image;
-	const char *counts; /* write the instruction counts there; NULL: nowhere */
+	const char *counts;  /* write the instruction counts there; NULL: nowhere */
+	const char *record;  /* write the answers of the bench there; NULL: nowhere */
+	const char *preempt; /* such answers, instead of a bench: interrupt it everywhere (preempt.c) */
+	const char *shared;  /* with it: memory that main and control share without a lock */
+	const char *only;    /* with it: main, control, CAN or gate; NULL: all */
+	unsigned every, share, shares;
 	unsigned cause, kept;
 	unsigned half_clocks; /* an instruction takes: 2, 3 or 4 */
 };
@@ -58,6 +63,7 @@ struct board {
 	struct board_options options;
 	uint8_t *flash, *sram, *ccm;
 	uint32_t app_poll, mark; /* addresses in the image */
+	uint32_t lock, unlock, on_gate;
 	int64_t now;
 	bool over;         /* the bench has ended the run */
 	bool reset_wanted; /* by software or watchdog, as reset_cause says */
@@ -91,6 +97,40 @@ void core_line(unsigned exception, bool high);
 uint32_t core_pc(void);
 void core_report(const char *path);
 
+/* What preempt.c does with it. Depth 0 is main, an interrupt's 1 and more. */
+struct core_watch {
+	void (*poll)(void); /* the next one begins */
+	void (*block)(unsigned depth, uint32_t address);
+	void (*instruction)(unsigned depth, uint32_t address); /* is next */
+	void (*entered)(unsigned exception, unsigned depth);   /* what was interrupted at depth - 1 */
+	void (*left)(unsigned exception, unsigned depth);
+	void (*access)(unsigned depth, uint32_t address, unsigned bytes, bool write); /* of the SRAM */
+};
+
+void core_boot(const struct core_watch *watch);
+void core_pass(void);           /* to the next event, interrupt, end of a poll or pause */
+void core_pause(void);          /* out of watch.instruction: before this instruction */
+void core_hold(unsigned depth); /* what runs at this depth stands still; CORE_HOLDS_NONE */
+bool core_masks_all(void);
+bool core_masks_control(void);
+uint32_t core_register(unsigned number);
+
+#define CORE_HOLDS_NONE UINT32_MAX
+
+/* preempt.c: what a file calls with all that it keeps, so that a state can be saved and come back. */
+void preempt_run(void);
+void preempt_keep(void *at, size_t bytes);
+void preempt_sent(const struct frame *frame);
+void core_state(void);
+void registers_state(void);
+void system_state(void);
+void timer_state(void);
+void sampling_state(void);
+void can_state(void);
+void plant_state(void);
+void core_save(void);
+void core_restore(void);
+
 /* system.c: clocks, flash, watchdog, random numbers, pins. */
 void system_reset(enum board_reset cause);
 bool system_read(uint32_t address, uint32_t *value);
@@ -113,6 +153,7 @@ bool timer_level(uint32_t timer, unsigned channel); /* its output is enabled: wh
 bool timer_drives(uint32_t timer, unsigned channel);
 void timer_estop(bool open);
 void timer_capture(unsigned capture, uint32_t time_us);
+unsigned timer_gates(void);     /* captures of the gates so far */
 int64_t timer_start_time(void); /* of TIM1; negative: it stands */
 uint32_t timer_us(int64_t time);
 
@@ -131,14 +172,17 @@ bool can_read(uint32_t address, uint32_t *value);
 void can_write(uint32_t address, uint32_t value);
 void can_answer(const struct sensorbus_answer *answer);
 void can_receive(const struct frame *frame);
+void can_again(void);       /* the last frame comes again */
+unsigned can_waiting(void); /* received frames that the firmware has not taken */
 
 /* plant.c: the other end of the sensor bus. */
-void plant_open(const char *prefix);
+void plant_open(const struct board_options *options);
 void plant_reset(void);
 void plant_edge(unsigned output, uint32_t time_us);
 bool plant_send(const struct frame *frame); /* false: no room until the next exchange */
 int64_t plant_next(void);
 void plant_event(void);
+void plant_inputs_off(uint16_t inputs); /* in place of what the answers say */
 uint32_t plant_random(void);
 
 #endif

@@ -11,14 +11,17 @@ BOARD = $(if $(wildcard /usr/include/unicorn/unicorn.h),$(BUILD)/droptower-firmw
 
 $(call obj,$(BOARD_C)): CPPFLAGS += $(LINUX)
 
-.PHONY: board size mistakes
+.PHONY: board size mistakes preempt
 board: $(BOARD) stm32g474 ## build the program that runs the board's image, if libunicorn is there
 size: $(BUILD)/droptower-bench board ## size, stack and instruction counts of the image that is flashed, against their budgets
 	@hil/board/size $(BUILD)
 
 MISTAKES ?=
-mistakes: $(BUILD)/droptower-bench board ## build the board's image with mistakes (MISTAKES= some) and see that a drop finds each
+mistakes: $(BUILD)/droptower-bench board ## build the board's image with mistakes (MISTAKES= some) and see that a drop, or preemption, finds each
 	@hil/board/mistakes $(BUILD) '$(STM32G474_CC) $(STM32G474_CFLAGS)' $(MISTAKES)
+
+preempt: $(BUILD)/droptower-bench board ## interrupt the board's image after every instruction of its longest polls and of control
+	@hil/board/preempt $(BUILD)
 
 ifndef SANITIZE
 tests: $(BOARD)

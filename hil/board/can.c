@@ -35,6 +35,7 @@ static struct {
 	unsigned tx_get, tx_fill, rx_get, rx_fill;
 	uint8_t errors;
 	bool off, off_told, passive, blocked;
+	struct frame last; /* that was received */
 } can;
 
 static const uint8_t lengths[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
@@ -48,6 +49,23 @@ void can_reset(void)
 {
 	memset(&can, 0, sizeof(can));
 	*at(CCCR) = INIT;
+}
+
+void can_state(void)
+{
+	preempt_keep(&can, sizeof(can));
+}
+
+void can_again(void)
+{
+	struct frame frame = can.last;
+
+	can_receive(&frame);
+}
+
+unsigned can_waiting(void)
+{
+	return can.rx_fill;
 }
 
 static void raise_line(void)
@@ -135,6 +153,7 @@ static uint32_t code_of_length(unsigned length)
 
 void can_receive(const struct frame *frame)
 {
+	can.last = *frame;
 	uint32_t element = RAM_RX0 + ELEMENT * ((can.rx_get + can.rx_fill) % ELEMENTS);
 
 	if (!passes_filters(frame) || *at(CCCR) & INIT)

@@ -40,10 +40,16 @@ static struct {
 	uint32_t idle; /* the address behind its call of app_poll; 0: not yet known */
 	bool at_idle, pass_idle, waiting, interrupted;
 	uint8_t before[BOARD_SRAM_BYTES]; /* the memory when the poll before ended */
+	unsigned held;                    /* the depth that stands still */
+	bool paused;
 	struct tally tally[BOARD_EXCEPTIONS];
-	uint8_t block_instructions[BOARD_FLASH_BYTES / 2];
-	uint8_t block_halfwords[BOARD_FLASH_BYTES / 2];
 } core;
+
+/* Of each block of instructions, decoded once. */
+static uint8_t block_instructions[BOARD_FLASH_BYTES / 2], block_halfwords[BOARD_FLASH_BYTES / 2];
+
+static const struct core_watch *watch; /* NULL: nobody watches */
+static uc_context *saved;
 
 static uint32_t get(int name)
 {
@@ -158,6 +164,8 @@ static void enter_handler(unsigned exception)
 	set(UC_ARM_REG_PC, vector);
 	core.level[++core.depth] = (struct level){exception, priority_of(exception), 0};
 	core.interrupted = true;
+	if (watch != NULL)
+		watch->entered(exception, core.depth);
 	if (exception != BOARD_TIM1 && exception != BOARD_TIM3 && exception != BOARD_TIM4)
 		board.woken =
 		        true; /* main gets what control, gates and CAN bring, from the samples nothing */
@@ -185,13 +193,15 @@ static void leave_handler(void)
 	if (core.lines >> level->exception & 1)
 		core.pending |= 1ull << level->exception;
 	core.depth--;
+	if (watch != NULL)
+		watch->left(level->exception, core.depth + 1);
 	next = next_exception();
 	if (next != 0) {
-		board.now += TAIL_CLOCKS;
+		board.now += board.options.half_clocks > 0 ? TAIL_CLOCKS : 0;
 		enter_handler(next);
 		return;
 	}
-	board.now += ENTRY_CLOCKS;
+	board.now += board.options.half_clocks > 0 ? ENTRY_CLOCKS : 0;
 	pop_frame();
 }
 
@@ -201,7 +211,7 @@ static void take_exceptions(void)
 
 	if (next == 0)
 		return;
-	board.now += ENTRY_CLOCKS;
+	board.now += board.options.half_clocks > 0 ? ENTRY_CLOCKS : 0;
 	push_frame();
 	enter_handler(next);
 }
@@ -213,8 +223,8 @@ static unsigned instructions_in(uint32_t address, uint32_t size)
 	uint32_t place = (address - BOARD_FLASH) / 2;
 	unsigned count = 0;
 
-	if (core.block_halfwords[place] * 2u == size)
-		return core.block_instructions[place];
+	if (block_halfwords[place] * 2u == size)
+		return block_instructions[place];
 	for (uint32_t i = 0; i < size; count++) {
 		uint16_t first;
 
@@ -222,15 +232,18 @@ static unsigned instructions_in(uint32_t address, uint32_t size)
 		i += first >> 11 >= 0x1D ? 4 : 2;
 	}
 	if (size / 2 <= UINT8_MAX) {
-		core.block_halfwords[place] = (uint8_t)(size / 2);
-		core.block_instructions[place] = (uint8_t)count;
+		block_halfwords[place] = (uint8_t)(size / 2);
+		block_instructions[place] = (uint8_t)count;
 	}
 	return count;
 }
 
 static void spend(unsigned instructions)
 {
-	unsigned halves = instructions * board.options.half_clocks + core.halves;
+	/* none: what starts up waits for time to pass, what runs afterwards for events */
+	unsigned cost =
+	        board.options.half_clocks == 0 && timer_start_time() < 0 ? 2 : board.options.half_clocks;
+	unsigned halves = instructions * cost + core.halves;
 
 	board.now += halves / 2;
 	core.halves = halves % 2;
@@ -258,7 +271,29 @@ static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *unu
 		return;
 	}
 	core.pass_idle = false;
-	spend(instructions_in(address, size));
+	if (watch != NULL)
+		watch->block(core.depth, address);
+	else
+		spend(instructions_in(address, size));
+}
+
+static void on_access(uc_engine *uc, int type, uint64_t address, int size, int64_t value, void *unused)
+{
+	(void)uc, (void)value, (void)unused;
+	watch->access(core.depth, (uint32_t)address, (unsigned)size, type == UC_MEM_WRITE);
+}
+
+/* Only where somebody watches: it takes twice the time. */
+static void on_instruction(uc_engine *uc, uint64_t address, uint32_t size, void *unused)
+{
+	(void)size, (void)unused;
+	if (core.paused || address - BOARD_FLASH >= BOARD_FLASH_BYTES)
+		return;
+	watch->instruction(core.depth, (uint32_t)address);
+	if (core.paused)
+		uc_emu_stop(uc);
+	else
+		spend(1);
 }
 
 static void on_interrupt(uc_engine *uc, uint32_t number, void *unused)
@@ -405,6 +440,50 @@ static void set_mark(enum board_reset cause)
 		memcpy(board.sram + (board.mark - BOARD_SRAM), mark, sizeof(mark));
 }
 
+void core_hold(unsigned depth)
+{
+	core.held = depth;
+}
+
+void core_pause(void)
+{
+	core.paused = true;
+}
+
+bool core_masks_all(void)
+{
+	return get(UC_ARM_REG_PRIMASK) & 1;
+}
+
+bool core_masks_control(void)
+{
+	uint32_t base = get(UC_ARM_REG_BASEPRI) & 0xF0;
+
+	return core_masks_all() || (base != 0 && priority_of(BOARD_PENDSV) >= base);
+}
+
+uint32_t core_register(unsigned number)
+{
+	return get(number == 14 ? UC_ARM_REG_LR : UC_ARM_REG_R0 + (int)number);
+}
+
+void core_state(void)
+{
+	preempt_keep(&core, sizeof(core));
+}
+
+void core_save(void)
+{
+	if (saved == NULL)
+		must(uc_context_alloc(core.uc, &saved), "context");
+	must(uc_context_save(core.uc, saved), "context");
+}
+
+void core_restore(void)
+{
+	must(uc_context_restore(core.uc, saved), "context");
+}
+
 static void boot(enum board_reset cause)
 {
 	board.reset_wanted = board.hung = false;
@@ -457,6 +536,8 @@ static void begin_poll(void)
 	core.level[0].instructions = 0;
 	core.interrupted = board.wrote = board.woken = core.waiting = false;
 	core.pass_idle = true;
+	if (watch != NULL)
+		watch->poll();
 }
 
 /* The main loop is between two polls. Time goes on to what comes next, where nothing else can happen; the
@@ -487,26 +568,48 @@ static void run_processor(void)
 		board_fail("%s", uc_strerror(error));
 }
 
+void core_boot(const struct core_watch *watching)
+{
+	if (watching != NULL && watch == NULL) {
+		hook(UC_HOOK_CODE, (void *)(uintptr_t)on_instruction);
+		if (watching->access != NULL)
+			hook(UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, (void *)(uintptr_t)on_access);
+	}
+	watch = watching;
+	core.held = CORE_HOLDS_NONE;
+	set_mark(board.options.cause);
+	boot(board.options.cause);
+}
+
+void core_pass(void)
+{
+	core.paused = false;
+	run_events();
+	if (board.over || board.reset_wanted)
+		return;
+	take_exceptions();
+	if (core.paused)
+		return;
+	if (core.depth == core.held) { /* as if this instruction took so long */
+		board.now = next_event();
+		return;
+	}
+	run_processor();
+	if (core.returning) {
+		core.returning = false;
+		leave_handler();
+	} else if (core.at_idle) {
+		idle();
+	}
+}
+
 void core_run(void)
 {
-	enum board_reset cause = board.options.cause;
-
-	set_mark(cause);
-	boot(cause);
+	core_boot(NULL);
 	while (!board.over) {
-		run_events();
-		if (board.reset_wanted) {
+		core_pass();
+		if (board.reset_wanted)
 			boot(board.reset_cause);
-			continue;
-		}
-		take_exceptions();
-		run_processor();
-		if (core.returning) {
-			core.returning = false;
-			leave_handler();
-		} else if (core.at_idle) {
-			idle();
-		}
 	}
 }
 

@@ -43,6 +43,14 @@ static const void *image_table(const char *path, size_t offset, size_t count, si
 
 static void image_names(const char *path, const Elf32_Ehdr *head)
 {
+	static const struct {
+		const char *name;
+		uint32_t *address, thumb;
+	} names[] = {
+	        {"app_poll", &board.app_poll, 1},   {"board_mark", &board.mark, 0},
+	        {"port_lock", &board.lock, 1},      {"port_unlock", &board.unlock, 1},
+	        {"app_on_gate", &board.on_gate, 1},
+	};
 	const Elf32_Shdr *sections = image_table(path, head->e_shoff, head->e_shnum, sizeof(*sections));
 
 	for (unsigned i = 0; i < head->e_shnum; i++) {
@@ -55,10 +63,9 @@ static void image_names(const char *path, const Elf32_Ehdr *head)
 		text = image_table(path, sections[sections[i].sh_link].sh_offset,
 		                   sections[sections[i].sh_link].sh_size, 1);
 		for (unsigned k = 0; k < sections[i].sh_size / sizeof(*symbols); k++) {
-			if (strcmp(text + symbols[k].st_name, "app_poll") == 0)
-				board.app_poll = symbols[k].st_value & ~1u;
-			if (strcmp(text + symbols[k].st_name, "board_mark") == 0)
-				board.mark = symbols[k].st_value;
+			for (unsigned n = 0; n < sizeof(names) / sizeof(names[0]); n++)
+				if (strcmp(text + symbols[k].st_name, names[n].name) == 0)
+					*names[n].address = symbols[k].st_value & ~names[n].thumb;
 		}
 	}
 }
@@ -84,7 +91,8 @@ void image_load(const char *path)
 		memcpy(board.flash + place, image_table(path, parts[i].p_offset, size, 1), size);
 	}
 	image_names(path, head);
-	if (board.app_poll == 0 || board.mark < BOARD_SRAM || board.mark - BOARD_SRAM > BOARD_SRAM_BYTES - 12)
-		image_refuse(path, "has no app_poll or board_mark");
+	if (board.app_poll == 0 || board.lock == 0 || board.unlock == 0 || board.on_gate == 0 ||
+	    board.mark < BOARD_SRAM || board.mark - BOARD_SRAM > BOARD_SRAM_BYTES - 12)
+		image_refuse(path, "lacks a name that this program looks for");
 	free(file.bytes);
 }

@@ -25,7 +25,15 @@ static const char usage[] =
         "                     4 reset pin\n"
         "  --kept N           what the firmware before the reset kept over it, 0 to 255\n"
         "  --image FILE       the ELF file; firmware-stm32g474/firmware.elf beside this program without it\n"
-        "  --clocks N         an instruction takes 1, 1.5 or 2 clocks; 1 without it\n"
+        "  --clocks N         an instruction takes 0, 0.5, 1, 1.5 or 2 clocks; 1 without it\n"
+        "  --record FILE      write what the other end answers to FILE\n"
+        "  --preempt FILE     no other end: the answers in FILE; interrupt what the image does after every\n"
+        "                     instruction, and say what breaks (exit 1)\n"
+        "  --shared FILE      with it: memory that main and interrupts share without a lock: address bytes "
+        "name\n"
+        "  --every N          with it: after each Nth instruction only\n"
+        "  --only PLACE       with it: main, control, CAN or gate alone\n"
+        "  --share I/N        with it: only the Ith of N parts, from 0\n"
         "  --counts FILE      add the counted instructions of the run to FILE: name calls least most sum\n"
         "  --help             this text\n"
         "\n"
@@ -63,12 +71,12 @@ static unsigned number(const char *text, unsigned most)
 
 static unsigned half_clocks(const char *text)
 {
-	static const char *const known[] = {"1", "1.5", "2"};
+	static const char *const known[] = {"0", "0.5", "1", "1.5", "2"};
 
-	for (unsigned i = 0; i < 3; i++)
+	for (unsigned i = 0; i < 5; i++)
 		if (strcmp(text, known[i]) == 0)
-			return 2 + i;
-	refuse("--clocks takes 1, 1.5 or 2, not ", text);
+			return i;
+	refuse("--clocks takes 0, 0.5, 1, 1.5 or 2, not ", text);
 }
 
 static void read_options(int argc, char **argv, struct board_options *options)
@@ -77,6 +85,9 @@ static void read_options(int argc, char **argv, struct board_options *options)
 	        {"bus", required_argument, NULL, 'b'},    {"reset-cause", required_argument, NULL, 'r'},
 	        {"kept", required_argument, NULL, 'k'},   {"image", required_argument, NULL, 'i'},
 	        {"clocks", required_argument, NULL, 'c'}, {"counts", required_argument, NULL, 'n'},
+	        {"record", required_argument, NULL, 'R'}, {"preempt", required_argument, NULL, 'p'},
+	        {"shared", required_argument, NULL, 's'}, {"every", required_argument, NULL, 'e'},
+	        {"share", required_argument, NULL, 'S'},  {"only", required_argument, NULL, 'o'},
 	        {"help", no_argument, NULL, 'h'},         {NULL, 0, NULL, 0},
 	};
 	int letter;
@@ -101,14 +112,34 @@ static void read_options(int argc, char **argv, struct board_options *options)
 		case 'n':
 			options->counts = optarg;
 			break;
+		case 'R':
+			options->record = optarg;
+			break;
+		case 'p':
+			options->preempt = optarg;
+			break;
+		case 's':
+			options->shared = optarg;
+			break;
+		case 'e':
+			options->every = number(optarg, UINT16_MAX);
+			break;
+		case 'o':
+			options->only = optarg;
+			break;
+		case 'S':
+			if (sscanf(optarg, "%u/%u", &options->share, &options->shares) != 2 ||
+			    options->share >= options->shares)
+				refuse("not a part of so many: ", optarg);
+			break;
 		case 'h':
 			fputs(usage, stdout);
 			exit(0);
 		default:
 			refuse("wrong option", "");
 		}
-	if (options->bus == NULL || optind != argc)
-		refuse("--bus PREFIX is needed, and nothing behind the options", "");
+	if ((options->bus == NULL) == (options->preempt == NULL) || optind != argc)
+		refuse("--bus PREFIX or --preempt FILE is needed, and nothing behind the options", "");
 }
 
 /* firmware-stm32g474/firmware.elf next to this program. */
@@ -130,14 +161,18 @@ static const char *image_beside(void)
 int main(int argc, char **argv)
 {
 	board.options.half_clocks = 2;
+	board.options.every = board.options.shares = 1;
 	read_options(argc, argv, &board.options);
 	if (board.options.image == NULL)
 		board.options.image = image_beside();
 	signal(SIGPIPE, SIG_IGN);
 	core_open();
 	image_load(board.options.image);
-	plant_open(board.options.bus);
-	core_run();
+	plant_open(&board.options);
+	if (board.options.preempt != NULL)
+		preempt_run();
+	else
+		core_run();
 	if (board.options.counts != NULL)
 		core_report(board.options.counts);
 	return 0;

@@ -20,7 +20,7 @@ enum {
 };
 
 static struct {
-	int request_fd, answer_fd;
+	int request_fd, answer_fd, record_fd;
 	int64_t next;  /* clocks of the next exchange since tick 0 */
 	uint8_t edges; /* since the exchange before */
 	uint32_t edge_us[SENSORBUS_OUTPUTS];
@@ -30,6 +30,9 @@ static struct {
 	bool more;               /* the next answer comes without a request */
 	size_t come, taken;      /* bytes of input[] */
 	uint8_t input[SENSORBUS_MESSAGE_MAX];
+	const uint8_t *recorded; /* answers, in place of the bench's */
+	size_t recorded_bytes, recorded_taken;
+	uint16_t inputs_off;
 	size_t bytes;
 	uint8_t request[SENSORBUS_REQUEST_BYTES + SENSORBUS_FRAMES_MAX * SENSORBUS_FRAME_BYTES_MAX];
 } plant;
@@ -48,10 +51,41 @@ static int plant_open_one(const char *prefix, const char *suffix, int flags)
 	return fd;
 }
 
-void plant_open(const char *prefix)
+/* All of a file that --record wrote. */
+static void plant_load(const char *path)
 {
-	plant.request_fd = plant_open_one(prefix, "request", O_WRONLY);
-	plant.answer_fd = plant_open_one(prefix, "answer", O_RDONLY);
+	FILE *file = fopen(path, "rb");
+	uint8_t *bytes = NULL;
+	size_t count = 0, room = 0, more = 1;
+
+	while (file != NULL && more > 0) {
+		if (count == room)
+			bytes = realloc(bytes, room = 2 * room + 1048576);
+		if (bytes == NULL)
+			break;
+		more = fread(bytes + count, 1, room - count, file);
+		count += more;
+	}
+	if (file == NULL || bytes == NULL || ferror(file) || count == 0) {
+		fprintf(stderr, "droptower-firmware-board: %s: no record of answers\n", path);
+		exit(BOARD_EXIT_LINK);
+	}
+	fclose(file);
+	plant.recorded = bytes;
+	plant.recorded_bytes = count;
+}
+
+void plant_open(const struct board_options *options)
+{
+	plant.record_fd = -1;
+	if (options->preempt != NULL) {
+		plant_load(options->preempt);
+		return;
+	}
+	plant.request_fd = plant_open_one(options->bus, "request", O_WRONLY);
+	plant.answer_fd = plant_open_one(options->bus, "answer", O_RDONLY);
+	if (options->record != NULL)
+		plant.record_fd = open(options->record, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
 }
 
 void plant_reset(void)
@@ -62,6 +96,8 @@ void plant_reset(void)
 	plant.more = false;
 	plant.behind = 0;
 	plant.come = plant.taken = 0;
+	plant.recorded_taken = 0;
+	plant.inputs_off = 0;
 	plant.frames = 0;
 	plant.bytes = SENSORBUS_REQUEST_BYTES;
 }
@@ -74,11 +110,25 @@ void plant_edge(unsigned output, uint32_t time_us)
 
 bool plant_send(const struct frame *frame)
 {
+	if (plant.recorded != NULL) {
+		preempt_sent(frame);
+		return true;
+	}
 	if (plant.frames == SENSORBUS_FRAMES_MAX)
 		return false;
 	plant.bytes += sensorbus_put_frame(plant.request + plant.bytes, frame, plant.behind);
 	plant.frames++;
 	return true;
+}
+
+void plant_state(void)
+{
+	preempt_keep(&plant, sizeof(plant));
+}
+
+void plant_inputs_off(uint16_t inputs)
+{
+	plant.inputs_off = inputs;
 }
 
 uint32_t plant_random(void)
@@ -112,6 +162,13 @@ static void plant_write(const uint8_t *bytes, size_t count)
 /* The next bytes of what was answered, read as far as they are not here. */
 static void plant_read(uint8_t *bytes, size_t count)
 {
+	if (plant.recorded != NULL) {
+		board.over |= plant.recorded_bytes - plant.recorded_taken < count;
+		if (!board.over)
+			memcpy(bytes, plant.recorded + plant.recorded_taken, count);
+		plant.recorded_taken += board.over ? 0 : count;
+		return;
+	}
 	while (plant.come - plant.taken < count && !board.over) {
 		ssize_t done =
 		        read(plant.answer_fd, plant.input + plant.come, sizeof(plant.input) - plant.come);
@@ -123,6 +180,8 @@ static void plant_read(uint8_t *bytes, size_t count)
 	if (board.over)
 		return;
 	memcpy(bytes, plant.input + plant.taken, count);
+	if (plant.record_fd >= 0 && write(plant.record_fd, bytes, count) != (ssize_t)count)
+		board_fail("what the bench says cannot be recorded");
 	plant.taken += count;
 }
 
@@ -198,7 +257,7 @@ static void plant_take(uint8_t group)
 	sensorbus_get_answer(bytes, &answer);
 	plant.random = answer.random;
 	board.hung |= answer.hang != 0;
-	system_inputs(answer.inputs);
+	system_inputs(answer.inputs & (uint16_t)~plant.inputs_off);
 	for (unsigned i = 0; i < SENSORBUS_CAPTURES; i++)
 		if (answer.captures & 1u << i)
 			timer_capture(i, answer.capture_us[i]);
@@ -218,7 +277,7 @@ void plant_event(void)
 
 	if (plant.more)
 		plant.behind++;
-	else
+	else if (plant.recorded == NULL)
 		plant_ask(group, of_ms);
 	if (!board.over)
 		plant_take(group);

@@ -25,6 +25,12 @@ uint32_t *registers_at(uint32_t address)
 	board_fail("no register at 0x%08X", address);
 }
 
+void registers_state(void)
+{
+	for (unsigned i = 0; i < PARTS; i++)
+		preempt_keep(parts[i].words, parts[i].bytes);
+}
+
 void registers_reset(void)
 {
 	for (unsigned i = 0; i < PARTS; i++)

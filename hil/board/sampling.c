@@ -74,6 +74,12 @@ void sampling_reset(void)
 		*at(pairs[i].base + CR) = *at(pairs[i].base + SLAVE + CR) = 1u << 29;
 }
 
+void sampling_state(void)
+{
+	preempt_keep(&sampling, sizeof(sampling));
+	preempt_keep(pairs, sizeof(pairs));
+}
+
 /* ---- what the sensors give ---- */
 
 static int code_of(int sum)

@@ -66,6 +66,11 @@ void system_reset(enum board_reset cause)
 	system_pins(board.now);
 }
 
+void system_state(void)
+{
+	preempt_keep(&chip, sizeof(chip));
+}
+
 /* ---- pins ---- */
 
 static const struct drive {

@@ -25,6 +25,7 @@ static struct counter counters[] = {
 enum { COUNTERS = sizeof(counters) / sizeof(counters[0]), TIM2_INDEX = 1, TIM5_INDEX = 4, CHANNELS = 4 };
 
 static bool estop_open;
+static unsigned gates;
 static int64_t began; /* TIM1, and with it the others; negative: not yet */
 
 static uint32_t stored(const struct counter *c, uint32_t offset)
@@ -120,11 +121,14 @@ static void start_slaves(int64_t time)
 	for (unsigned i = 1; i < COUNTERS; i++)
 		if ((stored(&counters[i], TIM_SMCR) & 0x00300077) == 6)
 			start_counter(&counters[i], time);
+	if (board.options.half_clocks == 0) /* the keeper's timer in step with the gates': no rounding */
+		counters[TIM5_INDEX].start += (time - counters[TIM5_INDEX].start) % BOARD_CLOCKS_PER_US;
 }
 
 void timer_reset(void)
 {
 	began = -1;
+	gates = 0;
 	for (unsigned i = 0; i < COUNTERS; i++) {
 		struct counter *c = &counters[i];
 
@@ -137,6 +141,14 @@ void timer_reset(void)
 		}
 		*registers_at(c->base + TIM_ARR) = c->most;
 	}
+}
+
+void timer_state(void)
+{
+	preempt_keep(counters, sizeof(counters));
+	preempt_keep(&estop_open, sizeof(estop_open));
+	preempt_keep(&gates, sizeof(gates));
+	preempt_keep(&began, sizeof(began));
 }
 
 /* ---- outputs ---- */
@@ -201,8 +213,14 @@ void timer_capture(unsigned capture, uint32_t time_us)
 		*registers_at(c->base + TIM_CCR + 4 * channel) = time_us;
 	else /* the same instant in the other timer's counts */
 		*registers_at(c->base + TIM_CCR + 4 * channel) = count_at(c, time + BOARD_CLOCKS_PER_US / 2);
+	gates += capture != 2 && !(stored(c, TIM_SR) & flag);
 	set_flag(c, stored(c, TIM_SR) & flag ? flag | flag << 8 : flag);
 	board.woken = true;
+}
+
+unsigned timer_gates(void)
+{
+	return gates;
 }
 
 int64_t timer_start_time(void)
