@@ -119,6 +119,7 @@ uint32_t core_register(unsigned number);
 
 /* preempt.c: what a file calls with all that it keeps, so that a state can be saved and come back. */
 void preempt_run(void);
+void preempt_where(void); /* on stderr; nothing where nobody preempts */
 void preempt_keep(void *at, size_t bytes);
 void preempt_sent(const struct frame *frame);
 void core_state(void);

@@ -50,6 +50,7 @@ void board_fail(const char *format, ...)
 	vfprintf(stderr, format, arguments);
 	va_end(arguments);
 	fprintf(stderr, ", at 0x%08X\n", core_pc());
+	preempt_where();
 	exit(BOARD_EXIT_FAIL);
 }
 

@@ -163,6 +163,14 @@ static void wrong(const char *what, uint32_t value)
 		       walk.run, walk.number, walk.address, variant_names[walk.variant], what, value);
 }
 
+void preempt_where(void)
+{
+	if (phase != SURVEY)
+		fprintf(stderr, "%s %u, %s instruction %u at 0x%08X, %s\n", place_names[walk.place], walk.run,
+		        phase == TRIAL ? "before" : "on the way to", walk.number, walk.address,
+		        variant_names[walk.variant]);
+}
+
 static enum place place_of(unsigned exception)
 {
 	return exception == BOARD_PENDSV  ? CONTROL
