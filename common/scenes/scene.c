@@ -79,29 +79,35 @@ static int scene_read_text(struct reading *reading, const char *name, const char
 	return 1;
 }
 
-/* Files of sensors, with commas or blanks between; those without a folder lie beside the scene. The scene
- * keeps where they are, so that it may be read from elsewhere. */
-static int scene_read_chain(struct reading *reading, const char *value)
+int scene_set_chain(struct scene *scene, const char *list, const char *beside)
 {
-	struct settings *settings = &reading->settings;
-	const char *slash = strrchr(settings->file, '/');
-	int folder = slash != NULL ? (int)(slash + 1 - settings->file) : 0;
-	char *chain = reading->scene.chain, name[PATH_MAX], whole[PATH_MAX];
-	size_t room = sizeof(reading->scene.chain), used = 0, length;
+	const char *slash = strrchr(beside, '/');
+	int folder = slash != NULL ? (int)(slash + 1 - beside) : 0;
+	char *chain = scene->chain, name[PATH_MAX], whole[PATH_MAX];
+	size_t room = sizeof(scene->chain), used = 0, length;
 
-	if (chain[0] != '\0')
-		return settings_fail(settings, DT_E_FORMAT, "chain is given twice");
-	for (const char *at = value + strspn(value, " ,"); *at != '\0' && used < room;
+	for (const char *at = list + strspn(list, " ,"); *at != '\0' && used < room;
 	     at += length + strspn(at + length, " ,")) {
 		length = strcspn(at, " ,");
-		snprintf(name, sizeof(name), "%.*s%.*s", at[0] != '/' ? folder : 0, settings->file,
-		         (int)length, at);
+		snprintf(name, sizeof(name), "%.*s%.*s", at[0] != '/' ? folder : 0, beside, (int)length, at);
 		used += (size_t)snprintf(chain + used, room - used, "%s%s", used > 0 ? "," : "",
 		                         realpath(name, whole) != NULL ? whole : name);
 	}
-	if (used > 0 && used < room && plain_is_line(value, strlen(value)))
-		return 1;
+	if (used > 0 && used < room && plain_is_line(list, strlen(list)))
+		return 0;
 	chain[0] = '\0';
+	return DT_E_FORMAT;
+}
+
+/* Those without a folder lie beside the scene. */
+static int scene_read_chain(struct reading *reading, const char *value)
+{
+	struct settings *settings = &reading->settings;
+
+	if (reading->scene.chain[0] != '\0')
+		return settings_fail(settings, DT_E_FORMAT, "chain is given twice");
+	if (scene_set_chain(&reading->scene, value, settings->file) == 0)
+		return 1;
 	return settings_fail(settings, DT_E_FORMAT, "chain is '%.60s', expected names of sensor files",
 	                     value);
 }

@@ -43,6 +43,10 @@ DT_MUST_USE int scene_read(struct scene *scene, const char *file, char message[S
  * message. */
 DT_MUST_USE int scene_check(const struct scene *scene, const char *where, char message[SCENE_MESSAGE_MAX]);
 
+/* Takes files of sensors, commas or blanks between, names seen from beside's folder ("": from here), so that
+ * they are found from anywhere. 0, or DT_E_FORMAT and there are none. */
+DT_MUST_USE int scene_set_chain(struct scene *scene, const char *list, const char *beside);
+
 /* Writes all that differs from what a key is without being given, [fit] where u is known, and [limits]. */
 void scene_write(const struct scene *scene, FILE *out);
 

@@ -60,10 +60,14 @@ struct archive_series {
 
 /* Name: letters, digits, and . _ - within; its name must be new. The scene is read from scene_file; NAN takes
  * its angle, its height. Another height is written into the scene that the series keeps, since where the
- * tower's parts stand follows from it. */
+ * tower's parts stand follows from it; so is the place of its sensors' files. */
 DT_MUST_USE int archive_new_series(struct archive *archive, const char *name, const char *campaign,
                                    const char *scene_file, double angle_deg, double height_m,
                                    unsigned planned);
+
+/* The files of the sensors of a series that has no drop yet: names that are found from anywhere, with commas
+ * between. */
+DT_MUST_USE int archive_set_chain(struct archive *archive, const char *series, const char *chain);
 
 /* The scene of a series, at its angle and height. */
 DT_MUST_USE int archive_scene(struct archive *archive, const char *series, struct scene *scene);
@@ -139,10 +143,6 @@ DT_MUST_USE int archive_decide(struct archive *archive, const char *drop, enum a
 DT_MUST_USE int archive_note(struct archive *archive, const char *drop, const char *operator_name,
                              const char *text);
 
-/* date: YYYY-MM-DD. */
-DT_MUST_USE int archive_calibrate(struct archive *archive, const char *sensor, double gain, const char *date,
-                                  const char *note);
-
 /* ---- looking ---- */
 
 /* What a result says in numbers: the columns of quantity.def. NAN where there is none. */
@@ -169,8 +169,9 @@ struct archive_drop {
 	const char *verdict;               /* of the test plan: "pass", ...; "" without limits */
 	double value[ARCHIVE_VALUE_COUNT]; /* NAN: none */
 	double sigma[ARCHIVE_VALUE_COUNT];
-	unsigned not_ok;   /* bit for each value whose status is not ok */
-	const char *flags; /* "clipped incomplete", sorted; "" */
+	struct budget_item budget[ARCHIVE_VALUE_COUNT]; /* what "": that one has none; largest_parts unused */
+	unsigned not_ok;                                /* bit for each value whose status is not ok */
+	const char *flags;                              /* "clipped incomplete", sorted; "" */
 };
 
 /* NULL, NAN and 0 take anything. */
@@ -211,14 +212,11 @@ DT_MUST_USE int archive_each_event(struct archive *archive, const char *drop,
                                    int (*each)(void *context, const struct archive_event *event),
                                    void *context);
 
-struct archive_calibration {
-	const char *sensor, *date, *note;
-	double gain;
-};
-DT_MUST_USE int archive_each_calibration(struct archive *archive,
-                                         int (*each)(void *context,
-                                                     const struct archive_calibration *calibration),
-                                         void *context);
+/* The sensors whose files went into a drop's result of that version (NULL: the newest), without transducer.
+ */
+DT_MUST_USE int archive_each_sensor(struct archive *archive, const char *drop, const char *version,
+                                    int (*each)(void *context, const struct sensor_used *sensor),
+                                    void *context);
 
 /* A drop's result back, by version or the newest (NULL). said->record: empty, or from the drop's log, and
  * then it keeps all but its flags. Methods and paths stay empty. DT_E_EMPTY: there is none. The channels of

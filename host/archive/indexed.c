@@ -343,7 +343,7 @@ void indexed_close(struct proof *proof)
 	sqlite3_finalize(proof->flags);
 }
 
-/* ---- series and calibrations ---- */
+/* ---- series ---- */
 
 /* What a series' row has of its scene besides the text. */
 static int hold_scene(struct proof *proof, int64_t series)
@@ -389,37 +389,12 @@ static int hold_series(struct proof *proof, const struct sidecar *told)
 	return result != 0 ? result : hold_scene(proof, row);
 }
 
-static int hold_calibration(struct proof *proof, const struct sidecar *told)
-{
-	double gain = NAN;
-	sqlite3_stmt *s;
-	int result = sql_query(proof->archive, &s,
-	                       "SELECT gain, note FROM calibrations WHERE sensor = ? AND date = ?", "ss",
-	                       sidecar_value(told, "calibration"), sidecar_value(told, "date"));
-
-	if (result != 0)
-		return result;
-	number_read(sidecar_value(told, "gain"), -HUGE_VAL, HUGE_VAL, &gain);
-	result = sql_step(proof->archive, s);
-	if (result > 0) {
-		hold_number(proof, s, 0, gain, "gain", "");
-		if (strcmp(sql_text(s, 1), sidecar_value(told, "note")) != 0)
-			tell_line(proof, true, "note", sql_text(s, 1), sidecar_value(told, "note"));
-	} else if (result == 0) {
-		proof_fault(proof, PROOF_INDEX, true, "index.sqlite: missing: the calibration of %s",
-		            told->file);
-	}
-	sqlite3_finalize(s);
-	return result < 0 ? result : 0;
-}
-
 int indexed_hold_other(struct proof *proof, const struct sidecar *told)
 {
 	snprintf(proof->file, sizeof(proof->file), "%s", told->file);
-	snprintf(proof->name, sizeof(proof->name), "%s%s", sidecar_value(told, "series"),
-	         sidecar_value(told, "calibration"));
-	return sidecar_value(told, "calibration")[0] != '\0' ? hold_calibration(proof, told)
-	                                                     : hold_series(proof, told);
+	snprintf(proof->name, sizeof(proof->name), "%s", sidecar_value(told, "series"));
+	/* calibrations were noted before sensors had files */
+	return sidecar_value(told, "calibration")[0] != '\0' ? 0 : hold_series(proof, told);
 }
 
 int indexed_hold_more(struct proof *proof)
@@ -427,12 +402,9 @@ int indexed_hold_more(struct proof *proof)
 	struct archive *archive = proof->archive;
 	char path[ARCHIVE_PATH_MAX];
 	sqlite3_stmt *s;
-	int result =
-	        sql_query(archive, &s,
-	                  "SELECT 'raw/' || substr(created, 1, 4) || '/' || name || '/series.ini' FROM series"
-	                  " UNION ALL SELECT 'raw/' || substr(date, 1, 4) || '/calibration-' || sensor || '-'"
-	                  " || date || '.ini' FROM calibrations",
-	                  "");
+	int result = sql_query(
+	        archive, &s,
+	        "SELECT 'raw/' || substr(created, 1, 4) || '/' || name || '/series.ini' FROM series", "");
 
 	if (result != 0)
 		return result;

@@ -16,10 +16,10 @@ DT_MUST_USE int indexed_hold_drop(struct proof *proof, const struct chain_entry 
 /* A result of proof->drop. row: of results; json: its text in the index. */
 DT_MUST_USE int indexed_hold_result(struct proof *proof, int64_t row, const char *json);
 
-/* The row that a sidecar of a series or calibration is of. */
+/* The row that a sidecar of a series is of. */
 DT_MUST_USE int indexed_hold_other(struct proof *proof, const struct sidecar *told);
 
-/* Series and calibrations of the index that no sidecar is of. */
+/* Series of the index that no sidecar is of. */
 DT_MUST_USE int indexed_hold_more(struct proof *proof);
 
 void indexed_close(struct proof *proof);

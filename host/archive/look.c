@@ -242,7 +242,7 @@ static const char drop_columns[] =
         ", d.number, CASE d.proof WHEN '' THEN d.state ELSE d.proof END, d.decision, d.reason, d.operator, "
         "d.note, d.raw, d.sha256,"
         " d.time, d.bytes, d.simulated, v.name, r.not_ok, r.flags, d.entry, d.fault, d.id, r.quantities, "
-        "(SELECT decision FROM of_verdict WHERE result_id = r.id)"
+        "(SELECT decision FROM of_verdict WHERE result_id = r.id), r.id"
 #define QUANTITY_COLUMN(NAME, name, unit, ...) ", r." name "_" unit ", r." name "_sigma_" unit
 #include "host/result/quantity.def"
         ;
@@ -251,14 +251,15 @@ static const char drop_columns[] =
 static const char drop_numbers[] =
         "SELECT " SERIES_COLUMNS
         ", d.number, d.proof, d.decision, NULL, NULL, NULL, NULL, substr(d.sha256, 1, 1)"
-        ", NULL, NULL, NULL, NULL, r.not_ok, NULL, NULL, NULL, d.id, NULL, NULL"
+        ", NULL, NULL, NULL, NULL, r.not_ok, NULL, NULL, NULL, d.id, NULL, NULL, r.id"
 #define QUANTITY_COLUMN(NAME, name, unit, ...) ", r." name "_" unit ", NULL"
 #include "host/result/quantity.def"
         ;
 
-static void drop_of(const struct archive *archive, sqlite3_stmt *s, struct archive_drop *drop)
+static int drop_of(struct archive *archive, sqlite3_stmt *s, sqlite3_stmt **budgets,
+                   struct archive_drop *drop)
 {
-	enum { N = SERIES_COLUMN_COUNT, VALUES = N + 19 };
+	enum { N = SERIES_COLUMN_COUNT, RESULT = N + 19, VALUES = N + 20 };
 
 	*drop = (struct archive_drop){
 	        .series = series_of(s),
@@ -292,6 +293,7 @@ static void drop_of(const struct archive *archive, sqlite3_stmt *s, struct archi
 		}
 	if (strcmp(drop->state, "recording") == 0 && !is_being_recorded(archive, drop->raw))
 		drop->state = "interrupted";
+	return quantities_budget(archive, budgets, sqlite3_column_int64(s, RESULT), drop->budget);
 }
 
 static int ask_for_drops(struct archive *archive, struct query *q, const char *columns,
@@ -325,7 +327,7 @@ static int each_drop(struct archive *archive, const char *columns, const struct 
 {
 	struct query q = {.count = 0};
 	struct archive_drop drop;
-	sqlite3_stmt *s;
+	sqlite3_stmt *s, *budgets = NULL;
 	int result = ask_for_drops(archive, &q, columns, filter);
 
 	if (result == 0)
@@ -333,11 +335,13 @@ static int each_drop(struct archive *archive, const char *columns, const struct 
 	if (result != 0)
 		return result;
 	while ((result = sql_step(archive, s)) > 0) {
-		drop_of(archive, s, &drop);
-		result = each(context, &drop);
+		result = drop_of(archive, s, &budgets, &drop);
+		if (result == 0)
+			result = each(context, &drop);
 		if (result != 0)
 			break;
 	}
+	sqlite3_finalize(budgets);
 	sqlite3_finalize(s);
 	return result;
 }
@@ -381,21 +385,40 @@ int archive_each_event(struct archive *archive, const char *drop,
 	return result;
 }
 
-int archive_each_calibration(struct archive *archive,
-                             int (*each)(void *context, const struct archive_calibration *calibration),
-                             void *context)
+/* The row of a drop's result. */
+static int look_result(struct archive *archive, const char *drop, const char *version, int64_t *row)
 {
-	sqlite3_stmt *s;
-	int result = sql_query(archive, &s,
-	                       "SELECT sensor, date, note, gain FROM calibrations ORDER BY sensor, date", "");
+	struct archive_place place;
+	int result = archive_locate(archive, drop, &place);
 
+	if (result == 0)
+		result = sql_number(archive, row,
+		                    "SELECT r.id FROM results r JOIN versions v ON v.id = r.version_id"
+		                    " WHERE r.drop_id = ?1 AND (?2 IS NULL OR v.name = ?2)"
+		                    " ORDER BY r.id DESC LIMIT 1",
+		                    "is", place.drop, version);
+	if (result == DT_E_EMPTY)
+		return archive_refuse(archive, result, "%.100s: no result", drop);
+	return result;
+}
+
+int archive_each_sensor(struct archive *archive, const char *drop, const char *version,
+                        int (*each)(void *context, const struct sensor_used *sensor), void *context)
+{
+	const struct quantity_home *home = &quantity_homes[QUANTITY_AT_SENSOR];
+	struct sensor_used used;
+	sqlite3_stmt *s;
+	int64_t row = 0;
+	int result = look_result(archive, drop, version, &row);
+
+	if (result == 0)
+		result = quantities_select(archive, home, &s);
 	if (result != 0)
 		return result;
+	sqlite3_bind_int64(s, 1, row);
 	while ((result = sql_step(archive, s)) > 0) {
-		struct archive_calibration c = {sql_text(s, 0), sql_text(s, 1), sql_text(s, 2),
-		                                sqlite3_column_double(s, 3)};
-
-		result = each(context, &c);
+		quantities_sensor(s, &used);
+		result = each(context, &used);
 		if (result != 0)
 			break;
 	}
@@ -405,18 +428,9 @@ int archive_each_calibration(struct archive *archive,
 
 int archive_analysis(struct archive *archive, const char *drop, const char *version, struct result *said)
 {
-	struct archive_place place;
 	int64_t row = 0;
-	int result = archive_locate(archive, drop, &place);
+	int result = look_result(archive, drop, version, &row);
 
-	if (result == 0)
-		result = sql_number(archive, &row,
-		                    "SELECT r.id FROM results r JOIN versions v ON v.id = r.version_id"
-		                    " WHERE r.drop_id = ?1 AND (?2 IS NULL OR v.name = ?2)"
-		                    " ORDER BY r.id DESC LIMIT 1",
-		                    "is", place.drop, version);
-	if (result == DT_E_EMPTY)
-		return archive_refuse(archive, result, "%.100s: no result", drop);
 	if (result == 0)
 		result = quantities_read(archive, row, said);
 	if (result == 0 && said->analysis->channel_count == 0)

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "host/result/uncertainty.h"
+
 int print_done(int result, const struct table *table)
 {
 	if (result == 0)
@@ -45,6 +47,21 @@ void print_more(const struct print *p)
 {
 	if (p->table.more)
 		fprintf(p->table.out, "there are more: these are the newest %zu\n", p->table.rows);
+}
+
+void print_uncertainties(const struct archive_cell *cell, FILE *out)
+{
+	struct budget_item item[ARCHIVE_VALUE_COUNT];
+	size_t count = archive_cell_uncertainties(cell, item);
+
+	if (count == 0)
+		return;
+	fputc('\n', out);
+	(void)uncertainty_table(item, count, TABLE_TEXT, out);
+	fputs("U = k u of the mean covers 95.45 %. Scatter falls with the number of drops; all other parts "
+	      "are the "
+	      "same in each,\nand cancel in differences between drops, SD and trends.\n",
+	      out);
 }
 
 /* ---- series ---- */
@@ -103,34 +120,4 @@ int print_series(struct archive *archive, const struct archive_filter *filter, e
 	if (format == TABLE_TEXT)
 		print_more(&p);
 	return print_done(result, &p.table);
-}
-
-/* ---- calibrations ---- */
-
-#define COLUMN(KIND, member, ...) TABLE_COLUMN(KIND, struct archive_calibration, member, __VA_ARGS__)
-static const struct table_column calibration_columns[] = {
-        COLUMN(WORDS, sensor, .key = "sensor", .title = "", .width = -12),
-        COLUMN(WORDS, date, .key = "date", .title = ""),
-        COLUMN(NUMBER, gain, .key = "gain", .title = "", .gap = "  ", .digits = TABLE_DIGITS_G),
-        COLUMN(WORDS, note, .key = "note", .title = "", .gap = "  "),
-};
-#undef COLUMN
-
-static int put_calibration(void *context, const struct archive_calibration *calibration)
-{
-	table_row(context, calibration);
-	return 0;
-}
-
-int print_calibrations(struct archive *archive, enum table_format format, FILE *out)
-{
-	struct table table = {.out = out, .format = format, .bare = true};
-	int result;
-
-	fputs(format == TABLE_JSON ? "{\"calibrations\":" : "", out);
-	table_begin(&table, calibration_columns, TABLE_COUNT(calibration_columns));
-	result = archive_each_calibration(archive, put_calibration, &table);
-	table_end(&table);
-	fputs(format == TABLE_JSON ? "}\n" : "", out);
-	return print_done(result, &table);
 }

@@ -25,6 +25,4 @@ DT_MUST_USE int print_drops(struct archive *archive, const struct archive_filter
 DT_MUST_USE int print_tables(struct archive *archive, const struct archive_filter *filter, bool undecided,
                              const char *reference, enum table_format format, FILE *out);
 
-DT_MUST_USE int print_calibrations(struct archive *archive, enum table_format format, FILE *out);
-
 #endif

@@ -7,6 +7,7 @@
 struct drop_row {
 	struct archive_drop drop;
 	struct table_value value[ARCHIVE_VALUE_COUNT];
+	double expanded[ARCHIVE_VALUE_COUNT], k[ARCHIVE_VALUE_COUNT]; /* NAN: no budget */
 	cJSON *not_ok, *events;
 	/* of the text */
 	char name[ARCHIVE_NAME_MAX + 16];
@@ -38,8 +39,10 @@ static const struct table_column first_columns[] = {
         COLUMN(WORDS, drop.verdict, .key = "verdict"),
 };
 static const struct table_column value_columns[] = {
-#define QUANTITY_COLUMN(NAME, name, unit, ...) \
-	COLUMN(VALUE, value[ARCHIVE_##NAME], .key = name "_" unit, .sigma = name "_sigma_" unit),
+#define QUANTITY_COLUMN(NAME, name, unit, ...)                                                    \
+	COLUMN(VALUE, value[ARCHIVE_##NAME], .key = name "_" unit, .sigma = name "_sigma_" unit), \
+	        COLUMN(NUMBER, expanded[ARCHIVE_##NAME], .key = name "_expanded_" unit),          \
+	        COLUMN(NUMBER, k[ARCHIVE_##NAME], .key = name "_k"),
 #include "host/result/quantity.def"
 };
 static const struct table_column last_columns[] = {
@@ -49,7 +52,7 @@ static const struct table_column last_columns[] = {
         COLUMN(ITEM, events, .key = "events"),       COLUMN(CHARS, remarks, .title = "", .gap = ""),
 };
 
-enum { COLUMNS_MAX = TABLE_COUNT(first_columns) + 2 * ARCHIVE_VALUE_COUNT + TABLE_COUNT(last_columns) };
+enum { COLUMNS_MAX = TABLE_COUNT(first_columns) + 4 * ARCHIVE_VALUE_COUNT + TABLE_COUNT(last_columns) };
 
 static size_t all_columns(struct table_column column[COLUMNS_MAX])
 {
@@ -97,6 +100,11 @@ static void fill_values(struct print *p, struct drop_row *row)
 		bool not_ok = (row->drop.not_ok >> i & 1u) != 0 && !isnan(row->drop.value[i]);
 
 		row->value[i] = (struct table_value){row->drop.value[i], row->drop.sigma[i], not_ok};
+		row->expanded[i] = row->k[i] = (double)NAN;
+		if (row->drop.budget[i].what[0] != '\0') {
+			row->expanded[i] = row->drop.budget[i].expanded;
+			row->k[i] = row->drop.budget[i].k;
+		}
 		p->marked |= not_ok && quantity_columns[i].head[0] != '\0';
 		if (not_ok && row->not_ok != NULL)
 			cJSON_AddItemToArray(row->not_ok,
@@ -208,6 +216,7 @@ static void total_text(const struct print *p)
 		archive_cell_row(&p->total, table.of, row.value);
 		table_row(&table, &row);
 	}
+	print_uncertainties(&p->total, table.out);
 }
 
 static int head_text(void *context, const struct archive_series *series)
@@ -263,6 +272,7 @@ int print_drops(struct archive *archive, const struct archive_filter *filter, bo
 		table_begin(&p.table, column, all_columns(column));
 		result = archive_each_drop(archive, &asked, print_drops_put_drop, &p);
 		table_end(&p.table);
+		archive_cell_close(&p.total);
 	}
 	if (result == 0 && format == TABLE_JSON)
 		result = end_json(&p);

@@ -20,6 +20,9 @@ struct print {
 /* The filter of a list: one more than its limit is asked for, so that more can be told. */
 struct archive_filter print_begin(struct print *p, const struct archive_filter *filter);
 
+/* The table of the means' expanded uncertainties, and what they are of; nothing without one. */
+void print_uncertainties(const struct archive_cell *cell, FILE *out);
+
 /* Says in a line of text that there are more. */
 void print_more(const struct print *p);
 
@@ -30,12 +33,16 @@ int print_done(int result, const struct table *table);
 enum { PRINT_SERIES_COLUMNS = 15 };
 extern const struct table_column print_series_columns[PRINT_SERIES_COLUMNS];
 
-/* Mean, SD and counts of a value; name: its group. */
-#define PRINT_MEAN(type, member, name, unit)                                               \
-	TABLE_COLUMN(NUMBER, type, member.mean, .key = "mean_" unit, .group = (name)),     \
-	        TABLE_COLUMN(NUMBER, type, member.sd, .key = "sd_" unit, .group = (name)), \
-	        TABLE_COLUMN(WHOLE, type, member.n, .key = "n", .group = (name)),          \
-	        TABLE_COLUMN(WHOLE, type, member.not_ok, .key = "not_ok", .csv = "", .group = (name))
+/* Mean, SD, counts and uncertainty of a value; name: its group. */
+#define PRINT_MEAN(type, member, name, unit)                                                                 \
+	TABLE_COLUMN(NUMBER, type, member.mean, .key = "mean_" unit, .group = (name)),                       \
+	        TABLE_COLUMN(NUMBER, type, member.sd, .key = "sd_" unit, .group = (name)),                   \
+	        TABLE_COLUMN(WHOLE, type, member.n, .key = "n", .group = (name)),                            \
+	        TABLE_COLUMN(WHOLE, type, member.not_ok, .key = "not_ok", .csv = "", .group = (name)),       \
+	        TABLE_COLUMN(NUMBER, type, member.whole.expanded, .key = "expanded_" unit, .group = (name)), \
+	        TABLE_COLUMN(NUMBER, type, member.whole.k, .key = "k", .group = (name)),                     \
+	        TABLE_COLUMN(CHARS, type, member.whole.largest, .key = "largest", .csv = "",                 \
+	                     .group = (name))
 
 /* Text columns of the values that have a head in quantity.def, an array of all of them at offset in the row;
  * TABLE_VALUE or TABLE_NUMBER. Returns how many. */

@@ -177,6 +177,15 @@ static void means_text(const struct archive_table *table, FILE *out)
 			fprintf(out, "%5s  %u accepted, but altered or missing, and in no mean\n", "",
 			        cell->faulty);
 	}
+	for (size_t i = 0; i < table->count; i++) {
+		const struct archive_cell *cell = &table->cell[i];
+		struct budget_item any[ARCHIVE_VALUE_COUNT];
+
+		if (archive_cell_uncertainties(cell, any) > 0)
+			fprintf(out, "\n%s from %g m at %g deg, campaign %s", cell->scene_name,
+			        cell->height_m, cell->angle_deg, cell->campaign);
+		print_uncertainties(cell, out);
+	}
 }
 
 static void ratio_text(FILE *out, double value)

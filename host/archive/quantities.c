@@ -268,6 +268,58 @@ int quantities_select(struct archive *archive, const struct quantity_home *home,
 	return quantities_query(archive, s, &text);
 }
 
+/* Texts that an item has no room for become one of those that there are. */
+static void budget_row(sqlite3_stmt *s, struct budget_item *item)
+{
+	const struct quantity *q = NULL;
+	int at = 1;
+
+	quantity_clear(QUANTITY_BUDGET, item);
+	quantities_read_row(s, &quantity_homes[QUANTITY_AT_BUDGET], item);
+	snprintf(item->what, sizeof(item->what), "%s", sql_text(s, 0));
+	if (isnan(item->degrees))
+		item->degrees = (double)INFINITY;
+	for (; (q = quantities_next(QUANTITY_BUDGET, q)) != NULL; at++) {
+		if (strcmp(q->key, "largest") == 0)
+			snprintf(item->largest, sizeof(item->largest), "%s", sql_text(s, at));
+		if (strcmp(q->key, "rule") == 0)
+			item->method = sql_text(s, at)[0] == 'd' ? "distribution" : "linear";
+	}
+}
+
+int quantities_budget(struct archive *archive, sqlite3_stmt **s, int64_t row,
+                      struct budget_item item[QUANTITY_COLUMNS])
+{
+	const struct quantity_home *home = &quantity_homes[QUANTITY_AT_BUDGET];
+	int result = *s != NULL ? 0 : quantities_select(archive, home, s);
+
+	if (result != 0)
+		return result;
+	sqlite3_bind_int64(*s, 1, row);
+	while ((result = sql_step(archive, *s)) > 0)
+		for (int i = 0; i < QUANTITY_COLUMNS; i++) {
+			char what[QUANTITY_WHAT_MAX];
+
+			quantity_column_what(&quantity_columns[i], what);
+			if (strcmp(what, sql_text(*s, 0)) == 0)
+				budget_row(*s, &item[i]);
+		}
+	sqlite3_reset(*s);
+	return result;
+}
+
+void quantities_sensor(sqlite3_stmt *s, struct sensor_used *used)
+{
+	const struct quantity *q = NULL;
+
+	memset(used, 0, sizeof(*used));
+	quantities_read_row(s, &quantity_homes[QUANTITY_AT_SENSOR], used);
+	snprintf(used->name, sizeof(used->name), "%s", sql_text(s, 0));
+	for (int at = 1; (q = quantities_next(QUANTITY_SENSOR, q)) != NULL; at++)
+		if (q->kind == QUANTITY_NAME)
+			*(const char **)(void *)((char *)used + q->offset) = sql_text(s, at);
+}
+
 static int read_place(struct archive *archive, int64_t row, enum quantity_place place, struct result *said)
 {
 	const struct quantity_home *home = &quantity_homes[place];

@@ -26,6 +26,13 @@ DT_MUST_USE int quantities_select(struct archive *archive, const struct quantity
 /* As quantity_next, of those that are columns. */
 const struct quantity *quantities_next(enum quantity_object object, const struct quantity *last);
 
+/* Budgets of the values that are columns of drops. s: NULL at first, kept between calls, to be finalized. */
+DT_MUST_USE int quantities_budget(struct archive *archive, sqlite3_stmt **s, int64_t row,
+                                  struct budget_item item[QUANTITY_COLUMNS]);
+
+/* A row of the sensors; its texts are the statement's. */
+void quantities_sensor(sqlite3_stmt *s, struct sensor_used *used);
+
 /* Back, with paths and methods left empty. A record that has channels, from its log, keeps what it has but
  * its flags. On success and on error the analysis' channels are to be freed. */
 DT_MUST_USE int quantities_read(struct archive *archive, int64_t row, struct result *said);

@@ -14,7 +14,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "common/base/date.h"
 #include "host/result/plan.h"
 #include "host/archive/proof.h"
 
@@ -41,32 +40,55 @@ static int read_scene_text(struct archive *archive, const char *file, char **tex
 	                      file, SCENE_MAX_BYTES);
 }
 
-/* The line that says height_m; NULL: there is none. A scene has one such key. */
-static const char *height_line(const char *text)
+/* The line of a scene's text that gives a key; section: whether it stands in one. NULL: there is none. */
+static const char *line_of(const char *text, const char *key, bool section)
 {
+	size_t length = strlen(key);
+	bool inside = false;
+
 	for (const char *line = text; *line != '\0'; line += strcspn(line, "\n"), line += *line != '\0') {
 		const char *word = line + strspn(line, " \t");
 
-		if (strcspn(word, " \t=:\n") == 8 && strncmp(word, "height_m", 8) == 0)
+		inside = inside || *word == '[';
+		if (inside == section && strcspn(word, " \t=:\n") == length &&
+		    strncmp(word, key, length) == 0)
 			return line;
 	}
 	return NULL;
 }
 
-/* Puts another height into a scene's text. */
-static int set_height(struct archive *archive, double height_m, char **text)
+/* Puts another line into a scene's text at the place of line, whose own goes. */
+static int put_line(struct archive *archive, char **text, const char *line, bool own, const char *with)
 {
-	const char *line = height_line(*text);
 	char *changed = NULL;
 
-	if (line == NULL)
-		return archive_refuse(archive, DT_E_FORMAT, "the scene has no line 'height_m = '");
-	if (asprintf(&changed, "%.*sheight_m = %.15g%s", (int)(line - *text), *text, height_m,
-	             line + strcspn(line, "\n")) < 0)
+	if (asprintf(&changed, "%.*s%s%s", (int)(line - *text), *text, with,
+	             own ? line + strcspn(line, "\n") : line) < 0)
 		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
 	free(*text);
 	*text = changed;
 	return 0;
+}
+
+static int set_height(struct archive *archive, double height_m, char **text)
+{
+	const char *line = line_of(*text, "height_m", true);
+	char with[48];
+
+	if (line == NULL)
+		return archive_refuse(archive, DT_E_FORMAT, "the scene has no line 'height_m = '");
+	snprintf(with, sizeof(with), "height_m = %.15g", height_m);
+	return put_line(archive, text, line, true, with);
+}
+
+/* Names that do not depend on where the scene stood. */
+static int set_chain(struct archive *archive, const char *chain, char **text)
+{
+	const char *line = line_of(*text, "chain", false);
+	char with[sizeof(((struct scene *)NULL)->chain) + 16];
+
+	snprintf(with, sizeof(with), "chain = %s%s", chain, line != NULL ? "" : "\n");
+	return put_line(archive, text, line != NULL ? line : *text, line != NULL, with);
 }
 
 int series_insert(struct archive *archive, const char *name, const char *campaign, const char *text,
@@ -125,6 +147,8 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 		return result;
 	if (!isnan(height_m))
 		result = set_height(archive, height_m, &text);
+	if (result == 0 && scene.chain[0] != '\0')
+		result = set_chain(archive, scene.chain, &text);
 	if (result == 0)
 		result = scene_of_text(archive, name, text, angle_deg, &scene);
 	if (result == 0)
@@ -134,6 +158,55 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 		                     recording_make_series(archive, name, campaign, text, &scene, planned));
 	free(text);
 	return result;
+}
+
+/* The row, angle and text of a series without drops. */
+static int open_series(struct archive *archive, const char *series, int64_t *row, double *angle_deg,
+                       char **text)
+{
+	sqlite3_stmt *s;
+	int result = sql_query(archive, &s,
+	                       "SELECT id, angle_deg, scene FROM series WHERE name = ? AND NOT EXISTS"
+	                       " (SELECT 1 FROM drops WHERE series_id = series.id)",
+	                       "s", series);
+
+	if (result != 0)
+		return result;
+	result = sql_step(archive, s);
+	if (result > 0) {
+		*row = sqlite3_column_int64(s, 0);
+		*angle_deg = sqlite3_column_double(s, 1);
+		*text = strdup(sql_text(s, 2));
+	}
+	sqlite3_finalize(s);
+	if (result == 0)
+		return archive_refuse(archive, DT_E_STATE, "no series '%.80s' without drops", series);
+	if (result > 0 && *text == NULL)
+		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+	return result < 0 ? result : 0;
+}
+
+int archive_set_chain(struct archive *archive, const char *series, const char *chain)
+{
+	double angle_deg = 0.0;
+	char *text = NULL;
+	struct scene scene;
+	int64_t row = 0;
+	int result = archive_start(archive);
+
+	if (result != 0)
+		return result;
+	result = open_series(archive, series, &row, &angle_deg, &text);
+	if (result == 0)
+		result = set_chain(archive, chain, &text);
+	if (result == 0)
+		result = scene_of_text(archive, series, text, angle_deg, &scene);
+	if (result == 0)
+		result = sql_run(archive, "UPDATE series SET scene = ? WHERE id = ?", "si", text, row);
+	if (result == 0)
+		result = sidecar_write_series(archive, row);
+	free(text);
+	return archive_end(archive, result);
 }
 
 /* ---- recording ---- */
@@ -348,7 +421,7 @@ int archive_finish(struct archive *archive, struct archive_recording *recording,
 	return result;
 }
 
-/* ---- decisions, notes, calibrations ---- */
+/* ---- decisions and notes ---- */
 
 /* What is asked for comes before the drop's files, which are read from end to end. */
 static int look_first(struct archive *archive, const char *drop, const char *operator_name, const char *text,
@@ -425,46 +498,4 @@ int archive_note(struct archive *archive, const char *drop, const char *operator
 	if (result == 0)
 		result = event_insert(archive, place.drop, "note", operator_name, text);
 	return end_change(archive, &place, result);
-}
-
-static int write_calibration(struct archive *archive, const char *sensor, double gain, const char *date,
-                             const char *note)
-{
-	char file[ARCHIVE_NAME_MAX + 64], text[ARCHIVE_TEXT_MAX + 600];
-	struct chain_place place;
-	int result = chain_next(archive, &place);
-
-	if (result != 0)
-		return result;
-	snprintf(file, sizeof(file), "raw/%.4s/calibration-%s-%s.ini", date, sensor, date);
-	snprintf(text, sizeof(text),
-	         SIDECAR_SECTION "\nformat = 1\ncalibration = %s\ngain = %.17g\ndate = %s\nnote = %s\n"
-	                         "entry = %lld\nprevious = %s\n",
-	         sensor, gain, date, note, (long long)place.number, place.head);
-	return sidecar_put(archive, file, text, strlen(text), &place);
-}
-
-int archive_calibrate(struct archive *archive, const char *sensor, double gain, const char *date,
-                      const char *note)
-{
-	int result = archive_check_name(archive, "sensor", sensor);
-
-	if (result == 0)
-		result = archive_check_text(archive, "note", note);
-	if (result != 0)
-		return result;
-	if (!date_is_day(date))
-		return archive_refuse(archive, DT_E_ARGUMENT, "'%.40s' is no date, expected YYYY-MM-DD",
-		                      date);
-	if (!(gain >= 0.1 && gain <= 10))
-		return archive_refuse(archive, DT_E_RANGE, "a gain of %g, expected 0.1 to 10", gain);
-	result = archive_start(archive);
-	if (result != 0)
-		return result;
-	result = sql_run(archive,
-	                 "INSERT OR REPLACE INTO calibrations (sensor, gain, date, note) VALUES (?, ?, ?, ?)",
-	                 "sdss", sensor, gain, date, note);
-	if (result == 0)
-		result = write_calibration(archive, sensor, gain, date, note);
-	return archive_end(archive, result);
 }

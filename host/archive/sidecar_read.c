@@ -257,12 +257,7 @@ static int sidecar_read_take(struct archive *archive, const struct sidecar *side
 	int result;
 
 	if (sidecar_value(sidecar, "calibration")[0] != '\0')
-		return sql_run(archive,
-		               "INSERT OR REPLACE INTO calibrations (sensor, gain, date, note)"
-		               " VALUES (?, ?, ?, ?)",
-		               "sdss", sidecar_value(sidecar, "calibration"),
-		               sidecar_read_number(sidecar, "gain"), sidecar_value(sidecar, "date"),
-		               sidecar_value(sidecar, "note"));
+		return 0; /* a note of before sensors had files: it stays in the chain */
 	if (sidecar_value(sidecar, "drop")[0] == '\0' && sidecar_is_of_drop(sidecar->file))
 		return archive_refuse(archive, DT_E_FORMAT, "no line 'drop = ', expected its number");
 	if (sidecar_value(sidecar, "drop")[0] == '\0')

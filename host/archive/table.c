@@ -8,7 +8,7 @@
 
 #include "host/archive/private.h"
 
-static void mean_add(struct archive_mean *m, double value, bool not_ok)
+static void mean_add(struct archive_mean *m, double value, bool not_ok, const struct budget_item *budget)
 {
 	double before = m->n > 0 ? value - m->mean : value;
 
@@ -19,6 +19,40 @@ static void mean_add(struct archive_mean *m, double value, bool not_ok)
 	m->mean = m->n > 1 ? m->mean + before / m->n : value;
 	m->squares += m->n > 1 ? before * (value - m->mean) : 0;
 	m->sd = m->n > 1 ? sqrt(m->squares / (m->n - 1)) : (double)NAN;
+	if (budget->what[0] != '\0')
+		budget_mean_add(&m->budget, budget);
+}
+
+void archive_cell_close(struct archive_cell *cell)
+{
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		struct archive_mean *m = &cell->value[i];
+
+		if (m->n > 0 && m->budget.count == m->n)
+			budget_mean_item(&m->budget, m->mean, m->sd, &m->whole);
+		else
+			m->whole = (struct budget_item){.expanded = NAN, .k = NAN};
+	}
+}
+
+size_t archive_cell_uncertainties(const struct archive_cell *cell,
+                                  struct budget_item item[ARCHIVE_VALUE_COUNT])
+{
+	size_t count = 0;
+
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		const struct quantity_column *c = &quantity_columns[i];
+		double scale = quantity_column_scale(c);
+
+		if (cell->value[i].n == 0 || !isfinite(cell->value[i].whole.expanded))
+			continue;
+		item[count] = cell->value[i].whole;
+		snprintf(item[count].what, sizeof(item[count].what), "%s", c->title);
+		item[count].unit = c->shown;
+		item[count].value *= scale;
+		item[count++].expanded *= scale;
+	}
+	return count;
 }
 
 void archive_cell_add(struct archive_cell *cell, const struct archive_drop *drop)
@@ -38,7 +72,7 @@ void archive_cell_add(struct archive_cell *cell, const struct archive_drop *drop
 	}
 	cell->drops++;
 	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
-		mean_add(&cell->value[i], drop->value[i], (drop->not_ok >> i & 1u) != 0);
+		mean_add(&cell->value[i], drop->value[i], (drop->not_ok >> i & 1u) != 0, &drop->budget[i]);
 }
 
 void archive_cell_row(const struct archive_cell *cell, enum table_of of,
@@ -117,6 +151,8 @@ int archive_table(struct archive *archive, const struct archive_filter *filter, 
 	struct growing g = {.undecided = undecided};
 	int result = archive_each_numbers(archive, filter, table_add_drop, &g);
 
+	for (size_t i = 0; i < g.table.count; i++)
+		archive_cell_close(&g.table.cell[i]);
 	if (result == 0)
 		*table = g.table;
 	else

@@ -8,11 +8,14 @@
 #include "host/base/table.h"
 
 struct archive_mean {
-	unsigned n;      /* drops that have the value */
-	unsigned not_ok; /* of them, those whose status says to look */
-	double mean;     /* NAN without any */
-	double sd;       /* of a single drop, over n - 1; NAN below two */
-	double squares;  /* while it grows: sum of squared deviations */
+	unsigned n;                /* drops that have the value */
+	unsigned not_ok;           /* of them, those whose status says to look */
+	double mean;               /* NAN without any */
+	double sd;                 /* of a single drop, over n - 1; NAN below two */
+	double squares;            /* while it grows: sum of squared deviations */
+	struct budget_mean budget; /* of those that have one, while it grows */
+	struct budget_item
+	        whole; /* the mean's uncertainty; expanded NAN: none, since one of them has no budget */
 };
 
 struct archive_cell {
@@ -36,6 +39,13 @@ struct archive_table {
 
 /* Adds a drop, or notes that it is faulty; a cell is begun zeroed. (Welford 1962) */
 void archive_cell_add(struct archive_cell *cell, const struct archive_drop *drop);
+
+/* Its means' uncertainties, once all drops are in. */
+void archive_cell_close(struct archive_cell *cell);
+
+/* Those that there are, by the values' titles and in the units that people read. Returns how many. */
+size_t archive_cell_uncertainties(const struct archive_cell *cell,
+                                  struct budget_item item[ARCHIVE_VALUE_COUNT]);
 
 /* Whether a drop counts: accepted, or with undecided, also recorded and not yet decided; and its files are
  * what was recorded. */

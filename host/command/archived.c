@@ -107,11 +107,12 @@ int archived_read(struct archive *archive, const char *drop, struct record *reco
 
 /* The result does not depend on where the archive stands. */
 static int command_archived_analyse(struct archive *archive, const char *drop, const struct scene *scene,
-                                    struct record *record, char message[ARCHIVE_MESSAGE_MAX])
+                                    const char *chain, struct record *record,
+                                    char message[ARCHIVE_MESSAGE_MAX])
 {
 	struct evaluated e;
 	struct result said;
-	char *json = evaluate_json(&e, record, scene);
+	char *json = evaluate_json(&e, record, scene, chain);
 	int result;
 
 	if (json == NULL) {
@@ -128,7 +129,28 @@ static int command_archived_analyse(struct archive *archive, const char *drop, c
 	return result;
 }
 
-int archived_result(struct archive *archive, const char *series, unsigned number,
+static int count_sensor(void *context, const struct sensor_used *used)
+{
+	(void)used;
+	(*(size_t *)context)++;
+	return 0;
+}
+
+/* A result that a laboratory has signed does not lose its uncertainties by a word left out. */
+static int lacks_sensors(struct archive *archive, const char *drop, const struct scene *scene,
+                         const char *chain, char message[ARCHIVE_MESSAGE_MAX])
+{
+	size_t count = 0;
+	int result = archive_each_sensor(archive, drop, NULL, count_sensor, &count);
+
+	if (result == DT_E_EMPTY || (result == 0 && (count == 0 || chain != NULL || scene->chain[0] != '\0')))
+		return 0;
+	snprintf(message, ARCHIVE_MESSAGE_MAX,
+	         "%.100s: its result rests on the files of %zu sensors: expected --chain", drop, count);
+	return result != 0 ? result : DT_E_STATE;
+}
+
+int archived_result(struct archive *archive, const char *series, unsigned number, const char *chain,
                     char fault[ARCHIVE_MESSAGE_MAX], char message[ARCHIVE_MESSAGE_MAX])
 {
 	char drop[ARCHIVE_NAME_MAX + 16];
@@ -141,18 +163,20 @@ int archived_result(struct archive *archive, const char *series, unsigned number
 	if (result != 0)
 		return result;
 	snprintf(drop, sizeof(drop), "%.60s/%u", series, number);
-	result = archived_read(archive, drop, &record, fault, message);
+	result = lacks_sensors(archive, drop, &scene, chain, message);
+	if (result == 0)
+		result = archived_read(archive, drop, &record, fault, message);
 	if (result != 0)
 		return result;
-	result = command_archived_analyse(archive, drop, &scene, &record, message);
+	result = command_archived_analyse(archive, drop, &scene, chain, &record, message);
 	record_free(&record);
 	return result;
 }
 
-int archived_analyse(struct archive *archive, const char *series, unsigned number)
+int archived_analyse(struct archive *archive, const char *series, unsigned number, const char *chain)
 {
 	char message[ARCHIVE_MESSAGE_MAX], fault[ARCHIVE_MESSAGE_MAX];
-	int result = archived_result(archive, series, number, fault, message);
+	int result = archived_result(archive, series, number, chain, fault, message);
 
 	if (fault[0] != '\0')
 		command_error("%s; analysed again from the log, which is what was recorded", fault);

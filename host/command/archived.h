@@ -31,10 +31,12 @@ DT_MUST_USE int archived_read(struct archive *archive, const char *drop, struct 
 
 /* As archived_analyse, with what is wrong in message, and 0 or DT_E_*. */
 DT_MUST_USE int archived_result(struct archive *archive, const char *series, unsigned number,
-                                char fault[ARCHIVE_MESSAGE_MAX], char message[ARCHIVE_MESSAGE_MAX]);
+                                const char *chain, char fault[ARCHIVE_MESSAGE_MAX],
+                                char message[ARCHIVE_MESSAGE_MAX]);
 
 /* Analyses SERIES/NUMBER from its log and keeps the result under this program's version. A log that cannot be
- * analysed stays, without a result; one that is not what was recorded is refused. */
-int archived_analyse(struct archive *archive, const char *series, unsigned number);
+ * analysed stays, without a result; one that is not what was recorded is refused. chain: the sensors' files
+ * in place of the scene's; NULL: those, and a drop whose newest result had such files is refused without. */
+int archived_analyse(struct archive *archive, const char *series, unsigned number, const char *chain);
 
 #endif

@@ -290,7 +290,7 @@ static int hand_on_drop(struct bridge *bridge)
 	result = publisher_drop(bridge->publisher, &record);
 	if (result == 0)
 		result = session_accept(bridge->session);
-	json = evaluate_json(&e, &record, bridge->scene_file != NULL ? &bridge->scene : NULL);
+	json = evaluate_json(&e, &record, bridge->scene_file != NULL ? &bridge->scene : NULL, NULL);
 	if (json == NULL)
 		command_error("drop %u: no result, it cannot be analysed", record.drop_id);
 	else if (result == 0)

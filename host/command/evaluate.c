@@ -449,9 +449,10 @@ int evaluate(struct record *record, const struct evaluate_options *options)
 	return code;
 }
 
-char *evaluate_json(struct evaluated *e, const struct record *record, const struct scene *scene)
+char *evaluate_json(struct evaluated *e, const struct record *record, const struct scene *scene,
+                    const char *chain)
 {
-	struct evaluate_options options = {.scene = scene, .iepe_time_constant_s = NAN};
+	struct evaluate_options options = {.scene = scene, .chain = chain, .iepe_time_constant_s = NAN};
 	struct text json;
 	int result;
 

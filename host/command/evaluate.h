@@ -78,9 +78,10 @@ struct result evaluate_said(struct evaluated *e);
 /* Prints and writes what was asked for. Returns a COMMAND_* exit code; errors were printed. */
 int evaluate(struct record *record, const struct evaluate_options *options);
 
-/* The JSON of a record as `analyze --scene` gives it, to be freed, with e open; NULL if it cannot be
- * analysed. scene may be NULL. */
-char *evaluate_json(struct evaluated *e, const struct record *record, const struct scene *scene);
+/* The JSON of a record as `analyze --scene --chain` gives it, to be freed, with e open; NULL if it cannot be
+ * analysed. scene and chain may be NULL. */
+char *evaluate_json(struct evaluated *e, const struct record *record, const struct scene *scene,
+                    const char *chain);
 
 /* A drop of the tower as a fit wants it; borrows record's samples. NULL, or the channel that is missing. */
 const char *evaluate_fit_drop(const struct record *record, double angle_deg, double height_m,

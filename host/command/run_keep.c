@@ -144,7 +144,7 @@ static int report_archived(struct run *run, struct record *record)
 		return run->log_failed ? run_keep_tell_lost(run) : archived_failed(run->archive);
 	}
 	run_progress(run, "recorded  %s/%u", r->series, r->number);
-	code = archived_analyse(run->archive, r->series, r->number);
+	code = archived_analyse(run->archive, r->series, r->number, NULL);
 	snprintf(record->file, sizeof(record->file), "%s", r->raw);
 	shown = evaluate(record, &options);
 	mine.series = r->series;

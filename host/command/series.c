@@ -22,10 +22,11 @@ static int take_dates(const struct option_table *table, const char *name, const 
 	a->date = text;
 	if (archive_parse_dates(text, &a->dates, &a->filter))
 		return OPTIONS_READ;
-	return option_wrong(table,
-	                    "--%s is '%s', expected YYYY, YYYY-MM, YYYY-MM-DD of the calendar, or two of "
-	                    "them with .. between",
-	                    name, text);
+	return option_wrong(
+	        table,
+	        "--%s is '%s', expected YYYY, YYYY-MM, YYYY-MM-DD or YYYY-MM-DDTHH:MM of the calendar, or "
+	        "two of them with .. between",
+	        name, text);
 }
 
 static const struct option_row rows[] = {
@@ -43,8 +44,13 @@ static const struct option_row rows[] = {
                      "those at an angle; for new: instead of the scene's; for add: of these logs"),
         OPTION_TAKEN("height", "M", struct series_arguments, height_m, command_height,
                      "for new: instead of the scene's"),
-        OPTION_TAKEN_BY("date", "DAY", take_dates,
-                        "drops of a day, month or year (UTC), or FROM..TO: 2026-11, 2026-11-02..2026-11-05"),
+        OPTION_TAKEN_BY(
+                "date", "DAY", take_dates,
+                "drops of a minute, day, month or year (UTC), or FROM..TO: 2026-11, 2026-11-02..2026-11-05, "
+                "2026-11-02T08:00..2026-11-02T12:30"),
+        OPTION_TEXT("chain", "FILE,...", struct series_arguments, chain,
+                    "for new, add and reanalyse: the files of the sensors, named by serial number; "
+                    "without it the scene's"),
         OPTION_UNSIGNED("drops", "N", struct series_arguments, drops, 1, 100000,
                         "for new: how many are planned (5)"),
         OPTION_TEXT("version", "V", struct series_arguments, filter.version,
@@ -59,7 +65,7 @@ static const struct option_row rows[] = {
         OPTION_UNSIGNED("limit", "N", struct series_arguments, filter.limit, 1, 1e6,
                         "for list and drops: the newest N, and whether there are more"),
         OPTION_TEXT("reason", "TEXT", struct series_arguments, reason, "of a decision"),
-        OPTION_TEXT("note", "TEXT", struct series_arguments, note, "for add and calibrate"),
+        OPTION_TEXT("note", "TEXT", struct series_arguments, note, "for add"),
         OPTION_FLAG("simulated", struct series_arguments, simulated, "for add: made on a simulated tower"),
         OPTION_TEXT("operator", "NAME", struct series_arguments, operator_name, "who decides ($USER)"),
         OPTION_FLAG("json", struct series_arguments, json, "JSON on standard output"),
@@ -89,7 +95,6 @@ static const struct option_table known_options = {
                 "  result DROP             the analysis in full, as JSON; --version V for an older one\n"
                 "  tables [CAMPAIGN]       means, SDs and ratios by scene and angle\n"
                 "  reanalyse SERIES...     by this version; the results of others stay\n"
-                "  calibrate [SENSOR GAIN] notes a calibration of --date DAY (--note TEXT), or lists them\n"
                 "\n",
         OPTION_ROWS(rows),
         .words = true,
@@ -129,7 +134,6 @@ static const struct verb {
         {"result", ARCHIVE_READ, 1, 1, series_verb_result, "DROP"},
         {"tables", ARCHIVE_READ, 0, 1, series_verb_tables, "at most a CAMPAIGN"},
         {"reanalyse", ARCHIVE_WRITE, 1, 1 << 20, series_verb_reanalyse, "SERIES..."},
-        {"calibrate", ARCHIVE_WRITE, 0, 2, series_verb_calibrate, "SENSOR GAIN, or nothing"},
 };
 enum { VERBS = sizeof(verbs) / sizeof(verbs[0]) };
 
@@ -140,6 +144,9 @@ static int series_check(const struct verb *verb, struct series_arguments *a)
 
 	if (a->count < verb->least || a->count > verb->most)
 		return command_usage("series", "%s: %d words, expected %s", name, a->count, verb->expected);
+	if (a->chain != NULL && verb->run != series_verb_new && verb->run != series_verb_add &&
+	    verb->run != series_verb_reanalyse)
+		return command_usage("series", "--chain goes with new, add and reanalyse, not with %s", name);
 	if (verb->run == series_verb_new) {
 		if (a->scene == NULL)
 			return command_usage("series", "new: expected --scene FILE");
@@ -156,10 +163,6 @@ static int series_check(const struct verb *verb, struct series_arguments *a)
 	a->filter.scene_name = a->scene;
 	if ((verb->run == series_verb_reject || verb->run == series_verb_reopen) && a->reason == NULL)
 		return command_usage("series", "%s: expected --reason TEXT", name);
-	if (verb->run == series_verb_calibrate && a->count == 1)
-		return command_usage("series", "calibrate: expected SENSOR GAIN, or nothing");
-	if (verb->run == series_verb_calibrate && a->count == 2 && a->date == NULL)
-		return command_usage("series", "calibrate: expected --date YYYY-MM-DD");
 	return COMMAND_DONE;
 }
 
@@ -203,5 +206,9 @@ int command_series(int argc, char **argv)
 	for (int i = 0; i < VERBS; i++)
 		if (strcmp(name, verbs[i].name) == 0)
 			return run_verb(&verbs[i], &a);
+	if (strcmp(name, "calibrate") == 0)
+		return command_usage("series",
+		                     "no verb 'calibrate': a calibration stands in its sensor's file, "
+		                     "which --chain names");
 	return command_usage("series", "no verb '%s'", name);
 }

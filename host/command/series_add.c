@@ -319,7 +319,7 @@ static void take_in(struct adding *adding, const char *name, const struct log_ca
 	}
 	printf("%s/%u  %s\n", r.series, r.number, name);
 	fflush(stdout);
-	code = archived_analyse(adding->archive, r.series, r.number);
+	code = archived_analyse(adding->archive, r.series, r.number, a->chain);
 	if (code != COMMAND_DONE)
 		adding->code = code;
 }
@@ -384,6 +384,8 @@ int series_verb_add(struct archive *archive, struct series_arguments *a)
 	struct adding adding = {.archive = archive, .a = a};
 	int code = series_must_be(archive, a->word[0]);
 
+	if (code == COMMAND_DONE)
+		code = series_check_chain(a);
 	if (code != COMMAND_DONE)
 		return code;
 	if (archive_scene(archive, a->word[0], &adding.scene) != 0 ||

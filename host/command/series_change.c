@@ -3,28 +3,55 @@
  * The verbs of `droptower series` that change an archive: series, decisions, notes, results. Logs are added
  * by series_add.c.
  */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "common/base/number.h"
 #include "host/command/archived.h"
 #include "host/base/beside.h"
 #include "host/command/command.h"
+#include "host/command/evaluate.h"
 #include "host/command/series_private.h"
 
-/* ---- a new series ---- */
+/* ---- a new series, and its sensors ---- */
+
+int series_check_chain(const struct series_arguments *a)
+{
+	return a->chain != NULL ? evaluate_check_chain(a->chain) : COMMAND_DONE;
+}
+
+/* The series keeps where the files are, wherever it is looked at from. */
+static int keep_chain(struct archive *archive, const struct series_arguments *a)
+{
+	struct scene scene;
+
+	if (a->chain == NULL)
+		return COMMAND_DONE;
+	if (scene_set_chain(&scene, a->chain, "") != 0)
+		return command_usage("series", "--chain is '%s', expected names of sensor files", a->chain);
+	return archive_set_chain(archive, a->word[0], scene.chain) == 0 ? COMMAND_DONE
+	                                                                : archived_failed(archive);
+}
 
 int series_verb_new(struct archive *archive, struct series_arguments *a)
 {
 	const char *campaign = a->filter.campaign != NULL ? a->filter.campaign : "default";
+	int code = series_check_chain(a);
 	char path[PATH_MAX];
+	struct scene scene;
 
+	if (code == COMMAND_DONE && a->chain == NULL)
+		code = evaluate_read_scene(&scene, a->scene, NAN);
+	if (code != COMMAND_DONE)
+		return code;
 	if (archive_new_series(archive, a->word[0], campaign, beside_scene_file(a->scene, path),
 	                       a->filter.angle_deg, a->height_m, a->drops) != 0)
 		return archived_failed(archive);
-	printf("series %s\n", a->word[0]);
-	return COMMAND_DONE;
+	code = keep_chain(archive, a);
+	if (code == COMMAND_DONE)
+		printf("series %s\n", a->word[0]);
+	return code;
 }
 
 /* ---- the drops that a verb works on ---- */
@@ -73,12 +100,12 @@ static int series_change_choose(struct archive *archive, const char *series, str
 }
 
 /* Analyses all chosen, and goes on past those that cannot be. */
-static int analyse_chosen(struct archive *archive, struct chosen *chosen)
+static int analyse_chosen(struct archive *archive, struct chosen *chosen, const char *chain)
 {
 	int code = COMMAND_DONE;
 
 	for (size_t i = 0; i < chosen->count && !interrupt_came(); i++) {
-		int one = archived_analyse(archive, chosen->drop[i].series, chosen->drop[i].number);
+		int one = archived_analyse(archive, chosen->drop[i].series, chosen->drop[i].number, chain);
 
 		if (one != COMMAND_DONE)
 			code = one;
@@ -128,8 +155,8 @@ int series_verb_accept(struct archive *archive, struct series_arguments *a)
 	return code;
 }
 
-static int decide_all(struct archive *archive, const struct series_arguments *a,
-                      enum archive_decision decision)
+static int decide_each(struct archive *archive, const struct series_arguments *a,
+                       enum archive_decision decision)
 {
 	int code = COMMAND_DONE;
 
@@ -140,41 +167,17 @@ static int decide_all(struct archive *archive, const struct series_arguments *a,
 
 int series_verb_reject(struct archive *archive, struct series_arguments *a)
 {
-	return decide_all(archive, a, ARCHIVE_REJECTED);
+	return decide_each(archive, a, ARCHIVE_REJECTED);
 }
 
 int series_verb_reopen(struct archive *archive, struct series_arguments *a)
 {
-	return decide_all(archive, a, ARCHIVE_OPEN);
+	return decide_each(archive, a, ARCHIVE_OPEN);
 }
 
 int series_verb_note(struct archive *archive, struct series_arguments *a)
 {
 	if (archive_note(archive, a->word[0], a->operator_name, a->word[1]) != 0)
-		return archived_failed(archive);
-	return COMMAND_DONE;
-}
-
-static bool is_sensor(const char *name)
-{
-	return name[0] == 'S' && (name[1] == '1' || name[1] == '2') &&
-	       (name[2] == '\0' || (strchr("XYZ", name[2]) != NULL && name[3] == '\0'));
-}
-
-int series_verb_calibrate(struct archive *archive, struct series_arguments *a)
-{
-	double gain;
-
-	if (a->count == 0)
-		return series_verb_calibrations(archive, a);
-	if (!number_read(a->word[1], 0.1, 10, &gain))
-		return command_usage("series", "calibrate: GAIN is '%s', expected a number from 0.1 to 10",
-		                     a->word[1]);
-	if (!is_sensor(a->word[0]))
-		return command_usage("series",
-		                     "calibrate: no sensor '%s', expected S1 or S2, or an axis as S1X",
-		                     a->word[0]);
-	if (archive_calibrate(archive, a->word[0], gain, a->date, a->note != NULL ? a->note : "") != 0)
 		return archived_failed(archive);
 	return COMMAND_DONE;
 }
@@ -185,13 +188,14 @@ int series_verb_reanalyse(struct archive *archive, struct series_arguments *a)
 {
 	int code = COMMAND_DONE;
 
+	code = series_check_chain(a);
 	interrupt_catch();
 	for (int i = 0; i < a->count && code == COMMAND_DONE; i++) {
 		struct chosen chosen = {0};
 
 		code = series_change_choose(archive, a->word[i], &chosen);
 		if (code == COMMAND_DONE)
-			code = analyse_chosen(archive, &chosen);
+			code = analyse_chosen(archive, &chosen, a->chain);
 	}
 	return code;
 }
@@ -212,7 +216,7 @@ int series_rebuild(const struct series_arguments *a)
 	interrupt_catch();
 	code = series_change_choose(archive, NULL, &chosen);
 	if (code == COMMAND_DONE)
-		code = analyse_chosen(archive, &chosen);
+		code = analyse_chosen(archive, &chosen, a->chain);
 	archive_close(archive);
 	printf("%s: index made again from the raw files\n", a->archive);
 	return code == COMMAND_DONE && wrong > 0 ? COMMAND_INPUT : code;

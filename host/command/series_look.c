@@ -71,11 +71,6 @@ static int series_look_print_table(struct job *job, enum table_format format, FI
 	                    job->arguments->reference, format, out);
 }
 
-static int print_gains(struct job *job, enum table_format format, FILE *out)
-{
-	return print_calibrations(job->archive, format, out);
-}
-
 int series_verb_list(struct archive *archive, struct series_arguments *a)
 {
 	return print(&(struct job){archive, a, print_list});
@@ -154,11 +149,6 @@ int series_verb_tables(struct archive *archive, struct series_arguments *a)
 	if (a->filter.campaign != NULL)
 		code = campaign_must_be(archive, a->filter.campaign);
 	return code != COMMAND_DONE ? code : print(&(struct job){archive, a, series_look_print_table});
-}
-
-int series_verb_calibrations(struct archive *archive, struct series_arguments *a)
-{
-	return print(&(struct job){archive, a, print_gains});
 }
 
 int series_verb_result(struct archive *archive, struct series_arguments *a)

@@ -10,7 +10,7 @@
 #include "host/archive/archive.h"
 
 struct series_arguments {
-	const char *archive, *csv, *reason, *note, *operator_name, *reference, *scene, *date;
+	const char *archive, *csv, *reason, *note, *operator_name, *reference, *scene, *date, *chain;
 	bool json, rebuild, fewer, undecided, simulated;
 	unsigned drops;
 	double height_m;
@@ -26,7 +26,6 @@ int series_verb_drops(struct archive *archive, struct series_arguments *argument
 int series_verb_show(struct archive *archive, struct series_arguments *arguments);
 int series_verb_tables(struct archive *archive, struct series_arguments *arguments);
 int series_verb_result(struct archive *archive, struct series_arguments *arguments);
-int series_verb_calibrations(struct archive *archive, struct series_arguments *arguments);
 
 int series_verb_new(struct archive *archive, struct series_arguments *arguments);
 int series_verb_add(struct archive *archive, struct series_arguments *arguments);
@@ -35,10 +34,12 @@ int series_verb_reject(struct archive *archive, struct series_arguments *argumen
 int series_verb_reopen(struct archive *archive, struct series_arguments *arguments);
 int series_verb_note(struct archive *archive, struct series_arguments *arguments);
 int series_verb_reanalyse(struct archive *archive, struct series_arguments *arguments);
-int series_verb_calibrate(struct archive *archive, struct series_arguments *arguments);
 
 /* Makes the index again, then analyses what came without a result. */
 int series_rebuild(const struct series_arguments *arguments);
+
+/* Whether the sensors' files of --chain can be used, if that was given. */
+int series_check_chain(const struct series_arguments *arguments);
 
 /* Complains when there is no series of that name. */
 int series_must_be(struct archive *archive, const char *name);

@@ -157,7 +157,7 @@ void work_keep_drop(struct job *way)
 		drop->on_disk = rescue(work, drop, message);
 	} else {
 		snprintf(name, sizeof(name), "%s/%u", r->series, r->number);
-		analysed = archived_result(work->archive, r->series, r->number, fault, message) == 0;
+		analysed = archived_result(work->archive, r->series, r->number, NULL, fault, message) == 0;
 	}
 	work_changed(work);
 	pthread_mutex_lock(&work->lock);
@@ -251,7 +251,7 @@ static void recover(struct work *work, const char *drop)
 	if (archive_finish(work->archive, &r, 0,
 	                   "the console ended before it was noted; the log is complete") != 0)
 		work_trouble(work, archive_message(work->archive));
-	else if (archived_result(work->archive, r.series, r.number, fault, message) != 0)
+	else if (archived_result(work->archive, r.series, r.number, NULL, fault, message) != 0)
 		work_trouble(work, message);
 	work_changed(work);
 }

@@ -19,8 +19,7 @@ struct laboratory_reading {
 
 static bool is_date_field(size_t field)
 {
-	return field == LABORATORY_report_issued || field == LABORATORY_item_received ||
-	       field == LABORATORY_s1_due || field == LABORATORY_s2_due;
+	return field == LABORATORY_report_issued || field == LABORATORY_item_received;
 }
 
 static int laboratory_entry(struct settings *settings, const char *section, const char *name,
@@ -46,6 +45,10 @@ static int laboratory_entry(struct settings *settings, const char *section, cons
 		memcpy(text, value, strlen(value) + 1);
 		return 1;
 	}
+	if (strcmp(section, "s1") == 0 || strcmp(section, "s2") == 0)
+		return settings_fail(settings, DT_E_FORMAT,
+		                     "[%s] stands in the sensor's file, which the series' --chain names",
+		                     section);
 	return settings_fail(settings, DT_E_FORMAT, "unknown key '%.60s' in [%.60s]", name, section);
 }
 
@@ -66,9 +69,4 @@ unsigned laboratory_missing(const struct laboratory *laboratory)
 	for (size_t i = 0; i < LABORATORY_FIELDS; i++)
 		missing += laboratory_rows[i].needed && laboratory->text[i][0] == '\0';
 	return missing;
-}
-
-bool laboratory_is_overdue(const struct laboratory *laboratory, enum laboratory_field due, const char *day)
-{
-	return laboratory->text[due][0] != '\0' && strncmp(day, laboratory->text[due], DATE_DAY_CHARS) > 0;
 }

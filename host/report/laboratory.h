@@ -2,8 +2,8 @@
 #ifndef DT_HOST_REPORT_LABORATORY_H
 #define DT_HOST_REPORT_LABORATORY_H
 /*
- * A laboratory's profile for one report, from an .ini file: who, for whom, what, how, with which sensors. Its
- * keys stand in laboratory.def. Dates are YYYY-MM-DD.
+ * A laboratory's profile for one report, from an .ini file: who, for whom, what, how. Its keys
+ * stand in laboratory.def; the sensors have files of their own (host/sensor). Dates are YYYY-MM-DD.
  */
 #include <stdbool.h>
 
@@ -35,8 +35,5 @@ DT_MUST_USE int laboratory_read(struct laboratory *laboratory, const char *file,
 
 /* How many needed fields are not given. */
 unsigned laboratory_missing(const struct laboratory *laboratory);
-
-/* Whether a sensor's calibration was due before day, which may be a time. */
-bool laboratory_is_overdue(const struct laboratory *laboratory, enum laboratory_field due, const char *day);
 
 #endif

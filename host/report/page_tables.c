@@ -5,6 +5,7 @@
 #include "host/model/ensemble.h"
 #include "host/report/page.h"
 #include "host/result/quantity.h"
+#include "host/result/uncertainty.h"
 
 enum { GAPS_MAX = 20 }; /* listed */
 
@@ -174,10 +175,39 @@ static void gaps(struct page *page)
 		        r->gap_count - GAPS_MAX);
 }
 
+static void uncertainties(struct page *page)
+{
+	const struct report *report = page->report;
+	FILE *out = page->out;
+
+	if (report->budget == NULL || report->budget->count == 0)
+		return;
+	fputs("<h2>Expanded uncertainties</h2>\n", out);
+	(void)uncertainty_table(report->budget->item, report->budget->count, TABLE_HTML, out);
+	fputs("<p class=\"note\">U = k u covers 95.45 %; &plusmn; above is one standard uncertainty of noise "
+	      "and fit. By "
+	      "the files of the sensors: ",
+	      out);
+	for (size_t i = 0; i < report->sensors->count; i++) {
+		const struct sensor_used *s = &report->sensors->used[i];
+
+		fputs(i > 0 ? "; " : "", out);
+		html_text(out, s->name);
+		fputs(", serial number ", out);
+		html_text(out, s->serial);
+		fputs(", certificate ", out);
+		html_text(out, s->certificate);
+		fprintf(out, " of %s, due %s%s", s->date, s->due,
+		        s->overdue ? ": <b style=\"color:var(--bad)\">OVERDUE</b>" : "");
+	}
+	fputs(".</p>\n", out);
+}
+
 void page_tables(struct page *page)
 {
 	results(page);
 	joint(page);
+	uncertainties(page);
 	model(page);
 	gaps(page);
 }

@@ -109,6 +109,11 @@ static int read_drop(struct series_page *page, struct series_drop *drop)
 		archive_cell_add(&page->cell, &drop->a);
 	if (result || !drop->a.version)
 		return result;
+	if (drop->counts)
+		result = archive_each_sensor(page->request->archive, name, drop->a.version,
+		                             series_take_sensor, &(struct series_drop_of_page){page, drop});
+	if (result)
+		return result;
 	result = archive_analysis(page->request->archive, name, drop->a.version, &said);
 	if (result == DT_E_FORMAT && !drop->no_log[0])
 		snprintf(drop->no_log, sizeof(drop->no_log), "the result by %s is no analysis",
@@ -259,6 +264,7 @@ static int series_gather(struct series_page *page)
 		return DT_E_FORMAT;
 	for (size_t i = 0; i < page->count && result == 0; i++)
 		result = read_drop(page, page->drop[i]);
+	archive_cell_close(&page->cell);
 	if (result != 0)
 		snprintf(page->page.message, page->page.size, "%s",
 		         result == DT_E_MEMORY || !archive_message(archive)[0] ? error_text(result)

@@ -7,30 +7,118 @@
 
 #include "host/report/series_private.h"
 
-/* Of the drops that count, the last one's day: what is due later was valid for all. */
-static const char *last_day(const struct series_page *page)
-{
-	const char *day = "";
+/* ---- the sensors of the drops that count ---- */
 
-	for (size_t i = 0; i < page->count; i++)
-		if (page->drop[i]->counts && strcmp(page->drop[i]->a.time, day) > 0)
-			day = page->drop[i]->a.time;
-	return day;
+static void copy(char *to, size_t room, const char *from)
+{
+	snprintf(to, room, "%s", from);
+}
+
+static struct series_sensor *sensor_of(struct series_page *page, const struct sensor_used *used)
+{
+	struct series_sensor *s = page->sensor;
+
+	for (; s < page->sensor + page->sensors; s++)
+		if (strcmp(s->file_sha256, used->file_sha256) == 0 && strcmp(s->name, used->name) == 0 &&
+		    s->overdue == used->overdue)
+			return s;
+	if (page->sensors == SERIES_SENSORS_MAX)
+		return NULL;
+	page->sensors++;
+	s->overdue = used->overdue;
+	copy(s->name, sizeof(s->name), used->name);
+	copy(s->serial, sizeof(s->serial), used->serial);
+	copy(s->model, sizeof(s->model), used->model);
+	copy(s->certificate, sizeof(s->certificate), used->certificate);
+	copy(s->laboratory, sizeof(s->laboratory), used->laboratory);
+	copy(s->date, sizeof(s->date), used->date);
+	copy(s->due, sizeof(s->due), used->due);
+	copy(s->file_sha256, sizeof(s->file_sha256), used->file_sha256);
+	return s;
+}
+
+int series_take_sensor(void *context, const struct sensor_used *used)
+{
+	const struct series_drop_of_page *of = context;
+	struct series_sensor *s = sensor_of(of->page, used);
+	size_t length;
+
+	if (s == NULL)
+		return DT_E_RANGE;
+	length = strlen(s->drops);
+	if (length < sizeof(s->drops) - 16)
+		snprintf(s->drops + length, sizeof(s->drops) - length, "%s%u", s->count > 0 ? ", " : "",
+		         of->drop->a.number);
+	else if (s->drops[length - 1] != '.')
+		snprintf(s->drops + length, sizeof(s->drops) - length, ", ...");
+	s->count++;
+	return 0;
 }
 
 bool series_is_overdue(const struct series_page *page)
 {
-	const struct laboratory *l = page->request->laboratory;
-
-	return l != NULL && (laboratory_is_overdue(l, LABORATORY_s1_due, last_day(page)) ||
-	                     laboratory_is_overdue(l, LABORATORY_s2_due, last_day(page)));
+	for (size_t i = 0; i < page->sensors; i++)
+		if (page->sensor[i].overdue)
+			return true;
+	return false;
 }
+
+/* Whether each drop that counts has that sensor's file. */
+static bool has_sensor(const struct series_page *page, const char *name)
+{
+	size_t drops = 0;
+
+	for (size_t i = 0; i < page->sensors; i++)
+		if (strcmp(page->sensor[i].name, name) == 0)
+			drops += page->sensor[i].count;
+	return drops > 0 && drops == series_counted(page);
+}
+
+void series_sensors(struct series_page *page)
+{
+#define COLUMN(KIND, member, ...) TABLE_COLUMN(KIND, struct series_sensor, member, .width = -1, __VA_ARGS__)
+	static const struct table_column columns[] = {
+	        COLUMN(CHARS, name, .title = "sensor"),
+	        COLUMN(CHARS, serial, .title = "serial number"),
+	        COLUMN(CHARS, model, .title = "model"),
+	        COLUMN(CHARS, certificate, .title = "certificate"),
+	        COLUMN(CHARS, laboratory, .title = "calibrated by"),
+	        COLUMN(CHARS, date, .title = "on"),
+	        COLUMN(CHARS, due, .title = "due"),
+	        COLUMN(YES, overdue, .title = "overdue"),
+	        COLUMN(CHARS, drops, .title = "drops"),
+	};
+#undef COLUMN
+	struct table table = {.out = page->page.out, .format = TABLE_HTML};
+
+	fputs("<h2>Sensors and their certificates</h2>\n", table.out);
+	if (page->sensors == 0) {
+		fputs("<p class=\"soft\">No sensor's file was applied: uncertainties are of noise and fit "
+		      "alone.</p>\n",
+		      table.out);
+		return;
+	}
+	table_begin(&table, columns, TABLE_COUNT(columns));
+	for (size_t i = 0; i < page->sensors; i++) {
+		table.row_class = page->sensor[i].overdue ? " style=\"color:var(--bad)\"" : "";
+		table_row(&table, &page->sensor[i]);
+	}
+	(void)table_end(&table);
+	for (size_t i = 0; i < page->sensors; i++) {
+		fputs(i == 0 ? "<p class=\"note\">Files, by their SHA-256: <span class=\"hash\">" : "; ",
+		      table.out);
+		html_text(table.out, page->sensor[i].serial);
+		fprintf(table.out, " %s", page->sensor[i].file_sha256);
+	}
+	fputs("</span></p>\n", table.out);
+}
+
+/* ---- the laboratory's profile ---- */
 
 static void laboratory_row(const struct series_page *page, enum laboratory_field field)
 {
 	const struct laboratory_row *row = &laboratory_rows[field];
 	const char *text = page->request->laboratory->text[field];
-	bool due = strcmp(row->key, "due") == 0;
 	FILE *out = page->page.out;
 
 	if (!text[0] && !row->needed)
@@ -40,9 +128,16 @@ static void laboratory_row(const struct series_page *page, enum laboratory_field
 		html_text(out, text);
 	else
 		fputs("<b style=\"color:var(--bad)\">missing</b>", out);
-	if (due && laboratory_is_overdue(page->request->laboratory, field, last_day(page)))
-		fputs(" <b style=\"color:var(--bad)\">OVERDUE when the drops were made</b>", out);
 	fprintf(out, "</td><td class=\"soft\">%s</td></tr>\n", row->clause);
+}
+
+static void sensor_row(const struct series_page *page, const char *name)
+{
+	fprintf(page->page.out, "<tr><th>sensor %s</th><td>%s</td><td class=\"soft\">7.8.3.1</td></tr>\n",
+	        name,
+	        has_sensor(page, name) ? "see the sensors and their certificates"
+	                               : "<b style=\"color:var(--bad)\">missing</b>: no file of its "
+	                                 "certificate was applied");
 }
 
 static void statements(const struct series_page *page, bool final)
@@ -52,12 +147,12 @@ static void statements(const struct series_page *page, bool final)
 
 	fputs("<p class=\"note\">The results relate only to the items tested (7.8.2.1 l). This report shall "
 	      "not be "
-	      "reproduced except in full without the laboratory's approval (7.8.2.2). &plusmn; is one "
-	      "standard "
-	      "uncertainty u; U = k u with k = 2, in the unit of the result, is the expanded uncertainty for "
-	      "about "
-	      "95 % (7.8.3.1 c). It holds noise and fit; the measuring chain's part is in it only where the "
-	      "limits state one. Differences from a prediction of the model are no uncertainty.</p>\n",
+	      "reproduced except in full without the laboratory's approval (7.8.2.2). &plusmn; in "
+	      "the tables of drops is one standard uncertainty of noise and fit. U = k u, in the unit of the "
+	      "result, is the expanded uncertainty for 95.45 % (7.8.3.1 c), with the measuring chain's parts "
+	      "by "
+	      "the certificates of the sensors. Differences from a prediction of the model are no "
+	      "uncertainty.</p>\n",
 	      out);
 	if (!final)
 		return;
@@ -77,7 +172,7 @@ void series_laboratory(struct series_page *page)
 
 	if (l == NULL)
 		return;
-	missing = laboratory_missing(l);
+	missing = laboratory_missing(l) + !has_sensor(page, "S1") + !has_sensor(page, "S2");
 	fputs("<h2>Test report", out);
 	if (l->text[LABORATORY_report_number][0]) {
 		fputs(" ", out);
@@ -90,13 +185,14 @@ void series_laboratory(struct series_page *page)
 		        "missing</div>\n",
 		        missing);
 	if (overdue)
-		fputs("<div class=\"verdict bad\">OVERDUE: a sensor's calibration was due before a drop was "
-		      "made; "
+		fputs("<div class=\"verdict bad\">OVERDUE when the drops were made: a sensor's calibration; "
 		      "not under accreditation</div>\n",
 		      out);
 	fputs("<table class=\"facts\">", out);
 	for (int i = 0; i < LABORATORY_FIELDS; i++)
 		laboratory_row(page, (enum laboratory_field)i);
+	sensor_row(page, "S1");
+	sensor_row(page, "S2");
 	fputs("</table>\n", out);
 	statements(page, missing == 0 && !overdue);
 }

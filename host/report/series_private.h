@@ -27,6 +27,18 @@ struct series_drop {
 	double model_s; /* the model's first touch, after zero; NAN: no model to lay over it */
 };
 
+/* A sensor's file, and the drops that it was applied to. */
+struct series_sensor {
+	char name[8], serial[TRANSDUCER_TEXT_MAX], model[TRANSDUCER_TEXT_MAX],
+	        certificate[TRANSDUCER_TEXT_MAX], laboratory[TRANSDUCER_TEXT_MAX], date[12], due[12],
+	        file_sha256[DIGEST_CHARS];
+	char drops[120];
+	size_t count; /* of them */
+	bool overdue; /* at one of them */
+};
+
+enum { SERIES_SENSORS_MAX = 32 };
+
 struct series_page {
 	struct page page;
 	const struct series_report *request;
@@ -39,6 +51,8 @@ struct series_page {
 	struct model_prediction prediction, below;
 	struct series_drop **drop;
 	size_t count, room;
+	struct series_sensor sensor[SERIES_SENSORS_MAX]; /* of drops that count */
+	size_t sensors;
 	struct archive_cell cell;                        /* means of those that count */
 	struct script_window window;                     /* of every picture, after zero */
 	double curve_g[SCRIPT_CURVE_POINTS][MODEL_AXES]; /* the model, from curve.from_s to curve.to_s */
@@ -65,6 +79,7 @@ const char *series_decision(const struct series_drop *drop);
 /* Sections, in the order of the page. */
 void series_head(struct series_page *page);
 void series_laboratory(struct series_page *page);
+void series_sensors(struct series_page *page);
 void series_limits(struct series_page *page);
 void series_subject(struct series_page *page);
 void series_results(struct series_page *page);
@@ -74,7 +89,14 @@ void series_excluded(struct series_page *page);
 void series_model(struct series_page *page);
 void series_records(struct series_page *page);
 
-/* Whether a sensor of the laboratory's profile was overdue at a drop that counts. */
+/* Adds a sensor of a drop; context: of the drop, with its page. */
+struct series_drop_of_page {
+	struct series_page *page;
+	const struct series_drop *drop;
+};
+int series_take_sensor(void *context, const struct sensor_used *used);
+
+/* Whether a sensor was overdue at a drop that counts. */
 bool series_is_overdue(const struct series_page *page);
 
 /* Behind the page. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Remarks in plain words, and what proves the rest: logs, versions, decisions, calibrations.
+ * Remarks in plain words, and what proves the rest: logs, versions, decisions, sensors.
  */
 #include <inttypes.h>
 #include <math.h>
@@ -337,21 +337,6 @@ static int series_records_history(struct series_page *page)
 	return result;
 }
 
-static int calibration_row(void *context, const struct archive_calibration *c)
-{
-	struct history *h = context;
-
-	fputs(h->rows++ ? "" : "<ul>", h->out);
-	fputs("<li><b>", h->out);
-	html_text(h->out, c->sensor);
-	fprintf(h->out, "</b>: gain %.6g on ", c->gain);
-	html_text(h->out, c->date);
-	fputs(c->note[0] ? ", " : "", h->out);
-	html_text(h->out, c->note);
-	fputs("</li>\n", h->out);
-	return 0;
-}
-
 void series_records(struct series_page *page)
 {
 	struct history h = {.out = page->page.out};
@@ -361,13 +346,7 @@ void series_records(struct series_page *page)
 		logs(page);
 		result = series_records_history(page);
 	}
-	fputs("<h2>Calibrations noted</h2>\n", h.out);
-	if (result == 0)
-		result = archive_each_calibration(page->request->archive, calibration_row, &h);
-	fputs(h.rows ? "</ul>\n<p class=\"note\">Noted in the archive; no figure above was multiplied by "
-	               "them.</p>\n"
-	             : "<p class=\"soft\">None.</p>\n",
-	      h.out);
+	series_sensors(page);
 	if (!page->page.error)
 		series_data(page);
 	fprintf(h.out, "<footer><p>Series made ");

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "host/report/series_private.h"
+#include "host/result/uncertainty.h"
 
 const char *series_decision(const struct series_drop *drop)
 {
@@ -82,6 +83,23 @@ static void put_table(const struct series_page *page, bool in_g)
 	(void)table_end(&table);
 }
 
+static void put_uncertainties(const struct series_page *page)
+{
+	struct budget_item item[ARCHIVE_VALUE_COUNT];
+	size_t count = archive_cell_uncertainties(&page->cell, item);
+	FILE *out = page->page.out;
+
+	if (count == 0)
+		return;
+	fputs("<h2>Means with expanded uncertainty</h2>\n", out);
+	(void)uncertainty_table(item, count, TABLE_HTML, out);
+	fputs("<p class=\"note\">U = k u of the mean covers 95.45 %. Scatter falls with the number of drops, "
+	      "s over the "
+	      "root of n; all other parts are the same in each drop, do not fall, and cancel in differences "
+	      "between drops, SD and trends.</p>\n",
+	      out);
+}
+
 void series_results(struct series_page *page)
 {
 	FILE *out = page->page.out;
@@ -102,6 +120,7 @@ void series_results(struct series_page *page)
 	fputs("<p class=\"note\">Lag between the largest and between the first peaks, and as that of an "
 	      "oscillator which S2 drives. Frequency and damping from the free ring-down of S1.</p>\n",
 	      out);
+	put_uncertainties(page);
 }
 
 /* ---- model ---- */

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <inttypes.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "host/report/facts.h"
 #include "host/result/measured.h"
 #include "host/report/shock.h"
 #include "host/result/quantity.h"
+#include "host/result/uncertainty.h"
 
 enum { TEXT_GAPS_MAX = 8, TEXT_WIDTH = 90 };
 
@@ -297,21 +299,6 @@ static void text_write_verdict(const struct verdict *verdict, FILE *out)
 	fputc('\n', out);
 }
 
-struct budget_row {
-	struct budget_item item;
-	const char *unit;
-};
-
-#define BUDGET_COLUMN(KIND, member, ...) TABLE_COLUMN(KIND, struct budget_row, member, __VA_ARGS__)
-static const struct table_column budget_columns[] = {
-        BUDGET_COLUMN(CHARS, item.what, .title = "uncertainty of", .width = -32),
-        BUDGET_COLUMN(NUMBER, item.value, .title = "value", .width = 11, .digits = -7),
-        BUDGET_COLUMN(NUMBER, item.expanded, .title = "U", .width = 9, .digits = -2),
-        BUDGET_COLUMN(NUMBER, item.k, .title = "k", .width = 5, .digits = 2),
-        BUDGET_COLUMN(WORDS, unit, .title = "", .width = -4),
-        BUDGET_COLUMN(CHARS, item.largest, .title = "largest parts of u^2", .gap = "  "),
-};
-
 /* What the table above shows; decays of single channels and instants are in JSON. */
 static bool is_shown(const struct budget_item *item)
 {
@@ -321,7 +308,8 @@ static bool is_shown(const struct budget_item *item)
 
 static void text_write_chain(const struct report *report, FILE *out)
 {
-	struct table table = {.out = out};
+	struct budget_item *shown;
+	size_t count = 0;
 
 	if (report->sensors == NULL)
 		return;
@@ -332,18 +320,12 @@ static void text_write_chain(const struct report *report, FILE *out)
 		fprintf(out, "sensor %s: %s, certificate %s of %s, due %s%s\n", s->name, s->serial,
 		        s->certificate, s->date, s->due, s->overdue ? ": OVERDUE" : "");
 	}
-	table_begin(&table, budget_columns, TABLE_COUNT(budget_columns));
-	for (size_t i = 0; i < report->budget->count; i++) {
-		struct budget_row row = {.item = report->budget->item[i]};
-		double scale = strcmp(row.item.unit, "s") == 0 ? 1e3 : 1.0;
-
-		row.unit = scale > 1.0 ? "ms" : row.item.unit;
-		row.item.value *= scale;
-		row.item.expanded *= scale;
-		if (is_shown(&row.item))
-			table_row(&table, &row);
-	}
-	(void)table_end(&table);
+	shown = calloc(report->budget->count + 1, sizeof(*shown));
+	for (size_t i = 0; shown != NULL && i < report->budget->count; i++)
+		if (is_shown(&report->budget->item[i]))
+			shown[count++] = report->budget->item[i];
+	(void)uncertainty_table(shown, count, TABLE_TEXT, out);
+	free(shown);
 	fputs("U = k u covers 95.45 %; +- above is one standard uncertainty of noise and fit.\n", out);
 }
 

@@ -123,6 +123,14 @@ double quantity_column_scale(const struct quantity_column *column)
 	return quantity_scale(quantity_find(quantity_homes[column->place].object, column->key));
 }
 
+void quantity_column_what(const struct quantity_column *c, char what[QUANTITY_WHAT_MAX])
+{
+	const char *path = quantity_homes[c->place].path;
+
+	snprintf(what, QUANTITY_WHAT_MAX, "%s%s%s%s%s", c->subject, c->subject[0] ? "." : "", path,
+	         path[0] ? "." : "", c->key);
+}
+
 /* ---- texts ---- */
 
 static void flag_names(unsigned flags, char *text, size_t size)

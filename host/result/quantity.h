@@ -91,6 +91,10 @@ void quantity_clear(enum quantity_object which, void *object);
 double quantity_scale(const struct quantity *quantity);
 double quantity_column_scale(const struct quantity_column *column);
 
+/* What the budget calls it: "S2X.peak.value_g". */
+enum { QUANTITY_WHAT_MAX = sizeof(((struct budget_item *)NULL)->what) };
+void quantity_column_what(const struct quantity_column *column, char what[QUANTITY_WHAT_MAX]);
+
 /* Status of an object; ok where it has none. */
 enum estimate_status quantity_object_status(enum quantity_object which, const void *object);
 

@@ -60,7 +60,7 @@ static void within(struct collecting *c, enum budget_part part, double half)
 
 /* ---- an item ---- */
 
-static void largest_of(struct budget_item *item)
+static void largest_of(struct budget_item *item, const char *noise)
 {
 	bool taken[BUDGET_PARTS] = {false};
 	size_t used = 0;
@@ -76,12 +76,15 @@ static void largest_of(struct budget_item *item)
 			break;
 		taken[most] = true;
 		used += (size_t)snprintf(item->largest + used, sizeof(item->largest) - used, "%s%s %.0f %%",
-		                         used > 0 ? ", " : "", part_names[most],
+		                         used > 0 ? ", " : "",
+		                         most == BUDGET_NOISE ? noise : part_names[most],
 		                         100.0 * pow(item->part[most] / item->u, 2));
 	}
 }
 
-static void settle(struct budget_item *item, const struct collecting *collected)
+/* noise: what that part is called; in the distribution it counts by student times its u. */
+static void settle(struct budget_item *item, const struct collecting *collected, const char *noise_name,
+                   double student)
 {
 	struct collecting c = *collected;
 	double noise = c.part[BUDGET_NOISE], rest = sqrt(c.coverage.normal + c.coverage.other);
@@ -94,15 +97,12 @@ static void settle(struct budget_item *item, const struct collecting *collected)
 	item->expanded = item->k * item->u;
 	item->method = "linear";
 	if (c.coverage.other > NOT_NORMAL * item->u * item->u) {
-		/* the noise as Student's t, by its variance */
-		coverage_add(
-		        &c.coverage, COVERAGE_NORMAL,
-		        noise * sqrt(isfinite(c.degrees) ? c.degrees / fmax(1.0, c.degrees - 2.0) : 1.0));
+		coverage_add(&c.coverage, COVERAGE_NORMAL, noise * student);
 		item->expanded = coverage_expanded(&c.coverage);
 		item->k = item->expanded / item->u;
 		item->method = "distribution";
 	}
-	largest_of(item);
+	largest_of(item, noise_name);
 }
 
 /* subject "" for what is of no channel. Nothing without a value, its noise and all that adds to it. */
@@ -128,7 +128,9 @@ static void item_add(struct desk *d, const char *subject, const char *what, cons
 	*item = (struct budget_item){.unit = unit, .value = value};
 	snprintf(item->what, sizeof(item->what), "%.31s%s%s", subject, subject[0] != '\0' ? "." : "", what);
 	c->part[BUDGET_NOISE] = noise;
-	settle(item, c);
+	/* Student's t by its variance */
+	settle(item, c, part_names[BUDGET_NOISE],
+	       isfinite(c->degrees) ? sqrt(c->degrees / fmax(1.0, c->degrees - 2.0)) : 1.0);
 }
 
 /* ---- what each source does ---- */
@@ -555,6 +557,60 @@ int budget_make(struct budget *budget, const struct sensors *sensors, const stru
 		return 0;
 	budget_free(budget);
 	return DT_E_MEMORY;
+}
+
+/* ---- of several drops ---- */
+
+void budget_mean_add(struct budget_mean *mean, const struct budget_item *item)
+{
+	mean->count++;
+	for (int p = 0; p < BUDGET_PARTS; p++)
+		mean->part[p] += item->part[p];
+	mean->noise = item->part[BUDGET_NOISE];
+	mean->u += item->u;
+	mean->expanded += item->expanded;
+	mean->distribution |= strcmp(item->method, "distribution") == 0;
+}
+
+/* The parts that all drops have, by the law that most of each is of. transverse: of a direction that nobody
+ * knows, or by the matrix. */
+static struct collecting common_parts(const struct budget_mean *mean, enum coverage_law transverse)
+{
+	struct collecting c = {.degrees = (double)INFINITY};
+
+	for (int p = 0; p < BUDGET_PARTS; p++)
+		if (p != BUDGET_NOISE)
+			collect(&c, (enum budget_part)p,
+			        p == BUDGET_TRANSVERSE                          ? transverse
+			        : p == BUDGET_SENSITIVITY || p == BUDGET_FILTER ? COVERAGE_NORMAL
+			                                                        : COVERAGE_RECTANGULAR,
+			        mean->part[p] / (double)mean->count);
+	return c;
+}
+
+/* By which of the two laws U is as far from what it is of the drops themselves. */
+static double missed(const struct budget_mean *mean, const struct collecting *c)
+{
+	struct coverage coverage = c->coverage;
+
+	coverage_add(&coverage, COVERAGE_NORMAL, mean->part[BUDGET_NOISE] / (double)mean->count);
+	return fabs(coverage_expanded(&coverage) - mean->expanded / (double)mean->count);
+}
+
+void budget_mean_item(const struct budget_mean *mean, double value, double sd, struct budget_item *item)
+{
+	struct collecting c = common_parts(mean, COVERAGE_ARCSINE),
+	                  normal = common_parts(mean, COVERAGE_NORMAL);
+	double n = (double)mean->count;
+
+	if (!mean->distribution || missed(mean, &normal) < missed(mean, &c))
+		c = normal;
+	c.degrees = mean->count > 1 ? n - 1.0 : (double)INFINITY;
+	c.part[BUDGET_NOISE] = mean->count > 1 ? sd / sqrt(n) : mean->noise;
+	*item = (struct budget_item){.unit = "", .value = value};
+	/* alone it covers what it has to */
+	settle(item, &c, mean->count > 1 ? "scatter" : part_names[BUDGET_NOISE],
+	       coverage_factor(c.degrees) / coverage_factor((double)INFINITY));
 }
 
 void budget_free(struct budget *budget)

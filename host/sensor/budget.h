@@ -58,6 +58,20 @@ DT_MUST_USE int budget_make(struct budget *budget, const struct sensors *sensors
                             const struct analysis *analysis);
 void budget_free(struct budget *budget);
 
+/* A number of several drops under one calibration: scatter becomes less with their number, and what they have
+ * in common does not. That cancels in differences between them, in their standard deviation and in a trend.
+ */
+struct budget_mean {
+	size_t count;
+	double part[BUDGET_PARTS], u, expanded; /* sums */
+	double noise;                           /* of the last one */
+	bool distribution;                      /* U of one of them is by the distribution */
+};
+void budget_mean_add(struct budget_mean *mean, const struct budget_item *item);
+
+/* sd: of a single drop. BUDGET_NOISE is the scatter's part then; of one drop its noise. */
+void budget_mean_item(const struct budget_mean *mean, double value, double sd, struct budget_item *item);
+
 /* NULL: that number has none. */
 const struct budget_item *budget_find(const struct budget *budget, const char *what);
 

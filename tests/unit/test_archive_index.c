@@ -75,7 +75,7 @@ static void test_a_version_1_index_is_migrated(void **state)
 	(void)state;
 	trial_sql(version_1);
 	archive = trial_open(ARCHIVE_READ);
-	assert_int_equal(schema_version(), 6);
+	assert_int_equal(schema_version(), 7);
 	seen = trial_look(archive, "one", 1, NULL);
 	assert_string_equal(seen.decision, "accepted");
 	assert_string_equal(seen.version, "v0");
@@ -84,11 +84,6 @@ static void test_a_version_1_index_is_migrated(void **state)
 	archive_close(archive);
 	archive = trial_open(ARCHIVE_WRITE);
 	assert_int_equal(archive_note(archive, "one/1", "Ann", "still here"), 0);
-	assert_int_equal(archive_calibrate(archive, "S1", 1.01, "2026-11-02", ""), 0);
-	assert_int_equal(archive_calibrate(archive, "S1", 1.01, "2026-11-32", ""), DT_E_ARGUMENT);
-	assert_int_equal(archive_calibrate(archive, "S1", 1.01, "2026-02-29", ""), DT_E_ARGUMENT);
-	assert_int_equal(archive_calibrate(archive, "S1", 1.01, "2026-11", ""), DT_E_ARGUMENT);
-	assert_int_equal(archive_calibrate(archive, "S1", 0, "2026-11-02", ""), DT_E_RANGE);
 	archive_close(archive);
 }
 
@@ -120,7 +115,6 @@ static char *listing(void)
 	assert_int_equal(print_series(archive, &filter, TABLE_JSON, out), 0);
 	assert_int_equal(print_drops(archive, &filter, true, TABLE_JSON, out), 0);
 	assert_int_equal(print_drops(archive, &filter, true, TABLE_CSV, out), 0);
-	assert_int_equal(print_calibrations(archive, TABLE_JSON, out), 0);
 	filter.series = "one"; /* with the history of each drop */
 	assert_int_equal(print_drops(archive, &filter, true, TABLE_JSON, out), 0);
 	filter.version = "v1";
@@ -147,7 +141,6 @@ static void make_many_things(void)
 	assert_int_equal(archive_note(archive, "one/2", "J\xc3\xbcrg", "  blanks kept  "), 0);
 	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", true, &r), 0);
 	archive_abandon(&r);
-	assert_int_equal(archive_calibrate(archive, "S1", 1.0 / 0.97, "2026-11-02", "by hand"), 0);
 	archive_close(archive);
 }
 

@@ -396,18 +396,15 @@ static void test_hostile_texts_are_escaped(void **state)
 
 	(void)state;
 	make_series();
-	assert_int_equal(archive_calibrate(archive, "S1", 1.003, "2026-11-02", "<svg onload=x>"), 0);
 	page = report();
 	assert_has(page, "<h1>Box &lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;plate&quot;</h1>");
 	assert_has(page, "&lt;i&gt;Ann&lt;/i&gt;");
 	assert_has(page, "Bob &quot;the&quot; &lt;b&gt;");
 	assert_has(page, "note &amp; &lt;u&gt;more&lt;/u&gt;");
-	assert_has(page, "&lt;svg onload=x&gt;");
 	assert_has_not(page, "<script");
 	assert_has_not(page, "<img");
 	assert_has_not(page, "<i>Ann");
 	assert_has_not(page, "<u>");
-	assert_has_not(page, "<svg onload");
 	free(page);
 }
 
@@ -446,7 +443,8 @@ static void test_proof_of_the_logs(void **state)
 	assert_has(page, "0001.csv<br>");
 	assert_has(page, "<td class=\"text\">1.0-test</td>");
 	assert_has(page, "2001-09-09 01:46"); /* second 1 000 000 000 */
-	assert_has(page, "Calibrations noted</h2>\n<p class=\"soft\">None.");
+	assert_has(page,
+	           "Sensors and their certificates</h2>\n<p class=\"soft\">No sensor's file was applied");
 	assert_has(page, "<th>processing</th><td>sensor high-pass of 0.25 s undone</td>");
 	assert_has(page, "Taken: <b>planar</b>");
 	free(page);
