@@ -93,8 +93,8 @@ static int sidecar_refuse_file(struct archive *archive, const char *path)
 
 /* On the disk beside its place, then in the chain, then in its place: whatever moment the power fails, the
  * chain's last entry of a path is the hash of the file or of what stands beside it. */
-int sidecar_put(struct archive *archive, const char *file, const char *text, size_t size,
-                const struct chain_place *place)
+static int sidecar_put(struct archive *archive, const char *file, const char *text, size_t size,
+                       const struct chain_place *place)
 {
 	char path[ARCHIVE_PATH_MAX], hash[DIGEST_CHARS];
 	int result;

@@ -25,10 +25,6 @@ DT_MUST_USE int sidecar_text_of_drop(struct archive *archive, int64_t drop, cons
 DT_MUST_USE int sidecar_text_of_series(struct archive *archive, int64_t series,
                                        const struct chain_place *place, struct text *text);
 
-/* A text of somebody's making, at a place of chain_next. file: in the folder. */
-DT_MUST_USE int sidecar_put(struct archive *archive, const char *file, const char *text, size_t size,
-                            const struct chain_place *place);
-
 /* ---- reading ---- */
 
 struct sidecar {
