@@ -419,24 +419,33 @@ static int hold_file(const struct record *record, hid_t file)
 	return hold_count(file, "/", count);
 }
 
-/* The samples of a drop are counts. */
-static int check_counts(const struct record *record)
+/* The samples of a drop are counts, marked where they are beyond the range. */
+static int check_sample(const struct channel *channel, size_t k)
 {
-	for (size_t i = 0; i < record->channel_count; i++) {
-		const struct channel *channel = &record->channels[i];
+	bool good = !(channel->sample[k] & (SAMPLE_LOST | SAMPLE_BAD));
+	char what[128];
 
-		for (size_t k = 0; k < channel->count; k++) {
-			char what[128];
-
-			if (channel->sample[k] & (SAMPLE_LOST | SAMPLE_BAD) ||
-			    drop_is_count(channel->value_g[k]))
-				continue;
-			snprintf(what, sizeof(what), "acceleration[%zu] of %s is %.15g g", k, channel->name,
-			         channel->value_g[k]);
-			return refuse(what, "a whole count of 1/32 g within full scale");
-		}
+	if (good && !drop_is_count(channel->value_g[k])) {
+		snprintf(what, sizeof(what), "acceleration[%zu] of %s is %.15g g", k, channel->name,
+		         channel->value_g[k]);
+		return refuse(what, "a whole count of 1/32 g within full scale");
+	}
+	if ((channel->sample[k] & SAMPLE_CLIPPED) != (good ? drop_mark(channel, channel->value_g[k]) : 0)) {
+		snprintf(what, sizeof(what), "mask[%zu] of %s at %.15g g is %u", k, channel->name,
+		         channel->value_g[k], channel->sample[k]);
+		return refuse(what, "4 beyond the range and nowhere else");
 	}
 	return 0;
+}
+
+static int check_samples(const struct record *record)
+{
+	int result = 0;
+
+	for (size_t i = 0; i < record->channel_count; i++)
+		for (size_t k = 0; k < record->channels[i].count && result == 0; k++)
+			result = check_sample(&record->channels[i], k);
+	return result;
 }
 
 static int get_record(struct record *record, hid_t file, char seal[DIGEST_CHARS])
@@ -458,7 +467,7 @@ static int get_record(struct record *record, hid_t file, char seal[DIGEST_CHARS]
 		result = get_channels(record, file, sealed);
 	if (result == 0 && sealed)
 		result = hold_file(record, file);
-	return result == 0 && record->is_drop ? check_counts(record) : result;
+	return result == 0 && record->is_drop ? check_samples(record) : result;
 }
 
 /* seal: the digits the file says; "" in one of a version before it. */

@@ -11,6 +11,19 @@
 
 static const char *const channel_names[DROP_CHANNELS] = {"S1X", "S1Y", "S1Z", "S2X", "S2Y", "S2Z"};
 
+static bool parameters_agree(const struct record *record)
+{
+	return record->crc_known && record->parameters_held == RECORD_PARAMETERS_ALL &&
+	       wire_parameters_crc32(record->parameters) == record->parameters_crc32;
+}
+
+double drop_range_g(const struct record *record)
+{
+	return (parameters_agree(record) ? record->parameters[WIRE_PARAMETER_range_counts]
+	                                 : wire_parameters[WIRE_PARAMETER_range_counts].initial) /
+	       (double)WIRE_COUNTS_PER_G;
+}
+
 int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_ms)
 {
 	uint32_t ticks = last_tick_ms - first_tick_ms + 1;
@@ -30,8 +43,7 @@ int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_
 			record_free(&drop);
 			return DT_E_MEMORY;
 		}
-		channel->range_g =
-		        (double)wire_parameters[WIRE_PARAMETER_range_counts].initial / WIRE_COUNTS_PER_G;
+		channel->range_g = drop_range_g(&drop);
 	}
 	drop_set_axes(&drop);
 	*record = drop;
@@ -41,6 +53,11 @@ int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_
 uint32_t drop_ticks(const struct record *record)
 {
 	return record->last_tick_ms - record->first_tick_ms + 1;
+}
+
+uint8_t drop_mark(const struct channel *channel, double value_g)
+{
+	return fabs(value_g) > channel->range_g ? SAMPLE_CLIPPED : 0;
 }
 
 static void drop_put_axis(struct channel *channel, size_t at, const int16_t *counts, size_t count)
@@ -53,7 +70,7 @@ static void drop_put_axis(struct channel *channel, size_t at, const int16_t *cou
 			channel->sample[at + i] = SAMPLE_BAD;
 		} else {
 			channel->value_g[at + i] = value_g;
-			channel->sample[at + i] = fabs(value_g) > channel->range_g ? SAMPLE_CLIPPED : 0;
+			channel->sample[at + i] = drop_mark(channel, value_g);
 		}
 	}
 }
@@ -142,6 +159,7 @@ bool drop_has_channel(const struct record *record)
 int drop_check(const struct record *record)
 {
 	bool equal = record->channel_count == DROP_CHANNELS;
+	double range_g = drop_range_g(record);
 	struct record drop;
 	int error = drop_open(&drop, record->first_tick_ms, record->last_tick_ms);
 
@@ -149,7 +167,8 @@ int drop_check(const struct record *record)
 		return error;
 	for (size_t i = 0; i < DROP_CHANNELS && equal; i++)
 		equal = strcmp(record->channels[i].name, drop.channels[i].name) == 0 &&
-		        record->channels[i].count == drop.channels[i].count;
+		        record->channels[i].count == drop.channels[i].count &&
+		        record->channels[i].range_g == range_g;
 	record_free(&drop);
 	return equal ? 0 : DT_E_FORMAT;
 }
@@ -173,6 +192,23 @@ void drop_capture_end(const struct record *record, struct frame *frame)
 	if (!isnan(record->frame_speed_m_s))
 		end.frame_speed_mm_s = (uint16_t)lround(record->frame_speed_m_s * 1e3);
 	wire_pack_capture_end(frame, WIRE_ID_CAPTURE_END, &end);
+}
+
+/* The parameters come behind the samples. */
+static void set_range(struct record *record)
+{
+	double range_g = drop_range_g(record);
+
+	for (size_t i = 0; i < record->channel_count; i++) {
+		struct channel *channel = &record->channels[i];
+
+		if (channel->range_g == range_g)
+			continue;
+		channel->range_g = range_g;
+		for (size_t k = 0; k < channel->count; k++)
+			if (!(channel->sample[k] & (SAMPLE_LOST | SAMPLE_BAD)))
+				channel->sample[k] = drop_mark(channel, channel->value_g[k]);
+	}
 }
 
 int drop_close(struct record *record)
@@ -210,8 +246,8 @@ int drop_close(struct record *record)
 	record->seal_agrees = record->seal_known && wire_check_capture_end(&end) == 0;
 	if (!record->crc_known || record->parameters_held != RECORD_PARAMETERS_ALL)
 		record->parameters_held = 0; /* nothing proves a part of the set */
-	record->parameters_known = record->parameters_held == RECORD_PARAMETERS_ALL &&
-	                           wire_parameters_crc32(record->parameters) == record->parameters_crc32;
+	record->parameters_known = parameters_agree(record);
+	set_range(record);
 	record_finish(record);
 	return 0;
 }

@@ -30,16 +30,22 @@ bool drop_get(const struct record *record, unsigned sensor, uint32_t tick, int16
 /* Whether a good sample of a drop can be of this value: a whole count, within full scale. */
 bool drop_is_count(double value_g);
 
+/* The sensors' range of a drop: by its parameters, if all of them are there and agree with their CRC-32, else
+ * the tower's own. */
+double drop_range_g(const struct record *record);
+
+/* What a good sample of a drop is marked with: SAMPLE_CLIPPED beyond the channel's range, nothing within. */
+uint8_t drop_mark(const struct channel *channel, double value_g);
+
 /* The capture end as it must have come, with the record's seal. */
 void drop_capture_end(const struct record *record, struct frame *frame);
 
-/* Lists the gaps, compares the samples with record->crc32 if crc_known and the capture
- * end with its seal, and finishes the record. On
- * DT_E_MEMORY the record is freed. */
+/* Lists the gaps, compares the samples with record->crc32 if crc_known and the capture end with its seal,
+ * puts range and clipped marks right, and finishes the record. On DT_E_MEMORY the record is freed. */
 DT_MUST_USE int drop_close(struct record *record);
 
-/* Whether the channels are those of a drop of its ticks, whole blocks of them: 0, DT_E_RANGE for the ticks,
- * DT_E_FORMAT for the channels, DT_E_MEMORY. */
+/* Whether the channels are those of a drop of its ticks, whole blocks of them, with its range: 0, DT_E_RANGE
+ * for the ticks, DT_E_FORMAT for the channels, DT_E_MEMORY. */
 DT_MUST_USE int drop_check(const struct record *record);
 
 /* Gives sensor and axis to the channels that have the names of a drop's. For those who know that they are:

@@ -123,7 +123,8 @@ static int check_drop(struct reading *reading)
 	if (error == DT_E_FORMAT)
 		return REFUSE(reading, error,
 		              "channels are not those of a drop of these ticks, expected "
-		              "S1X S1Y S1Z S2X S2Y S2Z with 7 and 10 samples a tick");
+		              "S1X S1Y S1Z S2X S2Y S2Z with 7 and 10 samples a tick and a range of %g g",
+		              drop_range_g(record));
 	return error ? REFUSE(reading, error, "%s", error_text(error)) : 0;
 }
 
@@ -154,7 +155,7 @@ static int check_names(struct reading *reading)
 static int read_sample(struct reading *reading, size_t i, double time_s, const char *cell, size_t length)
 {
 	struct channel *channel = &reading->record->channels[i];
-	size_t k = reading->next[i]++;
+	size_t k = reading->next[i]++, whole = length;
 	double value_g = NAN;
 	uint8_t sample = 0;
 
@@ -181,6 +182,10 @@ static int read_sample(struct reading *reading, size_t i, double time_s, const c
 		return REFUSE(reading, DT_E_FORMAT,
 		              "\"%.*s\" for %s, expected a whole count of 1/32 g within full scale",
 		              (int)(length < 80 ? length : 80), cell, channel->name);
+	if (reading->record->is_drop && (sample & SAMPLE_CLIPPED) != drop_mark(channel, value_g))
+		return REFUSE(reading, DT_E_FORMAT,
+		              "\"%.*s\" for %s, expected * behind a sample beyond %g g and no other",
+		              (int)(whole < 80 ? whole : 80), cell, channel->name, channel->range_g);
 	channel->value_g[k] = value_g;
 	channel->sample[k] = sample;
 	return 0;

@@ -220,21 +220,32 @@ static int check_good(const struct reading *reading, const struct channel *chann
 }
 
 /* The samples of a drop are counts. */
-static int read_uff58_check_counts(const struct reading *reading)
+static int check_sample(const struct reading *reading, const struct channel *channel, size_t k)
 {
-	for (size_t i = 0; i < reading->record->channel_count; i++) {
-		const struct channel *channel = &reading->record->channels[i];
+	double value_g = channel->value_g[k];
 
-		for (size_t k = 0; k < channel->count; k++)
-			if (isfinite(channel->value_g[k]) && !drop_is_count(channel->value_g[k]))
-				return source_refuse(reading->text.message, DT_E_FORMAT,
-				                     reading->text.source->file,
-				                     read_uff58_line_of(reading, channel, k),
-				                     "%.15g g for %s, expected a whole count of 1/32 g "
-				                     "within full scale",
-				                     channel->value_g[k], channel->name);
-	}
+	if (isfinite(value_g) && !drop_is_count(value_g))
+		return source_refuse(reading->text.message, DT_E_FORMAT, reading->text.source->file,
+		                     read_uff58_line_of(reading, channel, k),
+		                     "%.15g g for %s, expected a whole count of 1/32 g within full scale",
+		                     value_g, channel->name);
+	if ((channel->sample[k] & SAMPLE_CLIPPED) != drop_mark(channel, value_g))
+		return source_refuse(
+		        reading->text.message, DT_E_FORMAT, reading->text.source->file,
+		        read_uff58_line_of(reading, channel, k),
+		        "%.15g g for %s has the mask %u, expected 4 beyond %g g and nowhere else", value_g,
+		        channel->name, channel->sample[k], channel->range_g);
 	return 0;
+}
+
+static int read_uff58_check_samples(const struct reading *reading)
+{
+	int error = 0;
+
+	for (size_t i = 0; i < reading->record->channel_count; i++)
+		for (size_t k = 0; k < reading->record->channels[i].count && !error; k++)
+			error = check_sample(reading, &reading->record->channels[i], k);
+	return error;
 }
 
 static int read_mask(struct reading *reading, const struct uff58_head *head)
@@ -347,14 +358,19 @@ static int read_uff58_finish(struct reading *reading)
 		record_finish(record);
 		return 0;
 	}
-	error = read_uff58_check_counts(reading);
+	error = drop_check(record);
+	if (error)
+		return source_refuse(
+		        reading->text.message, error, reading->text.source->file, 0,
+		        "channels are not those of a drop of these ticks, expected S1X to S2Z with "
+		        "7 and 10 samples a tick and a range of %g g",
+		        drop_range_g(record));
+	error = read_uff58_check_samples(reading);
 	if (error)
 		return error;
-	error = drop_check(record);
-	if (!error)
-		error = drop_close(record);
-	return error ? source_refuse(reading->text.message, error, reading->text.source->file, 0,
-	                             "channels are not those of a drop of these ticks")
+	error = drop_close(record);
+	return error ? source_refuse(reading->text.message, error, reading->text.source->file, 0, "%s",
+	                             error_text(error))
 	             : 0;
 }
 

@@ -55,7 +55,8 @@ void hand_fill(struct hand_drop *drop, uint32_t first_tick_ms, uint32_t ticks, u
 	                           .ticks = ticks,
 	                           .trigger_us = ticks * 200 + 123,
 	                           .frame_speed_mm_s = 3912,
-	                           .camera_frame = 341};
+	                           .camera_frame = 341,
+	                           .range_counts = 16000};
 	for (unsigned s = 0; s < 2; s++)
 		for (uint32_t tick = 0; tick < ticks; tick++)
 			for (unsigned i = 0; i < HAND_PER_TICK; i++)
@@ -100,17 +101,17 @@ uint32_t hand_drop_crc32(const struct hand_drop *drop)
 }
 
 /* Not one is as at first, and each another. */
-static uint32_t parameter(unsigned i)
+static uint32_t parameter(const struct hand_drop *drop, unsigned i)
 {
-	return 100000 + 7 * i;
+	return i == 8 ? drop->range_counts : 100000 + 7 * i;
 }
 
-static uint32_t parameters_crc32(void)
+static uint32_t parameters_crc32(const struct hand_drop *drop)
 {
 	uint8_t bytes[4 * HAND_PARAMETERS];
 
 	for (unsigned i = 0; i < HAND_PARAMETERS; i++)
-		put_le(bytes + 4 * i, parameter(i), 4);
+		put_le(bytes + 4 * i, parameter(drop, i), 4);
 	return hand_crc32(bytes, sizeof(bytes));
 }
 
@@ -120,7 +121,7 @@ void hand_told(const struct hand_drop *drop, unsigned i, struct frame *frame)
 	put_le(frame->data, drop->drop_id, 2);
 	if (i > 0) {
 		put_le(frame->data + 2, 0x2000 + i - 1, 2);
-		put_le(frame->data + 4, parameter(i - 1), 4);
+		put_le(frame->data + 4, parameter(drop, i - 1), 4);
 		return;
 	}
 	frame->id = 0x686;
@@ -152,7 +153,7 @@ void hand_capture_end(const struct hand_drop *drop, struct frame *frame)
 	put_le(frame->data + 16, hand_drop_crc32(drop), 4);
 	put_le(frame->data + 20, drop->frame_speed_mm_s, 2);
 	put_le(frame->data + 22, (uint16_t)drop->camera_frame, 2);
-	put_le(frame->data + 24, parameters_crc32(), 4);
+	put_le(frame->data + 24, parameters_crc32(drop), 4);
 	hand_seal(frame);
 }
 

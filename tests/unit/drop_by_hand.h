@@ -20,6 +20,7 @@ struct hand_drop {
 	uint32_t trigger_us;
 	uint16_t frame_speed_mm_s;
 	int16_t camera_frame;
+	uint32_t range_counts;                            /* parameter 0x2008 */
 	int16_t sample[2][HAND_TICKS_MAX][HAND_PER_TICK]; /* 7 X, 10 Y, 10 Z */
 };
 

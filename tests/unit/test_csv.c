@@ -392,10 +392,11 @@ static unsigned replace(const char *file, const char *after, const char *from, c
 
 static void expect_refused(char *file, unsigned line, const char *why)
 {
-	char message[READ_MESSAGE_MAX] = "", place[16];
+	char message[READ_MESSAGE_MAX] = "", place[16] = "";
 	struct record record;
 
-	snprintf(place, sizeof(place), ":%u: ", line);
+	if (line > 0) /* it is told of one */
+		snprintf(place, sizeof(place), ":%u: ", line);
 	assert_int_equal(read_record(&record, file, NULL, message), DT_E_FORMAT);
 	if (!strstr(message, place) || !strstr(message, why))
 		fail_msg("\"%s\", expected %s%s", message, place, why);
@@ -421,6 +422,25 @@ static void test_samples_are_counts(void **state)
 		snprintf(cell, sizeof(cell), ",%s,", values[i]);
 		line = replace(file, "time_s,", ",101,", cell);
 		expect_refused(file, line, "expected a whole count of 1/32 g");
+	}
+	for (int i = 0; i < 4; i++) { /* what is beyond the range is marked, and nothing else */
+		static const char *const cells[] = {",101*,", ",501,", ",-501,", ",lost*,"};
+		char *file = round_trip(&record, ".csv", "csv");
+		unsigned line = replace(file, "time_s,", ",101,", cells[i]);
+
+		expect_refused(file, line, "for S1X, expected * behind a sample beyond 500 g and no other");
+	}
+	for (int i = 0; i < 2; i++) {
+		char *file = round_trip(&record, i == 0 ? ".csv" : ".unv", i == 0 ? "csv" : "uff58");
+
+		replace(file, i == 0 ? "# channel" : "S1X", "range_g=500", "range_g=400");
+		expect_refused(file, 0, "and a range of 500 g");
+	}
+	{
+		char *file = round_trip(&record, ".unv", "uff58");
+		unsigned line = replace(file, "S1X", "1.010000000000E+02", "5.010000000000E+02");
+
+		expect_refused(file, line, "501 g for S1X has the mask 0, expected 4 beyond 500 g");
 	}
 	{
 		char *file = round_trip(&record, ".unv", "uff58");

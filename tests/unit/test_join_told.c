@@ -14,7 +14,7 @@
 #include "host/record/join.h"
 #include "tests/unit/join_by_hand.h"
 
-enum { TICKS = 6, FOLLOW = 1 + WIRE_PARAMETERS };
+enum { TICKS = 6, FOLLOW = 1 + WIRE_PARAMETERS, RANGE_COUNTS = 6400 };
 
 static void begin_capture(void)
 {
@@ -48,6 +48,37 @@ static void told_when_all_has_come(void **state)
 	assert_int_equal(record.counters.corrupt, 0);
 	record_free(&record);
 	assert_false(join_told(join));
+}
+
+/* The set comes behind the samples, and says from where on they are marked. */
+static void range_is_the_parameters(void **state)
+{
+	struct record record;
+	struct frame frame;
+
+	(void)state;
+	hand_fill(&drop, 1000, TICKS, 5);
+	memset(drop.sample, 0, sizeof(drop.sample));
+	drop.range_counts = RANGE_COUNTS;
+	drop.sample[1][2][4] = RANGE_COUNTS;
+	drop.sample[1][2][5] = RANGE_COUNTS + 1;
+	drop.sample[1][2][6] = -RANGE_COUNTS - 1;
+	for (unsigned all = 0; all < 2; all++) {
+		join_forget_run(join);
+		join_by_hand_feed_both(0, TICKS - 1);
+		assert_int_equal(join_by_hand_feed_end(), 1);
+		for (unsigned i = 0; i < FOLLOW - !all; i++) {
+			hand_told(&drop, i, &frame);
+			assert_int_equal(join_feed(join, &frame), 0);
+		}
+		assert_int_equal(join_take(join, &record), 0);
+		assert_true(record.channels[3].range_g == (all ? RANGE_COUNTS / 32.0 : 500));
+		assert_int_equal(record.channels[3].sample[2 * 7 + 4], 0);
+		assert_int_equal(record.channels[3].sample[2 * 7 + 5], all ? SAMPLE_CLIPPED : 0);
+		assert_int_equal(record.channels[3].sample[2 * 7 + 6], all ? SAMPLE_CLIPPED : 0);
+		assert_int_equal(record.flags & RECORD_FLAG_CLIPPED, all ? RECORD_FLAG_CLIPPED : 0);
+		record_free(&record);
+	}
 }
 
 static void damage_is_counted(void **state)
@@ -140,6 +171,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test_setup_teardown(told_when_all_has_come, join_by_hand_begin, join_by_hand_end),
+	        cmocka_unit_test_setup_teardown(range_is_the_parameters, join_by_hand_begin,
+	                                        join_by_hand_end),
 	        cmocka_unit_test_setup_teardown(damage_is_counted, join_by_hand_begin, join_by_hand_end),
 	        cmocka_unit_test_setup_teardown(an_altered_set_is_marked, join_by_hand_begin,
 	                                        join_by_hand_end),

@@ -86,7 +86,7 @@ static void write_log(const char *file, double peak_g)
 			c->value_g[k] = t > 0.0 && t < 1.0
 			                        ? round(32 * peak_g * sin(3.14159265358979 * t)) / 32
 			                        : 0.0;
-			c->sample[k] = 0;
+			c->sample[k] = fabs(c->value_g[k]) > 500 ? SAMPLE_CLIPPED : 0;
 		}
 	}
 	record_finish(&record);
