@@ -316,3 +316,60 @@ int chain_reaches(struct archive *archive, const struct chain *chain)
 	               (long long)noted.number - 1, noted.head);
 	return 0;
 }
+
+bool chain_is_of_one(const struct chain *chain, int64_t noted, const char **path)
+{
+	*path = NULL;
+	for (size_t i = chain->count; i > 0 && chain->entry[i - 1].number > noted; i--) {
+		if (*path != NULL && strcmp(*path, chain->entry[i - 1].path) != 0)
+			return false;
+		*path = chain->entry[i - 1].path;
+	}
+	return true;
+}
+
+/* The sidecar whose entries the index does not know of, NULL: none; 1, or 0 as chain_is_reached. */
+static int left_behind(struct archive *archive, const struct chain *chain, const char **path)
+{
+	struct chain_place noted;
+	int result = place_of_index(archive, &noted);
+
+	if (result != 0)
+		return result;
+	if (chain_is_of_one(chain, noted.number - 1, path))
+		return 1;
+	archive_refuse(archive, DT_E_CORRUPT,
+	               "index.sqlite: behind: it knows of %lld entries of " CHAIN_FILE
+	               ", expected %lld: was an earlier one put back? 'droptower series --rebuild' makes it "
+	               "again",
+	               (long long)noted.number - 1, (long long)chain->entry[chain->count - 1].number);
+	return 0;
+}
+
+int chain_is_reached(struct archive *archive, const struct chain *chain)
+{
+	const char *path;
+
+	return left_behind(archive, chain, &path);
+}
+
+int chain_left(struct archive *archive, char file[ARCHIVE_PATH_MAX])
+{
+	struct chain_place next, noted;
+	struct chain chain;
+	const char *path;
+	int result = chain_next(archive, &next);
+
+	if (result == 0)
+		result = place_of_index(archive, &noted);
+	if (result != 0 || next.number <= noted.number)
+		return result;
+	result = chain_load(archive, &chain);
+	if (result != 0)
+		return result;
+	result = left_behind(archive, &chain, &path);
+	if (result > 0)
+		snprintf(file, ARCHIVE_PATH_MAX, "%s", path != NULL ? path : "");
+	chain_free(&chain);
+	return result > 0 ? file[0] != '\0' : result < 0 ? result : DT_E_CORRUPT;
+}

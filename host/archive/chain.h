@@ -70,6 +70,16 @@ DT_MUST_USE int chain_enter(struct archive *archive, const struct chain_place *p
 /* Whether the chain holds the entry whose head the index notes: 1, or 0 with one line in message. */
 DT_MUST_USE int chain_reaches(struct archive *archive, const struct chain *chain);
 
+/* Whether all entries behind NOTED are of one sidecar, as a writer leaves them that dies before it commits;
+ * its path, NULL when there are none. */
+bool chain_is_of_one(const struct chain *chain, int64_t noted, const char **path);
+
+/* The same of what the index notes: 1, or 0 with one line in message. */
+DT_MUST_USE int chain_is_reached(struct archive *archive, const struct chain *chain);
+
+/* The sidecar of which a writer left an entry so: 1; 0: of none. Within a transaction. */
+DT_MUST_USE int chain_left(struct archive *archive, char file[ARCHIVE_PATH_MAX]);
+
 /* The index notes the chain's last entry as its head. */
 DT_MUST_USE int chain_note(struct archive *archive, int64_t number, const char *head);
 

@@ -109,7 +109,9 @@ int indexed_hold_drop(struct proof *proof, const struct chain_entry *entry, cons
 	if (result != 0)
 		return result;
 	digest_of(text.bytes, text.size, hash);
-	proof->indexed = own != NULL && strcmp(hash, own->hash) == 0;
+	/* behind the chain's last word of it, only one that was never acknowledged may be */
+	proof->indexed = own != NULL && strcmp(hash, own->hash) == 0 &&
+	                 (own == entry || (entry != NULL && entry->number > proof->noted));
 	if (!proof->indexed && proof->begun) {
 		if (strcmp(sidecar_value(told, "state"), "recording") != 0)
 			tell_line(proof, true, "state", "recording", sidecar_value(told, "state"));

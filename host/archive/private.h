@@ -66,6 +66,8 @@ DT_MUST_USE int archive_first_drop(struct archive *archive, const char *query, c
 int sql_refuse(struct archive *archive);
 
 DT_MUST_USE int archive_start(struct archive *archive); /* a transaction for writing */
+/* The same for a change, after what a writer left that died has been put right. */
+DT_MUST_USE int archive_change(struct archive *archive);
 /* Commits when result is 0, else takes everything back; returns result or what committing said. */
 DT_MUST_USE int archive_end(struct archive *archive, int result);
 

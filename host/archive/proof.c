@@ -11,12 +11,21 @@
 
 int proof_open(struct archive *archive, struct proof *proof)
 {
+	const char *path;
 	int result;
 
 	*proof = (struct proof){.archive = archive, .copy = -1};
-	result = archive->index != NULL ? sql_number(archive, &proof->noted, "SELECT entries FROM chain", "")
-	                                : DT_E_EMPTY; /* before it is made again */
-	return result != 0 && result != DT_E_EMPTY ? result : chain_load(archive, &proof->chain);
+	result = chain_load(archive, &proof->chain);
+	if (result != 0 || archive->index == NULL) /* before it is made again */
+		return result;
+	result = sql_number(archive, &proof->noted, "SELECT entries FROM chain", "");
+	if (result != 0 && result != DT_E_EMPTY) {
+		chain_free(&proof->chain);
+		return result;
+	}
+	if (!chain_is_of_one(&proof->chain, proof->noted, &path)) /* an earlier index was put back */
+		proof->noted = INT64_MAX;
+	return 0;
 }
 
 void proof_close(struct proof *proof)

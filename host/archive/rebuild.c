@@ -186,12 +186,29 @@ static int64_t drops_of_index(const char *folder)
 	return count;
 }
 
+/* A series that awaits its first drop is something. */
+static int rebuild_hold_anything(struct archive *archive)
+{
+	int64_t rows;
+	int result = sql_number(archive, &rows, "SELECT COUNT(*) FROM series", "");
+
+	if (result != 0 || rows > 0)
+		return result;
+	return archive_refuse(
+	        archive, DT_E_EMPTY,
+	        "%.300s: nothing in the folder 'raw', expected series and drops: is it mounted? "
+	        "--fewer makes an empty index",
+	        archive->folder);
+}
+
 static int rebuild_hold_count(struct rebuild *rebuild)
 {
 	struct archive *archive = &rebuild->archive;
 	int64_t now = 0;
 	int result = sql_number(archive, &now, "SELECT COUNT(*) FROM drops", "");
 
+	if (result == 0 && now == 0 && rebuild->before == 0 && !rebuild->fewer)
+		return rebuild_hold_anything(archive);
 	if (result != 0 || now >= rebuild->before || rebuild->fewer)
 		return result;
 	return archive_refuse(archive, DT_E_STATE,

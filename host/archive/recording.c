@@ -152,7 +152,7 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 	if (result == 0)
 		result = scene_of_text(archive, name, text, angle_deg, &scene);
 	if (result == 0)
-		result = archive_start(archive);
+		result = archive_change(archive);
 	if (result == 0)
 		result = archive_end(archive,
 		                     recording_make_series(archive, name, campaign, text, &scene, planned));
@@ -192,7 +192,7 @@ int archive_set_chain(struct archive *archive, const char *series, const char *c
 	char *text = NULL;
 	struct scene scene;
 	int64_t row = 0;
-	int result = archive_start(archive);
+	int result = archive_change(archive);
 
 	if (result != 0)
 		return result;
@@ -317,7 +317,7 @@ static void take_back(struct archive *archive, const char *raw)
 	char message[ARCHIVE_MESSAGE_MAX];
 
 	memcpy(message, archive->message, sizeof(message));
-	if (archive_start(archive) != 0 || archive_end(archive, enter_removal(archive, raw)) != 0)
+	if (archive_change(archive) != 0 || archive_end(archive, enter_removal(archive, raw)) != 0)
 		archive->message[0] = '\0'; /* 'verify' names it as missing */
 	remove_files(archive, raw);
 	memcpy(archive->message, message, sizeof(message));
@@ -334,7 +334,7 @@ int archive_begin(struct archive *archive, const char *series, const char *opera
 	if (result != 0)
 		return result;
 	strcpy(r.series, series);
-	result = archive_start(archive);
+	result = archive_change(archive);
 	if (result != 0)
 		return result;
 	result = archive_end(archive, insert_drop(archive, operator_name, ending, simulated, &r));
@@ -357,7 +357,7 @@ void archive_abandon(struct archive_recording *recording)
 
 void archive_discard(struct archive *archive, struct archive_recording *recording)
 {
-	if (archive_start(archive) == 0 && archive_end(archive, remove_drop(archive, recording)) == 0)
+	if (archive_change(archive) == 0 && archive_end(archive, remove_drop(archive, recording)) == 0)
 		remove_files(archive, recording->raw);
 	archive_abandon(recording);
 }
@@ -412,7 +412,7 @@ int archive_finish(struct archive *archive, struct archive_recording *recording,
 	    (durable_sync(recording->log) != 0 || digest_file(recording->log, hash, &bytes, -1) != 0))
 		result = recording_refuse_file(archive, recording->log);
 	if (result == 0)
-		result = archive_start(archive);
+		result = archive_change(archive);
 	if (result == 0)
 		result = archive_end(archive,
 		                     recording_acknowledge(archive, recording, time_s != 0 ? when : NULL,
@@ -436,7 +436,7 @@ static int look_first(struct archive *archive, const char *drop, const char *ope
 
 static int start_change(struct archive *archive, const char *drop, struct archive_place *place)
 {
-	int result = archive_start(archive);
+	int result = archive_change(archive);
 
 	if (result != 0)
 		return result;

@@ -245,7 +245,7 @@ int archive_result(struct archive *archive, const char *drop, const char *versio
 	int result = proof_look(archive, drop, fault);
 
 	if (result == 0)
-		result = archive_start(archive);
+		result = archive_change(archive);
 	if (result != 0)
 		return result;
 	archive_time(now, time(NULL));

@@ -117,6 +117,15 @@ void sidecar_name(const char *raw, char file[ARCHIVE_NAME_MAX + 64])
 	         raw);
 }
 
+int sidecar_drop(struct archive *archive, const char *file, int64_t *row)
+{
+	char stem[ARCHIVE_NAME_MAX + 64];
+
+	snprintf(stem, sizeof(stem), "%.*s.", (int)(strrchr(file, '.') - file), file);
+	return sql_number(archive, row, "SELECT id FROM drops WHERE raw >= ?1 AND raw < ?1 || '~'", "s",
+	                  stem);
+}
+
 /* ---- its text ---- */
 
 /* The row is there. drop: its row, 0 of a series. */

@@ -12,6 +12,9 @@
 /* Of a log. */
 void sidecar_name(const char *raw, char file[ARCHIVE_NAME_MAX + 64]);
 
+/* The other way: the row of the drop that has this sidecar; DT_E_EMPTY without a message when none has. */
+DT_MUST_USE int sidecar_drop(struct archive *archive, const char *file, int64_t *row);
+
 /* ---- writing, within a transaction ---- */
 
 /* Writes FOLDER/raw/.../NNNN.ini of a drop, or .../series.ini, from the index. */

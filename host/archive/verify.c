@@ -43,13 +43,9 @@ static bool was_begun_only(struct proof *proof, const struct chain_entry *entry)
 /* A sidecar that the chain has and the index has not. */
 static int hold_unknown(struct proof *proof, const struct chain_entry *entry)
 {
-	char stem[ARCHIVE_NAME_MAX + 64];
 	int64_t row;
-	int result;
+	int result = sidecar_drop(proof->archive, entry->path, &row);
 
-	snprintf(stem, sizeof(stem), "%.*s.", (int)(strrchr(entry->path, '.') - entry->path), entry->path);
-	result = sql_number(proof->archive, &row, "SELECT id FROM drops WHERE raw >= ?1 AND raw < ?1 || '~'",
-	                    "s", stem);
 	if (result != DT_E_EMPTY)
 		return result;
 	if (!was_begun_only(proof, entry))
@@ -111,6 +107,12 @@ static int hold_chain(struct proof *proof)
 	if (reaches == 0)
 		proof_fault(proof, PROOF_CHAIN, proof->chain.count == 0, "%s",
 		            archive_message(proof->archive));
+	else
+		reaches = chain_is_reached(proof->archive, &proof->chain);
+	if (reaches < 0)
+		return reaches;
+	if (reaches == 0 && proof->told == 0)
+		proof_fault(proof, PROOF_INDEX, false, "%s", archive_message(proof->archive));
 	if (proof->chain.broken != 0)
 		proof_fault(proof, PROOF_CHAIN, false, CHAIN_FILE ": broken at entry %lld",
 		            (long long)proof->chain.broken);
