@@ -120,7 +120,8 @@ static const struct option_row rows[] = {
         OPTION_FLAG("each", struct arguments, each,
                     "every drop of IN into a file of its own: OUT.csv becomes OUT-0001.csv ..."),
         OPTION_TEXT("columns", "SPEC", struct arguments, columns,
-                    "for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\""),
+                    "what the columns of foreign text are, where the file does not tell it, e.g. "
+                    "\"time:ms,fixture:g,board:-g,-\""),
         OPTION_TEXT("dbc", "OUT", struct arguments, dbc,
                     "the wire as a DBC file for other CAN tools; - is standard output"),
 };
@@ -136,7 +137,7 @@ static const struct option_table known_options = {
                 "log,\n"
                 ".csv, .unv or .uff universal file (dataset 58), .h5 or .hdf5 HDF5. IN is recognised by its "
                 "content.\n"
-                "Foreign recordings become CSV, universal files or HDF5; foreign text needs --columns.\n"
+                "Foreign recordings become CSV, universal files or HDF5.\n"
                 "\n",
         OPTION_ROWS(rows),
         .words = true,

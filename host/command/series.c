@@ -105,8 +105,6 @@ static int series_check_options(const struct series_arguments *a)
 {
 	if (a->json && a->csv != NULL)
 		return command_usage("series", "--json and --csv exclude each other");
-	if (a->fewer && !a->rebuild)
-		return command_usage("series", "--fewer goes with --rebuild");
 	if (a->filter.limit > 0 && a->csv != NULL)
 		return command_usage("series",
 		                     "--limit goes without --csv, which cannot say that there are more");
@@ -137,6 +135,54 @@ static const struct verb {
 };
 enum { VERBS = sizeof(verbs) / sizeof(verbs[0]) };
 
+/* Whether a word is one of several with a blank between. */
+static bool is_among(const char *word, const char *words)
+{
+	size_t length = strlen(word);
+
+	for (const char *at = words; (at = strstr(at, word)) != NULL; at += length)
+		if ((at == words || at[-1] == ' ') && (at[length] == ' ' || at[length] == '\0'))
+			return true;
+	return false;
+}
+
+/* An option that a verb does not heed is refused: somebody relies on it. */
+static int check_heeded(const char *verb, const struct series_arguments *a)
+{
+	static const char lists[] = "list drops show tables";
+	const struct {
+		const char *option;
+		bool given;
+		const char *with;
+	} options[] = {
+	        {"fewer", a->fewer, "--rebuild"},
+	        {"campaign", a->filter.campaign != NULL, "list drops show tables new"},
+	        {"scene", a->scene != NULL, "list drops show tables new"},
+	        {"angle", !isnan(a->filter.angle_deg), "list drops show tables new add"},
+	        {"height", !isnan(a->height_m), "new"},
+	        {"date", a->date != NULL, "list drops show tables"},
+	        {"chain", a->chain != NULL, "new add reanalyse"},
+	        {"drops", a->drops > 0, "new"},
+	        {"version", a->filter.version != NULL, "list drops show tables result"},
+	        {"undecided", a->undecided, lists},
+	        {"reference", a->reference != NULL, "tables"},
+	        {"text", a->filter.text != NULL, "list drops"},
+	        {"limit", a->filter.limit > 0, "list drops"},
+	        {"reason", a->reason != NULL, "accept reject reopen"},
+	        {"note", a->note != NULL, "add"},
+	        {"simulated", a->simulated, "add"},
+	        {"operator", a->operator_name != NULL, "add accept reject reopen note"},
+	        {"json", a->json, "list drops show tables result"},
+	        {"csv", a->csv != NULL, "list drops show tables"},
+	};
+
+	for (size_t i = 0; i < sizeof(options) / sizeof(options[0]); i++)
+		if (options[i].given && !is_among(verb, options[i].with))
+			return command_usage("series", "--%s goes with %s, not with %s", options[i].option,
+			                     options[i].with, verb);
+	return COMMAND_DONE;
+}
+
 /* What a verb needs beside its words. */
 static int series_check(const struct verb *verb, struct series_arguments *a)
 {
@@ -144,22 +190,11 @@ static int series_check(const struct verb *verb, struct series_arguments *a)
 
 	if (a->count < verb->least || a->count > verb->most)
 		return command_usage("series", "%s: %d words, expected %s", name, a->count, verb->expected);
-	if (a->chain != NULL && verb->run != series_verb_new && verb->run != series_verb_add &&
-	    verb->run != series_verb_reanalyse)
-		return command_usage("series", "--chain goes with new, add and reanalyse, not with %s", name);
 	if (verb->run == series_verb_new) {
 		if (a->scene == NULL)
 			return command_usage("series", "new: expected --scene FILE");
 		return COMMAND_DONE;
 	}
-	if (!isnan(a->height_m))
-		return command_usage("series", "--height goes with new, not with %s", name);
-	if (a->simulated && verb->run != series_verb_add)
-		return command_usage("series", "--simulated goes with add, not with %s", name);
-	if ((a->filter.text != NULL || a->filter.limit > 0) && verb->run != series_verb_list &&
-	    verb->run != series_verb_drops)
-		return command_usage("series", "--text and --limit go with list and drops, not with %s",
-		                     name);
 	a->filter.scene_name = a->scene;
 	if ((verb->run == series_verb_reject || verb->run == series_verb_reopen) && a->reason == NULL)
 		return command_usage("series", "%s: expected --reason TEXT", name);
@@ -186,22 +221,25 @@ static int run_verb(const struct verb *verb, struct series_arguments *a)
 
 int command_series(int argc, char **argv)
 {
-	struct series_arguments a = {.drops = 5, .height_m = NAN, .filter = archive_filter_none()};
+	struct series_arguments a = {.height_m = NAN, .filter = archive_filter_none()};
 	int code = option_read(&known_options, &a, argc, argv);
 	const char *name;
 
 	if (code != OPTIONS_READ)
 		return code;
 	code = series_check_options(&a);
+	name = a.rebuild ? "--rebuild" : optind < argc ? argv[optind] : "list";
+	for (int i = 0; i < VERBS && code == COMMAND_DONE; i++)
+		if (a.rebuild || strcmp(name, verbs[i].name) == 0)
+			code = check_heeded(name, &a);
 	if (code != COMMAND_DONE)
 		return code;
 	a.operator_name = archived_operator(a.operator_name);
 	a.archive = archived_folder(a.archive);
-	name = optind < argc ? argv[optind] : "list";
 	a.count = optind < argc ? argc - optind - 1 : 0;
 	a.word = argv + optind + 1;
 	if (a.rebuild)
-		return optind < argc ? command_usage("series", "--rebuild goes without '%s'", name)
+		return optind < argc ? command_usage("series", "--rebuild goes without '%s'", argv[optind])
 		                     : series_rebuild(&a);
 	for (int i = 0; i < VERBS; i++)
 		if (strcmp(name, verbs[i].name) == 0)

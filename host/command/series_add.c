@@ -148,17 +148,24 @@ static bool speed_agrees(struct adding *adding, const char *name, const struct r
 	                  "m/s", "between the gates");
 }
 
-static bool parameters_agree(struct adding *adding, const char *name, const struct log_capture *capture)
+/* Those that the drop itself tells, else what its log knows of the tower. */
+static bool parameters_agree(struct adding *adding, const char *name, const struct log_capture *capture,
+                             const struct record *record)
 {
 	struct tower_setting settings[TOWER_SETTINGS];
 
 	tower_setup_settings(&adding->scene, settings);
 	for (unsigned i = 0; i < TOWER_SETTINGS; i++) {
-		const struct wire_parameter_info *parameter = &wire_parameters[settings[i].number];
+		unsigned number = settings[i].number;
+		const struct wire_parameter_info *parameter = &wire_parameters[number];
+		double found = NAN;
 
-		if (capture->parameters.known[settings[i].number] &&
-		    !one_agrees(adding, name, parameter->name, capture->parameters.value[settings[i].number],
-		                round(settings[i].value), 0, parameter->unit, "in the tower"))
+		if (record->parameters_known)
+			found = record->parameters[number];
+		else if (capture != NULL && capture->parameters.known[number])
+			found = capture->parameters.value[number];
+		if (!one_agrees(adding, name, parameter->name, found, round(settings[i].value), 0,
+		                parameter->unit, "in the tower"))
 			return false;
 	}
 	return true;
@@ -175,8 +182,7 @@ static bool series_add_agrees(struct adding *adding, const char *name, const str
 	                  adding->beside) &&
 	       one_agrees(adding, name, "height", adding->height_m, scene->drop_height_m, HEIGHT_M, "m",
 	                  adding->beside) &&
-	       (capture == NULL || parameters_agree(adding, name, capture)) &&
-	       speed_agrees(adding, name, record);
+	       parameters_agree(adding, name, capture, record) && speed_agrees(adding, name, record);
 }
 
 /* ---- what is there already ---- */

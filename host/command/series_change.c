@@ -46,7 +46,7 @@ int series_verb_new(struct archive *archive, struct series_arguments *a)
 	if (code != COMMAND_DONE)
 		return code;
 	if (archive_new_series(archive, a->word[0], campaign, beside_scene_file(a->scene, path),
-	                       a->filter.angle_deg, a->height_m, a->drops) != 0)
+	                       a->filter.angle_deg, a->height_m, a->drops > 0 ? a->drops : 5) != 0)
 		return archived_failed(archive);
 	code = keep_chain(archive, a);
 	if (code == COMMAND_DONE)
