@@ -42,6 +42,7 @@ static struct {
 	uint8_t before[BOARD_SRAM_BYTES]; /* the memory when the poll before ended */
 	unsigned held;                    /* the depth that stands still */
 	bool paused;
+	uint32_t stopped; /* the instruction that did not begin; 0: none */
 	struct tally tally[BOARD_EXCEPTIONS];
 } core;
 
@@ -250,11 +251,19 @@ static void spend(unsigned instructions)
 	core.level[core.depth].instructions += instructions;
 }
 
+/* libunicorn's own idea of where it stopped is the instruction before where that one lies across two pages.
+ */
+static void stop_before(uint32_t address)
+{
+	core.stopped = address;
+	uc_emu_stop(core.uc);
+}
+
 static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *unused)
 {
 	uint32_t address = (uint32_t)address64;
 
-	(void)unused;
+	(void)uc, (void)unused;
 	if (address - BOARD_FLASH >= BOARD_FLASH_BYTES) /* a return, which the processor reports next */
 		return;
 	if (core.depth == 0 && address == board.app_poll && core.idle == 0) {
@@ -263,11 +272,11 @@ static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *unu
 	}
 	if (core.depth == 0 && address == core.idle && !core.pass_idle) {
 		core.at_idle = true;
-		uc_emu_stop(uc);
+		stop_before(address);
 		return;
 	}
 	if (board.now >= core.limit || (core.pending & core.enabled && next_exception() != 0)) {
-		uc_emu_stop(uc);
+		stop_before(address);
 		return;
 	}
 	core.pass_idle = false;
@@ -286,12 +295,12 @@ static void on_access(uc_engine *uc, int type, uint64_t address, int size, int64
 /* Only where somebody watches: it takes twice the time. */
 static void on_instruction(uc_engine *uc, uint64_t address, uint32_t size, void *unused)
 {
-	(void)size, (void)unused;
-	if (core.paused || address - BOARD_FLASH >= BOARD_FLASH_BYTES)
+	(void)uc, (void)size, (void)unused;
+	if (core.paused || core.stopped != 0 || address - BOARD_FLASH >= BOARD_FLASH_BYTES)
 		return;
 	watch->instruction(core.depth, (uint32_t)address);
 	if (core.paused)
-		uc_emu_stop(uc);
+		stop_before((uint32_t)address);
 	else
 		spend(1);
 }
@@ -563,9 +572,12 @@ static void run_processor(void)
 	uc_err error;
 
 	core.limit = next_event();
+	core.stopped = 0;
 	error = uc_emu_start(core.uc, get(UC_ARM_REG_PC) | 1, 0xFFFFFFFE, 0, 0);
 	if (error != UC_ERR_OK && !core.returning)
 		board_fail("%s", uc_strerror(error));
+	if (core.stopped != 0)
+		set(UC_ARM_REG_PC, core.stopped | 1);
 }
 
 void core_boot(const struct core_watch *watching)
