@@ -40,8 +40,8 @@ static const struct instant {
 static struct machine {
 	uint32_t tick_ms, now_us;
 	uint16_t outputs, inputs;
-	uint16_t bias; /* bits of the inputs, and bias_high, of the last Y and Z before this instant */
-	uint8_t bias_high;
+	uint16_t scanned, bias; /* bits of the inputs: as converted, as looked at */
+	uint8_t scanned_high, bias_high;
 	uint8_t edges;                       /* outputs that changed since the last request ... */
 	uint32_t edge_us[SENSORBUS_OUTPUTS]; /* ... and when */
 	uint8_t off_planned;                 /* outputs that port_off_at will switch ... */
@@ -97,7 +97,7 @@ uint8_t lockstep_kept(void)
 
 uint32_t lockstep_random(void)
 {
-	return machine.answer.random;
+	return machine.answer.random++; /* another one each time */
 }
 
 bool port_brown_out_set(void)
@@ -379,20 +379,25 @@ static int read_answer(void)
 	return result == 0 && answer->then == SENSORBUS_STOP ? LOCKSTEP_GONE : result;
 }
 
-/* The bias is converted with Y and Z, so that what came with them is known from the next instant on. */
-static void take_bias(void)
+/* The board converts the bias with the first Y and Z of a millisecond, and looks at it when the next begins.
+ */
+static void take_bias(unsigned instant)
 {
-	if (!(instants[at].group & SENSORBUS_YZ))
-		return;
-	machine.bias = machine.answer.inputs & BIAS;
-	machine.bias_high = machine.answer.bias_high;
+	if (at == 0) {
+		machine.scanned = machine.answer.inputs & BIAS;
+		machine.scanned_high = machine.answer.bias_high;
+	}
+	if (instant == 0) {
+		machine.bias = machine.scanned;
+		machine.bias_high = machine.scanned_high;
+	}
 }
 
 int lockstep_exchange(unsigned instant)
 {
 	int result = 0;
 
-	take_bias();
+	take_bias(instant);
 	at = instant;
 	set_time(&instants[instant]);
 	if (machine.answer.then == SENSORBUS_MORE)

@@ -133,7 +133,7 @@ void plant_inputs_off(uint16_t inputs)
 
 uint32_t plant_random(void)
 {
-	return plant.random;
+	return plant.random++; /* another one each time */
 }
 
 int64_t plant_next(void)
