@@ -21,11 +21,14 @@ const char *const study_figure_title[STUDY_FIGURES] = {"Figure 10: peaks in X ov
                                                        "Figure 12: histories at 25 deg", "Figures 10 to 12"};
 const char *const study_figure_text[STUDY_FIGURES] = {
         "The mounts of 2A leave the plate 60 to 75 % of its box's peak, those of 2B 75 to 90 %; all fall "
-        "with the angle. Lines are predictions, planar and coupled; bars are SDs of five drops.",
+        "with the angle. study: measured, means of five drops; simulated: means of the drops here; bars are "
+        "SDs of five drops. planar is fitted to the study's means, coupled predicted without them.",
         "With the angle the box's peak falls and the plate's rises; above 25 deg 2B's plate gets more than "
         "its box. coupled, whose box does not turn, has neither right.",
         "The plate follows later, longer and lower, then rings; the softer mount more so. The dotted "
-        "prediction lies on the measured lines nearly everywhere. The study gives no samples to draw.",
+        "line is planar, fitted to the study's means; the simulated tower has its equations, so that they "
+        "must "
+        "lie on each other. The study gives no samples to draw.",
         ""};
 
 struct drawing {
@@ -86,12 +89,14 @@ static void draw_peaks(struct drawing *d, size_t g, enum study_quantity q, const
 		const char *c = colours[s];
 		int b = first + 4 * s;
 
-		fprintf(d->script, "$b%d using 1:2 with lines lc rgb '%s' lw 2 title '%s: planar', ", b, c,
-		        sensors[s]);
-		fprintf(d->script, "$b%d using 1:2 with lines lc rgb '%s' lw 1.5 dt 2 title 'coupled', ",
+		fprintf(d->script, "$b%d using 1:2 with lines lc rgb '%s' lw 2 title '%s: planar, fitted', ",
+		        b, c, sensors[s]);
+		fprintf(d->script,
+		        "$b%d using 1:2 with lines lc rgb '%s' lw 1.5 dt 2 title 'coupled, predicted', ",
 		        b + 1, c);
-		fprintf(d->script, "$b%d with yerrorbars lc rgb '%s' pt 7 ps 0.9 title 'study', ", b + 2, c);
-		fprintf(d->script, "$b%d with yerrorbars lc rgb '%s' pt 4 ps 0.9 title 'dropped here'%s",
+		fprintf(d->script, "$b%d with yerrorbars lc rgb '%s' pt 7 ps 0.9 title 'study, measured', ",
+		        b + 2, c);
+		fprintf(d->script, "$b%d with yerrorbars lc rgb '%s' pt 4 ps 0.9 title 'simulated here'%s",
 		        b + 3, c, s > 0 ? ", " : "\n");
 	}
 }
@@ -156,10 +161,10 @@ static int draw_history(struct drawing *d, size_t g, enum study_quantity q, cons
 	        label, study_geometry[g], "XY"[q], study_angle_deg[a], 1e3 * history_from_s,
 	        1e3 * history_to_s, q == STUDY_X ? -350 : -200, q == STUDY_X ? 600 : 340);
 	for (int s = STUDY_SENSORS - 1; s >= 0; s--) {
-		fprintf(d->script, "$b%d with lines lc rgb '%s' lw 1.5 title '%s: one drop here', ",
+		fprintf(d->script, "$b%d with lines lc rgb '%s' lw 1.5 title '%s: one simulated drop', ",
 		        first + s, colours[s], sensors[s]);
-		fprintf(d->script, "$b%d with lines lc rgb 'black' lw 1 dt 3 title 'planar'%s", first + 2 + s,
-		        s > 0 ? ", " : "\n");
+		fprintf(d->script, "$b%d with lines lc rgb 'black' lw 1 dt 3 title 'planar, fitted'%s",
+		        first + 2 + s, s > 0 ? ", " : "\n");
 	}
 	return status;
 }
