@@ -22,7 +22,7 @@ const char *const fit_window_names[FIT_WINDOWS] = {"before the touch", "0 to 1 m
 /* With any of those, an angle so many of its deviations from the one set is named first. */
 #define TURNED_FAR 4.0
 
-enum { PERIODOGRAM_LINES = 137 };
+enum { PERIODOGRAM_LINES = 138 }; /* even: two at a time */
 
 static double periodogram_hz(size_t line)
 {

@@ -107,16 +107,19 @@ struct peak {
 	double at_s, value, before, last;
 };
 
-/* The largest value so far, by the parabola through three nodes of one step. */
+/* The largest value so far, by the parabola through three nodes of one step, which rises above the middle one
+ * by less than the half of it. */
 static void motion_peak(struct peak *k, size_t node, double value)
 {
-	double bend = k->before - 2.0 * k->last + value, lean = 0.5 * (value - k->before), most, step;
+	double middle = fabs(k->last), bend, lean, most, step;
 
-	if (node >= 2 && node != MOTION_FINE_NODES + 1 && bend != 0.0 &&
-	    (fabs(k->last) >= fabs(k->before) && fabs(k->last) >= fabs(value))) {
-		most = k->last - 0.5 * lean * lean / bend;
+	if (middle >= fabs(k->before) && middle >= fabs(value) && 1.5 * middle > fabs(k->value) &&
+	    node >= 2 && node != MOTION_FINE_NODES + 1) {
+		bend = k->before - 2.0 * k->last + value;
+		lean = 0.5 * (value - k->before);
+		most = k->last - (bend != 0.0 ? 0.5 * lean * lean / bend : 0.0);
 		step = node <= MOTION_FINE_NODES ? MOTION_FINE_S : MOTION_COARSE_S;
-		if (fabs(most) > fabs(k->value)) {
+		if (bend != 0.0 && fabs(most) > fabs(k->value)) {
 			k->value = most;
 			k->at_s = motion_node_s(node - 1) - lean / bend * step;
 		}

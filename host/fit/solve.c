@@ -122,9 +122,12 @@ bool solve_histories(struct solve *s, const struct solve_drop *d, bool slopes)
 	double p[MOTION_PARAMETERS];
 
 	solve_parameters(s, d, p);
-	if (motion_solve(s->scene, p, s->nodes, s->motion,
-	                 s->derives ? s->derived[slopes ? 0 : 1 + MOTION_PARAMETERS] : NULL) != 0)
+	if (slopes && s->tried)
+		memcpy(s->derived[0], s->derived[1 + MOTION_PARAMETERS], sizeof(s->derived[0]));
+	else if (motion_solve(s->scene, p, s->nodes, s->motion,
+	                      s->derives ? s->derived[slopes ? 0 : 1 + MOTION_PARAMETERS] : NULL) != 0)
 		return false;
+	s->tried = false;
 	for (size_t i = 0; slopes && i < MOTION_PARAMETERS; i++) {
 		double was = p[i];
 
@@ -419,13 +422,16 @@ bool solve_run(struct solve *s, unsigned iterations, double enough)
 				break;
 			solve_keep(s, &kept, true);
 		}
+		s->tried = s->drops == 1 && tried <= now && i + 1 < iterations;
 		if (!(tried <= now)) {
 			s->squares = now;
 			return true;
 		}
 		/* a step that had to be shortened says nothing of how far the minimum is */
-		if (now - tried < enough && !(damping > first))
+		if (now - tried < enough && !(damping > first)) {
+			s->tried = false;
 			return true;
+		}
 		damping = fmax(damping / 10.0, 1e-9);
 	}
 	return true;

@@ -39,6 +39,7 @@ struct solve {
 	size_t used;           /* samples in it */
 	struct motion *motion; /* [1 + MOTION_PARAMETERS], and, if `derives`, what is derived of each */
 	bool derives;
+	bool tried; /* motion[0] is the history where the unknowns are now, of the only drop */
 	double derived[2 + MOTION_PARAMETERS][MOTION_DERIVED]; /* the last: of the latest without slopes */
 };
 

@@ -38,7 +38,7 @@ double body_wedge(double angle_rad)
 	return sin(2.0 * BODY_WEDGE_RAD) / fmax(fabs(sin(2.0 * angle_rad)), sin(2.0 * BODY_WEDGE_MIN_RAD));
 }
 
-static struct corner body_corner(const struct body *b, int corner, double cosine, double sine)
+static inline struct corner body_corner(const struct body *b, int corner, double cosine, double sine)
 {
 	double x = side_x[corner] * b->lever_x_m, y = side_y[corner] * b->lever_y_m;
 
@@ -68,7 +68,7 @@ void body_start(const struct body *b, double y[BODY_STATES])
 }
 
 /* Of the angle at the touch plus turn. */
-static void body_turned(const struct body *b, double turn, double *cosine, double *sine)
+static inline void body_turned(const struct body *b, double turn, double *cosine, double *sine)
 {
 	double t2 = turn * turn, c, s;
 
@@ -83,7 +83,8 @@ static void body_turned(const struct body *b, double turn, double *cosine, doubl
 	*sine = b->sine * c + b->cosine * s;
 }
 
-static struct foot foot_of(const struct body *b, const double y[], int corner, double cosine, double sine)
+static inline struct foot foot_of(const struct body *b, const double y[], int corner, double cosine,
+                                  double sine)
 {
 	struct foot f = {body_corner(b, corner, cosine, sine), 0.0, -y[BODY_V_UP], 0.0};
 
@@ -152,7 +153,7 @@ static void press(const struct body *b, const double y[], int corner, struct loa
 
 	if (!(f.depth > 0.0))
 		return;
-	l->depth = fmax(l->depth, f.depth);
+	l->depth = f.depth > l->depth ? f.depth : l->depth; /* fmax is a call, here and below */
 	root = sqrt(f.depth);
 	normal = touch->stiffness_n_m15 * f.depth * root * damped(touch, &f);
 	if (!(normal > 0.0))
@@ -163,7 +164,7 @@ static void press(const struct body *b, const double y[], int corner, struct loa
 		l->creep[corner] = f.sliding;
 		if (touch->hold != BODY_STICKS) {
 			along = -touch->side * most;
-			l->creep[corner] = touch->side * fmin(touch->side * f.sliding, 0.0);
+			l->creep[corner] = touch->side * f.sliding < 0.0 ? f.sliding : 0.0;
 		} else if (b->clips && fabs(along) > most) {
 			along = copysign(most, along);
 			if (f.sliding * y[body_grip(corner)] > 0.0)
