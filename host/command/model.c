@@ -159,6 +159,57 @@ static int take_sweep(const struct option_table *table, const char *name, const 
 	return parse_sweep(ensemble, text) == COMMAND_DONE ? OPTIONS_READ : OPTIONS_WRONG;
 }
 
+static int take_limit(const struct option_table *table, const char *name, const char *text, void *into)
+{
+	struct design *design = into;
+	struct design_limit *limit = &design->limit[design->limits];
+	size_t length = strcspn(text, "=");
+	char quantity[LIST_MAX], *end = NULL;
+
+	if (design->limits == DESIGN_LIMITS_MAX)
+		return option_wrong(table, "--%s is given too often, expected %d at most", name,
+		                    DESIGN_LIMITS_MAX);
+	snprintf(quantity, sizeof(quantity), "%.*s", (int)(length < LIST_MAX ? length : LIST_MAX - 1), text);
+	if (design_quantity(quantity, &limit->quantity) != 0)
+		return option_wrong(table,
+		                    "--%s: no quantity '%s', expected one of --json's predicted, such as "
+		                    "s1_resultant_g or plate_travel_m",
+		                    name, quantity);
+	limit->value = text[length] == '=' ? strtod(text + length + 1, &end) : -1.0;
+	if (!end || end == text + length + 1 || *end != '\0' || !(limit->value > 0.0) ||
+	    !isfinite(limit->value))
+		return option_wrong(table, "--%s is '%s', expected QUANTITY=VALUE above 0", name, text);
+	design->limits++;
+	return OPTIONS_READ;
+}
+
+/* After the scene is read: its values are the middles. */
+static int parse_design(struct design *design, const struct ensemble *ensemble, const char *list)
+{
+	char word[LIST_MAX];
+
+	design->ensemble = *ensemble;
+	if (design->limits == 0)
+		return command_usage("model", "--design needs --limit QUANTITY=VALUE");
+	while (model_next_word(&list, word)) {
+		struct vary_key key;
+		int code = parse_key("design", word, strlen(word), &key);
+
+		if (code != COMMAND_DONE)
+			return code;
+		switch (design_add_key(design, &key)) {
+		case 0:
+			break;
+		case DT_E_RANGE:
+			return command_usage("model", "--design has too many keys, expected %d at most",
+			                     DESIGN_KEYS_MAX);
+		default:
+			return command_usage("model", "--design: %s of the scene is not above 0", key.name);
+		}
+	}
+	return COMMAND_DONE;
+}
+
 static const struct option_row rows[] = {
         OPTION_TEXT("scene", "FILE", struct model_arguments, scene_file, "what falls"),
         OPTION_TAKEN("angle", "DEG", struct model_arguments, angle_deg, command_angle,
@@ -190,6 +241,13 @@ static const struct option_row rows[] = {
                     "their standard deviations; SD% is percent of the scene's value"),
         OPTION_UINT64("seed", "S", struct model_arguments, seed, 0, 1e9,
                       "another seed makes other drops (1)"),
+        OPTION_TEXT(
+                "design", "KEY,...", struct model_arguments, design_keys,
+                "which values of up to three keys, from a quarter to four times the scene's, keep the "
+                "limits of --limit: the best, those that none beats, and how often they hold under [fit]"),
+        OPTION_TAKEN("limit", "QUANTITY=VALUE", struct model_arguments, design, take_limit,
+                     "of --design: s1_resultant_g=300, plate_travel_m=0.004, ...; several at once"),
+        OPTION_FLAG("csv", struct model_arguments, csv, "--design's table as CSV"),
         OPTION_FLAG("sensitivity", struct model_arguments, sensitivity,
                     "percent for a percent (angles: for a degree) of every key that matters"),
 };
@@ -213,13 +271,19 @@ static const struct option_table known_options = {
 /* What does not go together. */
 static int model_check(struct model_arguments *a)
 {
-	int tasks = (a->ensemble.axes > 0) + (a->draws > 0) + a->sensitivity + (a->history != NULL);
+	int tasks = (a->ensemble.axes > 0) + (a->draws > 0) + a->sensitivity + (a->history != NULL) +
+	            (a->design_keys != NULL);
 
 	if (!a->scene_file)
 		return command_usage("model", "no scene, expected --scene FILE");
 	if (tasks > 1)
-		return command_usage("model",
-		                     "expected one of --sweep, --monte-carlo, --sensitivity and --history");
+		return command_usage(
+		        "model",
+		        "expected one of --sweep, --monte-carlo, --design, --sensitivity and --history");
+	if (!a->design_keys && (a->design.limits > 0 || a->csv))
+		return command_usage("model", "--%s needs --design KEY", a->csv ? "csv" : "limit");
+	if (a->csv && a->json)
+		return command_usage("model", "expected one of --json and --csv");
 	if (command_is_input("model", a->history, a->scene_file))
 		return COMMAND_USAGE;
 	if (a->history == NULL && (a->step_us > 0 || a->span_ms > 0))
@@ -258,7 +322,9 @@ int command_model(int argc, char **argv)
 		return code;
 	a.ensemble.scene = &scene;
 	a.ensemble.seed = a.seed != NO_SEED ? a.seed : 1;
-	if (a.vary)
+	if (a.design_keys)
+		code = parse_design(&a.design, &a.ensemble, a.design_keys);
+	else if (a.vary)
 		code = parse_vary(&a.ensemble, a.vary);
 	else if (a.draws > 0 && !ensemble_fitted(&scene))
 		code = command_usage("model", "--monte-carlo needs --vary, or a scene with [fit]");

@@ -159,8 +159,30 @@ static int sensitivity(const struct model_arguments *a)
 	return forecast_sensitivity(&at, a->json, stdout) == 0 ? COMMAND_DONE : not_written();
 }
 
+static int model_answer_design(struct design *design, const struct model_arguments *a)
+{
+	int error;
+
+	design->ensemble.options.ring = false;
+	for (size_t i = 0; i < design->limits; i++)
+		design->ensemble.options.ring =
+		        design->ensemble.options.ring ||
+		        strcmp(design->limit[i].quantity.key, "plate_frequency_hz") == 0;
+	error = design_write(design, a->json ? TABLE_JSON : a->csv ? TABLE_CSV : TABLE_TEXT, stdout);
+	if (error == DT_E_EMPTY)
+		return no_drop(a, "no design makes a drop of which this model tells what is limited");
+	if (error != 0)
+		return command_output_failed(error_text(error));
+	return fflush(stdout) != 0 || ferror(stdout) ? not_written() : COMMAND_DONE;
+}
+
 int model_answer(const struct model_arguments *a)
 {
+	if (a->design_keys) {
+		struct design design = a->design;
+
+		return model_answer_design(&design, a);
+	}
 	if (a->ensemble.axes > 0 || a->draws > 0)
 		return many(a);
 	if (a->sensitivity)

@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 #include "host/model/ensemble.h"
+#include "host/report/design.h"
 
 struct model_arguments {
 	const char *scene_file, *history;
@@ -15,8 +16,9 @@ struct model_arguments {
 	unsigned draws;
 	uint64_t seed;
 	struct ensemble ensemble; /* scene is set once it is read */
-	const char *vary;
-	bool json, sensitivity;
+	const char *vary, *design_keys;
+	struct design design; /* its ensemble's scene and axes are set once the scene is read */
+	bool json, csv, sensitivity;
 };
 
 /* Prints what was asked for. A COMMAND_* exit code; what is wrong was printed. */
