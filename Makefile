@@ -19,7 +19,9 @@ PACKAGES_TEST = $(PACKAGES_RUN) libcmocka-dev clang llvm libclang-rt-14-dev can-
 
 WARNINGS = -Wall -Wextra -Werror -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes \
 	-Wundef -Wcast-qual -Wwrite-strings -Wvla -Wpointer-arith -Wimplicit-fallthrough
-CFLAGS = -std=c11 -O2 -g -ffp-contract=off -fno-common $(WARNINGS)
+# Lines and names are all that a sanitizer's report needs.
+DEBUG = $(if $(SANITIZE),-g1,-g)
+CFLAGS = -std=c11 -O2 $(DEBUG) -ffp-contract=off -fno-common $(WARNINGS)
 ifdef SANITIZE
 CFLAGS += -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
 LDFLAGS += -fsanitize=address,undefined
