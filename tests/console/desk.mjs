@@ -246,20 +246,26 @@ export class Desk {
 		this.errors = this.errors.filter((text) => !(/status of 4\d\d /.test(text) && text.endsWith(`/api/${request}`)));
 	}
 
-	/* Released, and something else at once: with the console's answer, before the page hears of it. */
+	/* Released, and something else at once: with the console's answer, before the page hears of it. What goes wrong meanwhile
+	 * is kept until the press is over: a rejection that nobody waits for yet would end the program. */
 	async releaseAnd(action) {
-		const done = new Promise((settle, fail) => {
-			this.page.route("**/api/release", async (route) => {
-				const response = await route.fetch();
-				if (response.ok())
-					await action().then(settle, fail);
-				else
-					fail(new Error(`RELEASE was refused with ${response.status()}`));
+		const answered = async (route) => {
+			const response = await route.fetch();
+			try {
+				assert.ok(response.ok(), `RELEASE was refused with ${response.status()}`);
+				return { value: await action() };
+			} finally {
 				await route.fulfill({ response });
-			}, { times: 1 });
+			}
+		};
+		const done = new Promise((settle) => {
+			this.page.route("**/api/release", (route) => answered(route).catch((error) => ({ error })).then(settle), { times: 1 });
 		});
-		await this.click("#release", SOON);
-		return done;
+		await this.click("#release", SOON).catch((error) => this.page.unroute("**/api/release").then(() => { throw error; }));
+		const { value, error } = await done;
+		if (error)
+			throw error;
+		return value;
 	}
 
 	/* until its result is on the page; returns the ms that the page measured from the capture's end */
