@@ -175,6 +175,7 @@ async function footLearnt() {
 async function byFoot() {
 	const { page } = desk;
 	await desk.again(async () => {
+		await page.keyboard.up(FOOT); // of an earlier try
 		await desk.ready();
 		await page.focus("body");
 		await scan("ARK-007");

@@ -185,9 +185,12 @@ export class Desk {
 	async hold(down, up) {
 		await this.page.hover("#arm", SOON);
 		await down();
-		await this.page.waitForSelector('#arm[data-held="yes"]', SOON);
-		await this.page.waitForSelector('#arm[data-held="no"]', { state: "attached", ...SOON });
-		await up();
+		try {
+			await this.page.waitForSelector('#arm[data-held="yes"]', SOON);
+			await this.page.waitForSelector('#arm[data-held="no"]', { state: "attached", ...SOON });
+		} finally {
+			await up();
+		}
 	}
 
 	async shifted(way, key) {
@@ -226,13 +229,13 @@ export class Desk {
 		});
 	}
 
-	/* What the tower may take back for the reason above is tried three times; what is tried ends with its effect. */
+	/* What the tower may take back for the reason above is tried six times; what is tried ends with its effect. */
 	async again(action) {
 		for (let tries = 1; ; tries++) {
 			try {
 				return await action(tries);
 			} catch (error) {
-				if (tries === 3)
+				if (tries === 6)
 					throw error;
 				note(`tried again: ${error.message.split("\n")[0]}`);
 				this.forgive("arm");
