@@ -22,7 +22,7 @@
 
 #include "common/error.h"
 #include "common/scenes/scene.h"
-#include "host/result/quantity.h"
+#include "host/result/repeats.h"
 
 struct archive;
 
@@ -282,14 +282,8 @@ DT_MUST_USE int archive_rebuild(const char *folder, bool fewer,
 
 /* ---- the tower over a series ---- */
 
-/* A straight line through what the drops measured: at the first and at the last of them. NAN of no drop. */
-struct archive_trend {
-	unsigned drops;  /* that measured it */
-	double from, to; /* in the unit of the quantity's key */
-};
-
-/* Of a QUANTITY_TOWER, in the newest result of each drop. */
+/* Of a QUANTITY_TOWER, in the newest result of each drop: closed, to be freed after 0. */
 DT_MUST_USE int archive_trend(struct archive *archive, const char *series, const struct quantity *quantity,
-                              struct archive_trend *trend);
+                              struct repeats_row *row);
 
 #endif

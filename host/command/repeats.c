@@ -31,22 +31,11 @@ static int repeats_json(const struct repeats *repeats)
 		put_number(&b, row, "sigma_change_percent", 100 * r->sigma_change);
 		put_bool(&b, row, "moves", r->moves);
 		put_number(&b, row, "changes_at", r->change_at > 0 ? (double)r->change_at : (double)NAN);
+		put_number(&b, row, "stands_out", r->stands_out > 0 ? (double)r->stands_out : (double)NAN);
 		put_numbers(&b, row, "number", r->number, r->count);
 		put_numbers(&b, row, "value", r->value, r->count);
 	}
 	return put_out(&b, root, stdout);
-}
-
-/* "rises", with by how much in front of the bar; a step is told where it is one. */
-static void repeats_words(const struct repeats_row *r, char words[64])
-{
-	words[0] = '\0';
-	if (r->change_at > 0)
-		snprintf(words, 64, "another from repeat %u on", r->change_at);
-	else if (r->moves)
-		snprintf(words, 64, r->change > 0 ? "rises" : "falls");
-	else if (isfinite(r->trend))
-		snprintf(words, 64, "no trend");
 }
 
 int repeats_print(const struct repeats *repeats, bool json)
@@ -59,7 +48,7 @@ int repeats_print(const struct repeats *repeats, bool json)
 	       repeats->repeats, "channel", "value", "n", "out", "mean", "SD", "first to last %");
 	for (size_t i = 0; i < repeats->rows; i++) {
 		const struct repeats_row *r = &repeats->row[i];
-		char words[64];
+		char words[REPEATS_WORDS_MAX];
 
 		repeats_words(r, words);
 		printf("%-16.16s %-20s %5zu %4zu ", r->channel, r->quantity->key, r->count, r->left_out);

@@ -290,11 +290,9 @@ static int check_copy(const struct adding *adding, const char *name, const struc
 /* When the capture ended, where the log has the time of day and several drops; else when it was written. */
 static int64_t time_of(const struct adding *adding, const struct log_capture *capture)
 {
-	static const int64_t some_year_us = (int64_t)100000000 * 1000000;
+	int64_t time_s = capture != NULL && !capture->alone ? log_capture_time_s(capture) : 0;
 
-	if (capture != NULL && !capture->alone && capture->time_us > some_year_us)
-		return capture->time_us / 1000000;
-	return adding->status.st_mtime;
+	return time_s > 0 ? time_s : adding->status.st_mtime;
 }
 
 static void take_in(struct adding *adding, const char *name, const struct log_capture *capture,

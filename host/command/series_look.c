@@ -88,15 +88,19 @@ static int print_trends(struct archive *archive, const char *series)
 
 	while ((q = quantity_next(QUANTITY_TOWER, q)) != NULL) {
 		double scale = quantity_scale(q);
-		struct archive_trend trend;
+		char words[REPEATS_WORDS_MAX];
+		struct repeats_row row;
 
 		if (q->label[0] == '\0')
 			continue;
-		if (archive_trend(archive, series, q, &trend) != 0)
+		if (archive_trend(archive, series, q, &row) != 0)
 			return archived_failed(archive);
-		if (trend.drops > 1)
-			printf("tower    %s %.*f -> %.*f %s over %u drops\n", q->label, q->digits,
-			       trend.from * scale, q->digits, trend.to * scale, q->shown, trend.drops);
+		repeats_words(&row, words);
+		if (row.count > 1)
+			printf("tower    %s %.*f -> %.*f %s over %zu drops%s%s\n", q->label, q->digits,
+			       row.from * scale, q->digits, row.to * scale, q->shown, row.count,
+			       words[0] != '\0' ? ": " : "", words);
+		repeats_row_free(&row);
 	}
 	return COMMAND_DONE;
 }

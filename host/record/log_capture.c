@@ -87,3 +87,10 @@ void log_capture_key(const struct record *record, char key[LOG_CAPTURE_KEY_CHARS
 	for (unsigned i = 0; i < 16; i++) /* half of it names a capture well enough */
 		used += snprintf(key + used, (size_t)(LOG_CAPTURE_KEY_CHARS - used), "%02x", digest[i]);
 }
+
+int64_t log_capture_time_s(const struct log_capture *capture)
+{
+	static const int64_t some_year_us = (int64_t)100000000 * 1000000;
+
+	return capture->time_us > some_year_us ? capture->time_us / 1000000 : 0;
+}

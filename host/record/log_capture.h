@@ -46,6 +46,9 @@ void log_capture_of_record(const struct record *record, struct log_capture *capt
 uint32_t log_capture_blocks(const struct log_capture *capture);
 uint32_t log_capture_missing(const struct log_capture *capture);
 
+/* When it was, in seconds since 1970; 0: the log counts from elsewhere. */
+int64_t log_capture_time_s(const struct log_capture *capture);
+
 /* Whether both say the same of the same capture: all of the second part but corrupt frames, which depend on
  * how much of the log was read. */
 bool log_capture_equal(const struct log_capture *a, const struct log_capture *b);

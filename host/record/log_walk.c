@@ -105,6 +105,7 @@ static int log_walk_take(struct log_walk *walk, struct log_capture *capture, str
 		error = join_take(walk->join, record);
 	if (error == 0) {
 		log_capture_of_record(record, capture);
+		record->time_s = log_capture_time_s(capture);
 		*has_record = true;
 	} else if (error == DT_E_EMPTY) {
 		error = join_skip(walk->join, capture);

@@ -327,6 +327,8 @@ static void text_write_chain(const struct report *report, FILE *out)
 	(void)uncertainty_table(shown, count, TABLE_TEXT, out);
 	free(shown);
 	fputs("U = k u covers 95.45 %; +- above is one standard uncertainty of noise and fit.\n", out);
+	if (report->record->time_s == 0)
+		fputs("The record tells no day: its certificates are held against that of its file.\n", out);
 }
 
 static void text_write_frames(const struct record *r, FILE *out)

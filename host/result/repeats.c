@@ -11,7 +11,7 @@
 #include <gsl/gsl_statistics_double.h>
 
 enum { CHANGE_LEAST = 8, TREND_LEAST = 3 };
-static const double MOVES_CHANCE = 0.0027, KOLMOGOROV = 1.63;
+static const double MOVES_CHANCE = 0.0027, KOLMOGOROV = 1.63, OUT_CHANCE = 0.01;
 
 /* What is worth a row, of each channel. */
 static const struct {
@@ -45,7 +45,7 @@ static struct repeats_row *repeats_row_of(struct repeats *repeats, const char *c
 	return more;
 }
 
-static int repeats_value(struct repeats_row *row, size_t number, double value)
+int repeats_value(struct repeats_row *row, size_t number, double value)
 {
 	if (row->count == row->room) {
 		size_t room = row->room > 0 ? 2 * row->room : 16;
@@ -98,16 +98,21 @@ static void repeats_mean(struct repeats_row *row)
 /* Sum of squares that the line leaves; INFINITY without one. */
 static double repeats_line(struct repeats_row *row)
 {
-	double n = (double)row->count, span, first, begin, variance, left, unused[2];
+	double n = (double)row->count, span, first, begin, slope, variance, left, unused[2];
 
-	row->trend = row->sigma_trend = row->change = row->sigma_change = NAN;
+	row->trend = row->sigma_trend = row->change = row->sigma_change = row->from = row->to = NAN;
+	if (row->count < 2)
+		return INFINITY;
+	gsl_fit_linear(row->number, 1, row->value, 1, row->count, &begin, &slope, &unused[0], &unused[1],
+	               &variance, &left);
+	row->from = begin + slope * row->number[0];
+	row->to = begin + slope * row->number[row->count - 1];
 	if (row->count < TREND_LEAST)
 		return INFINITY;
-	gsl_fit_linear(row->number, 1, row->value, 1, row->count, &begin, &row->trend, &unused[0], &unused[1],
-	               &variance, &left);
+	row->trend = slope;
 	row->sigma_trend = sqrt(variance);
 	row->moves = fabs(row->trend) > gsl_cdf_tdist_Qinv(MOVES_CHANCE / 2, n - 2) * row->sigma_trend;
-	first = begin + row->trend * row->number[0];
+	first = row->from;
 	span = row->number[row->count - 1] - row->number[0];
 	row->change = row->trend * span / first;
 	row->sigma_change = fabs(row->sigma_trend * span / first);
@@ -156,22 +161,79 @@ static void repeats_change(struct repeats_row *row, double left_by_line)
 		row->change_at = (unsigned)row->number[at];
 }
 
+/* ---- which stands out ---- */
+
+double repeats_grubbs(size_t n, double alpha)
+{
+	double m = (double)n, t = gsl_cdf_tdist_Qinv(alpha / (2.0 * m), m - 2.0);
+
+	return (m - 1.0) / sqrt(m) * sqrt(t * t / (m - 2.0 + t * t));
+}
+
+double repeats_pooled(size_t n, double degrees, double alpha)
+{
+	double m = (double)n;
+
+	return gsl_cdf_tdist_Qinv(alpha / (2.0 * m), degrees) * sqrt((m - 1.0) / m);
+}
+
+static void repeats_stands_out(struct repeats_row *row)
+{
+	double most = 0;
+	size_t at = 0;
+
+	row->stands_out = 0;
+	if (row->count < TREND_LEAST)
+		return;
+	for (size_t i = 0; i < row->count; i++)
+		if (fabs(row->value[i] - row->mean) > most) {
+			most = fabs(row->value[i] - row->mean);
+			at = i;
+		}
+	if (most > repeats_grubbs(row->count, OUT_CHANCE) * row->sd)
+		row->stands_out = (unsigned)row->number[at];
+}
+
+void repeats_words(const struct repeats_row *r, char words[REPEATS_WORDS_MAX])
+{
+	size_t used;
+
+	words[0] = '\0';
+	if (r->change_at > 0)
+		snprintf(words, REPEATS_WORDS_MAX, "another from repeat %u on", r->change_at);
+	else if (r->moves)
+		snprintf(words, REPEATS_WORDS_MAX, r->change > 0 ? "rises" : "falls");
+	else if (isfinite(r->trend))
+		snprintf(words, REPEATS_WORDS_MAX, "no trend");
+	used = strlen(words);
+	if (r->stands_out > 0)
+		snprintf(words + used, REPEATS_WORDS_MAX - used, "; repeat %u stands out", r->stands_out);
+}
+
+void repeats_row_close(struct repeats_row *row)
+{
+	repeats_mean(row);
+	repeats_change(row, repeats_line(row));
+	repeats_stands_out(row);
+}
+
+void repeats_row_free(struct repeats_row *row)
+{
+	free(row->value);
+	free(row->number);
+	*row = (struct repeats_row){.count = 0};
+}
+
 void repeats_close(struct repeats *repeats)
 {
-	for (size_t i = 0; i < repeats->rows; i++) {
-		struct repeats_row *row = &repeats->row[i];
-
-		repeats_mean(row);
-		repeats_change(row, repeats_line(row));
-	}
+	for (size_t i = 0; i < repeats->rows; i++)
+		repeats_row_close(&repeats->row[i]);
 }
 
 void repeats_free(struct repeats *repeats)
 {
-	for (size_t i = 0; i < repeats->rows; i++) {
-		free(repeats->row[i].value);
-		free(repeats->row[i].number);
-	}
+	for (size_t i = 0; i < repeats->rows; i++)
+		repeats_row_free(&repeats->row[i]);
 	free(repeats->row);
 	*repeats = (struct repeats){.row = NULL};
 }

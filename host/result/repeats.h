@@ -10,7 +10,8 @@
  * degrees of freedom. "Moves" where a trend as large came by chance in 0.27 % of cases (Student's t). Change:
  * the largest cumulative sum against the scatter between neighbours, which no slow trend widens; told beyond
  * the 1 % limit of Kolmogorov (1.63), from eight values on, and where a step leaves less behind than the line
- * does.
+ * does. Stands out: the value farthest from the mean, beyond the 1 % limit of Grubbs. It is marked, never
+ * taken out: that needs a cause.
  */
 #include "host/result/quantity.h"
 
@@ -23,8 +24,10 @@ struct repeats_row {
 	/* by repeats_close */
 	double mean, sd;             /* NAN below 1 and 2 values */
 	double trend, sigma_trend;   /* of the value a repeat; NAN below 3 */
+	double from, to;             /* the line at the first and the last; NAN below 2 */
 	double change, sigma_change; /* first to last by the line, of the value at the first */
 	unsigned change_at;          /* repeat from which on it is another; 0: none */
+	unsigned stands_out; /* repeat that is no other's kin, by Grubbs; 0: none. It counts all the same */
 	bool moves;
 };
 
@@ -32,6 +35,22 @@ struct repeats {
 	struct repeats_row *row;
 	size_t rows, repeats;
 };
+
+/* A value more of one row. 0 or DT_E_MEMORY. */
+DT_MUST_USE int repeats_value(struct repeats_row *row, size_t number, double value);
+void repeats_row_close(struct repeats_row *row);
+void repeats_row_free(struct repeats_row *row);
+
+/* "rises", "another from repeat 7 on", "; repeat 3 stands out". */
+enum { REPEATS_WORDS_MAX = 96 };
+void repeats_words(const struct repeats_row *row, char words[REPEATS_WORDS_MAX]);
+
+/* The largest distance from the mean of n values, in their own standard deviations, that comes by chance once
+ * in 1 / alpha (Grubbs, two-sided): of three values and more. */
+double repeats_grubbs(size_t n, double alpha);
+
+/* The same in standard deviations that are known apart, of so many degrees of freedom: of earlier series. */
+double repeats_pooled(size_t n, double degrees, double alpha);
 
 /* Another repeat. 0 or DT_E_MEMORY. */
 DT_MUST_USE int repeats_add(struct repeats *repeats, struct result *result);

@@ -445,9 +445,10 @@ static bool pair_of(const struct desk *d, const char *sensor, struct axis pair[2
 	return pair[0].used == pair[1].used;
 }
 
-/* Scale times the length of a's components along X and Y. */
+/* Scale times the length of a's components along X and Y, whose zeros are wrong by up to zero, and which the
+ * supply changes by that part of T / tau. */
 static void of_length(const struct desk *d, struct collecting *c, const struct axis pair[2],
-                      const double a[3], double scale)
+                      const double a[3], double scale, const double zero[2], double part)
 {
 	double length = hypot(a[pair[0].axis], a[pair[1].axis]), w[3] = {0.0, 0.0, 0.0};
 
@@ -456,12 +457,10 @@ static void of_length(const struct desk *d, struct collecting *c, const struct a
 
 		w[pair[i].axis] = scale * along * along / length;
 		transverse(d, c, pair[i].used, pair[i].axis, a, scale * fabs(along) / length);
-		within(c, BUDGET_ZERO,
-		       scale * pair[i].used->transducer.calibration_zero_shift_percent * PERCENT * along *
-		               along / length);
+		within(c, BUDGET_ZERO, scale * zero[i] * along / length);
 	}
 	gains(c, pair[0].used, w);
-	supply(c, &pair[0], scale * length, 1.0 / UNITS_PI);
+	supply(c, &pair[0], scale * length, part);
 }
 
 /* The instant of the length's maximum: each axis counts by its share. */
@@ -481,13 +480,15 @@ static void of_resultant(struct desk *d, const struct estimate_resultant *r)
 {
 	struct axis pair[2];
 	struct collecting height, instant;
-	double a[3];
+	double a[3], zero[2];
 
 	if (!pair_of(d, r->sensor, pair))
 		return;
 	others_at(d, &pair[0], r->time_s, r->peak_g, a);
 	height = instant = begin(&pair[0]);
-	of_length(d, &height, pair, a, 1.0);
+	for (int i = 0; i < 2; i++)
+		zero[i] = zero_of(&pair[i]);
+	of_length(d, &height, pair, a, 1.0, zero, 1.0 / UNITS_PI);
 	item_add(d, r->sensor, "peak_g", "g", r->peak_g, r->sigma_g, &height);
 	late_length(d, &instant, pair, a);
 	within(&instant, BUDGET_CLOCK, clock_of(pair[0].used) * r->time_s);
@@ -518,18 +519,54 @@ static void of_rebound(struct desk *d)
 	const struct estimate_rebound *r = &d->analysis->rebound;
 	struct collecting c, flight = {.degrees = (double)INFINITY};
 	struct axis pair[2];
-	double a[3], v[2];
+	double a[3], v[2], zero[2];
 
 	if (!pair_of(d, "S2", pair))
 		return;
 	others_area(d, &pair[0], 0.0, a);
-	for (int i = 0; i < 2; i++)
+	for (int i = 0; i < 2; i++) {
 		v[i] = a[pair[i].axis] = pair[i].e->pulse.velocity_change_m_s;
+		zero[i] = UNITS_G_M_S2 * zero_of(&pair[i]) * duration_of(&pair[i]);
+	}
 	c = begin(&pair[0]);
-	of_length(d, &c, pair, a, (1.0 + r->velocity_ratio) / hypot(v[0], v[1]));
+	of_length(d, &c, pair, a, (1.0 + r->velocity_ratio) / hypot(v[0], v[1]), zero, 0.5);
 	item_add(d, "", "rebound.velocity_ratio", "1", r->velocity_ratio, r->sigma_velocity_ratio, &c);
 	within(&flight, BUDGET_CLOCK, clock_of(pair[0].used) * r->flight_ratio);
 	item_add(d, "", "rebound.flight_ratio", "1", r->flight_ratio, r->sigma_flight_ratio, &flight);
+}
+
+/* Of the fitted body: its own uncertainty holds noise and the channels' gains by the fit's prior. What the
+ * body leaves unexplained is the doubt of its definition: chi-square of that many degrees is 1 where it is
+ * the body. */
+static void of_motion(struct desk *d)
+{
+	const struct estimate_motion *m = &d->analysis->motion;
+	const struct {
+		const char *key, *unit;
+		double value, noise, late, follows;
+	} number[] = {{"contact_time_s", "s", m->contact_time_s, m->sigma_contact_time_s, 0.0, 1.0},
+	              {"restitution", "1", m->restitution, m->sigma_restitution, 0.0, 0.0},
+	              {"spin_rad_s", "rad/s", m->spin_rad_s, m->sigma_spin_rad_s, 0.0, 1.0},
+	              {"lag_s", "s", m->lag_s, m->sigma_lag_s, 1.0, 0.0},
+	              {"lag_x_s", "s", m->lag_x_s, m->sigma_lag_x_s, 1.0, 0.0},
+	              {"angle_deg", "deg", m->angle_deg, m->sigma_angle_deg, 0.0, 0.0},
+	              {"speed_m_s", "m/s", m->speed_m_s, m->sigma_speed_m_s, 0.0, 0.0}};
+	struct axis one[2], two[2];
+
+	if (m->status != ESTIMATE_OK || !pair_of(d, "S1", one) || !pair_of(d, "S2", two))
+		return;
+	for (size_t i = 0; i < sizeof(number) / sizeof(number[0]); i++) {
+		struct collecting c = {.degrees = (double)INFINITY};
+		char what[48];
+
+		collect(&c, BUDGET_DEFINITION, COVERAGE_NORMAL,
+		        number[i].noise * sqrt(fmax(0.0, m->chi_square - 1.0)));
+		late(&c, &one[0], number[i].late);
+		late(&c, &two[0], number[i].late);
+		within(&c, BUDGET_CLOCK, clock_of(two[0].used) * number[i].value * number[i].follows);
+		snprintf(what, sizeof(what), "motion.%s", number[i].key);
+		item_add(d, "", what, number[i].unit, number[i].value, number[i].noise, &c);
+	}
 }
 
 /* ---- all of it ---- */
@@ -551,6 +588,8 @@ int budget_make(struct budget *budget, const struct sensors *sensors, const stru
 		of_decay(&d, pair[0].used, "", "plate", &analysis->plate, begin(&pair[0]).degrees);
 	if (analysis->has_rebound)
 		of_rebound(&d);
+	if (analysis->has_motion)
+		of_motion(&d);
 	for (size_t i = 0; i < budget->count; i++)
 		budget->item[i].largest_parts = budget->item[i].largest;
 	if (!d.failed)

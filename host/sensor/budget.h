@@ -15,6 +15,7 @@
  *     frequency    clock; where it follows the swing, how far its definitions are apart
  *     damping      nothing more: gain cancels, a linear filter moves no pole
  *     rebound      as the velocity change, or the clock
+ *     motion       what the fitted body leaves unexplained; filters, skews and clock of what is a time
  *
  * U covers 95.45 %: k u with Student's k of the effective degrees of freedom, or, where more than 30 % of the
  * variance is not normal, by the distribution of the sum (coverage.h).

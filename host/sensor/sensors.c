@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "common/base/date.h"
 #include "host/sensor/lowpass.h"
@@ -38,21 +39,60 @@ static void sensors_name(struct sensor_used *used)
 		snprintf(used->name, sizeof(used->name), "%.*s", (int)length, stem);
 }
 
+/* A file as it was read last: of thousands of drops each has the same. Another time or size: read again. */
+struct known_file {
+	char name[SETTINGS_MESSAGE_MAX], digest[DIGEST_CHARS];
+	struct stat status;
+	struct transducer transducer;
+};
+
+static bool is_known(const struct known_file *known, const char *file, const struct stat *now)
+{
+	const struct stat *then = &known->status;
+
+	return strcmp(known->name, file) == 0 && then->st_ino == now->st_ino && then->st_dev == now->st_dev &&
+	       then->st_size == now->st_size && then->st_mtim.tv_sec == now->st_mtim.tv_sec &&
+	       then->st_mtim.tv_nsec == now->st_mtim.tv_nsec;
+}
+
+static int sensors_file(struct sensor_used *used, size_t place, const char *file,
+                        char message[SETTINGS_MESSAGE_MAX])
+{
+	static _Thread_local struct known_file known[SENSORS_MAX];
+	struct known_file *k = &known[place];
+	struct stat now;
+	int64_t bytes;
+	bool there = stat(file, &now) == 0;
+	int result;
+
+	if (!there || !is_known(k, file, &now)) {
+		k->name[0] = '\0';
+		result = transducer_read(&k->transducer, file, message);
+		if (result != 0)
+			return result;
+		if (digest_file(file, k->digest, &bytes, -1) != 0) {
+			snprintf(message, SETTINGS_MESSAGE_MAX, "%.300s: %s", file, strerror(errno));
+			return DT_E_SYSTEM;
+		}
+		k->status = now;
+		if (there)
+			snprintf(k->name, sizeof(k->name), "%s", file);
+	}
+	used->transducer = k->transducer;
+	memcpy(used->digest, k->digest, sizeof(k->digest));
+	return 0;
+}
+
 static int sensors_add(struct sensors *sensors, const char *file, double day,
                        char message[SETTINGS_MESSAGE_MAX])
 {
 	struct sensor_used *used = &sensors->used[sensors->count];
 	const struct transducer *t = &used->transducer;
 	double calibrated = 0.0, due = 0.0;
-	int64_t bytes;
-	int result = transducer_read(&used->transducer, file, message);
+	int result = sensors_file(used, sensors->count, file, message);
 
 	if (result != 0)
 		return result;
-	if (digest_file(file, used->digest, &bytes, -1) != 0) {
-		snprintf(message, SETTINGS_MESSAGE_MAX, "%.300s: %s", file, strerror(errno));
-		return DT_E_SYSTEM;
-	}
 	used->serial = t->sensor_serial;
 	used->model = t->sensor_model;
 	used->certificate = t->calibration_certificate;

@@ -268,7 +268,8 @@ static void pulses(void **state)
 	        {TRANSDUCER_BUTTERWORTH, 2, {1.007, 1.003, 1.001}, 5e-4, {NAN, NAN, NAN}, 0},
 	        {TRANSDUCER_BUTTERWORTH, 4, {1.0225, 1.0028, 1.0004}, 5e-5, {-0.145, -0.009, 0}, 5e-4},
 	        {TRANSDUCER_BUTTERWORTH, 8, {1.047, 1.019, 1.002}, 5e-4, {-0.48, -0.097, -0.005}, 5e-3},
-	        {TRANSDUCER_BESSEL, 4, {1, 1, 1}, 5e-5, {-0.884, -0.319, -0.099}, 6e-4},
+	        {TRANSDUCER_BESSEL, 4, {1, 1, 1}, 5e-5, {-0.8843, -0.3189, -0.0985}, 2e-4}, /* |H(1/2T)| - 1
+	                                                                                     */
 	};
 	static const double periods[] = {3, 5, 9};
 
