@@ -177,20 +177,30 @@ double repeats_pooled(size_t n, double degrees, double alpha)
 	return gsl_cdf_tdist_Qinv(alpha / (2.0 * m), degrees) * sqrt((m - 1.0) / m);
 }
 
+/* Whether the others differ, each from each but for one pair. */
+static bool repeats_scatters(const struct repeats_row *row, size_t but)
+{
+	size_t equal = 0;
+
+	for (size_t i = 0; i < row->count; i++)
+		for (size_t k = 0; k < i; k++)
+			equal += i != but && k != but && !(fabs(row->value[i] - row->value[k]) > 0);
+	return equal <= 1 && row->count > TREND_LEAST;
+}
+
 static void repeats_stands_out(struct repeats_row *row)
 {
 	double most = 0;
 	size_t at = 0;
 
 	row->stands_out = 0;
-	if (row->count < TREND_LEAST)
-		return;
 	for (size_t i = 0; i < row->count; i++)
 		if (fabs(row->value[i] - row->mean) > most) {
 			most = fabs(row->value[i] - row->mean);
 			at = i;
 		}
-	if (most > repeats_grubbs(row->count, OUT_CHANCE) * row->sd)
+	/* counts of a clock are equal but for their last digit: nothing is known of the scatter then */
+	if (repeats_scatters(row, at) && most > repeats_grubbs(row->count, OUT_CHANCE) * row->sd)
 		row->stands_out = (unsigned)row->number[at];
 }
 

@@ -10,8 +10,8 @@
  * degrees of freedom. "Moves" where a trend as large came by chance in 0.27 % of cases (Student's t). Change:
  * the largest cumulative sum against the scatter between neighbours, which no slow trend widens; told beyond
  * the 1 % limit of Kolmogorov (1.63), from eight values on, and where a step leaves less behind than the line
- * does. Stands out: the value farthest from the mean, beyond the 1 % limit of Grubbs. It is marked, never
- * taken out: that needs a cause.
+ * does. Stands out: the value farthest from the mean, beyond the 1 % limit of Grubbs, of four and more that
+ * differ. It is marked, never taken out: that needs a cause.
  */
 #include "host/result/quantity.h"
 

@@ -73,7 +73,7 @@ static void power(void **state)
 static void told(void **state)
 {
 	static const double level[] = {10.1, 9.9, 10.05, 9.95, 10, 14, 10.02, 9.97, 10.04},
-	                    rising[] = {1, 2.01, 2.99, 4.02, 5, 5.98};
+	                    counted[] = {8, 8, 8, 8.001, 8}, rising[] = {1, 2.01, 2.99, 4.02, 5, 5.98};
 	char words[REPEATS_WORDS_MAX];
 	struct repeats_row row;
 
@@ -84,6 +84,9 @@ static void told(void **state)
 	assert_near(row.mean, 94.03 / 9, 1e-9);
 	repeats_words(&row, words);
 	assert_string_equal(words, "no trend; repeat 6 stands out");
+	repeats_row_free(&row);
+	row_of(&row, counted, 5);
+	assert_int_equal(row.stands_out, 0);
 	repeats_row_free(&row);
 	row_of(&row, rising, 6);
 	assert_int_equal(row.stands_out, 0);
