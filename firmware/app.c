@@ -360,9 +360,10 @@ static void watch_bus(const struct glance *now)
 	}
 }
 
+/* Before the first tick there is no time to tell. */
 static void watch_fault(const struct glance *now)
 {
-	if (now->fault == app.fault_reported)
+	if (now->fault == app.fault_reported || app.tick_ms == UINT32_MAX)
 		return;
 	send_emergency(now->fault);
 	app.fault_reported = now->fault;
