@@ -83,10 +83,9 @@ static inline void body_turned(const struct body *b, double turn, double *cosine
 	*sine = b->sine * c + b->cosine * s;
 }
 
-static inline struct foot foot_of(const struct body *b, const double y[], int corner, double cosine,
-                                  double sine)
+static inline struct foot foot_of(const struct body *b, const double y[], int i, double cosine, double sine)
 {
-	struct foot f = {body_corner(b, corner, cosine, sine), 0.0, -y[BODY_V_UP], 0.0};
+	struct foot f = {body_corner(b, i, cosine, sine), 0.0, -y[BODY_V_UP], 0.0};
 
 	f.depth = b->corner_up_m - f.at.up - y[BODY_UP];
 	if (b->turns) {
