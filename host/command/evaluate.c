@@ -313,9 +313,12 @@ int evaluate_check_chain(const char *list)
 	char message[SETTINGS_MESSAGE_MAX];
 	struct sensors sensors;
 
-	if (sensors_read(&sensors, list, 0.0, message) == 0)
+	if (sensors_read(&sensors, list, 0.0, message) != 0)
+		command_error("%s", message);
+	else if (list[0] != '\0' && sensors.count == 0)
+		command_error("chain is '%s', expected names of sensor files", list);
+	else
 		return COMMAND_DONE;
-	command_error("%s", message);
 	return COMMAND_INPUT;
 }
 
