@@ -203,6 +203,8 @@ static int parse_design(struct design *design, const struct ensemble *ensemble, 
 		case DT_E_RANGE:
 			return command_usage("model", "--design has too many keys, expected %d at most",
 			                     DESIGN_KEYS_MAX);
+		case DT_E_STATE:
+			return command_usage("model", "--design has %s twice", key.name);
 		default:
 			return command_usage("model", "--design: %s of the scene is not above 0", key.name);
 		}

@@ -55,6 +55,9 @@ int design_add_key(struct design *design, const struct vary_key *key)
 		return DT_E_RANGE;
 	if (!(value > 0.0))
 		return DT_E_ARGUMENT;
+	for (size_t i = 0; i < design->ensemble.axes; i++)
+		if (design->ensemble.axis[i].key.offset == key->offset)
+			return DT_E_STATE;
 	*axis = (struct ensemble_axis){
 	        .key = *key, .from = fmax(value / RANGE, key->min), .step = fmin(value * RANGE, key->max)};
 	design->ensemble.axes++;
@@ -70,7 +73,7 @@ static double design_margin(const struct design *d, const struct model_predictio
 		double margin = 1.0 - value / d->limit[i].value;
 
 		quantity[i] = value;
-		if (!(margin >= least)) /* a NaN stays */
+		if (isnan(margin) || margin < least) /* a NaN stays: nothing is less */
 			least = margin;
 	}
 	return least;
@@ -79,8 +82,9 @@ static double design_margin(const struct design *d, const struct model_predictio
 static void design_scene(const struct design *d, const double key[], struct scene *scene)
 {
 	*scene = *d->ensemble.scene;
-	for (size_t i = 0; i < d->ensemble.axes; i++)
-		vary_set(scene, &d->ensemble.axis[i].key, key[i]);
+	/* twice: a key may move one before it, and where it stays it moves none */
+	for (size_t i = 0; i < 2 * d->ensemble.axes; i++)
+		vary_set(scene, &d->ensemble.axis[i % d->ensemble.axes].key, key[i % d->ensemble.axes]);
 }
 
 static void design_solve(const struct design *d, struct design_row *row)

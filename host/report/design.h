@@ -32,7 +32,7 @@ struct design {
 DT_MUST_USE int design_quantity(const char *name, struct ensemble_output *quantity);
 
 /* Adds an axis: from a quarter to four times the scene's value, within what the key may be. DT_E_RANGE: too
- * many; DT_E_ARGUMENT: that value is 0 or below. */
+ * many; DT_E_ARGUMENT: that value is 0 or below; DT_E_STATE: it is an axis. */
 DT_MUST_USE int design_add_key(struct design *design, const struct vary_key *key);
 
 /* Writes the table. 0; DT_E_EMPTY: no design makes a drop that tells what is limited; DT_E_MEMORY. */
