@@ -143,7 +143,7 @@ static bool put_outlier(FILE *out, const struct repeats_row *row, double varianc
 
 	if (row->count < 3 || !(sd > 0.0))
 		return false;
-	limit = others ? repeats_pooled(row->count, degrees, 0.05) : repeats_grubbs(row->count, 0.05);
+	limit = repeats_grubbs(row->count, others ? degrees : (double)row->count - 1.0, 0.05);
 	for (size_t i = 0; i < row->count; i++)
 		if (fabs(row->value[i] - row->mean) > most) {
 			most = fabs(row->value[i] - row->mean);

@@ -163,18 +163,11 @@ static void repeats_change(struct repeats_row *row, double left_by_line)
 
 /* ---- which stands out ---- */
 
-double repeats_grubbs(size_t n, double alpha)
+double repeats_grubbs(size_t n, double degrees, double alpha)
 {
-	double m = (double)n, t = gsl_cdf_tdist_Qinv(alpha / (2.0 * m), m - 2.0);
+	double m = (double)n, t = gsl_cdf_tdist_Qinv(alpha / (2.0 * m), degrees - 1.0);
 
-	return (m - 1.0) / sqrt(m) * sqrt(t * t / (m - 2.0 + t * t));
-}
-
-double repeats_pooled(size_t n, double degrees, double alpha)
-{
-	double m = (double)n;
-
-	return gsl_cdf_tdist_Qinv(alpha / (2.0 * m), degrees) * sqrt((m - 1.0) / m);
+	return sqrt((m - 1.0) / m * degrees * t * t / (degrees - 1.0 + t * t));
 }
 
 /* Whether the others differ, each from each but for one pair. */
@@ -200,7 +193,8 @@ static void repeats_stands_out(struct repeats_row *row)
 			at = i;
 		}
 	/* counts of a clock are equal but for their last digit: nothing is known of the scatter then */
-	if (repeats_scatters(row, at) && most > repeats_grubbs(row->count, OUT_CHANCE) * row->sd)
+	if (repeats_scatters(row, at) &&
+	    most > repeats_grubbs(row->count, (double)row->count - 1.0, OUT_CHANCE) * row->sd)
 		row->stands_out = (unsigned)row->number[at];
 }
 

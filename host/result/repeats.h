@@ -45,12 +45,10 @@ void repeats_row_free(struct repeats_row *row);
 enum { REPEATS_WORDS_MAX = 96 };
 void repeats_words(const struct repeats_row *row, char words[REPEATS_WORDS_MAX]);
 
-/* The largest distance from the mean of n values, in their own standard deviations, that comes by chance once
- * in 1 / alpha (Grubbs, two-sided): of three values and more. */
-double repeats_grubbs(size_t n, double alpha);
-
-/* The same in standard deviations that are known apart, of so many degrees of freedom: of earlier series. */
-double repeats_pooled(size_t n, double degrees, double alpha);
+/* The largest distance from the mean of n values, three and more, in standard deviations of so many degrees
+ * of freedom, that comes by chance once in 1 / alpha (Grubbs, two-sided). The values' own scatter is part of
+ * that standard deviation: degrees is n - 1 where it is all of it, and more where other series are in it. */
+double repeats_grubbs(size_t n, double degrees, double alpha);
 
 /* Another repeat. 0 or DT_E_MEMORY. */
 DT_MUST_USE int repeats_add(struct repeats *repeats, struct result *result);

@@ -32,12 +32,16 @@ static void grubbs(void **state)
 	(void)state;
 	for (size_t i = 0; i < sizeof(known) / sizeof(known[0]);
 	     i++) /* the last digit is cut, not rounded, at 3 */
-		assert_near(repeats_grubbs(known[i].n, 0.05), known[i].limit, 0.00051);
+		assert_near(repeats_grubbs(known[i].n, (double)known[i].n - 1, 0.05), known[i].limit,
+		            0.00051);
 	/* no value of n is further from their mean than this: 1.789 of five */
 	assert_near(4 / sqrt(5), 1.789, 0.0005);
-	assert_true(repeats_grubbs(5, 1e-9) < 4 / sqrt(5));
+	assert_true(repeats_grubbs(5, 4, 1e-9) < 4 / sqrt(5));
 	/* scatter that is known well: the normal law's alpha / 2n */
-	assert_near(repeats_pooled(5, 1e7, 0.05), 2.5758 * sqrt(0.8), 1e-3);
+	assert_near(repeats_grubbs(5, 1e7, 0.05), 2.5758 * sqrt(0.8), 1e-3);
+	/* beside two that are equal the worst of five is sqrt(0.8 * 5) of that scatter away: it is still
+	 * found */
+	assert_true(repeats_grubbs(5, 5, 0.05) < 2);
 }
 
 /* Five of a normal law with one 5 and 8 sigma off: own scatter finds 38 and 77 %, a scatter known of 40 more
@@ -61,9 +65,9 @@ static void power(void **state)
 				most = fmax(most, fabs(x[i] - mean));
 			}
 			for (int i = 0; i < 40; i++)
-				known += pow(synth_normal(&random), 2) / 40;
-			own += most > repeats_grubbs(5, 0.05) * sqrt(squares / 4);
-			pooled += most > repeats_pooled(5, 40, 0.05) * sqrt(known);
+				known += pow(synth_normal(&random), 2);
+			own += most > repeats_grubbs(5, 4, 0.05) * sqrt(squares / 4);
+			pooled += most > repeats_grubbs(5, 44, 0.05) * sqrt((squares + known) / 44);
 		}
 		assert_near(100.0 * own / draws, own_percent[k], 2.5);
 		assert_true(k == 0 ? fabs(100.0 * pooled / draws - 5) < 1.5 : pooled > 0.95 * draws);

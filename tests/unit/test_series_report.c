@@ -95,14 +95,19 @@ static void write_log(const char *file, double peak_g)
 	record_free(&record);
 }
 
-static unsigned add_drop(double peak_g)
+static unsigned add_to(const char *series, double peak_g)
 {
 	struct archive_recording r;
 
-	assert_int_equal(archive_begin(archive, "by-hand", "<i>Ann</i>", ".csv", simulated, &r), 0);
+	assert_int_equal(archive_begin(archive, series, "<i>Ann</i>", ".csv", simulated, &r), 0);
 	write_log(r.log, peak_g);
 	assert_int_equal(archive_finish(archive, &r, 1000000000, "note & <u>more</u>"), 0);
 	return r.number;
+}
+
+static unsigned add_drop(double peak_g)
+{
+	return add_to("by-hand", peak_g);
 }
 
 static struct estimate_channel channel_of(double value)
@@ -516,6 +521,35 @@ static void test_undecided_counts_when_asked(void **state)
 	free(page);
 }
 
+/* A far one is found beside a series of two, too, whose scatter adds one degree of freedom to its own. */
+static void test_one_that_stands_out_is_marked(void **state)
+{
+	static const double peak_g[] = {300, 300.5, 301, 300.2, 330}, other_g[] = {300, 300.1};
+	char scene[96], drop[32], *page;
+
+	(void)state;
+	snprintf(scene, sizeof(scene), "%s/scene.ini", folder);
+	assert_int_equal(archive_new_series(archive, "other", "another", scene, 25, NAN, 2), 0);
+	for (unsigned i = 0; i < 5; i++) {
+		snprintf(drop, sizeof(drop), "by-hand/%u", add_drop(peak_g[i]));
+		give_result(drop, peak_g[i], ESTIMATE_OK, 0);
+		decide(drop, ARCHIVE_ACCEPTED, "");
+	}
+	page = report();
+	assert_has(page, "Drop 5 stands out in S1 X");
+	assert_has(page, "by their own scatter");
+	free(page);
+	for (unsigned i = 0; i < 2; i++) {
+		snprintf(drop, sizeof(drop), "other/%u", add_to("other", other_g[i]));
+		give_result(drop, other_g[i], ESTIMATE_OK, 0);
+		decide(drop, ARCHIVE_ACCEPTED, "");
+	}
+	page = report();
+	assert_has(page, "Drop 5 stands out in S1 X");
+	assert_has(page, "by the scatter of all such series");
+	free(page);
+}
+
 static int find_raw(void *context, const struct archive_drop *drop)
 {
 	snprintf(context, 200, "%s/%s", folder, drop->raw);
@@ -664,6 +698,7 @@ int main(void)
 	        cmocka_unit_test_setup_teardown(test_empty_series, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_all_rejected, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_undecided_counts_when_asked, set_up, tear_down),
+	        cmocka_unit_test_setup_teardown(test_one_that_stands_out_is_marked, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_log_missing_or_changed, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_without_result_and_interrupted, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_a_simulated_tower_is_named, set_up, tear_down),
