@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 #
 # The unit tests are one program, linked once; each $(BUILD)/tests/test_X is a link to it. Those that replace functions
-# of the C library, of the port, of the firmware or of the console are programs of their own. `make unit` and `make check-fast` are the
-# fast loop.
+# of the C library, of the port, of the firmware or of the console are programs of their own. `make unit` and
+# `make check-fast` are the fast loop.
 
 UNITS_ALONE = $(addprefix $(BUILD)/tests/,test_promises test_port_faults test_link_faults test_console_work)
 UNITS_TOGETHER = $(filter-out $(UNITS_ALONE),$(UNITS))
@@ -38,6 +38,9 @@ $(UNITS_ALONE): $(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(call obj,$(UNIT_
 
 .PHONY: units unit check-fast
 units: $(UNITS)
+
+# Each is a make of its own, which would build the libraries beside the one that called it.
+unit check-fast: | $(filter all,$(MAKECMDGOALS))
 
 unit: ## build the unit tests and run them side by side
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) units
