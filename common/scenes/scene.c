@@ -79,37 +79,50 @@ static int scene_read_text(struct reading *reading, const char *name, const char
 	return 1;
 }
 
-int scene_set_chain(struct scene *scene, const char *list, const char *beside)
+size_t scene_chain_file(const char **list)
 {
-	const char *slash = strrchr(beside, '/');
+	size_t length;
+
+	*list += strspn(*list, " ,");
+	length = strcspn(*list, ",");
+	while (length > 0 && (*list)[length - 1] == ' ')
+		length--;
+	return length;
+}
+
+/* Behind those that are there. */
+static int scene_add_chain(struct scene *scene, const char *list, const char *beside)
+{
+	const char *slash = strrchr(beside, '/'), *at = list;
 	int folder = slash != NULL ? (int)(slash + 1 - beside) : 0;
 	char *chain = scene->chain, name[PATH_MAX], whole[PATH_MAX];
-	size_t room = sizeof(scene->chain), used = 0, length;
+	size_t room = sizeof(scene->chain), before = strlen(chain), used = before, length;
 
-	for (const char *at = list + strspn(list, " ,"); *at != '\0' && used < room;
-	     at += length + strspn(at + length, " ,")) {
-		length = strcspn(at, " ,");
+	while (used < room && (length = scene_chain_file(&at)) > 0) {
 		snprintf(name, sizeof(name), "%.*s%.*s", at[0] != '/' ? folder : 0, beside, (int)length, at);
 		used += (size_t)snprintf(chain + used, room - used, "%s%s", used > 0 ? "," : "",
 		                         realpath(name, whole) != NULL ? whole : name);
+		at += length;
 	}
-	if (used > 0 && used < room && plain_is_line(list, strlen(list)))
+	if (used > before && used < room && plain_is_line(list, strlen(list)))
 		return 0;
 	chain[0] = '\0';
 	return DT_E_FORMAT;
 }
 
+int scene_set_chain(struct scene *scene, const char *list, const char *beside)
+{
+	scene->chain[0] = '\0';
+	return scene_add_chain(scene, list, beside);
+}
+
 /* Those without a folder lie beside the scene. */
 static int scene_read_chain(struct reading *reading, const char *value)
 {
-	struct settings *settings = &reading->settings;
-
-	if (reading->scene.chain[0] != '\0')
-		return settings_fail(settings, DT_E_FORMAT, "chain is given twice");
-	if (scene_set_chain(&reading->scene, value, settings->file) == 0)
+	if (scene_add_chain(&reading->scene, value, reading->settings.file) == 0)
 		return 1;
-	return settings_fail(settings, DT_E_FORMAT, "chain is '%.60s', expected names of sensor files",
-	                     value);
+	return settings_fail(&reading->settings, DT_E_FORMAT,
+	                     "chain is '%.60s', expected names of sensor files", value);
 }
 
 static int scene_read_number(struct reading *reading, size_t index, const char *text)
@@ -279,14 +292,15 @@ void scene_write(const struct scene *scene, FILE *out)
 	struct scene placed = *scene;
 	const char *section = "";
 	bool fitted = false;
+	size_t length;
 
 	placed.tower_separation_m = placed.tower_dampers_m = 0.0;
 	placed.tower_gate_lower_m = placed.tower_gate_upper_m = 0.0;
 	place_tower(&placed);
 	fprintf(out, "; SPDX-License-Identifier: GPL-3.0-or-later\nname = %s\ntitle = %s\n", scene->name,
 	        scene->title);
-	if (scene->chain[0] != '\0')
-		fprintf(out, "chain = %s\n", scene->chain);
+	for (const char *at = scene->chain; (length = scene_chain_file(&at)) > 0; at += length)
+		fprintf(out, "chain = %.*s\n", (int)length, at);
 	for (size_t i = 0; i < KEYS; i++) {
 		double value = value_in(scene, &keys[i]);
 		bool by_height = keys[i].initial == 0.0 && strcmp(keys[i].section, "tower") == 0;

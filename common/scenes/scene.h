@@ -21,8 +21,7 @@ extern const char *const scene_fitted[SCENE_FITTED];
 struct scene {
 	char name[64];    /* key `name` before any section, e.g. "geometry-2A" */
 	char title[128];  /* key `title`, for reports */
-	char chain[1024]; /* key `chain`: files of its sensors (transducer.h), seen from the scene's; "": none
-	                   */
+	char chain[1024]; /* keys `chain`: files of its sensors (transducer.h), commas between; "": none */
 #define SCENE_KEY(section, key, min, max, initial, doc) double section##_##key;
 #include "common/scenes/scene.def"
 #undef SCENE_KEY
@@ -43,9 +42,12 @@ DT_MUST_USE int scene_read(struct scene *scene, const char *file, char message[S
  * message. */
 DT_MUST_USE int scene_check(const struct scene *scene, const char *where, char message[SCENE_MESSAGE_MAX]);
 
-/* Takes files of sensors, commas or blanks between, names seen from beside's folder ("": from here), so that
- * they are found from anywhere. 0, or DT_E_FORMAT and there are none. */
+/* Takes files of sensors, commas between, names seen from beside's folder ("": from here), so that they are
+ * found from anywhere. 0, or DT_E_FORMAT and there are none. */
 DT_MUST_USE int scene_set_chain(struct scene *scene, const char *list, const char *beside);
+
+/* The next file of such a list: *list is moved to where its name begins. Its length, 0 when there is none. */
+size_t scene_chain_file(const char **list);
 
 /* Writes all that differs from what a key is without being given, [fit] where u is known, and [limits]. */
 void scene_write(const struct scene *scene, FILE *out);

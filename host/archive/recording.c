@@ -6,6 +6,7 @@
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -81,14 +82,23 @@ static int set_height(struct archive *archive, double height_m, char **text)
 	return put_line(archive, text, line, true, with);
 }
 
-/* Names that do not depend on where the scene stood. */
+/* Names that do not depend on where the scene stood, a line each in place of those that were there. */
 static int set_chain(struct archive *archive, const char *chain, char **text)
 {
-	const char *line = line_of(*text, "chain", false);
-	char with[sizeof(((struct scene *)NULL)->chain) + 16];
+	const char *line;
+	size_t at = 0;
+	int result = 0;
 
-	snprintf(with, sizeof(with), "chain = %s%s", chain, line != NULL ? "" : "\n");
-	return put_line(archive, text, line != NULL ? line : *text, line != NULL, with);
+	while (result == 0 && (line = line_of(*text, "chain", false)) != NULL)
+		result = put_line(archive, text, line, true, "");
+	for (size_t length; result == 0 && (length = scene_chain_file(&chain)) > 0; chain += length) {
+		char with[PATH_MAX + 16];
+
+		snprintf(with, sizeof(with), "chain = %.*s\n", (int)length, chain);
+		result = put_line(archive, text, *text + at, false, with);
+		at += strlen(with);
+	}
+	return result;
 }
 
 int series_insert(struct archive *archive, const char *name, const char *campaign, const char *text,

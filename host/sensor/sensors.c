@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 
 #include "common/base/date.h"
+#include "common/scenes/scene.h"
 #include "host/sensor/lowpass.h"
 
 #define DAYS_A_YEAR 365.25
@@ -113,12 +114,11 @@ static int sensors_add(struct sensors *sensors, const char *file, double day,
 int sensors_read(struct sensors *sensors, const char *list, double day, char message[SETTINGS_MESSAGE_MAX])
 {
 	char file[SETTINGS_MESSAGE_MAX];
+	size_t length;
 	int result = 0;
 
 	sensors->count = 0;
-	for (const char *at = list + strspn(list, " ,"); *at != '\0' && result == 0;) {
-		size_t length = strcspn(at, " ,");
-
+	for (const char *at = list; result == 0 && (length = scene_chain_file(&at)) > 0; at += length) {
 		if (sensors->count == SENSORS_MAX || length >= sizeof(file)) {
 			snprintf(message, SETTINGS_MESSAGE_MAX, "%.300s: expected at most %d sensor files",
 			         list, SENSORS_MAX);
@@ -126,7 +126,6 @@ int sensors_read(struct sensors *sensors, const char *list, double day, char mes
 		}
 		snprintf(file, sizeof(file), "%.*s", (int)length, at);
 		result = sensors_add(sensors, file, day, message);
-		at += length + strspn(at + length, " ,");
 	}
 	return result;
 }
