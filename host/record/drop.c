@@ -168,7 +168,8 @@ int drop_check(const struct record *record)
 	for (size_t i = 0; i < DROP_CHANNELS && equal; i++)
 		equal = strcmp(record->channels[i].name, drop.channels[i].name) == 0 &&
 		        record->channels[i].count == drop.channels[i].count &&
-		        record->channels[i].range_g == range_g;
+		        (record->channels[i].range_g == range_g ||
+		         record->channels[i].range_g == drop.channels[i].range_g);
 	record_free(&drop);
 	return equal ? 0 : DT_E_FORMAT;
 }

@@ -44,8 +44,9 @@ void drop_capture_end(const struct record *record, struct frame *frame);
  * puts range and clipped marks right, and finishes the record. On DT_E_MEMORY the record is freed. */
 DT_MUST_USE int drop_close(struct record *record);
 
-/* Whether the channels are those of a drop of its ticks, whole blocks of them, with its range: 0, DT_E_RANGE
- * for the ticks, DT_E_FORMAT for the channels, DT_E_MEMORY. */
+/* Whether the channels are those of a drop of its ticks, whole blocks of them, with its range or, as
+ * files had it before that was worked out, the tower's own, which drop_close puts right: 0, DT_E_RANGE for
+ * the ticks, DT_E_FORMAT for the channels, DT_E_MEMORY. */
 DT_MUST_USE int drop_check(const struct record *record);
 
 /* Gives sensor and axis to the channels that have the names of a drop's. For those who know that they are:

@@ -12,6 +12,8 @@
 #include <string.h>
 
 #include "host/record/join.h"
+#include "host/record/read.h"
+#include "host/record/write.h"
 #include "tests/unit/join_by_hand.h"
 
 enum { TICKS = 6, FOLLOW = 1 + WIRE_PARAMETERS, RANGE_COUNTS = 6400 };
@@ -50,34 +52,69 @@ static void told_when_all_has_come(void **state)
 	assert_false(join_told(join));
 }
 
-/* The set comes behind the samples, and says from where on they are marked. */
-static void range_is_the_parameters(void **state)
+/* A drop of a smaller range, with three samples about it; all: its parameters have come, too. */
+static void take_ranged(bool all, struct record *record)
 {
-	struct record record;
 	struct frame frame;
 
-	(void)state;
 	hand_fill(&drop, 1000, TICKS, 5);
 	memset(drop.sample, 0, sizeof(drop.sample));
 	drop.range_counts = RANGE_COUNTS;
 	drop.sample[1][2][4] = RANGE_COUNTS;
 	drop.sample[1][2][5] = RANGE_COUNTS + 1;
 	drop.sample[1][2][6] = -RANGE_COUNTS - 1;
+	join_forget_run(join);
+	join_by_hand_feed_both(0, TICKS - 1);
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	for (unsigned i = 0; i < (all ? FOLLOW : FOLLOW - 1); i++) {
+		hand_told(&drop, i, &frame);
+		assert_int_equal(join_feed(join, &frame), 0);
+	}
+	assert_int_equal(join_take(join, record), 0);
+}
+
+/* The set comes behind the samples, and says from where on they are marked. */
+static void range_is_the_parameters(void **state)
+{
+	struct record record;
+
+	(void)state;
 	for (unsigned all = 0; all < 2; all++) {
-		join_forget_run(join);
-		join_by_hand_feed_both(0, TICKS - 1);
-		assert_int_equal(join_by_hand_feed_end(), 1);
-		for (unsigned i = 0; i < FOLLOW - !all; i++) {
-			hand_told(&drop, i, &frame);
-			assert_int_equal(join_feed(join, &frame), 0);
-		}
-		assert_int_equal(join_take(join, &record), 0);
+		take_ranged(all, &record);
 		assert_true(record.channels[3].range_g == (all ? RANGE_COUNTS / 32.0 : 500));
 		assert_int_equal(record.channels[3].sample[2 * 7 + 4], 0);
 		assert_int_equal(record.channels[3].sample[2 * 7 + 5], all ? SAMPLE_CLIPPED : 0);
 		assert_int_equal(record.channels[3].sample[2 * 7 + 6], all ? SAMPLE_CLIPPED : 0);
 		assert_int_equal(record.flags & RECORD_FLAG_CLIPPED, all ? RECORD_FLAG_CLIPPED : 0);
 		record_free(&record);
+	}
+}
+
+/* Files once had the tower's own range whatever the parameters said, and marks by that. */
+static void an_older_file_is_put_right(void **state)
+{
+	static const char *const ending[] = {".csv", ".unv"};
+
+	(void)state;
+	for (unsigned k = 0; k < 2; k++) {
+		char message[READ_MESSAGE_MAX] = "", *file = hand_file(ending[k], "", 0);
+		struct record record, again;
+
+		take_ranged(true, &record);
+		for (size_t i = 0; i < record.channel_count; i++)
+			record.channels[i].range_g = 500;
+		record.channels[3].sample[2 * 7 + 5] = record.channels[3].sample[2 * 7 + 6] = 0;
+		assert_int_equal(write_record(&record, file, message), 0);
+		if (read_record(&again, file, NULL, message) != 0)
+			fail_msg("%s", message);
+		assert_true(again.channels[3].range_g == RANGE_COUNTS / 32.0);
+		assert_int_equal(again.channels[3].sample[2 * 7 + 4], 0);
+		assert_int_equal(again.channels[3].sample[2 * 7 + 5], SAMPLE_CLIPPED);
+		assert_int_equal(again.channels[3].sample[2 * 7 + 6], SAMPLE_CLIPPED);
+		assert_true(again.crc_agrees && again.parameters_known);
+		record_free(&again);
+		record_free(&record);
+		hand_unlink(file);
 	}
 }
 
@@ -172,6 +209,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test_setup_teardown(told_when_all_has_come, join_by_hand_begin, join_by_hand_end),
 	        cmocka_unit_test_setup_teardown(range_is_the_parameters, join_by_hand_begin,
+	                                        join_by_hand_end),
+	        cmocka_unit_test_setup_teardown(an_older_file_is_put_right, join_by_hand_begin,
 	                                        join_by_hand_end),
 	        cmocka_unit_test_setup_teardown(damage_is_counted, join_by_hand_begin, join_by_hand_end),
 	        cmocka_unit_test_setup_teardown(an_altered_set_is_marked, join_by_hand_begin,
