@@ -16,6 +16,9 @@ enum { DIFFERENCES_MIN = 16, BEGINNING = 16 };
 /* What the last samples before a pulse are off those before them, of what they are off zero: at rest. */
 #define AT_REST 0.25
 
+/* Samples of a record's beginning for each of its rise: more than the foot of any pulse has. */
+#define LINGERS 6.0
+
 /* Of the good samples, outliers that are none. */
 #define OUTLIERS_MOST 0.03
 
@@ -112,8 +115,24 @@ static double baseline_largest(const struct trace *trace, size_t *at)
 	return most;
 }
 
+/* Whether it lingers where it begins: many more samples before the peak are nearer to the first than to the
+ * peak than the other way round, which no rise is. */
+static bool lingers(const struct trace *trace, double sign, double first, double peak, size_t at)
+{
+	size_t below = 0, above = 0;
+
+	for (size_t k = 0; k < at; k++)
+		if (trace_good(trace, k)) {
+			bool is_above = sign * trace->value_g[k] > (first + peak) / 2;
+
+			above += is_above;
+			below += !is_above;
+		}
+	return (double)below > LINGERS * (double)(above + 1);
+}
+
 /* Of a record without a quiet part: whether it begins on something else than the rise of its pulse. Then it
- * is as high as the pulse from the first sample on, or falls before it rises. */
+ * is as high as the pulse from the first sample on, falls before it rises, or lingers far from 0. */
 static bool begins_in_motion(const struct trace *trace, double noise_g)
 {
 	double low = INFINITY, first, sign, peak;
@@ -128,7 +147,8 @@ static bool begins_in_motion(const struct trace *trace, double noise_g)
 		if (trace_good(trace, k))
 			low = fmin(low, sign * trace->value_g[k]);
 	return fmin(first, low) > LIMIT_MOST * fabs(peak) ||
-	       first - low > fmax(LIMIT_NOISE * noise_g, LIMIT_EDGE * fabs(peak));
+	       first - low > fmax(LIMIT_NOISE * noise_g, LIMIT_EDGE * fabs(peak)) ||
+	       (first > LIMIT_EDGE * fabs(peak) && lingers(trace, sign, first, fabs(peak), at));
 }
 
 /* Mean of the good samples [from, until) without zero as it was found; *n of them. */

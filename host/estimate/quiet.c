@@ -335,10 +335,11 @@ bool quiet_settled(struct quiet *quiet)
 {
 	bool any = false;
 
-	while (quiet->until - quiet->from >= 4 * QUIET_SAMPLES_MIN &&
-	       quiet_decays(quiet->trace, quiet->from, quiet->until)) {
-		quiet->from = quiet->until - (quiet->until - quiet->from) / 2;
+	while (quiet_decays(quiet->trace, quiet->from, quiet->until)) {
 		any = true;
+		if (quiet->until - quiet->from < 4 * QUIET_SAMPLES_MIN)
+			break;
+		quiet->from = quiet->until - (quiet->until - quiet->from) / 2;
 	}
 	return any;
 }
