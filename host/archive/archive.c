@@ -9,6 +9,7 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -206,6 +207,34 @@ int index_open(struct archive *archive, const char *name, enum archive_mode mode
 	return result != 0 ? result : schema_upgrade(archive);
 }
 
+/* Bytes of FOLDER/NAME, 0 when it is not there, -1 when it is no file. */
+static int64_t bytes_of(const struct archive *archive, const char *name)
+{
+	char path[ARCHIVE_PATH_MAX];
+	struct stat status;
+
+	snprintf(path, sizeof(path), "%s/%s", archive->folder, name);
+	if (stat(path, &status) != 0)
+		return 0;
+	return S_ISREG(status.st_mode) ? status.st_size : -1;
+}
+
+int index_look(struct archive *archive)
+{
+	int64_t bytes = bytes_of(archive, "index.sqlite");
+
+	if (bytes < 0)
+		return archive_refuse(archive, DT_E_FORMAT, "%.400s/index.sqlite: expected a regular file",
+		                      archive->folder);
+	/* who makes an archive has no raw files yet */
+	if (bytes == 0 && archive_is_there(archive, "raw") && bytes_of(archive, "index.sqlite-wal") <= 0)
+		return archive_refuse(archive, DT_E_CORRUPT,
+		                      "%.250s/index.sqlite: emptied; 'droptower series --archive %.250s "
+		                      "--rebuild' makes it again",
+		                      archive->folder, archive->folder);
+	return 0;
+}
+
 static int open_in(struct archive *archive, enum archive_mode mode)
 {
 	char inside[ARCHIVE_PATH_MAX];
@@ -231,7 +260,9 @@ static int open_in(struct archive *archive, enum archive_mode mode)
 			                      archive->folder);
 		made = true;
 	}
-	result = mode == ARCHIVE_READ ? 0 : archive_lock(archive, false);
+	result = made ? 0 : index_look(archive);
+	if (result == 0 && mode != ARCHIVE_READ)
+		result = archive_lock(archive, false);
 	if (result == 0)
 		result = index_open(archive, "index.sqlite", mode);
 	snprintf(inside, sizeof(inside), "%s/index.sqlite", archive->folder);

@@ -73,6 +73,8 @@ DT_MUST_USE int archive_end(struct archive *archive, int result);
 
 /* Opens FOLDER/NAME and makes or migrates the schema. */
 DT_MUST_USE int index_open(struct archive *archive, const char *name, enum archive_mode mode);
+/* Whether the index that is there is a file, and not an empty one beside raw files; opens nothing. */
+DT_MUST_USE int index_look(struct archive *archive);
 DT_MUST_USE int schema_upgrade(struct archive *archive);
 
 /* An archive without an index yet, with its folder locked. */

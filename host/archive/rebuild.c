@@ -281,7 +281,7 @@ static int rebuild_fill(struct rebuild *rebuild)
 		return result;
 	rebuild->proof.wrong = rebuild->wrong;
 	rebuild->proof.context = rebuild->context;
-	of_index = drops_of_index(archive->folder);
+	of_index = index_look(archive) == 0 ? drops_of_index(archive->folder) : 0;
 	rebuild->before = drops_of_chain(&rebuild->proof.chain);
 	if (of_index > rebuild->before)
 		rebuild->before = of_index;

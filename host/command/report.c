@@ -60,6 +60,14 @@ static int failed(const char *message)
 	return COMMAND_INPUT;
 }
 
+/* The archive knows best what was wrong with it. */
+static int report_failed(const struct series_report *request, int result)
+{
+	const char *message = archive_message(request->archive);
+
+	return failed(message[0] != '\0' ? message : error_text(result));
+}
+
 /* The table of the series' drops, which goes into each of the files. */
 static int report_make_data(const struct series_report *request, struct text *data)
 {
@@ -70,7 +78,7 @@ static int report_make_data(const struct series_report *request, struct text *da
 	if (result == 0)
 		result = text_close(data, print_drops(request->archive, &filter, request->undecided,
 		                                      TABLE_CSV, data->out));
-	return result == 0 ? COMMAND_DONE : failed(error_text(result));
+	return result == 0 ? COMMAND_DONE : report_failed(request, result);
 }
 
 /* The PDF, the table of drops as an attachment, and the page's evidence as comments. */
@@ -146,7 +154,9 @@ static int report_make(const struct series_report *request, struct text *page)
 		result = text_close(page, series_report_html(request, page->out, message, sizeof(message)));
 	if (result == 0)
 		result = seal_fill(page->bytes, page->size);
-	return result == 0 ? COMMAND_DONE : failed(message[0] != '\0' ? message : error_text(result));
+	if (result != 0)
+		return message[0] != '\0' ? failed(message) : report_failed(request, result);
+	return COMMAND_DONE;
 }
 
 static int report_write_page(const struct series_report *request, const struct arguments *a,
