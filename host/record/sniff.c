@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/sniff.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdarg.h>
@@ -555,8 +556,35 @@ int sniff_names(struct sniff *sniff, size_t count, const struct piece *units, bo
 
 /* ---- above and below the rows ---- */
 
-/* A rate or an interval of a line like "Sample rate: 51200 Hz" or "dt = 1e-5 s"; 0 where there is none. */
-static double rate_of(const struct source_line *line)
+/* The number at *at of a line, and *at behind it. NAN: it may be one of two, as 20,000; 0: there is none. */
+static double told_number(const struct piece *text, struct cells_style style, size_t *at)
+{
+	size_t from = *at, end = from, digits = 0;
+	double value = 0;
+	char sign = '.';
+
+	while (end < text->length && strchr("0123456789.+-eE", text->text[end]))
+		end++;
+	if (end < text->length && text->text[end] == ',') {
+		while (end + 1 + digits < text->length &&
+		       isdigit((unsigned char)text->text[end + 1 + digits]))
+			digits++;
+		if (digits == 3 && style.decimal != ',')
+			return NAN;
+		if (digits > 0 && style.separator != ',') {
+			sign = ',';
+			end += 1 + digits;
+		}
+	}
+	*at = end;
+	if (sign == '.' && style.decimal == ',' && memchr(text->text + from, '.', end - from) != NULL)
+		return NAN; /* where a comma is the decimal sign a point may stand for thousands */
+	return number_parse(text->text + from, end - from, sign, &value) && value > 0 ? value : 0;
+}
+
+/* A rate or an interval of a line like "Sample rate: 51200 Hz" or "dt = 1e-5 s"; 0 where there is none, NAN
+ * where it may be one of two. */
+static double rate_of(const struct source_line *line, struct cells_style style)
 {
 	static const char *const rates[] = {"sample rate",      "sampling rate",
 	                                    "samplerate",       "sample_rate",
@@ -586,10 +614,10 @@ static double rate_of(const struct source_line *line)
 		return 0;
 	for (at = 0; at < text.length && !(text.text[at] >= '0' && text.text[at] <= '9');)
 		at++;
-	for (end = at; end < text.length && strchr("0123456789.+-eE", text.text[end]);)
-		end++;
-	if (!number_parse(text.text + at, end - at, '.', &value) || !(value > 0))
-		return 0;
+	end = at;
+	value = told_number(&text, style, &end);
+	if (!(value > 0))
+		return value;
 	while (end < text.length && strchr(" \t,;\"", text.text[end]))
 		end++;
 	at = end;
@@ -607,6 +635,34 @@ static double rate_of(const struct source_line *line)
 	       : strcmp(unit->name, "kHz") == 0 ? value * 1e3
 	       : strcmp(unit->name, "MHz") == 0 ? value * 1e6
 	                                        : 0;
+}
+
+/* A line like "Scale factor: 2", of a number other than 1. */
+static bool tells_scale(const struct source_line *line)
+{
+	static const char *const words[] = {
+	        "scale",        "scale factor",      "scaling",           "scaling factor", "factor",
+	        "scale_factor", "multiplier",        "conversion factor", "faktor",         "skalierung",
+	        "skalenfaktor", "skalierungsfaktor", "y multiplier"};
+	struct piece text = {line->text, line->length};
+	double value = 1;
+	size_t at;
+
+	while (text.length > 0 && strchr("#\"; \t%/", text.text[0])) {
+		text.text++;
+		text.length--;
+	}
+	for (size_t i = 0; i < sizeof(words) / sizeof(words[0]); i++) {
+		if (!begins(text, words[i]))
+			continue;
+		at = strlen(words[i]);
+		while (at < text.length && strchr(" \t:=;,\"", text.text[at]))
+			at++;
+		value = at < text.length && isdigit((unsigned char)text.text[at])
+		                ? told_number(&text, (struct cells_style){0}, &at)
+		                : value;
+	}
+	return !(fabs(value - 1) < 1e-12);
 }
 
 static bool is_of_ours(const struct source *source)
@@ -718,8 +774,18 @@ static int read_head(struct work *work, struct sniff *sniff, size_t columns, str
 	struct source_line line = {0};
 
 	for (size_t at = 0; source_next_line(work->source, &line); at = line.next) {
-		double rate_hz = rate_of(&line);
+		double rate_hz = rate_of(&line, sniff->style);
 
+		if (isnan(rate_hz))
+			return source_refuse(work->message, DT_E_FORMAT, work->source->file, line.number,
+			                     "\"%.*s\": a rate with a comma or point for thousands or for a "
+			                     "decimal sign, expected --columns with name:unit@RATE_HZ",
+			                     (int)(line.length < 60 ? line.length : 60), line.text);
+		if (tells_scale(&line))
+			return source_refuse(work->message, DT_E_FORMAT, work->source->file, line.number,
+			                     "\"%.*s\" may be in the numbers or not, expected --columns that "
+			                     "says so, e.g. name:g or name:g*FACTOR",
+			                     (int)(line.length < 60 ? line.length : 60), line.text);
 		if (rate_hz > 0 && sniff->told_rate_hz > 0 && fabs(rate_hz / sniff->told_rate_hz - 1) > 1e-3)
 			return source_refuse(work->message, DT_E_FORMAT, work->source->file, line.number,
 			                     "rate %.9g Hz here and %.9g Hz in line %llu, expected one",

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/unit.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <string.h>
 
@@ -166,6 +167,19 @@ static const struct unit *in_brackets(const char *name, size_t length, char open
 	return found;
 }
 
+/* Whether the word from there on is the end of a bracket that has a number in it, too: "a [10 g]". */
+static bool is_multiple(const char *name, size_t from, size_t length)
+{
+	bool number = false;
+
+	if (memchr(name + from, ']', length - from) == NULL &&
+	    memchr(name + from, ')', length - from) == NULL)
+		return false;
+	while (from > 0 && name[from - 1] != '[' && name[from - 1] != '(')
+		number |= isdigit((unsigned char)name[--from]) != 0;
+	return number && from > 0;
+}
+
 const struct unit *unit_of_name(const char *name, size_t length, enum unit_kind wanted)
 {
 	const struct unit *unit = in_brackets(name, length, '[', ']');
@@ -177,6 +191,8 @@ const struct unit *unit_of_name(const char *name, size_t length, enum unit_kind 
 		return unit;
 	while (from > 0 && !strchr(" \t,_", name[from - 1]))
 		from--;
+	if (is_multiple(name, from, length))
+		return NULL;
 	unit = unit_find(name + from, length - from);
 	return unit && unit->kind == wanted ? unit : NULL;
 }
