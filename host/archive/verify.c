@@ -158,15 +158,16 @@ int archive_verify(struct archive *archive, const char *series, unsigned number,
                    void (*wrong)(void *context, const char *text), void *context)
 {
 	struct proof proof;
-	int result = proof_open(archive, &proof), told;
+	int result = proof_open(archive, &proof), told, of_chain;
 
 	if (result != 0)
 		return result;
 	proof.wrong = wrong;
 	proof.context = context;
-	if (series == NULL)
+	if (number == 0)
 		result = hold_chain(&proof);
-	else if (number == 0)
+	of_chain = series != NULL ? (int)proof.told : 0; /* told, and no lack of the series */
+	if (result == 0 && series != NULL && number == 0)
 		result = verify_series(&proof, series);
 	if (result == 0)
 		result = proof_of_all(&proof, series, number);
@@ -174,7 +175,7 @@ int archive_verify(struct archive *archive, const char *series, unsigned number,
 		result = proof_of_rest(&proof, NULL, true);
 	if (result == 0 && series == NULL)
 		result = indexed_hold_more(&proof);
-	told = (int)proof.told;
+	told = (int)proof.told - of_chain;
 	proof_close(&proof);
 	return result != 0 ? result : told;
 }
