@@ -86,6 +86,10 @@ void plant_open(const struct board_options *options)
 	plant.answer_fd = plant_open_one(options->bus, "answer", O_RDONLY);
 	if (options->record != NULL)
 		plant.record_fd = open(options->record, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+	if (options->record != NULL && plant.record_fd < 0) {
+		fprintf(stderr, "droptower-firmware-board: %s: %s\n", options->record, strerror(errno));
+		exit(BOARD_EXIT_LINK);
+	}
 }
 
 void plant_reset(void)

@@ -145,9 +145,13 @@ static int lacks_sensors(struct archive *archive, const char *drop, const struct
 
 	if (result == DT_E_EMPTY || (result == 0 && (count == 0 || chain != NULL || scene->chain[0] != '\0')))
 		return 0;
+	if (result != 0) {
+		snprintf(message, ARCHIVE_MESSAGE_MAX, "%.100s: %s", drop, error_text(result));
+		return result;
+	}
 	snprintf(message, ARCHIVE_MESSAGE_MAX,
 	         "%.100s: its result rests on the files of %zu sensors: expected --chain", drop, count);
-	return result != 0 ? result : DT_E_STATE;
+	return DT_E_STATE;
 }
 
 int archived_result(struct archive *archive, const char *series, unsigned number, const char *chain,

@@ -64,16 +64,23 @@ size_t ensemble_points(const struct ensemble *e)
 	return points;
 }
 
-void ensemble_grid_scene(const struct ensemble *e, size_t point, struct scene *scene, double value[])
+void ensemble_set(const struct ensemble *e, const double value[], struct scene *scene)
 {
 	*scene = *e->scene;
+	/* twice: a key may move one before it, and where it stays it moves none */
+	for (size_t i = 0; i < 2 * e->axes; i++)
+		vary_set(scene, &e->axis[i % e->axes].key, value[i % e->axes]);
+}
+
+void ensemble_grid_scene(const struct ensemble *e, size_t point, struct scene *scene, double value[])
+{
 	for (size_t i = e->axes; i-- > 0;) {
 		const struct ensemble_axis *axis = &e->axis[i];
 
 		value[i] = axis->from + (double)(point % axis->count) * axis->step;
 		point /= axis->count;
-		vary_set(scene, &axis->key, value[i]);
 	}
+	ensemble_set(e, value, scene);
 }
 
 /* Vigna's splitmix64, 0 to 1, both excluded. */

@@ -47,6 +47,9 @@ struct ensemble {
 #define ENSEMBLE_POINTS_MAX 10000000
 size_t ensemble_points(const struct ensemble *ensemble);
 
+/* The scene with the axes' keys at value[axes], in whatever order they move each other. */
+void ensemble_set(const struct ensemble *ensemble, const double value[], struct scene *scene);
+
 /* The scene of a point of the grid, or of a random draw, with the varied values in value[axes]. */
 void ensemble_grid_scene(const struct ensemble *ensemble, size_t point, struct scene *scene, double value[]);
 /* (a scene with [fit]: its parameters are drawn from their covariance first) */

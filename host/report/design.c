@@ -79,20 +79,12 @@ static double design_margin(const struct design *d, const struct model_predictio
 	return least;
 }
 
-static void design_scene(const struct design *d, const double key[], struct scene *scene)
-{
-	*scene = *d->ensemble.scene;
-	/* twice: a key may move one before it, and where it stays it moves none */
-	for (size_t i = 0; i < 2 * d->ensemble.axes; i++)
-		vary_set(scene, &d->ensemble.axis[i % d->ensemble.axes].key, key[i % d->ensemble.axes]);
-}
-
 static void design_solve(const struct design *d, struct design_row *row)
 {
 	struct model_prediction p;
 	struct scene scene;
 
-	design_scene(d, row->key, &scene);
+	ensemble_set(&d->ensemble, row->key, &scene);
 	row->margin = (double)NAN;
 	if (model_solve(&scene, d->ensemble.fidelity, &d->ensemble.options, &p, NULL) == 0)
 		row->margin = design_margin(d, &p, row->quantity);
@@ -194,7 +186,7 @@ static double design_yield(const struct design *d, const struct design_row *row)
 	struct ensemble at = {.scene = &scene, .seed = d->ensemble.seed};
 	size_t within = 0;
 
-	design_scene(d, row->key, &scene);
+	ensemble_set(&d->ensemble, row->key, &scene);
 	if (!ensemble_fitted(&scene))
 		return (double)NAN;
 	for (size_t k = 0; k < DESIGN_DRAWS; k++) {

@@ -53,7 +53,8 @@ static bool is_known(const struct known_file *known, const char *file, const str
 
 	return strcmp(known->name, file) == 0 && then->st_ino == now->st_ino && then->st_dev == now->st_dev &&
 	       then->st_size == now->st_size && then->st_mtim.tv_sec == now->st_mtim.tv_sec &&
-	       then->st_mtim.tv_nsec == now->st_mtim.tv_nsec;
+	       then->st_mtim.tv_nsec == now->st_mtim.tv_nsec && then->st_ctim.tv_sec == now->st_ctim.tv_sec &&
+	       then->st_ctim.tv_nsec == now->st_ctim.tv_nsec;
 }
 
 static int sensors_file(struct sensor_used *used, size_t place, const char *file,
