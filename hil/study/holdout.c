@@ -281,7 +281,7 @@ static bool tell_refinements(const struct study *study, struct sheet *sheet, str
 			*all = t;
 		if (fails || all->data == 0) {
 			sheet_row(sheet, "%s|-|-|-|-|%s", without[i].what, "no fit*");
-			pays = false; /* what nothing can be held against */
+			pays = pays && i > 0;
 			continue;
 		}
 		if (i > 0 && !(t.aicc - all->aicc > PAYS))
