@@ -59,15 +59,12 @@ struct archive_series {
 };
 
 /* Name: letters, digits, and . _ - within; its name must be new. The scene is read from scene_file; NAN takes
- * its angle, its height. Another height is written into the scene that the series keeps, since where the
- * tower's parts stand follows from it; so is the place of its sensors' files. */
+ * its angle, its height, NULL the files of its sensors, with commas between. Another height is written into
+ * the scene that the series keeps, since where the tower's parts stand follows from it; so is the place of
+ * its sensors' files. */
 DT_MUST_USE int archive_new_series(struct archive *archive, const char *name, const char *campaign,
                                    const char *scene_file, double angle_deg, double height_m,
-                                   unsigned planned);
-
-/* The files of the sensors of a series that has no drop yet: names that are found from anywhere, with commas
- * between. */
-DT_MUST_USE int archive_set_chain(struct archive *archive, const char *series, const char *chain);
+                                   const char *chain, unsigned planned);
 
 /* The scene of a series, at its angle and height. */
 DT_MUST_USE int archive_scene(struct archive *archive, const char *series, struct scene *scene);

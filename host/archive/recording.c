@@ -138,7 +138,8 @@ static int recording_make_series(struct archive *archive, const char *name, cons
 }
 
 int archive_new_series(struct archive *archive, const char *name, const char *campaign,
-                       const char *scene_file, double angle_deg, double height_m, unsigned planned)
+                       const char *scene_file, double angle_deg, double height_m, const char *chain,
+                       unsigned planned)
 {
 	char message[SCENE_MESSAGE_MAX], *text;
 	struct scene scene;
@@ -150,6 +151,9 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 	if (scene_read(&scene, scene_file, message) != 0 ||
 	    plan_read(&plan, scene.limits, scene_file, message) != 0)
 		return archive_refuse(archive, DT_E_FORMAT, "%s", message);
+	if (chain != NULL && scene_set_chain(&scene, chain, "") != 0)
+		return archive_refuse(archive, DT_E_FORMAT,
+		                      "chain is '%.60s', expected names of sensor files", chain);
 	if (isnan(angle_deg))
 		angle_deg = scene.drop_angle_deg;
 	result = read_scene_text(archive, scene_file, &text);
@@ -168,55 +172,6 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 		                     recording_make_series(archive, name, campaign, text, &scene, planned));
 	free(text);
 	return result;
-}
-
-/* The row, angle and text of a series without drops. */
-static int open_series(struct archive *archive, const char *series, int64_t *row, double *angle_deg,
-                       char **text)
-{
-	sqlite3_stmt *s;
-	int result = sql_query(archive, &s,
-	                       "SELECT id, angle_deg, scene FROM series WHERE name = ? AND NOT EXISTS"
-	                       " (SELECT 1 FROM drops WHERE series_id = series.id)",
-	                       "s", series);
-
-	if (result != 0)
-		return result;
-	result = sql_step(archive, s);
-	if (result > 0) {
-		*row = sqlite3_column_int64(s, 0);
-		*angle_deg = sqlite3_column_double(s, 1);
-		*text = strdup(sql_text(s, 2));
-	}
-	sqlite3_finalize(s);
-	if (result == 0)
-		return archive_refuse(archive, DT_E_STATE, "no series '%.80s' without drops", series);
-	if (result > 0 && *text == NULL)
-		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
-	return result < 0 ? result : 0;
-}
-
-int archive_set_chain(struct archive *archive, const char *series, const char *chain)
-{
-	double angle_deg = 0.0;
-	char *text = NULL;
-	struct scene scene;
-	int64_t row = 0;
-	int result = archive_change(archive);
-
-	if (result != 0)
-		return result;
-	result = open_series(archive, series, &row, &angle_deg, &text);
-	if (result == 0)
-		result = set_chain(archive, chain, &text);
-	if (result == 0)
-		result = scene_of_text(archive, series, text, angle_deg, &scene);
-	if (result == 0)
-		result = sql_run(archive, "UPDATE series SET scene = ? WHERE id = ?", "si", text, row);
-	if (result == 0)
-		result = sidecar_write_series(archive, row);
-	free(text);
-	return archive_end(archive, result);
 }
 
 /* ---- recording ---- */

@@ -21,19 +21,6 @@ int series_check_chain(const struct series_arguments *a)
 	return a->chain != NULL ? evaluate_check_chain(a->chain) : COMMAND_DONE;
 }
 
-/* The series keeps where the files are, wherever it is looked at from. */
-static int keep_chain(struct archive *archive, const struct series_arguments *a)
-{
-	struct scene scene;
-
-	if (a->chain == NULL)
-		return COMMAND_DONE;
-	if (scene_set_chain(&scene, a->chain, "") != 0)
-		return command_usage("series", "--chain is '%s', expected names of sensor files", a->chain);
-	return archive_set_chain(archive, a->word[0], scene.chain) == 0 ? COMMAND_DONE
-	                                                                : archived_failed(archive);
-}
-
 int series_verb_new(struct archive *archive, struct series_arguments *a)
 {
 	const char *campaign = a->filter.campaign != NULL ? a->filter.campaign : "default";
@@ -46,12 +33,10 @@ int series_verb_new(struct archive *archive, struct series_arguments *a)
 	if (code != COMMAND_DONE)
 		return code;
 	if (archive_new_series(archive, a->word[0], campaign, beside_scene_file(a->scene, path),
-	                       a->filter.angle_deg, a->height_m, a->drops > 0 ? a->drops : 5) != 0)
+	                       a->filter.angle_deg, a->height_m, a->chain, a->drops > 0 ? a->drops : 5) != 0)
 		return archived_failed(archive);
-	code = keep_chain(archive, a);
-	if (code == COMMAND_DONE)
-		printf("series %s\n", a->word[0]);
-	return code;
+	printf("series %s\n", a->word[0]);
+	return COMMAND_DONE;
 }
 
 /* ---- the drops that a verb works on ---- */
@@ -186,9 +171,8 @@ int series_verb_note(struct archive *archive, struct series_arguments *a)
 
 int series_verb_reanalyse(struct archive *archive, struct series_arguments *a)
 {
-	int code = COMMAND_DONE;
+	int code = series_check_chain(a);
 
-	code = series_check_chain(a);
 	interrupt_catch();
 	for (int i = 0; i < a->count && code == COMMAND_DONE; i++) {
 		struct chosen chosen = {0};

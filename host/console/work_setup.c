@@ -202,7 +202,7 @@ void work_new_series(struct job *job)
 		return;
 	}
 	result = archive_new_series(work->archive, wanted.name, wanted.campaign, scene->file,
-	                            wanted.angle_deg, wanted.height_m, (unsigned)wanted.planned);
+	                            wanted.angle_deg, wanted.height_m, NULL, (unsigned)wanted.planned);
 	if (result != 0) {
 		work_refuse(job, result);
 		return;

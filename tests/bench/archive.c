@@ -35,7 +35,8 @@ bool bench_archive_make(void)
 	if (nowhere == NULL || mkdtemp(scratch_name(folder, "bench")) == NULL)
 		return false;
 	archive = open_it(ARCHIVE_CREATE);
-	result = archive_new_series(archive, "first", "bench", "common/scenes/geometry-2A.ini", 25, NAN, 5);
+	result = archive_new_series(archive, "first", "bench", "common/scenes/geometry-2A.ini", 25, NAN, NULL,
+	                            5);
 	archive_close(archive);
 	return result == 0 && archive_stock_fill(folder, BENCH_ARCHIVE_DROPS, BENCH_ARCHIVE_JSON_BYTES);
 }

@@ -76,8 +76,8 @@ static void begin(void)
 		fuzz_fail("no folder");
 	atexit(clean);
 	archive = open_archive();
-	if (archive_new_series(archive, "one", "default", "common/scenes/geometry-2A.ini", 25, 0.894, 5) !=
-	            0 ||
+	if (archive_new_series(archive, "one", "default", "common/scenes/geometry-2A.ini", 25, 0.894, NULL,
+	                       5) != 0 ||
 	    archive_begin(archive, "one", "Ann", ".log", false, &r) != 0)
 		fuzz_fail("%s", archive_message(archive));
 	store(r.log, log, sizeof(log) - 1);

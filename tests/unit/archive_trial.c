@@ -43,7 +43,7 @@ struct archive *trial_with_series(const char *name)
 {
 	struct archive *archive = trial_open(ARCHIVE_CREATE);
 
-	assert_int_equal(archive_new_series(archive, name, "trial", TRIAL_SCENE, 25, NAN, 5), 0);
+	assert_int_equal(archive_new_series(archive, name, "trial", TRIAL_SCENE, 25, NAN, NULL, 5), 0);
 	return archive;
 }
 

@@ -183,14 +183,18 @@ static void test_names_stay_inside_the_folder(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
-		assert_int_equal(archive_new_series(archive, wrong[i], "trial", TRIAL_SCENE, 25, NAN, 5),
-		                 DT_E_ARGUMENT);
-		assert_int_equal(archive_new_series(archive, "two", wrong[i], TRIAL_SCENE, 25, NAN, 5),
+		assert_int_equal(
+		        archive_new_series(archive, wrong[i], "trial", TRIAL_SCENE, 25, NAN, NULL, 5),
+		        DT_E_ARGUMENT);
+		assert_int_equal(archive_new_series(archive, "two", wrong[i], TRIAL_SCENE, 25, NAN, NULL, 5),
 		                 DT_E_ARGUMENT);
 	}
-	assert_int_equal(archive_new_series(archive, "one", "trial", TRIAL_SCENE, 25, NAN, 5), DT_E_STATE);
-	assert_int_equal(archive_new_series(archive, "two", "trial", "README.md", 25, NAN, 5), DT_E_FORMAT);
-	assert_int_equal(archive_new_series(archive, "two", "trial", TRIAL_SCENE, 95, NAN, 5), DT_E_RANGE);
+	assert_int_equal(archive_new_series(archive, "one", "trial", TRIAL_SCENE, 25, NAN, NULL, 5),
+	                 DT_E_STATE);
+	assert_int_equal(archive_new_series(archive, "two", "trial", "README.md", 25, NAN, NULL, 5),
+	                 DT_E_FORMAT);
+	assert_int_equal(archive_new_series(archive, "two", "trial", TRIAL_SCENE, 95, NAN, NULL, 5),
+	                 DT_E_RANGE);
 	trial_record(archive, "one", "abc");
 	assert_int_equal(archive_note(archive, "one/1", "Bo", "a C1 \xC2\x9B control"), DT_E_ARGUMENT);
 	assert_int_equal(archive_note(archive, "one/1", "Bo", "turned \xE2\x80\xAE round"), DT_E_ARGUMENT);

@@ -129,7 +129,7 @@ static void make_many_things(void)
 	struct archive *archive = trial_with_series("one");
 	struct archive_recording r;
 
-	assert_int_equal(archive_new_series(archive, "empty", "other", TRIAL_BARE, 35, NAN, 3), 0);
+	assert_int_equal(archive_new_series(archive, "empty", "other", TRIAL_BARE, 35, NAN, NULL, 3), 0);
 	trial_record(archive, "one", "abc");
 	trial_result(archive, "one/1", "v1", -1.0 / 3, 2);
 	trial_result(archive, "one/1", "v2", -2.0 / 3, 2);
@@ -351,13 +351,13 @@ static void test_a_series_from_another_height(void **state)
 	for (int i = 0; i < 3; i++) {
 		write_scene(path, sections[i], keys[i]);
 		snprintf(name, sizeof(name), "s%d", i);
-		assert_int_equal(archive_new_series(archive, name, "trial", path, 33, 0.6, 5), 0);
+		assert_int_equal(archive_new_series(archive, name, "trial", path, 33, 0.6, NULL, 5), 0);
 		assert_int_equal(archive_scene(archive, name, &scene), 0);
 		assert_memory_equal(&scene, &expected, sizeof(scene));
 	}
-	assert_int_equal(archive_new_series(archive, "low", "trial", path, NAN, 0.1, 5), DT_E_RANGE);
+	assert_int_equal(archive_new_series(archive, "low", "trial", path, NAN, 0.1, NULL, 5), DT_E_RANGE);
 	assert_non_null(strstr(archive_message(archive), "is the height too small?"));
-	assert_int_equal(archive_new_series(archive, "high", "trial", path, NAN, 5.5, 5), DT_E_RANGE);
+	assert_int_equal(archive_new_series(archive, "high", "trial", path, NAN, 5.5, NULL, 5), DT_E_RANGE);
 	archive_close(archive);
 	assert_int_equal(unlink(path), 0);
 	snprintf(path, sizeof(path), "%s/index.sqlite", trial_folder);

@@ -41,7 +41,7 @@ static void test_means_by_hand(void **state)
 	const struct archive_cell *bare, *plate;
 
 	(void)state;
-	assert_int_equal(archive_new_series(archive, "flat", "trial", TRIAL_BARE, 25, NAN, 8), 0);
+	assert_int_equal(archive_new_series(archive, "flat", "trial", TRIAL_BARE, 25, NAN, NULL, 8), 0);
 	fill_eight(archive, "one", 1);
 	fill_eight(archive, "flat", 4);
 	trial_record(archive, "one", "undecided");
@@ -80,8 +80,8 @@ static void test_heights_are_not_averaged(void **state)
 	struct archive_table table;
 
 	(void)state;
-	assert_int_equal(archive_new_series(archive, "low", "trial", TRIAL_SCENE, 25, 0.5, 5), 0);
-	assert_int_equal(archive_new_series(archive, "bare", "trial", TRIAL_BARE, 25, NAN, 5), 0);
+	assert_int_equal(archive_new_series(archive, "low", "trial", TRIAL_SCENE, 25, 0.5, NULL, 5), 0);
+	assert_int_equal(archive_new_series(archive, "bare", "trial", TRIAL_BARE, 25, NAN, NULL, 5), 0);
 	trial_record(archive, "one", "abc");
 	trial_record(archive, "low", "abcd");
 	trial_record(archive, "bare", "abcde");
@@ -212,8 +212,8 @@ static struct archive *with_words(void)
 {
 	struct archive *archive = trial_with_series("box");
 
-	assert_int_equal(archive_new_series(archive, "rig_b", "winter", TRIAL_SCENE, 25, NAN, 5), 0);
-	assert_int_equal(archive_new_series(archive, "empty", "winter", TRIAL_BARE, 25, NAN, 5), 0);
+	assert_int_equal(archive_new_series(archive, "rig_b", "winter", TRIAL_SCENE, 25, NAN, NULL, 5), 0);
+	assert_int_equal(archive_new_series(archive, "empty", "winter", TRIAL_BARE, 25, NAN, NULL, 5), 0);
 	trial_record(archive, "box", "abc");
 	trial_record(archive, "box", "def");
 	trial_record(archive, "rig_b", "ghi");

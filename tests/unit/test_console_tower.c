@@ -332,12 +332,13 @@ static void make_archive(void)
 	struct archive *archive = archive_open(archive_name, ARCHIVE_CREATE, message);
 
 	assert_non_null(archive);
-	assert_int_equal(archive_new_series(archive, "box", "c", "common/scenes/geometry-2A.ini", 25, NAN, 5),
-	                 0);
+	assert_int_equal(
+	        archive_new_series(archive, "box", "c", "common/scenes/geometry-2A.ini", 25, NAN, NULL, 5),
+	        0);
 	for (size_t i = 0; i < sizeof(heights) / sizeof(heights[0]); i++)
 		assert_int_equal(archive_new_series(archive, heights[i].series, "c",
 		                                    "common/scenes/geometry-2A.ini", 25, heights[i].height_m,
-		                                    1),
+		                                    NULL, 1),
 		                 0);
 	archive_close(archive);
 }

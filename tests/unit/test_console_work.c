@@ -270,7 +270,7 @@ static void start_with_drops(void)
 	struct archive_recording r;
 
 	fill_hand();
-	assert_int_equal(archive_new_series(archive, "one", "trial", SCENE, 27, NAN, 5), 0);
+	assert_int_equal(archive_new_series(archive, "one", "trial", SCENE, 27, NAN, NULL, 5), 0);
 	record_hand(archive, "one", -1);
 	record_hand(archive, "one", 200);
 	assert_int_equal(archive_begin(archive, "one", "Ann", ".log", false, &r), 0);

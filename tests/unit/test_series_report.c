@@ -55,7 +55,7 @@ static int set_up(void **state)
 	snprintf(scene, sizeof(scene), "%s/scene.ini", folder);
 	write_scene(scene);
 	archive = archive_open(folder, ARCHIVE_CREATE, message);
-	return !archive || archive_new_series(archive, "by-hand", "trial", scene, 25, NAN, 3);
+	return !archive || archive_new_series(archive, "by-hand", "trial", scene, 25, NAN, NULL, 3);
 }
 
 static int tear_down(void **state)
@@ -529,7 +529,7 @@ static void test_one_that_stands_out_is_marked(void **state)
 
 	(void)state;
 	snprintf(scene, sizeof(scene), "%s/scene.ini", folder);
-	assert_int_equal(archive_new_series(archive, "other", "another", scene, 25, NAN, 2), 0);
+	assert_int_equal(archive_new_series(archive, "other", "another", scene, 25, NAN, NULL, 2), 0);
 	for (unsigned i = 0; i < 5; i++) {
 		snprintf(drop, sizeof(drop), "by-hand/%u", add_drop(peak_g[i]));
 		give_result(drop, peak_g[i], ESTIMATE_OK, 0);
