@@ -2,11 +2,13 @@
 /*
  * `droptower model`: its options.
  */
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/number.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
 #include "host/command/model_private.h"
@@ -164,7 +166,7 @@ static int take_limit(const struct option_table *table, const char *name, const 
 	struct design *design = into;
 	struct design_limit *limit = &design->limit[design->limits];
 	size_t length = strcspn(text, "=");
-	char quantity[LIST_MAX], *end = NULL;
+	char quantity[LIST_MAX];
 
 	if (design->limits == DESIGN_LIMITS_MAX)
 		return option_wrong(table, "--%s is given too often, expected %d at most", name,
@@ -175,9 +177,7 @@ static int take_limit(const struct option_table *table, const char *name, const 
 		                    "--%s: no quantity '%s', expected one of --json's predicted, such as "
 		                    "s1_resultant_g or plate_travel_m",
 		                    name, quantity);
-	limit->value = text[length] == '=' ? strtod(text + length + 1, &end) : -1.0;
-	if (!end || end == text + length + 1 || *end != '\0' || !(limit->value > 0.0) ||
-	    !isfinite(limit->value))
+	if (text[length] != '=' || !number_read(text + length + 1, DBL_TRUE_MIN, DBL_MAX, &limit->value))
 		return option_wrong(table, "--%s is '%s', expected QUANTITY=VALUE above 0", name, text);
 	design->limits++;
 	return OPTIONS_READ;

@@ -202,7 +202,7 @@ int ensemble_run(size_t points, void (*work)(void *context, size_t first, size_t
 		for (int i = 0; i < busy; i++) {
 			if (jobs[i].started)
 				pthread_join(jobs[i].thread, NULL);
-			if (result == 0)
+			if (result == 0 && done != NULL)
 				result = done(context, jobs[i].first, jobs[i].count, i);
 		}
 	}
@@ -235,15 +235,6 @@ static void ensemble_draw(void *context, size_t first, size_t count, int thread)
 		for (size_t i = 0; i < d->count; i++)
 			d->value[i * d->points + k] = drops ? ensemble_value(&p, d->outputs[i]) : (double)NAN;
 	}
-}
-
-static int ensemble_drawn(void *context, size_t first, size_t count, int thread)
-{
-	(void)context;
-	(void)first;
-	(void)count;
-	(void)thread;
-	return 0;
 }
 
 static int ascending(const void *a, const void *b)
@@ -284,7 +275,7 @@ int ensemble_monte_carlo(const struct ensemble *e, size_t draws,
 	d.value = malloc((draws ? draws : 1) * d.count * sizeof(*d.value));
 	if (!d.value)
 		return DT_E_MEMORY;
-	error = ensemble_run(draws, ensemble_draw, ensemble_drawn, &d);
+	error = ensemble_run(draws, ensemble_draw, NULL, &d);
 	for (size_t i = 0; i < d.count; i++) {
 		double *row = &d.value[i * draws];
 		size_t kept = 0;

@@ -56,8 +56,9 @@ void ensemble_grid_scene(const struct ensemble *ensemble, size_t point, struct s
 void ensemble_random_scene(const struct ensemble *ensemble, size_t point, struct scene *scene,
                            double value[]);
 
-/* Calls work(context, first, count, thread) for all points, in blocks, on all cores; `done` follows for each
- * block, in order, on the caller's thread, and ends all with a value other than 0, which is returned. */
+/* Calls work(context, first, count, thread) for all points, in blocks, on all cores; `done`, where there is
+ * one, follows for each block, in order, on the caller's thread, and ends all with a value other than 0,
+ * which is returned. */
 enum { ENSEMBLE_BLOCK = 8192, ENSEMBLE_THREADS_MAX = 16 };
 DT_MUST_USE int ensemble_run(size_t points,
                              void (*work)(void *context, size_t first, size_t count, int thread),

@@ -556,6 +556,18 @@ int sniff_names(struct sniff *sniff, size_t count, const struct piece *units, bo
 
 /* ---- above and below the rows ---- */
 
+/* A line of a head without the marks before its words. */
+static struct piece head_words(const struct source_line *line)
+{
+	struct piece text = {line->text, line->length};
+
+	while (text.length > 0 && strchr("#\"; \t%/", text.text[0])) {
+		text.text++;
+		text.length--;
+	}
+	return text;
+}
+
 /* The number at *at of a line, and *at behind it. NAN: it may be one of two, as 20,000; 0: there is none. */
 static double told_number(const struct piece *text, struct cells_style style, size_t *at)
 {
@@ -594,16 +606,12 @@ static double rate_of(const struct source_line *line, struct cells_style style)
 	                         *const steps[] = {"sample interval", "sampling interval", "sampling period",
 	                                           "time step",       "delta t",           "dt",
 	                                           "interval",        "abtastintervall"};
-	struct piece text = {line->text, line->length};
+	struct piece text = head_words(line);
 	bool rate = false, step = false;
 	const struct unit *unit;
 	double value;
 	size_t at, end;
 
-	while (text.length > 0 && strchr("#\"; \t%/", text.text[0])) {
-		text.text++;
-		text.length--;
-	}
 	for (size_t i = 0; i < sizeof(rates) / sizeof(rates[0]); i++)
 		rate |= begins(text, rates[i]) &&
 		        (text.length == strlen(rates[i]) || !is_letter(text.text[strlen(rates[i])]));
@@ -644,14 +652,10 @@ static bool tells_scale(const struct source_line *line)
 	        "scale",        "scale factor",      "scaling",           "scaling factor", "factor",
 	        "scale_factor", "multiplier",        "conversion factor", "faktor",         "skalierung",
 	        "skalenfaktor", "skalierungsfaktor", "y multiplier"};
-	struct piece text = {line->text, line->length};
+	struct piece text = head_words(line);
 	double value = 1;
 	size_t at;
 
-	while (text.length > 0 && strchr("#\"; \t%/", text.text[0])) {
-		text.text++;
-		text.length--;
-	}
 	for (size_t i = 0; i < sizeof(words) / sizeof(words[0]); i++) {
 		if (!begins(text, words[i]))
 			continue;

@@ -108,15 +108,6 @@ static void design_block(void *context, size_t first, size_t count, int thread)
 	}
 }
 
-static int design_done(void *context, size_t first, size_t count, int thread)
-{
-	(void)context;
-	(void)first;
-	(void)count;
-	(void)thread;
-	return 0;
-}
-
 static size_t designs_points(const struct designs *g)
 {
 	size_t points = 1;
@@ -158,7 +149,7 @@ static int designs_zoom(struct designs *coarser, size_t best)
 			g.ratio[i] = pow(high / low, 1.0 / FINE);
 			g.steps[i] = FINE;
 		}
-		error = ensemble_run(designs_points(&g), design_block, design_done, &g);
+		error = ensemble_run(designs_points(&g), design_block, NULL, &g);
 		found = designs_best(g.row, designs_points(&g));
 		if (!error && found < designs_points(&g) && g.row[found].margin > coarser->row[best].margin)
 			coarser->row[best] = g.row[found];
@@ -288,7 +279,7 @@ int design_write(struct design *d, enum table_format format, FILE *out)
 	g.row = calloc(points, sizeof(*g.row));
 	if (!g.row)
 		return DT_E_MEMORY;
-	error = ensemble_run(points, design_block, design_done, &g);
+	error = ensemble_run(points, design_block, NULL, &g);
 	best = designs_best(g.row, points);
 	if (!error && best == points)
 		error = DT_E_EMPTY;

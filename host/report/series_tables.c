@@ -138,17 +138,13 @@ static bool put_outlier(FILE *out, const struct repeats_row *row, double varianc
                         const char *title, bool first)
 {
 	bool others = degrees > (double)row->count - 1.0;
-	double sd = others ? sqrt(variance) : row->sd, most = 0.0, limit;
-	size_t at = 0;
+	double sd = others ? sqrt(variance) : row->sd, most, limit;
+	size_t at;
 
 	if (row->count < 3 || !(sd > 0.0))
 		return false;
 	limit = repeats_grubbs(row->count, others ? degrees : (double)row->count - 1.0, 0.05);
-	for (size_t i = 0; i < row->count; i++)
-		if (fabs(row->value[i] - row->mean) > most) {
-			most = fabs(row->value[i] - row->mean);
-			at = i;
-		}
+	at = repeats_farthest(row, &most);
 	if (!(most > limit * sd))
 		return false;
 	fprintf(out, "%s<li>Drop %.0f stands out in ", first ? "<ul>" : "", row->number[at]);

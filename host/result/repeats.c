@@ -181,17 +181,25 @@ static bool repeats_scatters(const struct repeats_row *row, size_t but)
 	return equal <= 1 && row->count > TREND_LEAST;
 }
 
-static void repeats_stands_out(struct repeats_row *row)
+size_t repeats_farthest(const struct repeats_row *row, double *distance)
 {
-	double most = 0;
 	size_t at = 0;
 
-	row->stands_out = 0;
+	*distance = 0.0;
 	for (size_t i = 0; i < row->count; i++)
-		if (fabs(row->value[i] - row->mean) > most) {
-			most = fabs(row->value[i] - row->mean);
+		if (fabs(row->value[i] - row->mean) > *distance) {
+			*distance = fabs(row->value[i] - row->mean);
 			at = i;
 		}
+	return at;
+}
+
+static void repeats_stands_out(struct repeats_row *row)
+{
+	double most;
+	size_t at = repeats_farthest(row, &most);
+
+	row->stands_out = 0;
 	/* counts of a clock are equal but for their last digit: nothing is known of the scatter then */
 	if (repeats_scatters(row, at) &&
 	    most > repeats_grubbs(row->count, (double)row->count - 1.0, OUT_CHANCE) * row->sd)

@@ -45,6 +45,9 @@ void repeats_row_free(struct repeats_row *row);
 enum { REPEATS_WORDS_MAX = 96 };
 void repeats_words(const struct repeats_row *row, char words[REPEATS_WORDS_MAX]);
 
+/* Index of the value that is farthest from the mean, and how far; 0 of equal ones. */
+size_t repeats_farthest(const struct repeats_row *row, double *distance);
+
 /* The largest distance from the mean of n values, three and more, in standard deviations of so many degrees
  * of freedom, that comes by chance once in 1 / alpha (Grubbs, two-sided). The values' own scatter is part of
  * that standard deviation: degrees is n - 1 where it is all of it, and more where other series are in it. */

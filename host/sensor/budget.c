@@ -606,7 +606,6 @@ void budget_mean_add(struct budget_mean *mean, const struct budget_item *item)
 	for (int p = 0; p < BUDGET_PARTS; p++)
 		mean->part[p] += item->part[p];
 	mean->noise = item->part[BUDGET_NOISE];
-	mean->u += item->u;
 	mean->expanded += item->expanded;
 	mean->distribution |= strcmp(item->method, "distribution") == 0;
 }

@@ -64,9 +64,9 @@ void budget_free(struct budget *budget);
  */
 struct budget_mean {
 	size_t count;
-	double part[BUDGET_PARTS], u, expanded; /* sums */
-	double noise;                           /* of the last one */
-	bool distribution;                      /* U of one of them is by the distribution */
+	double part[BUDGET_PARTS], expanded; /* sums */
+	double noise;                        /* of the last one */
+	bool distribution;                   /* U of one of them is by the distribution */
 };
 void budget_mean_add(struct budget_mean *mean, const struct budget_item *item);
 

@@ -134,18 +134,9 @@ static void sweep_block(void *context, size_t first, size_t count, int thread)
 	}
 }
 
-static int sweep_done(void *context, size_t first, size_t count, int thread)
-{
-	(void)context;
-	(void)first;
-	(void)count;
-	(void)thread;
-	return 0;
-}
-
 static void sweep(void *context)
 {
-	must(ensemble_run(SWEEP, sweep_block, sweep_done, context) == 0, "the sweep");
+	must(ensemble_run(SWEEP, sweep_block, NULL, context) == 0, "the sweep");
 }
 
 /* ---- the table ---- */
