@@ -149,7 +149,7 @@ static void tell_ready(struct bench *bench)
 static void start_target(struct bench *bench, unsigned cause)
 {
 	const struct target_options options = {.command = bench->options->firmware,
-	                                       .realtime = bench->options->realtime,
+	                                       .realtime = bench->options->link != NULL,
 	                                       .cause = cause,
 	                                       .kept = cause == 0 ? 0 : bench->kept};
 	char message[TARGET_MESSAGE_MAX];
@@ -251,7 +251,7 @@ static void bench_start(struct bench *bench)
 	if (!bench->stop)
 		bench_tell(options, "%s at %g deg, seed %llu, %s, %s", options->scene.name,
 		           options->scene.drop_angle_deg, (unsigned long long)options->seed,
-		           options->realtime ? "paced by the clock" : "as fast as it goes",
+		           options->link ? "paced by the clock" : "as fast as it goes",
 		           options->link ? options->link : "scripted operator");
 }
 

@@ -34,11 +34,10 @@ enum {
 
 struct bench_options {
 	struct scene scene;
-	const char *link;     /* NULL: the script is the host */
+	const char *link;     /* by the clock; NULL: the script is the host, as fast as it goes */
 	const char *firmware; /* NULL: droptower-firmware beside this program */
 	uint64_t seed;
-	bool quiet;    /* nothing is said of how it goes on */
-	bool realtime; /* paced by the clock, else as fast as it goes */
+	bool quiet; /* nothing is said of how it goes on */
 	struct script_options script;
 	bool ideal;
 	double clock_ppm;            /* the firmware's clock is this much too fast */

@@ -26,7 +26,6 @@ struct line {
 	double angle_deg;  /* NAN: the scene's */
 	unsigned ready_fd; /* or NO_FD */
 	bool operate;
-	const char *pace;
 };
 
 /* "LEFT@SECONDS" or "LEFT@+SECONDS": copies LEFT and finds the seconds. */
@@ -82,14 +81,13 @@ static const struct option_row rows[] = {
         OPTION_NUMBER("angle", "DEG", struct line, angle_deg, -360, 360,
                       "contact angle instead of the scene's"), /* which knows the true limits */
         OPTION_TEXT("link", "URL", struct line, bench.link,
-                    "the host's CAN: unix:PATH, can:IF, ...; until SIGINT or SIGTERM"),
-        OPTION_FLAG("operate", struct line, operate, "no host: a scripted operator in virtual time"),
+                    "the host's CAN: unix:PATH, can:IF, ...; by the clock, until SIGINT or "
+                    "SIGTERM"),
+        OPTION_FLAG("operate", struct line, operate, "no host: a scripted operator in virtual time, as fast as it goes"),
         OPTION_UNSIGNED("drops", "N", struct line, bench.script.drops, 1, 1000000,
                         "as many drops of the operator (1)"),
         OPTION_TEXT("firmware", "COMMAND", struct line, bench.firmware,
                     "instead of droptower-firmware beside this program"),
-        OPTION_TEXT("pace", "max|1", struct line, pace,
-                    "as fast as it goes (with --operate), by the clock (with --link)"),
         OPTION_UINT64("seed", "N", struct line, bench.seed, 0, 0x1p64,
                       "of the tower's scatter and noise and of the bus (1)"),
         OPTION_FLAG("ideal", struct line, bench.ideal, "no noise, no scatter, no high-pass"),
@@ -180,8 +178,6 @@ static int main_check(const struct line *line)
 	if (line->bench.script.drops > 1 && !line->operate)
 		return option_wrong(table,
 		                    "--drops counts the drops of --operate; with --link the host decides");
-	if (line->pace != NULL && strcmp(line->pace, "max") != 0 && strcmp(line->pace, "1") != 0)
-		return option_wrong(table, "--pace is '%s', expected max or 1", line->pace);
 	return OPTIONS_READ;
 }
 
@@ -318,6 +314,5 @@ int main(int argc, char **argv)
 		return code;
 	if (line.ready_fd != NO_FD)
 		line.bench.ready_fd = (int)line.ready_fd;
-	line.bench.realtime = line.pace != NULL ? strcmp(line.pace, "1") == 0 : line.bench.link != NULL;
 	return line.scenario_file != NULL ? run_scenario(&line) : main_run_scene(&line);
 }
