@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/columns.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -94,11 +95,12 @@ static bool columns_take_unit(struct column *column, struct piece text)
 		return column->unit != NULL && factor.text == NULL &&
 		       columns_sensitivity(rest, column->unit, &column->divisor);
 	}
-	if (column->unit == NULL || (column->kind == COLUMN_TIME && column->unit->divisor < 1) ||
+	if (column->unit == NULL ||
 	    column->unit->kind != (column->kind == COLUMN_TIME ? UNIT_TIME : UNIT_ACCELERATION))
 		return false;
 	column->is_clock = strcmp(column->unit->name, "clock") == 0;
 	column->divisor = column->unit->divisor / value;
+	column->has_factor = factor.text != NULL;
 	return true;
 }
 
@@ -205,6 +207,11 @@ void columns_text(const struct columns *columns, char *text, size_t size)
 		                             column->divisor < 0 ? "-" : "", unit);
 
 		used += put > 0 ? (size_t)put : 0;
+		if (used < size && column->has_factor) {
+			put = snprintf(text + used, size - used, "*%.9g",
+			               column->unit->divisor / fabs(column->divisor));
+			used += put > 0 ? (size_t)put : 0;
+		}
 		if (used < size && columns->rate_hz > 0 && column->kind == COLUMN_CHANNEL) {
 			put = snprintf(text + used, size - used, "@%.9g", columns->rate_hz);
 			used += put > 0 ? (size_t)put : 0;

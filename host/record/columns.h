@@ -20,8 +20,9 @@ struct column {
 	enum column_kind kind;
 	char name[32];
 	const struct unit *unit;
-	double divisor; /* number in the file / divisor = s or g, with the sign asked for */
-	bool is_clock;  /* h:m:s, with a date or without; divisor 1 */
+	double divisor;  /* number in the file / divisor = s or g, with the sign asked for */
+	bool has_factor; /* "g*10": the user says how many units a number is */
+	bool is_clock;   /* h:m:s, with a date or without; divisor 1 */
 };
 
 struct columns {

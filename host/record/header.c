@@ -63,8 +63,16 @@ int header_check_unit(const struct columns *columns, size_t i, struct piece said
 	bool minutes = unit && unit->kind == UNIT_TIME && unit->divisor < 1; /* or a minimum */
 
 	if (!unit || column->kind == COLUMN_SKIP || unit_same(unit, column->unit) ||
-	    (minutes && column->kind == COLUMN_CHANNEL))
+	    (minutes && column->kind == COLUMN_CHANNEL) ||
+	    (unit->kind == UNIT_MULTIPLE && column->has_factor))
 		return 0;
+	if (unit->kind == UNIT_MULTIPLE)
+		return source_refuse(
+		        message, DT_E_FORMAT, file, line,
+		        "column %zu, \"%.*s\", is in a number of units or tells a range, expected a "
+		        "factor in --columns, %s:%s*1 or another",
+		        i + 1, (int)(said.length < SHOWN ? said.length : SHOWN), said.text, column->name,
+		        column->unit->name);
 	return source_refuse(message, DT_E_FORMAT, file, line,
 	                     "column %zu, \"%.*s\", is in %s, but --columns says %s:%s, expected one unit",
 	                     i + 1, (int)(said.length < SHOWN ? said.length : SHOWN), said.text, unit->name,

@@ -296,7 +296,7 @@ static struct piece stem_of(struct piece name)
 {
 	for (size_t at = name.length; at-- > 1;)
 		if (name.text[at] == '(' || name.text[at] == '[') {
-			const struct unit *unit = unit_find(name.text + at, name.length - at);
+			const struct unit *unit = unit_in_bracket(name.text + at, name.length - at);
 
 			if (unit != NULL)
 				name.length = at;
@@ -306,7 +306,7 @@ static struct piece stem_of(struct piece name)
 		if (strchr(" \t,_", name.text[at]) != NULL) {
 			const struct unit *unit = unit_find(name.text + at + 1, name.length - at - 1);
 
-			if (unit != NULL && unit->kind != UNIT_OTHER)
+			if (unit != NULL && unit->kind <= UNIT_ACCELERATION)
 				name.length = at;
 			break;
 		}
@@ -324,7 +324,7 @@ static const struct unit *trusted(const struct unit *unit, struct piece name, st
 	             strcmp(unit->name, "ug") == 0 || strcmp(unit->name, "kilo-g") == 0);
 	bool capital = name.length > 0 && told.length == 0 && name.text[name.length - 1] == 'G';
 
-	if (unit->kind == UNIT_TIME && unit->divisor < 1)
+	if (unit->kind == UNIT_TIME && unit->divisor < 1 && !is_time_name(name)) /* a minimum, a height */
 		return NULL;
 	if (!gram)
 		return unit;

@@ -34,7 +34,13 @@ static const struct {
         {"nanoseconds", {"ns", UNIT_TIME, 1e9, 0}},
         {"clock", {"clock", UNIT_TIME, 1, 0}},
         {"min", {"min", UNIT_TIME, 1 / 60.0, 0}},
+        {"minute", {"min", UNIT_TIME, 1 / 60.0, 0}},
         {"minutes", {"min", UNIT_TIME, 1 / 60.0, 0}},
+        {"h", {"h", UNIT_TIME, 1 / 3600.0, 0}},
+        {"hr", {"h", UNIT_TIME, 1 / 3600.0, 0}},
+        {"hrs", {"h", UNIT_TIME, 1 / 3600.0, 0}},
+        {"hour", {"h", UNIT_TIME, 1 / 3600.0, 0}},
+        {"hours", {"h", UNIT_TIME, 1 / 3600.0, 0}},
         {"g", {"g", UNIT_ACCELERATION, 1, 0}},
         {"gs", {"g", UNIT_ACCELERATION, 1, 0}},
         {"gn", {"g", UNIT_ACCELERATION, 1, 0}},
@@ -141,6 +147,20 @@ const struct unit *unit_find(const char *text, size_t length)
 	return NULL;
 }
 
+const struct unit *unit_in_bracket(const char *text, size_t length)
+{
+	static const struct unit multiple = {"a multiple of a unit", UNIT_MULTIPLE, 0, 0};
+	const struct unit *unit = unit_find(text, length);
+	bool number = false;
+
+	for (; length > 0 && !unit_find(text, length); text++, length--) {
+		if (!isdigit((unsigned char)*text) && !strchr(" \t([+-.,*^eEx", *text))
+			return NULL;
+		number |= isdigit((unsigned char)*text) != 0;
+	}
+	return unit ? unit : number && length > 0 ? &multiple : NULL;
+}
+
 /* The last bracket of that kind that holds a unit. */
 static const struct unit *in_brackets(const char *name, size_t length, char open, char close)
 {
@@ -158,26 +178,13 @@ static const struct unit *in_brackets(const char *name, size_t length, char open
 				break;
 		}
 		if (to < length) {
-			const struct unit *unit = unit_find(name + from + 1, to - from - 1);
+			const struct unit *unit = unit_in_bracket(name + from + 1, to - from - 1);
 
 			found = unit ? unit : found;
 			from = to;
 		}
 	}
 	return found;
-}
-
-/* Whether the word from there on is the end of a bracket that has a number in it, too: "a [10 g]". */
-static bool is_multiple(const char *name, size_t from, size_t length)
-{
-	bool number = false;
-
-	if (memchr(name + from, ']', length - from) == NULL &&
-	    memchr(name + from, ')', length - from) == NULL)
-		return false;
-	while (from > 0 && name[from - 1] != '[' && name[from - 1] != '(')
-		number |= isdigit((unsigned char)name[--from]) != 0;
-	return number && from > 0;
 }
 
 const struct unit *unit_of_name(const char *name, size_t length, enum unit_kind wanted)
@@ -191,8 +198,6 @@ const struct unit *unit_of_name(const char *name, size_t length, enum unit_kind 
 		return unit;
 	while (from > 0 && !strchr(" \t,_", name[from - 1]))
 		from--;
-	if (is_multiple(name, from, length))
-		return NULL;
 	unit = unit_find(name + from, length - from);
 	return unit && unit->kind == wanted ? unit : NULL;
 }

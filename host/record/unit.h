@@ -11,7 +11,8 @@
 enum unit_kind {
 	UNIT_TIME,
 	UNIT_ACCELERATION,
-	UNIT_OTHER, /* of something else: volt, newton, metre */
+	UNIT_OTHER,    /* of something else: volt, newton, metre */
+	UNIT_MULTIPLE, /* a number of units, or a range: no unit of a column */
 };
 
 struct unit {
@@ -24,9 +25,12 @@ struct unit {
 /* The unit that is the whole text; NULL for one that is not known. */
 const struct unit *unit_find(const char *text, size_t length);
 
+/* The same of what stands in brackets, which may be a number of them. */
+const struct unit *unit_in_bracket(const char *text, size_t length);
+
 /* What the name of a column says of its unit: one in the last brackets, "Accel (g)" and "t [ms]"; of the kind
- * that is wanted one behind the last blank, comma or underscore, or the name itself. NULL where it says
- * nothing.
+ * that is wanted one behind the last blank, comma or underscore, or the name itself. A bracket with a number
+ * of units, "[10 g]", is UNIT_MULTIPLE. NULL where it says nothing.
  */
 const struct unit *unit_of_name(const char *name, size_t length, enum unit_kind wanted);
 
