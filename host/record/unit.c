@@ -4,6 +4,7 @@
 #include <ctype.h>
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
 #include "common/units.h"
 
@@ -147,9 +148,10 @@ const struct unit *unit_find(const char *text, size_t length)
 	return NULL;
 }
 
+static const struct unit multiple = {"a multiple of a unit", UNIT_MULTIPLE, 0, 0};
+
 const struct unit *unit_in_bracket(const char *text, size_t length)
 {
-	static const struct unit multiple = {"a multiple of a unit", UNIT_MULTIPLE, 0, 0};
 	const struct unit *unit = unit_find(text, length);
 	bool number = false;
 
@@ -187,6 +189,57 @@ static const struct unit *in_brackets(const char *name, size_t length, char open
 	return found;
 }
 
+/* Past the bracket that opens there, if it holds a unit; else the same. */
+static size_t past_unit(const char *name, size_t from, size_t length)
+{
+	char close = name[from] == '[' ? ']' : name[from] == '(' ? ')' : '\0';
+	const char *end = close ? memchr(name + from, close, length - from) : NULL;
+
+	return end && unit_find(name + from, (size_t)(end - name) - from) ? (size_t)(end - name) + 1 : from;
+}
+
+/* "Acc*10 [g]"; behind the unit, where it is no axis or place, also "[g] x100", "[g] (x 2)" and "[s]/10". */
+static bool has_factor(const char *name, size_t length)
+{
+	bool behind = false;
+
+	for (size_t i = 0; i < length; i++) {
+		size_t past = past_unit(name, i, length), next = i + 1;
+		bool word = i > 0 && isalnum((unsigned char)name[i - 1]);
+		bool factor = name[i] == '*' || (behind && (name[i] == '/' || (name[i] == 'x' && !word)));
+
+		if (past > i) {
+			behind = true;
+			i = past - 1;
+			continue;
+		}
+		if (length - i >= 2 && memcmp(name + i, "\303\227", 2) == 0) { /* a multiplication sign */
+			factor = true;
+			next++;
+		}
+		while (next < length && name[next] == ' ')
+			next++;
+		if (factor && next < length && isdigit((unsigned char)name[next]))
+			return true;
+	}
+	return false;
+}
+
+/* Whether the word from there on ends a bracket that says more of it: "[dB re 1 g]", "(rms of 8, g)". */
+static bool is_of_other(const char *name, size_t from, size_t length)
+{
+	bool other = false;
+
+	if (memchr(name + from, ']', length - from) == NULL &&
+	    memchr(name + from, ')', length - from) == NULL)
+		return false;
+	while (from > 0 && name[from - 1] != '[' && name[from - 1] != '(') {
+		from--;
+		other |= isdigit((unsigned char)name[from]) != 0 || strncasecmp(name + from, "db", 2) == 0;
+	}
+	return other && from > 0;
+}
+
 const struct unit *unit_of_name(const char *name, size_t length, enum unit_kind wanted)
 {
 	const struct unit *unit = in_brackets(name, length, '[', ']');
@@ -195,9 +248,11 @@ const struct unit *unit_of_name(const char *name, size_t length, enum unit_kind 
 	if (!unit)
 		unit = in_brackets(name, length, '(', ')');
 	if (unit)
-		return unit;
+		return has_factor(name, length) ? &multiple : unit;
 	while (from > 0 && !strchr(" \t,_", name[from - 1]))
 		from--;
+	if (is_of_other(name, from, length))
+		return NULL;
 	unit = unit_find(name + from, length - from);
 	return unit && unit->kind == wanted ? unit : NULL;
 }
