@@ -277,10 +277,11 @@ DT_MUST_USE int archive_rebuild(const char *folder, bool fewer,
                                 void (*wrong)(void *context, const char *text), void *context,
                                 char message[ARCHIVE_MESSAGE_MAX]);
 
-/* ---- the tower over a series ---- */
+/* ---- how a series went ---- */
 
-/* Of a QUANTITY_TOWER, in the newest result of each drop: closed, to be freed after 0. */
-DT_MUST_USE int archive_trend(struct archive *archive, const char *series, const struct quantity *quantity,
-                              struct repeats_row *row);
+/* A row for each value of the drops that count, and for what they measured of their tower, of three and more:
+ * closed, to be freed by repeats_free after 0. */
+DT_MUST_USE int archive_trends(struct archive *archive, const char *series, bool undecided,
+                               struct repeats *repeats);
 
 #endif

@@ -179,7 +179,25 @@ static int begin_json(struct print *p, const struct archive_filter *filter)
 	return result;
 }
 
-static int end_json(struct print *p)
+/* How the series went; nothing of fewer than three drops. */
+static int print_trends(const struct print *p, const char *series)
+{
+	FILE *out = p->table.out;
+	struct repeats repeats;
+	int result = archive_trends(p->archive, series, p->undecided, &repeats);
+
+	if (result != 0)
+		return result;
+	if (p->table.format == TABLE_TEXT && repeats.rows > 0)
+		fputc('\n', out);
+	result = repeats_table(&repeats, p->table.format, out);
+	if (p->table.format == TABLE_TEXT && repeats.rows > 0)
+		fputs(REPEATS_NOTE "\n", out);
+	repeats_free(&repeats);
+	return result;
+}
+
+static int end_json(struct print *p, const struct archive_filter *filter)
 {
 	FILE *out = p->table.out;
 	struct archive_seal seal;
@@ -190,6 +208,10 @@ static int end_json(struct print *p)
 	                      out);
 	if (result == 0)
 		result = archive_seal(p->archive, &seal);
+	if (result == 0 && filter->series != NULL && filter->number == 0) {
+		fputs(",\"trends\":", out);
+		result = print_trends(p, filter->series);
+	}
 	fputs(",\"seal\":", out);
 	if (result == 0)
 		result = table_object(seal_columns, TABLE_COUNT(seal_columns), &seal, out);
@@ -227,10 +249,11 @@ static int head_text(void *context, const struct archive_series *series)
 	return 0;
 }
 
-static int end_text(const struct print *p, bool of_series)
+static int end_text(const struct print *p, const struct archive_filter *filter)
 {
 	FILE *out = p->table.out;
 	struct archive_seal seal = {.entry = 0};
+	bool of_series = filter->series != NULL;
 	int result = of_series ? archive_seal(p->archive, &seal) : 0;
 
 	if (p->table.rows == 0)
@@ -241,6 +264,8 @@ static int end_text(const struct print *p, bool of_series)
 		fputs(p->faulty_accepted > 0 ? "\nnone of the accepted is as it was recorded: no mean\n"
 		                             : "\nnone accepted yet: no mean\n",
 		      out);
+	if (result == 0 && of_series && filter->number == 0)
+		result = print_trends(p, filter->series);
 	if (p->faulty > 0)
 		fprintf(out, "%u altered or missing, and in no mean\n", p->faulty);
 	if (p->marked)
@@ -275,8 +300,8 @@ int print_drops(struct archive *archive, const struct archive_filter *filter, bo
 		archive_cell_close(&p.total);
 	}
 	if (result == 0 && format == TABLE_JSON)
-		result = end_json(&p);
+		result = end_json(&p, filter);
 	else if (result == 0 && format == TABLE_TEXT)
-		result = end_text(&p, filter->series != NULL);
+		result = end_text(&p, filter);
 	return print_done(result, &p.table);
 }

@@ -1,24 +1,79 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * What the drops of a series measured of their tower, in their order.
+ * How a series went: what its drops measured, of the product and of their tower, in their order.
  */
+#include <math.h>
 #include <stdio.h>
 
 #include "host/archive/private.h"
+#include "host/archive/table.h"
 
-int archive_trend(struct archive *archive, const char *series, const struct quantity *quantity,
-                  struct repeats_row *row)
+struct trends {
+	struct repeats *repeats;
+	double angle_deg, height_m;
+	char scene_name[ARCHIVE_TEXT_MAX + 1];
+	bool undecided;
+};
+
+static int trends_take(void *context, const struct archive_drop *drop)
+{
+	struct trends *t = context;
+
+	if (!archive_counts(drop, t->undecided))
+		return 0;
+	t->repeats->repeats++;
+	t->angle_deg = drop->series.angle_deg;
+	t->height_m = drop->series.height_m;
+	snprintf(t->scene_name, sizeof(t->scene_name), "%s", drop->series.scene_name);
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
+		if (isfinite(drop->value[i]) &&
+		    repeats_value(&t->repeats->row[i], drop->number, drop->value[i]) != 0)
+			return DT_E_MEMORY;
+	return 0;
+}
+
+/* Scatter of each value in all series of this scene, height and angle, this one among them. */
+static int trends_pool(struct archive *archive, const struct trends *t)
+{
+	struct archive_filter filter = archive_filter_none();
+	struct archive_table table;
+	int result;
+
+	filter.scene_name = t->scene_name;
+	filter.angle_deg = t->angle_deg;
+	result = archive_table(archive, &filter, t->undecided, &table);
+	if (result != 0)
+		return result;
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		struct repeats_row *row = &t->repeats->row[i];
+		double squares = 0;
+
+		for (size_t c = 0; c < table.count; c++) {
+			const struct archive_mean *m = &table.cell[c].value[i];
+
+			if (m->n < 2 || fabs(table.cell[c].height_m - t->height_m) > 1e-9)
+				continue;
+			squares += m->squares;
+			row->degrees += m->n - 1.0;
+		}
+		row->pooled = row->degrees > 0 ? squares / row->degrees : 0;
+	}
+	archive_table_free(&table);
+	return 0;
+}
+
+/* A QUANTITY_TOWER, in the newest result of each drop. */
+static int trends_tower(struct archive *archive, const char *series, struct repeats_row *row)
 {
 	char query[400];
 	sqlite3_stmt *s;
 	int result;
 
-	*row = (struct repeats_row){.quantity = quantity};
 	snprintf(query, sizeof(query),
 	         "SELECT d.number, t.\"%s\" AS value FROM drops d JOIN series g ON g.id = d.series_id"
 	         " JOIN of_tower t ON t.result_id = (SELECT max(id) FROM results WHERE drop_id = d.id)"
 	         " WHERE g.name = ? AND value IS NOT NULL ORDER BY d.number",
-	         quantity->key);
+	         row->quantity->key);
 	result = sql_query(archive, &s, query, "s", series);
 	if (result != 0)
 		return result;
@@ -28,9 +83,68 @@ int archive_trend(struct archive *archive, const char *series, const struct quan
 			break;
 	}
 	sqlite3_finalize(s);
+	return result;
+}
+
+static int trends_rows(struct repeats *repeats)
+{
+	const struct quantity *q = NULL;
+
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++) {
+		const struct quantity_column *c = &quantity_columns[i];
+		struct repeats_row *row = repeats_row_new(
+		        repeats, c->subject, quantity_find(quantity_homes[c->place].object, c->key));
+
+		if (row == NULL)
+			return DT_E_MEMORY;
+		row->title = c->title;
+	}
+	while ((q = quantity_next(QUANTITY_TOWER, q)) != NULL) {
+		struct repeats_row *row = q->label[0] != '\0' ? repeats_row_new(repeats, "tower", q) : NULL;
+
+		if (row != NULL)
+			row->title = q->label;
+		else if (q->label[0] != '\0')
+			return DT_E_MEMORY;
+	}
+	return 0;
+}
+
+/* Rows of fewer values than three say nothing that a mean does not. */
+static void trends_close(struct repeats *repeats)
+{
+	size_t kept = 0;
+
+	for (size_t i = 0; i < repeats->rows; i++) {
+		if (i < ARCHIVE_VALUE_COUNT)
+			repeats->row[i].left_out = repeats->repeats - repeats->row[i].count;
+		if (repeats->row[i].count < 3)
+			repeats_row_free(&repeats->row[i]);
+		else
+			repeats->row[kept++] = repeats->row[i];
+	}
+	repeats->rows = kept;
+	repeats_close(repeats);
+}
+
+int archive_trends(struct archive *archive, const char *series, bool undecided, struct repeats *repeats)
+{
+	struct archive_filter filter = archive_filter_none();
+	struct trends t = {.repeats = repeats, .undecided = undecided};
+	int result;
+
+	*repeats = (struct repeats){.one = "drop"};
+	filter.series = series;
+	result = trends_rows(repeats);
 	if (result == 0)
-		repeats_row_close(row);
+		result = archive_each_numbers(archive, &filter, trends_take, &t);
+	if (result == 0 && repeats->repeats > 1)
+		result = trends_pool(archive, &t);
+	for (size_t i = ARCHIVE_VALUE_COUNT; result == 0 && i < repeats->rows; i++)
+		result = trends_tower(archive, series, &repeats->row[i]);
+	if (result == 0)
+		trends_close(repeats);
 	else
-		repeats_row_free(row);
+		repeats_free(repeats);
 	return result == DT_E_MEMORY ? archive_refuse(archive, result, "%s", error_text(result)) : result;
 }

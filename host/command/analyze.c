@@ -9,7 +9,6 @@
 #include "host/command/command.h"
 #include "host/command/files.h"
 #include "host/command/list.h"
-#include "host/command/repeats.h"
 #include "host/estimate/cfc.h"
 #include "host/record/log_capture.h"
 #include "host/record/profile.h"
@@ -303,6 +302,25 @@ static int analyze_files(const struct files *files, const struct analyze_argumen
 	return code;
 }
 
+/* 0, DT_E_SYSTEM or DT_E_MEMORY. */
+static int analyze_print_repeats(const struct repeats *repeats, bool json)
+{
+	int result;
+
+	if (json)
+		printf("{\"repeats\":%zu,\"quantities\":\"%s\",\"rows\":", repeats->repeats,
+		       quantity_version());
+	else
+		printf("%zu repeats; values whose status is not ok are left out; first to last by a straight "
+		       "line, +- one standard uncertainty\n",
+		       repeats->repeats);
+	result = repeats_table(repeats, json ? TABLE_JSON : TABLE_TEXT, stdout);
+	puts(json ? "}" : REPEATS_NOTE);
+	if (result == 0 && (fflush(stdout) != 0 || ferror(stdout)))
+		result = DT_E_SYSTEM;
+	return result;
+}
+
 static int analyze_words(char **words, int count, const struct analyze_arguments *arguments)
 {
 	char message[READ_MESSAGE_MAX];
@@ -314,7 +332,7 @@ static int analyze_words(char **words, int count, const struct analyze_arguments
 	code = analyze_files(&files, arguments);
 	if (arguments->evaluate.repeats != NULL) {
 		repeats_close(arguments->evaluate.repeats);
-		if (repeats_print(arguments->evaluate.repeats, arguments->evaluate.json) != 0)
+		if (analyze_print_repeats(arguments->evaluate.repeats, arguments->evaluate.json) != 0)
 			code = COMMAND_INPUT;
 	}
 	if (arguments->save_profile != NULL &&

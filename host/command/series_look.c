@@ -81,30 +81,6 @@ int series_verb_drops(struct archive *archive, struct series_arguments *a)
 	return print(&(struct job){archive, a, print_all});
 }
 
-/* How the tower has changed over the series; nothing when its drops say nothing. */
-static int print_trends(struct archive *archive, const char *series)
-{
-	const struct quantity *q = NULL;
-
-	while ((q = quantity_next(QUANTITY_TOWER, q)) != NULL) {
-		double scale = quantity_scale(q);
-		char words[REPEATS_WORDS_MAX];
-		struct repeats_row row;
-
-		if (q->label[0] == '\0')
-			continue;
-		if (archive_trend(archive, series, q, &row) != 0)
-			return archived_failed(archive);
-		repeats_words(&row, words);
-		if (row.count > 1)
-			printf("tower    %s %.*f -> %.*f %s over %zu drops%s%s\n", q->label, q->digits,
-			       row.from * scale, q->digits, row.to * scale, q->shown, row.count,
-			       words[0] != '\0' ? ": " : "", words);
-		repeats_row_free(&row);
-	}
-	return COMMAND_DONE;
-}
-
 int series_verb_show(struct archive *archive, struct series_arguments *a)
 {
 	int code = series_must_be(archive, a->word[0]);
@@ -112,8 +88,6 @@ int series_verb_show(struct archive *archive, struct series_arguments *a)
 	a->filter.series = a->word[0];
 	if (code == COMMAND_DONE)
 		code = print(&(struct job){archive, a, print_all});
-	if (code == COMMAND_DONE && a->csv == NULL && !a->json)
-		code = print_trends(archive, a->word[0]);
 	if (code == COMMAND_DONE && archive_unread(archive)[0] != '\0') {
 		command_error("%s", archive_unread(archive));
 		code = COMMAND_INPUT;

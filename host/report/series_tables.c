@@ -101,86 +101,21 @@ static void put_uncertainties(const struct series_page *page)
 	      out);
 }
 
-/* ---- which stands out ---- */
-
-/* Variance of a value in all series of this scene, height and angle, this one among them, and its degrees of
- * freedom. */
-static double pooled_of(const struct archive_table *table, const struct series_page *page, int value,
-                        double *degrees)
+static void put_trends(struct series_page *page)
 {
-	double squares = 0.0;
-
-	*degrees = 0.0;
-	for (size_t i = 0; i < table->count; i++) {
-		const struct archive_mean *m = &table->cell[i].value[value];
-
-		if (m->n < 2 || fabs(table->cell[i].height_m - page->series.height_m) > 1e-9)
-			continue;
-		squares += m->squares;
-		*degrees += m->n - 1.0;
-	}
-	return *degrees > 0.0 ? squares / *degrees : 0.0;
-}
-
-/* One value of the drops that count. 0 or DT_E_MEMORY. */
-static int take_values(const struct series_page *page, int value, struct repeats_row *row)
-{
-	for (size_t i = 0; i < page->count; i++)
-		if (page->drop[i]->counts && isfinite(page->drop[i]->a.value[value]) &&
-		    repeats_value(row, page->drop[i]->a.number, page->drop[i]->a.value[value]) != 0)
-			return DT_E_MEMORY;
-	repeats_row_close(row);
-	return 0;
-}
-
-/* Against the scatter of all such series where there are others, else its own. */
-static bool put_outlier(FILE *out, const struct repeats_row *row, double variance, double degrees,
-                        const char *title, bool first)
-{
-	bool others = degrees > (double)row->count - 1.0;
-	double sd = others ? sqrt(variance) : row->sd, most, limit;
-	size_t at;
-
-	if (row->count < 3 || !(sd > 0.0))
-		return false;
-	limit = repeats_grubbs(row->count, others ? degrees : (double)row->count - 1.0, 0.05);
-	at = repeats_farthest(row, &most);
-	if (!(most > limit * sd))
-		return false;
-	fprintf(out, "%s<li>Drop %.0f stands out in ", first ? "<ul>" : "", row->number[at]);
-	html_text(out, title);
-	fprintf(out, ": %.2f SD from the mean, limit %.2f by %s</li>\n", most / sd, limit,
-	        others ? "the scatter of all such series" : "their own scatter");
-	return true;
-}
-
-static void put_outliers(struct series_page *page)
-{
-	struct archive_filter filter = archive_filter_none();
-	struct archive_table table;
 	FILE *out = page->page.out;
-	bool any = false;
+	struct repeats repeats;
 
-	filter.scene_name = page->series.scene_name;
-	filter.angle_deg = page->series.angle_deg;
-	page->page.error = archive_table(page->request->archive, &filter, page->request->undecided, &table);
+	page->page.error =
+	        archive_trends(page->request->archive, page->series.name, page->request->undecided, &repeats);
 	if (page->page.error != 0)
 		return;
-	for (int i = 0; i < ARCHIVE_VALUE_COUNT && page->page.error == 0; i++) {
-		struct repeats_row row = {.count = 0};
-		double degrees, variance = pooled_of(&table, page, i, &degrees);
-
-		page->page.error = take_values(page, i, &row);
-		if (page->page.error == 0)
-			any |= put_outlier(out, &row, variance, degrees, quantity_columns[i].title, !any);
-		repeats_row_free(&row);
+	if (repeats.rows > 0) {
+		fputs("<h2>How the series went</h2>\n", out);
+		page->page.error = repeats_table(&repeats, TABLE_HTML, out);
+		fputs("<p class=\"note\">" REPEATS_NOTE "</p>\n", out);
 	}
-	if (any)
-		fputs("</ul>\n<p class=\"note\">Grubbs, 5 %, of each value. Marked, and in the means all the "
-		      "same: to leave a "
-		      "drop out needs a cause and a name.</p>\n",
-		      out);
-	archive_table_free(&table);
+	repeats_free(&repeats);
 }
 
 void series_results(struct series_page *page)
@@ -204,7 +139,7 @@ void series_results(struct series_page *page)
 	      "oscillator which S2 drives. Frequency and damping from the free ring-down of S1.</p>\n",
 	      out);
 	put_uncertainties(page);
-	put_outliers(page);
+	put_trends(page);
 }
 
 /* ---- model ---- */

@@ -10,8 +10,11 @@
 #include <gsl/gsl_fit.h>
 #include <gsl/gsl_statistics_double.h>
 
-enum { CHANGE_LEAST = 8, TREND_LEAST = 3 };
-static const double MOVES_CHANCE = 0.0027, KOLMOGOROV = 1.63, OUT_CHANCE = 0.01;
+enum { CHANGE_LEAST = 8, OUT_LEAST = 4, TREND_LEAST = 3 };
+static const double MOVES_CHANCE = 0.0027, CHANGE_CHANCE = 0.01, OUT_CHANCE = 0.01;
+
+/* 3 / d2 and D4 of ranges of two: 3 sqrt(pi) / 2, 1 + 3 sqrt(pi / 2 - 1). */
+static const double CHART_VALUE = 2.6587, CHART_STEP = 3.2665;
 
 /* What is worth a row, of each channel. */
 static const struct {
@@ -27,15 +30,11 @@ static const struct {
 
 /* ---- taking in ---- */
 
-static struct repeats_row *repeats_row_of(struct repeats *repeats, const char *channel,
-                                          const struct quantity *quantity)
+struct repeats_row *repeats_row_new(struct repeats *repeats, const char *channel,
+                                    const struct quantity *quantity)
 {
-	struct repeats_row *more;
+	struct repeats_row *more = realloc(repeats->row, (repeats->rows + 1) * sizeof(*more));
 
-	for (size_t i = 0; i < repeats->rows; i++)
-		if (repeats->row[i].quantity == quantity && strcmp(repeats->row[i].channel, channel) == 0)
-			return &repeats->row[i];
-	more = realloc(repeats->row, (repeats->rows + 1) * sizeof(*more));
 	if (more == NULL)
 		return NULL;
 	repeats->row = more;
@@ -43,6 +42,15 @@ static struct repeats_row *repeats_row_of(struct repeats *repeats, const char *c
 	*more = (struct repeats_row){.quantity = quantity};
 	snprintf(more->channel, sizeof(more->channel), "%s", channel);
 	return more;
+}
+
+static struct repeats_row *repeats_row_of(struct repeats *repeats, const char *channel,
+                                          const struct quantity *quantity)
+{
+	for (size_t i = 0; i < repeats->rows; i++)
+		if (repeats->row[i].quantity == quantity && strcmp(repeats->row[i].channel, channel) == 0)
+			return &repeats->row[i];
+	return repeats_row_new(repeats, channel, quantity);
 }
 
 int repeats_value(struct repeats_row *row, size_t number, double value)
@@ -100,64 +108,72 @@ static double repeats_line(struct repeats_row *row)
 {
 	double n = (double)row->count, span, first, begin, slope, variance, left, unused[2];
 
-	row->trend = row->sigma_trend = row->change = row->sigma_change = row->from = row->to = NAN;
-	if (row->count < 2)
+	row->trend = row->sigma_trend = row->change = row->sigma_change = NAN;
+	if (row->count < TREND_LEAST)
 		return INFINITY;
 	gsl_fit_linear(row->number, 1, row->value, 1, row->count, &begin, &slope, &unused[0], &unused[1],
 	               &variance, &left);
-	row->from = begin + slope * row->number[0];
-	row->to = begin + slope * row->number[row->count - 1];
-	if (row->count < TREND_LEAST)
-		return INFINITY;
 	row->trend = slope;
 	row->sigma_trend = sqrt(variance);
 	row->moves = fabs(row->trend) > gsl_cdf_tdist_Qinv(MOVES_CHANCE / 2, n - 2) * row->sigma_trend;
-	first = row->from;
+	first = begin + slope * row->number[0];
 	span = row->number[row->count - 1] - row->number[0];
 	row->change = row->trend * span / first;
 	row->sigma_change = fabs(row->sigma_trend * span / first);
 	return left;
 }
 
-/* Of one value, from the differences of neighbours (von Neumann), which no slow trend widens. */
-static double repeats_scatter(const struct repeats_row *row)
+/* What a count's last digit scatters at least, squared: neighbours differ by one of it or by nothing. */
+static double repeats_rounding(const struct repeats_row *row)
 {
-	double squares = 0;
+	double least = INFINITY;
 
-	for (size_t i = 0; i + 1 < row->count; i++)
-		squares += (row->value[i + 1] - row->value[i]) * (row->value[i + 1] - row->value[i]);
-	return sqrt(squares / (2 * (double)(row->count - 1)));
+	for (size_t i = 0; i + 1 < row->count; i++) {
+		double step = fabs(row->value[i + 1] - row->value[i]);
+
+		least = step > 0 ? fmin(least, step) : least;
+	}
+	return least * least / 12;
 }
 
-/* Where the cumulative sum is largest, if that is no chance, and a step fits better than the line does. */
+/* ---- another from there on ---- */
+
+double repeats_step_limit(size_t n)
+{
+	/* how many steps at one place each are as probable together: 2 10^6 ... 30 000 normal series each */
+	static const double ln_n[] = {2.0794, 2.3026, 2.9957, 3.9318, 4.6052, 6.9078},
+	                    as_many[] = {5.0, 6.7, 12.0, 20.8, 28.0, 57.0};
+	double at = log((double)n), many;
+	size_t i = 0;
+
+	while (i + 2 < sizeof(ln_n) / sizeof(ln_n[0]) && at > ln_n[i + 1])
+		i++;
+	many = as_many[i] + (as_many[i + 1] - as_many[i]) * (at - ln_n[i]) / (ln_n[i + 1] - ln_n[i]);
+	return gsl_cdf_tdist_Qinv(CHANGE_CHANCE / (2 * many), (double)n - 2);
+}
+
 static void repeats_change(struct repeats_row *row, double left_by_line)
 {
-	double n = (double)row->count, sum = 0, most = 0, scatter, left = 0, before = 0, after = 0;
+	double n = (double)row->count, sum = 0, most = 0, left;
 	size_t at = 0;
 
 	row->change_at = 0;
-	if (row->count < CHANGE_LEAST)
+	row->step_t = NAN;
+	if (row->count < CHANGE_LEAST || !(row->sd > 0))
 		return;
-	for (size_t i = 0; i + 1 < row->count; i++) {
-		sum += row->value[i] - row->mean;
-		if (fabs(sum) > most) {
-			most = fabs(sum);
-			at = i + 1;
+	for (size_t i = 1; i <= row->count - 2; i++) {
+		double by_step, before = (double)i;
+
+		sum += row->value[i - 1] - row->mean;
+		by_step = sum * sum * n / (before * (n - before));
+		if (i > 1 && by_step > most) {
+			most = by_step;
+			at = i;
 		}
 	}
-	scatter = repeats_scatter(row);
-	if (at == 0 || !(most > KOLMOGOROV * scatter * sqrt(n)) || !(most > 0))
-		return;
-	for (size_t i = 0; i < row->count; i++)
-		*(i < at ? &before : &after) += row->value[i];
-	before /= (double)at;
-	after /= n - (double)at;
-	for (size_t i = 0; i < row->count; i++) {
-		double rest = row->value[i] - (i < at ? before : after);
-
-		left += rest * rest;
-	}
-	if (left < left_by_line)
+	left = fmax(row->sd * row->sd * (n - 1) - most, 0);
+	row->step_t = sqrt((n - 2) * most / fmax(left, n * repeats_rounding(row)));
+	if (left < left_by_line && row->step_t > repeats_step_limit(row->count))
 		row->change_at = (unsigned)row->number[at];
 }
 
@@ -170,56 +186,51 @@ double repeats_grubbs(size_t n, double degrees, double alpha)
 	return sqrt((m - 1.0) / m * degrees * t * t / (degrees - 1.0 + t * t));
 }
 
-/* Whether the others differ, each from each but for one pair. */
-static bool repeats_scatters(const struct repeats_row *row, size_t but)
-{
-	size_t equal = 0;
-
-	for (size_t i = 0; i < row->count; i++)
-		for (size_t k = 0; k < i; k++)
-			equal += i != but && k != but && !(fabs(row->value[i] - row->value[k]) > 0);
-	return equal <= 1 && row->count > TREND_LEAST;
-}
-
-size_t repeats_farthest(const struct repeats_row *row, double *distance)
+static size_t repeats_farthest(const struct repeats_row *row)
 {
 	size_t at = 0;
 
-	*distance = 0.0;
 	for (size_t i = 0; i < row->count; i++)
-		if (fabs(row->value[i] - row->mean) > *distance) {
-			*distance = fabs(row->value[i] - row->mean);
+		if (fabs(row->value[i] - row->mean) > fabs(row->value[at] - row->mean))
 			at = i;
-		}
 	return at;
 }
 
 static void repeats_stands_out(struct repeats_row *row)
 {
-	double most;
-	size_t at = repeats_farthest(row, &most);
+	double own = (double)row->count - 1, variance = row->sd * row->sd;
+	bool others = row->degrees > own;
+	size_t at = repeats_farthest(row), least = others ? OUT_LEAST - 1 : OUT_LEAST;
 
 	row->stands_out = 0;
-	/* counts of a clock are equal but for their last digit: nothing is known of the scatter then */
-	if (repeats_scatters(row, at) &&
-	    most > repeats_grubbs(row->count, (double)row->count - 1.0, OUT_CHANCE) * row->sd)
+	if (row->count < least || !(row->sd > 0))
+		return;
+	variance = (others ? row->pooled : variance) + repeats_rounding(row);
+	if (fabs(row->value[at] - row->mean) >
+	    repeats_grubbs(row->count, others ? row->degrees : own, OUT_CHANCE) * sqrt(variance))
 		row->stands_out = (unsigned)row->number[at];
 }
 
-void repeats_words(const struct repeats_row *r, char words[REPEATS_WORDS_MAX])
-{
-	size_t used;
+/* ---- control chart ---- */
 
-	words[0] = '\0';
-	if (r->change_at > 0)
-		snprintf(words, REPEATS_WORDS_MAX, "another from repeat %u on", r->change_at);
-	else if (r->moves)
-		snprintf(words, REPEATS_WORDS_MAX, r->change > 0 ? "rises" : "falls");
-	else if (isfinite(r->trend))
-		snprintf(words, REPEATS_WORDS_MAX, "no trend");
-	used = strlen(words);
-	if (r->stands_out > 0)
-		snprintf(words + used, REPEATS_WORDS_MAX - used, "; repeat %u stands out", r->stands_out);
+static void repeats_chart(struct repeats_row *row)
+{
+	double steps = 0;
+
+	row->low = row->high = row->step = NAN;
+	row->beyond = row->steps = 0;
+	if (row->count < TREND_LEAST)
+		return;
+	for (size_t i = 0; i + 1 < row->count; i++)
+		steps += fabs(row->value[i + 1] - row->value[i]);
+	steps /= (double)row->count - 1;
+	row->low = row->mean - CHART_VALUE * steps;
+	row->high = row->mean + CHART_VALUE * steps;
+	row->step = CHART_STEP * steps;
+	for (size_t i = 0; i < row->count; i++) {
+		row->beyond += row->value[i] < row->low || row->value[i] > row->high;
+		row->steps += i > 0 && fabs(row->value[i] - row->value[i - 1]) > row->step;
+	}
 }
 
 void repeats_row_close(struct repeats_row *row)
@@ -227,6 +238,7 @@ void repeats_row_close(struct repeats_row *row)
 	repeats_mean(row);
 	repeats_change(row, repeats_line(row));
 	repeats_stands_out(row);
+	repeats_chart(row);
 }
 
 void repeats_row_free(struct repeats_row *row)
