@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "host/record/table_data.h"
+#include "host/record/unit.h"
 
 enum {
 	LEAD_IN = 28,
@@ -36,8 +37,8 @@ struct tdms_object {
 	bool active, unscaled, scales;
 	bool moved;            /* step or beginning are told twice, and differ */
 	const char *begins_at; /* its wf_start_time, 16 bytes; NULL: not told */
-	char name[64], unit[32];
-	double increment_s, offset_s;
+	char name[64], unit[32], time_unit[32];
+	double increment, offset; /* in the unit of time */
 	double *value;
 	size_t used, room;
 };
@@ -117,6 +118,9 @@ static void set_text(struct tdms_object *object, const char *name, uint32_t leng
 {
 	if (says(name, length, "unit_string"))
 		snprintf(object->unit, sizeof(object->unit), "%.*s", (int)(size < 31 ? size : 31), text);
+	else if (says(name, length, "wf_xunit_string"))
+		snprintf(object->time_unit, sizeof(object->time_unit), "%.*s", (int)(size < 31 ? size : 31),
+		         text);
 	else if (says(name, length, "NI_Scaling_Status"))
 		object->unscaled = says(text, size, "unscaled");
 }
@@ -124,11 +128,11 @@ static void set_text(struct tdms_object *object, const char *name, uint32_t leng
 static void set_number(struct tdms_object *object, const char *name, uint32_t length, double value)
 {
 	if (says(name, length, "wf_increment")) {
-		object->moved |= object->used > 0 && fabs(value - object->increment_s) > 1e-9 * fabs(value);
-		object->increment_s = value;
+		object->moved |= object->used > 0 && fabs(value - object->increment) > 1e-9 * fabs(value);
+		object->increment = value;
 	}
 	if (says(name, length, "wf_start_offset"))
-		object->offset_s = value;
+		object->offset = value;
 	else if (says(name, length, "NI_Number_Of_Scales"))
 		object->scales = value > 0;
 }
@@ -365,10 +369,15 @@ static int give_columns(struct tdms *tdms, struct table_data *table)
 {
 	for (size_t i = 0; i < tdms->objects; i++) {
 		struct tdms_object *object = &tdms->object[i];
+		double unit_s = unit_seconds(object->time_unit);
 		struct table_column *column;
 
 		if (object->used == 0)
 			continue;
+		if (unit_s == 0)
+			return source_refuse(tdms->message, DT_E_FORMAT, tdms->source->file, 0,
+			                     "TDMS file: %s steps in \"%s\", expected s or another time",
+			                     object->name, object->time_unit);
 		if (object->moved)
 			return source_refuse(
 			        tdms->message, DT_E_FORMAT, tdms->source->file, 0,
@@ -386,8 +395,8 @@ static int give_columns(struct tdms *tdms, struct table_data *table)
 		memcpy(column->value, object->value, object->used * sizeof(double));
 		memcpy(column->name, object->name, sizeof(column->name));
 		memcpy(column->unit, object->unit, sizeof(column->unit));
-		column->rate_hz = object->increment_s > 0 ? 1 / object->increment_s : 0;
-		column->start_s = object->offset_s;
+		column->rate_hz = object->increment > 0 ? 1 / (object->increment * unit_s) : 0;
+		column->start_s = object->offset * unit_s;
 	}
 	return table->count > 0 ? 0 : tdms_refuse(tdms, "no channel with numbers");
 }

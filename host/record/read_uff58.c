@@ -66,15 +66,20 @@ static int read_uff58_check_channel(struct reading *reading, const struct uff58_
 		error = UFF58_REFUSE(&reading->text, DT_E_FORMAT,
 		                     "\"%.32s\" has data of type %d, expected 2 or 4 (real)", head->id[0],
 		                     head->precision);
-	else if (head->even && !(head->step_s > 0))
+	else if (head->even && !(head->step > 0))
 		error = UFF58_REFUSE(&reading->text, DT_E_FORMAT,
-		                     "\"%.32s\" has a step of %g s, expected more than 0", head->id[0],
-		                     head->step_s);
+		                     "\"%.32s\" has a step of %g, expected more than 0", head->id[0],
+		                     head->step);
 	/* a number takes so many bytes at least: this bounds the memory */
 	else if (head->count < 2 || head->count > (reading->text.source->size - reading->samples) / least)
 		error = UFF58_REFUSE(&reading->text, DT_E_FORMAT,
 		                     "\"%.32s\" has %zu samples, expected 2 to what the file holds",
 		                     head->id[0], head->count);
+	reading->text.line.number = head->line + 7; /* record 8 */
+	if (!error && unit_seconds(head->time_unit) == 0)
+		error = UFF58_REFUSE(&reading->text, DT_E_FORMAT,
+		                     "the abscissa of \"%.32s\" is in \"%s\", expected s", head->id[0],
+		                     head->time_unit);
 	reading->text.line.number = head->line + 8; /* record 9 */
 	if (!error && unit_factor_g(head->unit) == 0)
 		error = UFF58_REFUSE(&reading->text, DT_E_FORMAT,
@@ -121,17 +126,20 @@ static int read_uff58_channel(struct reading *reading, const struct uff58_head *
 	struct channel *channel;
 	double *time_s = NULL;
 	int error = read_uff58_check_channel(reading, head, binary != NULL ? 4 : 13);
+	double unit_s;
 	uint64_t line;
 	char name[32];
 
 	if (error)
 		return error;
+	unit_s = unit_seconds(head->time_unit);
 	reading->samples += head->count;
 	name_channel(reading, head, name);
-	channel = record_add_channel(reading->record, name, head->even ? 1 / head->step_s : 1, head->count);
+	channel = record_add_channel(reading->record, name, head->even ? 1 / (head->step * unit_s) : 1,
+	                             head->count);
 	if (!channel)
 		return UFF58_REFUSE(&reading->text, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
-	channel->start_s = head->start_s;
+	channel->start_s = head->start * unit_s;
 	if (!head->even)
 		time_s = malloc(head->count * sizeof(*time_s));
 	if (!head->even && !time_s)
@@ -143,6 +151,8 @@ static int read_uff58_channel(struct reading *reading, const struct uff58_head *
 	                       : uff58_read_data(&reading->text, head, channel->value_g, time_s);
 	if (!error)
 		settle_samples(channel, unit_factor_g(head->unit));
+	for (size_t k = 0; !error && time_s && k < head->count; k++)
+		time_s[k] *= unit_s;
 	if (!error && time_s)
 		error = settle_times(reading, head, line, channel, time_s);
 	free(time_s);

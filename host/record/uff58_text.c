@@ -102,8 +102,8 @@ static int read_record_7(struct uff58_text *text, struct uff58_head *head)
 	if (!uff58_text_take_whole(&text->line, 0, 10, &head->precision) ||
 	    !uff58_text_take_whole(&text->line, 10, 10, &count) ||
 	    !uff58_text_take_whole(&text->line, 20, 10, &spacing) ||
-	    !uff58_text_take_number(&text->line, 30, 13, &head->start_s) ||
-	    !uff58_text_take_number(&text->line, 43, 13, &head->step_s) || count < 0)
+	    !uff58_text_take_number(&text->line, 30, 13, &head->start) ||
+	    !uff58_text_take_number(&text->line, 43, 13, &head->step) || count < 0)
 		return UFF58_REFUSE(
 		        text, DT_E_FORMAT,
 		        "record 7, expected three whole numbers in 10 columns each and two numbers in "
@@ -113,7 +113,7 @@ static int read_record_7(struct uff58_text *text, struct uff58_head *head)
 	return 0;
 }
 
-/* Records 8 to 11, of which the ordinate says what was measured: Format(I10,3I5,2(1X,20A1)) */
+/* Records 8 to 11, of which abscissa and ordinate say what was measured: Format(I10,3I5,2(1X,20A1)) */
 static int read_axes(struct uff58_text *text, struct uff58_head *head)
 {
 	for (int record = 8; record <= 11; record++) {
@@ -121,6 +121,8 @@ static int read_axes(struct uff58_text *text, struct uff58_head *head)
 
 		if (error)
 			return error;
+		if (record == 8)
+			uff58_take(&text->line, 47, 20, head->time_unit, sizeof(head->time_unit));
 		if (record != 9)
 			continue;
 		if (!uff58_text_take_whole(&text->line, 0, 10, &head->quantity))

@@ -28,8 +28,9 @@ struct uff58_head {
 	int precision;                 /* record 7 */
 	size_t count;
 	bool even;
-	double start_s, step_s;
-	int quantity; /* record 9 */
+	double start, step;
+	char time_unit[21]; /* record 8 */
+	int quantity;       /* record 9 */
 	char unit[21];
 };
 

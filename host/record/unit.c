@@ -56,19 +56,13 @@ static const struct {
         {"kilo-g", {"kilo-g", UNIT_ACCELERATION, 1e-3, 0}},
         {"kgn", {"kilo-g", UNIT_ACCELERATION, 1e-3, 0}},
         {"m/s2", {"m/s2", UNIT_ACCELERATION, G, 0}},
-        {"m/ss", {"m/s2", UNIT_ACCELERATION, G, 0}}, /* m/(s*s) */
-        {"m/s/s", {"m/s2", UNIT_ACCELERATION, G, 0}},
-        {"m/sec2", {"m/s2", UNIT_ACCELERATION, G, 0}},
-        {"m/sec/sec", {"m/s2", UNIT_ACCELERATION, G, 0}},
         {"ms-2", {"m/s2", UNIT_ACCELERATION, G, 0}},
         {"mps2", {"m/s2", UNIT_ACCELERATION, G, 0}},
         {"mm/s2", {"mm/s2", UNIT_ACCELERATION, G * 1e3, 0}},
         {"cm/s2", {"cm/s2", UNIT_ACCELERATION, G * 1e2, 0}},
         {"gal", {"cm/s2", UNIT_ACCELERATION, G * 1e2, 0}},
         {"ft/s2", {"ft/s2", UNIT_ACCELERATION, G / 0.3048, 0}},
-        {"ft/sec2", {"ft/s2", UNIT_ACCELERATION, G / 0.3048, 0}},
         {"in/s2", {"in/s2", UNIT_ACCELERATION, G / 0.0254, 0}},
-        {"in/sec2", {"in/s2", UNIT_ACCELERATION, G / 0.0254, 0}},
         {"v", {"V", UNIT_OTHER, 0, 1}},
         {"volt", {"V", UNIT_OTHER, 0, 1}},
         {"volts", {"V", UNIT_OTHER, 0, 1}},
@@ -126,6 +120,21 @@ static size_t sign_at(const char *text, size_t length, char *as)
 	return 1;
 }
 
+/* Its other spellings to "/s2": m/(s*s), ft/s/s, in/sec2. */
+static void per_second_squared(char *plain, size_t used)
+{
+	static const char *const endings[] = {"/ss", "/s/s", "/sec2", "/secsec", "/sec/sec"};
+
+	for (size_t i = 0; i < sizeof(endings) / sizeof(endings[0]); i++) {
+		size_t length = strlen(endings[i]);
+
+		if (used > length && strcmp(plain + used - length, endings[i]) == 0) {
+			memcpy(plain + used - length, "/s2", sizeof("/s2"));
+			return;
+		}
+	}
+}
+
 const struct unit *unit_find(const char *text, size_t length)
 {
 	char plain[CHARS_MAX + 1];
@@ -142,6 +151,7 @@ const struct unit *unit_find(const char *text, size_t length)
 		plain[used++] = c;
 	}
 	plain[used] = '\0';
+	per_second_squared(plain, used);
 	for (size_t i = 0; i < sizeof(table) / sizeof(table[0]); i++)
 		if (strcmp(table[i].spelling, plain) == 0)
 			return &table[i].unit;
@@ -161,6 +171,15 @@ const struct unit *unit_in_bracket(const char *text, size_t length)
 		number |= isdigit((unsigned char)*text) != 0;
 	}
 	return unit ? unit : number && length > 0 ? &multiple : NULL;
+}
+
+double unit_seconds(const char *text)
+{
+	const struct unit *unit = unit_in_bracket(text, strlen(text));
+
+	if (unit == NULL)
+		return 1;
+	return unit->kind == UNIT_TIME ? 1 / unit->divisor : 0;
 }
 
 /* The last bracket of that kind that holds a unit. */

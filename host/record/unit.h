@@ -28,6 +28,11 @@ const struct unit *unit_find(const char *text, size_t length);
 /* The same of what stands in brackets, which may be a number of them. */
 const struct unit *unit_in_bracket(const char *text, size_t length);
 
+/* Seconds of one of it, 1 where it tells no unit as formats have it that are in seconds; 0 for a unit of
+ * something else.
+ */
+double unit_seconds(const char *text);
+
 /* What the name of a column says of its unit: one in the last brackets, "Accel (g)" and "t [ms]"; of the kind
  * that is wanted one behind the last blank, comma or underscore, or the name itself. A bracket with a number
  * of units, "[10 g]", is UNIT_MULTIPLE. NULL where it says nothing.
