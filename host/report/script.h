@@ -47,6 +47,10 @@ void script_reach_samples(struct script_range *range, const struct channel *c, d
 void script_axes(FILE *out, int width, int height, struct script_window window, double zero_s,
                  struct script_range range);
 
+/* The same of a spectrum, both axes logarithmic; a range above 0. */
+void script_spectrum_axes(FILE *out, int width, int height, double from_hz, double to_hz,
+                          struct script_range range);
+
 /* $name from the samples in the window; returns how many points there are. A sample that is not good breaks
  * the line. */
 size_t script_samples(FILE *out, const char *name, const struct channel *c, double offset, double zero_s,

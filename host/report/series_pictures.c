@@ -153,6 +153,7 @@ void series_pictures(struct series_page *page)
 	picture_over(page, 0, 'Y');
 	picture_over(page, 1, 'Y');
 	fputs("</div>\n", out);
+	series_spectra(page);
 	drops(page, true,
 	      "<h2>Drop by drop</h2>\n<p class=\"soft\">S1 and S2 along X and along Y, g over ms; dashed in "
 	      "their "

@@ -85,6 +85,7 @@ void series_subject(struct series_page *page);
 void series_results(struct series_page *page);
 void series_remarks(struct series_page *page);
 void series_pictures(struct series_page *page);
+void series_spectra(struct series_page *page);
 void series_excluded(struct series_page *page);
 void series_model(struct series_page *page);
 void series_records(struct series_page *page);

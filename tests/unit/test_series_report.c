@@ -375,22 +375,29 @@ static void test_rejected_is_in_no_mean(void **state)
 }
 
 /* Curves in the colour of S1 in the picture of its X: one for each drop that counts. */
-static void test_overlay_has_what_counts(void **state)
+/* Curves in S1's colour of the picture with that label. */
+static size_t curves_of(const char *page, const char *label)
 {
 	static const char colour[] = "rgb(  0, 114, 178)";
-	const char *at, *end;
+	const char *at = strstr(page, label), *end;
 	size_t curves = 0;
+
+	assert_non_null(at);
+	end = strstr(at, "</svg>");
+	for (at = strstr(at, "<path stroke="); at && at < end; at = strstr(at + 1, "<path stroke="))
+		curves += !strncmp(at + strlen("<path stroke='"), colour, strlen(colour));
+	return curves;
+}
+
+static void test_overlay_has_what_counts(void **state)
+{
 	char *page;
 
 	(void)state;
 	make_series();
 	page = report();
-	at = strstr(page, "aria-label=\"S1 X of all drops that count\"");
-	assert_non_null(at);
-	end = strstr(at, "</svg>");
-	for (at = strstr(at, "<path stroke="); at && at < end; at = strstr(at + 1, "<path stroke="))
-		curves += !strncmp(at + strlen("<path stroke='"), colour, strlen(colour));
-	assert_int_equal(curves, 3);
+	assert_int_equal(curves_of(page, "aria-label=\"S1 X of all drops that count\""), 3);
+	assert_int_equal(curves_of(page, "aria-label=\"shock response spectra of S1 X\""), 3);
 	assert_has(page, "aria-label=\"drop 3, S1 and S2 along X\""); /* drawn, on its own */
 	free(page);
 }
@@ -587,6 +594,7 @@ static void test_log_missing_or_changed(void **state)
 	assert_cell(page, "<h2>Peaks", "n", 2, "1"); /* drop 4 alone */
 	assert_has_not(page, "aria-label=\"drop 1, S1 and S2 along X\"");
 	assert_has(page, "aria-label=\"drop 4, S1 and S2 along X\"");
+	assert_int_equal(curves_of(page, "aria-label=\"shock response spectra of S1 X\""), 1); /* drop 4's */
 	free(page);
 }
 
