@@ -226,6 +226,15 @@ static void place_tower(struct scene *scene)
 		scene->tower_gate_upper_m = scene->tower_separation_m * UPPER_GATE_SHARE;
 }
 
+/* What is changed after reading leaves the drop alone in which the contact time was measured. */
+static void scene_of_contact_time(struct scene *scene)
+{
+	if (scene->contact_duration_height_m == 0.0)
+		scene->contact_duration_height_m = scene->drop_height_m;
+	if (scene->contact_mass_kg == 0.0)
+		scene->contact_mass_kg = scene->product_case_mass_kg;
+}
+
 static int scene_complete(struct reading *reading)
 {
 	const struct settings *settings = &reading->settings;
@@ -242,6 +251,7 @@ static int scene_complete(struct reading *reading)
 		return settings_refuse(settings, DT_E_FORMAT, "name is missing");
 	if (reading->scene.title[0] == '\0')
 		memcpy(reading->scene.title, reading->scene.name, sizeof(reading->scene.name));
+	scene_of_contact_time(&reading->scene);
 	place_tower(&reading->scene);
 	return scene_check(&reading->scene, settings->file, settings->message);
 }

@@ -71,15 +71,27 @@ static int put_line(struct archive *archive, char **text, const char *line, bool
 	return 0;
 }
 
-static int set_height(struct archive *archive, double height_m, char **text)
+/* In place of the key's line, else before that of another of its section. */
+static int set_number(struct archive *archive, const char *key, double value, const char *before, char **text)
 {
-	const char *line = line_of(*text, "height_m", true);
-	char with[48];
+	const char *line = line_of(*text, key, true);
+	bool own = line != NULL;
+	char with[64];
 
-	if (line == NULL)
-		return archive_refuse(archive, DT_E_FORMAT, "the scene has no line 'height_m = '");
-	snprintf(with, sizeof(with), "height_m = %.15g", height_m);
-	return put_line(archive, text, line, true, with);
+	if (!own && (before == NULL || (line = line_of(*text, before, true)) == NULL))
+		return archive_refuse(archive, DT_E_FORMAT, "the scene has no line '%s = '",
+		                      before != NULL ? before : key);
+	snprintf(with, sizeof(with), "%s = %.15g%s", key, value, own ? "" : "\n");
+	return put_line(archive, text, line, own, with);
+}
+
+/* The contact time stays that of the drop it was measured in. */
+static int set_height(struct archive *archive, double height_m, double measured_m, char **text)
+{
+	int result = set_number(archive, "height_m", height_m, NULL, text);
+
+	return result != 0 ? result
+	                   : set_number(archive, "duration_height_m", measured_m, "duration_s", text);
 }
 
 /* Names that do not depend on where the scene stood, a line each in place of those that were there. */
@@ -160,7 +172,7 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 	if (result != 0)
 		return result;
 	if (!isnan(height_m))
-		result = set_height(archive, height_m, &text);
+		result = set_height(archive, height_m, scene.contact_duration_height_m, &text);
 	if (result == 0 && scene.chain[0] != '\0')
 		result = set_chain(archive, scene.chain, &text);
 	if (result == 0)

@@ -15,7 +15,7 @@
 #include "host/model/contact.h"
 #include "host/model/model.h"
 #include "host/model/sdof.h"
-#include "host/model/steady.h"
+#include "host/model/oscillator.h"
 
 #define PULSE_S 0.003
 
@@ -28,7 +28,7 @@ double maps_steady_ratio(double pulse, double zeta)
 	double peak, when, steady, phase;
 
 	if (sdof_init(&sdof, pulse / PULSE_S, zeta, 1, PULSE_S) || sdof_peak(&sdof, &peak, &when) ||
-	    steady_response(0.5 / pulse, zeta, &steady, &phase))
+	    oscillator_steady(0.5 / pulse, zeta, &steady, &phase))
 		return NAN;
 	return steady / fabs(peak);
 }

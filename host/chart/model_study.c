@@ -39,6 +39,7 @@ struct scene study_scene(enum study_product product, double angle_deg)
 	s.product_thickness_m = 0.021;
 	s.product_balance_angle_deg = 25;
 	s.contact_duration_s = 0.003;
+	s.contact_duration_height_m = 0.894;
 	s.contact_mass_kg = 0.173;
 	s.contact_restitution = 0.5;
 	s.contact_stiffness_n_m15 = 3.81e6;

@@ -94,24 +94,23 @@ static int parse_sweep(struct ensemble *ensemble, const char *text)
 {
 	struct ensemble_axis *axis = &ensemble->axis[ensemble->axes];
 	size_t length = strcspn(text, "=");
-	double to;
 	char end;
 	int code = parse_key("sweep", text, length, &axis->key);
 
 	if (code != COMMAND_DONE)
 		return code;
 	if (text[length] != '=' ||
-	    sscanf(text + length + 1, "%lf:%lf:%lf%c", &axis->from, &to, &axis->step, &end) != 3 ||
-	    !(axis->step > 0.0 && to >= axis->from) || !isfinite(axis->step))
+	    sscanf(text + length + 1, "%lf:%lf:%lf%c", &axis->from, &axis->to, &axis->step, &end) != 3 ||
+	    !(axis->step > 0.0 && axis->to >= axis->from) || !isfinite(axis->step))
 		return command_usage("model",
 		                     "--sweep is '%s', expected KEY=FROM:TO:STEP with a step above 0", text);
-	if (!(axis->from >= axis->key.min && to <= axis->key.max))
+	if (!(axis->from >= axis->key.min && axis->to <= axis->key.max))
 		return command_usage("model", "--sweep is '%s', expected %s from %g to %g", text,
 		                     axis->key.key, axis->key.min, axis->key.max);
-	if ((to - axis->from) / axis->step > ENSEMBLE_POINTS_MAX)
+	if ((axis->to - axis->from) / axis->step > ENSEMBLE_POINTS_MAX)
 		return command_usage("model", "--sweep is '%s', expected %d points at most", text,
 		                     ENSEMBLE_POINTS_MAX);
-	axis->count = (size_t)((to - axis->from) / axis->step * (1.0 + 1e-12) + 1e-9) + 1;
+	axis->count = (size_t)((axis->to - axis->from) / axis->step * (1.0 + 1e-12) + 1e-9) + 1;
 	ensemble->axes++;
 	return COMMAND_DONE;
 }

@@ -92,6 +92,8 @@ static void scene_fill(const struct arguments *a, const char *file, struct scene
 	s->product_thickness_m = a->thickness_m;
 	s->product_balance_angle_deg = UNITS_DEG(atan(a->width_m / a->length_m));
 	s->contact_restitution = RULE_RESTITUTION;
+	s->contact_duration_height_m = a->height_m;
+	s->contact_mass_kg = a->mass_kg;
 	s->contact_stiffness_n_m15 = RULE_STIFFNESS_N_M15;
 	s->sensor_s2_offset_m = a->s2_offset_m;
 	speed = sqrt(2.0 * s->drop_gravity_m_s2 * a->height_m);

@@ -402,6 +402,8 @@ static void conclude_scene(const struct solve *s, const struct scene *start, str
 	motion_to_scene(s->common, to);
 	if (isfinite(fit->drop[0].derived[MOTION_CONTACT_S])) {
 		to->contact_duration_s = fit->drop[0].derived[MOTION_CONTACT_S];
+		to->contact_duration_height_m =
+		        exp(2.0 * fit->drop[0].own[FIT_LN_SPEED]) / (2.0 * start->drop_gravity_m_s2);
 		to->contact_mass_kg = start->product_case_mass_kg;
 	}
 	conclude_bars(fit);

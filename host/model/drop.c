@@ -36,6 +36,8 @@ static int model_drop_check(const struct scene *s, char *message)
 	        {"balance_angle_deg", s->product_balance_angle_deg, 0.0, 90.0},
 	        {"inertia_ratio", s->product_inertia_ratio, 0.0, INFINITY},
 	        {"duration_s", s->contact_duration_s, 0.0, INFINITY},
+	        {"duration_height_m", s->contact_duration_height_m, 0.0, INFINITY},
+	        {"mass_kg", s->contact_mass_kg, 0.0, INFINITY},
 	        {"restitution", s->contact_restitution, 0.0, 1.0 + 1e-15},
 	        {"s2_offset_m", s->sensor_s2_offset_m, -INFINITY, INFINITY},
 	        {"s1_yaw_deg", s->sensor_s1_yaw_deg, -INFINITY, INFINITY},
@@ -63,6 +65,17 @@ static double squared_gyration(const struct scene *s)
 	       (s->product_length_m * s->product_length_m + s->product_width_m * s->product_width_m) / 12.0;
 }
 
+/* T is as (m/k)^(2/5) v^(-1/5) for any restitution. Between the case alone and the case with its plate, what
+ * of a plate on mounts counts as m is not known: there the measured time stands. */
+static double duration_of(const struct scene *s)
+{
+	double measured_kg = s->contact_mass_kg, case_kg = s->product_case_mass_kg;
+	double mass_kg = fmin(fmax(measured_kg, case_kg), case_kg + s->mount_plate_mass_kg);
+
+	return s->contact_duration_s * pow(mass_kg / measured_kg, 0.4) *
+	       pow(s->drop_height_m / s->contact_duration_height_m, -0.1);
+}
+
 int drop_of_scene(const struct scene *scene, struct drop *drop, char *message)
 {
 	double angle = UNITS_RAD(scene->drop_angle_deg), s1 = angle + UNITS_RAD(scene->sensor_s1_yaw_deg);
@@ -73,6 +86,7 @@ int drop_of_scene(const struct scene *scene, struct drop *drop, char *message)
 		return error;
 	d.gravity_m_s2 = scene->drop_gravity_m_s2;
 	d.speed_m_s = sqrt(2.0 * d.gravity_m_s2 * scene->drop_height_m);
+	d.duration_s = duration_of(scene);
 	d.has_plate = scene->mount_plate_mass_kg > 0.0;
 	d.lever_y_m = scene->product_width_m / 2.0;
 	d.lever_x_m = d.lever_y_m / tan(UNITS_RAD(scene->product_balance_angle_deg));
@@ -110,12 +124,12 @@ int drop_contact_law(const struct drop *drop, struct contact_law *law, char *mes
 int drop_contact(const struct drop *drop, struct contact_law *law, double *stiffness_n_m15, char *message)
 {
 	const struct scene *s = drop->scene;
-	double mass = s->contact_mass_kg > 0.0 ? s->contact_mass_kg : s->product_case_mass_kg;
+	double speed_m_s = sqrt(2.0 * drop->gravity_m_s2 * s->contact_duration_height_m);
 	int error = contact_law_init(law, s->contact_restitution);
 
 	if (error)
 		return no_law(s, error, message);
-	*stiffness_n_m15 = contact_stiffness(law, mass, drop->speed_m_s, s->contact_duration_s);
+	*stiffness_n_m15 = contact_stiffness(law, s->contact_mass_kg, speed_m_s, s->contact_duration_s);
 	return 0;
 }
 

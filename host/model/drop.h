@@ -17,6 +17,7 @@ struct drop {
 	const struct scene *scene;
 	double angle, cosine, sine;
 	double gravity_m_s2, speed_m_s;
+	double duration_s; /* contact time on the scene's mat, but for a plate's part */
 	bool has_plate;
 	double lever_x_m, lever_y_m; /* contact corner from the centre of gravity, along -X and -Y */
 	double inertia_kg_m2;
@@ -34,7 +35,8 @@ DT_MUST_USE int drop_of_scene(const struct scene *scene, struct drop *drop, char
 /* The law of the scene's restitution, its duration but roughly. */
 DT_MUST_USE int drop_contact_law(const struct drop *drop, struct contact_law *law, char *message);
 
-/* The law of the scene's restitution, and the stiffness at which the scene's contact time follows from it. */
+/* The law of the scene's restitution, and the stiffness that gives the scene's contact time with the height
+ * and the mass it was measured with. */
 DT_MUST_USE int drop_contact(const struct drop *drop, struct contact_law *law, double *stiffness_n_m15,
                              char *message);
 

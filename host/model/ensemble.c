@@ -247,7 +247,7 @@ static int ascending(const void *a, const void *b)
 /* Sorts; NANs were taken out. */
 static struct ensemble_spread ensemble_spread_of(double *value, size_t count)
 {
-	struct ensemble_spread s = {(double)NAN, (double)NAN, (double)NAN, (double)NAN};
+	struct ensemble_spread s = {(double)NAN, (double)NAN, (double)NAN, (double)NAN, 0};
 	double sum = 0.0, squares = 0.0;
 
 	if (count < 2)
@@ -284,6 +284,7 @@ int ensemble_monte_carlo(const struct ensemble *e, size_t draws,
 			if (!isnan(row[k]))
 				row[kept++] = row[k];
 		spread[i] = ensemble_spread_of(row, kept);
+		spread[i].without = draws - kept;
 		if (kept > most)
 			most = kept;
 	}

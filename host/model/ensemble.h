@@ -29,7 +29,7 @@ enum { ENSEMBLE_KEYS_MAX = 8 };
 /* One axis of a grid, or one uncertain input. */
 struct ensemble_axis {
 	struct vary_key key;
-	double from, step; /* grid */
+	double from, to, step; /* grid; a range has no step */
 	size_t count;
 	double sd; /* random: standard deviation */
 };
@@ -69,10 +69,11 @@ DT_MUST_USE int ensemble_run(size_t points,
 struct ensemble_spread {
 	double mean, sd;
 	double low, high; /* 95 % of the draws are between */
+	size_t without;   /* draws that have no such value, those that make no drop among them */
 };
 
-/* spread[i] of the i-th output selected by options.asked; *failed: draws that make no drop, left out. 0,
- * DT_E_MEMORY, or DT_E_EMPTY when fewer than two are left. */
+/* spread[i] of the i-th output selected by options.asked; *failed: draws that make no drop, left out and
+ * counted in each. 0, DT_E_MEMORY, or DT_E_EMPTY when fewer than two are left. */
 DT_MUST_USE int ensemble_monte_carlo(const struct ensemble *ensemble, size_t draws,
                                      struct ensemble_spread spread[ENSEMBLE_OUTPUTS], size_t *failed);
 

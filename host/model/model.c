@@ -34,34 +34,32 @@ int model_fidelity_parse(const char *name, enum model_fidelity *fidelity)
 	return DT_E_UNKNOWN;
 }
 
+/* 0: no such name. */
+static unsigned bit_of(const char *name, const char *const names[], size_t count)
+{
+	for (size_t i = 0; i < count; i++)
+		if (!strcmp(name, names[i]))
+			return 1u << i;
+	return 0;
+}
+
 int model_refinement_parse(const char *name, enum model_refinement *refinement)
 {
-	static const struct {
-		const char *name;
-		enum model_refinement refinement;
-	} names[] = {{"stiffness", MODEL_STIFFNESS},
-	             {"wedge", MODEL_WEDGE},
-	             {"grip", MODEL_GRIP},
-	             {"mounts", MODEL_MOUNTS}};
+	static const char *const names[] = {"stiffness", "wedge", "grip", "mounts"};
+	unsigned bit = bit_of(name, names, sizeof(names) / sizeof(names[0]));
 
-	for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
-		if (!strcmp(name, names[i].name)) {
-			*refinement = names[i].refinement;
-			return 0;
-		}
-	return DT_E_UNKNOWN;
+	*refinement = bit ? (enum model_refinement)bit : *refinement;
+	return bit ? 0 : DT_E_UNKNOWN;
 }
 
 int model_question_parse(const char *name, enum model_question *question)
 {
 	static const char *const names[] = {"plate", "axes", "box", "lag", "s2", "direction"};
 
-	for (unsigned i = 0; i < sizeof(names) / sizeof(names[0]); i++)
-		if (!strcmp(name, names[i])) {
-			*question = (enum model_question)(1u << i);
-			return 0;
-		}
-	return DT_E_UNKNOWN;
+	unsigned bit = bit_of(name, names, sizeof(names) / sizeof(names[0]));
+
+	*question = bit ? (enum model_question)bit : *question;
+	return bit ? 0 : DT_E_UNKNOWN;
 }
 
 /* Nothing said yet. */
@@ -162,6 +160,13 @@ static void give_reason(struct model_prediction *p, const char *why, const char 
 		at += length;
 	}
 	p->reason[at] = '\0';
+}
+
+void rung_swing(double omega, double zeta, struct model_prediction *p)
+{
+	p->plate_damping_ratio = zeta;
+	p->plate_frequency_hz =
+	        zeta < 1.0 ? omega * sqrt((1.0 - zeta) * (1.0 + zeta)) / (2.0 * UNITS_PI) : (double)NAN;
 }
 
 int rung_solve(const struct drop *drop, enum model_fidelity fidelity, const struct model_options *options,

@@ -59,3 +59,16 @@ double oscillator_turn(const struct oscillator *o, double z, double v)
 		return 0.0;
 	return o->overdamped ? atanh(o->split * rise / pull) / o->split : rise / pull;
 }
+
+int oscillator_steady(double r, double zeta, double *transmissibility, double *phase_rad)
+{
+	double damper = 2.0 * zeta * r, below = hypot((1.0 - r) * (1.0 + r), damper);
+
+	if (!(r > 0.0) || !isfinite(r) || !(zeta >= 0.0) || !isfinite(zeta))
+		return DT_E_ARGUMENT;
+	if (!(below > 0.0))
+		return DT_E_NUMERIC;
+	*transmissibility = hypot(1.0, damper) / below;
+	*phase_rad = atan2(damper, (1.0 - r) * (1.0 + r)) - atan(damper);
+	return 0;
+}

@@ -27,4 +27,10 @@ void oscillator_move(const struct oscillator *oscillator, double tau, double *z,
 /* When z, which starts as z and z', first turns round; 0 when it never does. Every later turn is smaller. */
 double oscillator_turn(const struct oscillator *oscillator, double z, double v);
 
+/* On a base that has always shaken in a sine: equation (17) in its usual form, with the branch of its phase
+ * put right. r: forcing over undamped natural frequency. Amplitude over the base's, and by how much it comes
+ * after it (0 to pi). 0, DT_E_ARGUMENT: r > 0, zeta >= 0, finite; DT_E_NUMERIC at resonance without damping.
+ */
+DT_MUST_USE int oscillator_steady(double r, double zeta, double *transmissibility, double *phase_rad);
+
 #endif

@@ -3,7 +3,7 @@
 #define DT_HOST_MODEL_RUNG_H
 /*
  * One rung of the ladder as model.c sees it: a drop in, a prediction or a time history out. The physics lives
- * in modules of their own that know no scene (paper, steady, sdof, coupled, planar); a rung puts the drop
+ * in modules of their own that know no scene (paper, oscillator, sdof, course); a rung puts the drop
  * into such a module's terms and its answer into the prediction's. Used within host/model.
  */
 #include <stddef.h>
@@ -30,6 +30,9 @@ struct rung {
 DT_MUST_USE int rung_solve(const struct drop *drop, enum model_fidelity fidelity,
                            const struct model_options *options, const char *why,
                            struct model_prediction *prediction, char *message);
+
+/* The plate's free swing. */
+void rung_swing(double omega, double zeta, struct model_prediction *prediction);
 
 extern const struct rung rung_paper, rung_steady, rung_sdof, rung_coupled, rung_planar;
 

@@ -10,7 +10,6 @@
 #include "common/units.h"
 #include "host/model/paper.h"
 #include "host/model/sdof.h"
-#include "host/model/steady.h"
 
 /* ---- paper ---- */
 
@@ -34,7 +33,7 @@ static int paper_of(const struct drop *drop, const struct model_options *options
 	        .case_damping_ratio = s->product_case_damping_ratio,
 	        .plate_omega = drop->has_plate ? sqrt(s->mount_stiffness_n_m / s->mount_plate_mass_kg) : 0.0,
 	        .mount_damping_ratio = s->mount_damping_ratio,
-	        .contact_time_s = options->paper_measured_time ? s->contact_duration_s : 0.0,
+	        .contact_time_s = options->paper_measured_time ? drop->duration_s : 0.0,
 	        .speed_signed = options->paper_signed_speed,
 	};
 	error = paper_solve(in, r);
@@ -61,11 +60,7 @@ static int paper_predict(const struct drop *drop, const struct model_options *op
 	p->resultant[0] = p->box;
 	if (drop->has_plate) {
 		p->resultant[0] = (struct model_peak){r.plate_m_s2, r.plate_time_s};
-		p->plate_frequency_hz =
-		        in.plate_omega *
-		        sqrt((1.0 - in.mount_damping_ratio) * (1.0 + in.mount_damping_ratio)) /
-		        (2.0 * UNITS_PI);
-		p->plate_damping_ratio = in.mount_damping_ratio;
+		rung_swing(in.plate_omega, in.mount_damping_ratio, p);
 	}
 	p->direction_deg[0] = drop->scene->drop_angle_deg;
 	p->peak[MODEL_S1X] =
@@ -108,12 +103,12 @@ const struct rung rung_paper = {
 static double half_sine(const struct drop *drop)
 {
 	return UNITS_PI * (1.0 + drop->scene->contact_restitution) * drop->speed_m_s /
-	       (2.0 * drop->scene->contact_duration_s);
+	       (2.0 * drop->duration_s);
 }
 
 static double half_sine_at(const struct drop *drop, double t)
 {
-	double duration = drop->scene->contact_duration_s;
+	double duration = drop->duration_s;
 
 	return t > 0.0 && t < duration ? half_sine(drop) * sin(UNITS_PI * t / duration) : 0.0;
 }
@@ -122,10 +117,10 @@ static double half_sine_at(const struct drop *drop, double t)
 static void fill_half_sine(const struct drop *drop, struct model_peak s1, struct model_prediction *p)
 {
 	double share_y = drop->share[MODEL_S2Y] - drop->turning;
-	struct model_peak box = {half_sine(drop), drop->scene->contact_duration_s / 2.0};
+	struct model_peak box = {half_sine(drop), drop->duration_s / 2.0};
 
 	p->velocity_change_m_s = (1.0 + drop->scene->contact_restitution) * drop->speed_m_s;
-	p->contact_time_s = drop->scene->contact_duration_s;
+	p->contact_time_s = drop->duration_s;
 	p->restitution = drop->scene->contact_restitution;
 	p->box = box;
 	p->peak[MODEL_S1X] = (struct model_peak){s1.value_g * drop->share[MODEL_S1X], s1.time_s};
@@ -148,27 +143,18 @@ static void share_out(const struct drop *drop, double s1, double box, double val
 	value[MODEL_S2Y] = box * (drop->share[MODEL_S2Y] - drop->turning);
 }
 
-static void rungs_closed_fill_plate(const struct drop *drop, struct model_prediction *p)
-{
-	p->plate_damping_ratio = drop->plate_zeta;
-	p->plate_frequency_hz = drop->plate_zeta < 1.0
-	                                ? drop->plate_omega / (2.0 * UNITS_PI) *
-	                                          sqrt((1.0 - drop->plate_zeta) * (1.0 + drop->plate_zeta))
-	                                : (double)NAN;
-}
-
 /* ---- steady ---- */
 
 static int steady_of(const struct drop *drop, double *transmissibility, double *phase, char *message)
 {
-	double forcing = UNITS_PI / drop->scene->contact_duration_s;
+	double forcing = UNITS_PI / drop->duration_s;
 	int error;
 
 	*transmissibility = 1.0;
 	*phase = 0.0;
 	if (!drop->has_plate)
 		return 0;
-	error = steady_response(forcing / drop->plate_omega, drop->plate_zeta, transmissibility, phase);
+	error = oscillator_steady(forcing / drop->plate_omega, drop->plate_zeta, transmissibility, phase);
 	if (error)
 		return drop_refuse(
 		        message, error,
@@ -180,7 +166,7 @@ static int steady_of(const struct drop *drop, double *transmissibility, double *
 static int steady_predict(const struct drop *drop, const struct model_options *options,
                           struct model_prediction *p, char *message)
 {
-	double duration = drop->scene->contact_duration_s, transmissibility, phase;
+	double duration = drop->duration_s, transmissibility, phase;
 	int error = steady_of(drop, &transmissibility, &phase, message);
 
 	(void)options;
@@ -191,7 +177,7 @@ static int steady_predict(const struct drop *drop, const struct model_options *o
 	                                   duration / 2.0 + phase / (UNITS_PI / duration)},
 	               p);
 	if (drop->has_plate)
-		rungs_closed_fill_plate(drop, p);
+		rung_swing(drop->plate_omega, drop->plate_zeta, p);
 	return 0;
 }
 
@@ -199,7 +185,7 @@ static int steady_predict(const struct drop *drop, const struct model_options *o
 static int steady_history(const struct drop *drop, const struct model_options *options, double start_s,
                           double step_s, double (*value)[MODEL_AXES], size_t count, char *message)
 {
-	double duration = drop->scene->contact_duration_s, transmissibility, phase;
+	double duration = drop->duration_s, transmissibility, phase;
 	int error = steady_of(drop, &transmissibility, &phase, message);
 
 	(void)options;
@@ -234,7 +220,7 @@ static int sdof_of(const struct drop *drop, struct sdof *sdof, char *message)
 
 	if (drop->has_plate)
 		error = sdof_init(sdof, drop->plate_omega / (2.0 * UNITS_PI), drop->plate_zeta,
-		                  half_sine(drop), drop->scene->contact_duration_s);
+		                  half_sine(drop), drop->duration_s);
 	return error ? drop_refuse(message, error == DT_E_MEMORY ? error : DT_E_NUMERIC,
 	                           "the plate's response is beyond the range of numbers")
 	             : 0;
@@ -243,7 +229,7 @@ static int sdof_of(const struct drop *drop, struct sdof *sdof, char *message)
 static int sdof_predict(const struct drop *drop, const struct model_options *options,
                         struct model_prediction *p, char *message)
 {
-	struct model_peak s1 = {half_sine(drop), drop->scene->contact_duration_s / 2.0};
+	struct model_peak s1 = {half_sine(drop), drop->duration_s / 2.0};
 	struct sdof sdof;
 	int error = sdof_of(drop, &sdof, message);
 
@@ -256,7 +242,7 @@ static int sdof_predict(const struct drop *drop, const struct model_options *opt
 			return drop_refuse(message, error,
 			                   "stiffness_n_m: the plate swings over %d times within the contact",
 			                   SDOF_CYCLES_MAX);
-		rungs_closed_fill_plate(drop, p);
+		rung_swing(drop->plate_omega, drop->plate_zeta, p);
 	}
 	fill_half_sine(drop, s1, p);
 	return 0;

@@ -103,17 +103,6 @@ static int contact_of(const struct drop *drop, unsigned refinements, struct cont
 	return 0;
 }
 
-/* Two masses on a linear mount, both free: their damping ratio against each other. */
-static void fill_linear_plate(const struct drop *drop, double damping_n_s_m, struct model_prediction *p)
-{
-	double zeta = 0.5 * damping_n_s_m * drop->plate_omega / drop->scene->mount_stiffness_n_m;
-
-	p->plate_damping_ratio = zeta;
-	p->plate_frequency_hz =
-	        zeta < 1.0 ? drop->plate_omega * sqrt((1.0 - zeta) * (1.0 + zeta)) / (2.0 * UNITS_PI)
-	                   : (double)NAN;
-}
-
 static int check_refinements(const struct scene *s, unsigned refinements, char *message)
 {
 	const struct {
@@ -203,8 +192,11 @@ static int course_predict(const struct drop *drop, const struct model_options *o
 		p->plate_travel_m = fabs(peak_of(r.peak[COURSE_TRAVEL]).value_g);
 		p->plate_frequency_hz = r.ring_hz;
 		p->plate_damping_ratio = r.ring_damping;
-		if (!(course.body.softening > 0.0))
-			fill_linear_plate(drop, course.body.mount_damping_n_s_m, p);
+		if (!(course.body.softening > 0.0)) /* linear, both masses free */
+			rung_swing(drop->plate_omega,
+			           0.5 * course.body.mount_damping_n_s_m * drop->plate_omega /
+			                   drop->scene->mount_stiffness_n_m,
+			           p);
 	}
 	return 0;
 }

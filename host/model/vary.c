@@ -70,9 +70,7 @@ void vary_set(struct scene *scene, const struct vary_key *key, double value)
 	*at = value;
 	if (!key->linked || !(times > 0.0) || !isfinite(times))
 		return;
-	if (at == &scene->drop_height_m) {
-		scene->contact_duration_s *= pow(times, -0.1);
-	} else if (at == &scene->contact_duration_s) {
+	if (at == &scene->contact_duration_s) {
 		scene->contact_stiffness_n_m15 *= pow(times, -2.5);
 	} else if (at == &scene->mount_cube_m) {
 		scene->mount_stiffness_n_m *= times;

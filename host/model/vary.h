@@ -5,11 +5,13 @@
  * Changing a scene by name: any key of scene.def as "section.key", alone; or by a short name, with what
  * depends on it:
  *
- *   angle, mass, restitution, stiffness   drop.angle_deg, product.case_mass_kg, ...: nothing else
- *   height        the contact time with v^-0.2, as a given mat has it
+ *   angle, height, mass, restitution, stiffness   drop.angle_deg, drop.height_m, ...: nothing else
  *   contact-time  the contact's stiffness with T^-2.5
  *   cube          the mounts' stiffness and dampers with the cube's side, cubes being similar
  *   damping       the identified dampers with the damping ratio
+ *
+ * The contact time is that of the height and the mass it was measured with (contact.duration_height_m,
+ * mass_kg): the model has it follow another height or mass.
  *
  * Pure functions, any thread; a scene that comes out is the caller's to check.
  */

@@ -59,7 +59,7 @@ int design_add_key(struct design *design, const struct vary_key *key)
 		if (design->ensemble.axis[i].key.offset == key->offset)
 			return DT_E_STATE;
 	*axis = (struct ensemble_axis){
-	        .key = *key, .from = fmax(value / RANGE, key->min), .step = fmin(value * RANGE, key->max)};
+	        .key = *key, .from = fmax(value / RANGE, key->min), .to = fmin(value * RANGE, key->max)};
 	design->ensemble.axes++;
 	return 0;
 }
@@ -143,7 +143,7 @@ static int designs_zoom(struct designs *coarser, size_t best)
 
 		for (size_t i = 0; i < d->ensemble.axes; i++) {
 			double low = fmax(coarser->row[best].key[i] / g.ratio[i], d->ensemble.axis[i].from),
-			       high = fmin(coarser->row[best].key[i] * g.ratio[i], d->ensemble.axis[i].step);
+			       high = fmin(coarser->row[best].key[i] * g.ratio[i], d->ensemble.axis[i].to);
 
 			g.low[i] = low;
 			g.ratio[i] = pow(high / low, 1.0 / FINE);
@@ -273,7 +273,7 @@ int design_write(struct design *d, enum table_format format, FILE *out)
 	for (size_t i = 0; i < d->ensemble.axes; i++) {
 		g.steps[i] = coarse[d->ensemble.axes];
 		g.low[i] = d->ensemble.axis[i].from;
-		g.ratio[i] = pow(d->ensemble.axis[i].step / g.low[i], 1.0 / (double)g.steps[i]);
+		g.ratio[i] = pow(d->ensemble.axis[i].to / g.low[i], 1.0 / (double)g.steps[i]);
 	}
 	points = designs_points(&g);
 	g.row = calloc(points, sizeof(*g.row));

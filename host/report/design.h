@@ -21,7 +21,7 @@ struct design_limit {
 	double value; /* of its magnitude, above 0 */
 };
 
-/* The ensemble's axes are the keys: count is set here, from and step are the range's ends. */
+/* The ensemble's axes are the keys: count is set here, from and to are the range's ends. */
 struct design {
 	struct ensemble ensemble;
 	struct design_limit limit[DESIGN_LIMITS_MAX];

@@ -283,6 +283,7 @@ static int monte_carlo_json(const struct ensemble *e, size_t draws, size_t faile
 		put_number(&b, item, "sd", spread[i].sd);
 		put_number(&b, item, "low_95", spread[i].low);
 		put_number(&b, item, "high_95", spread[i].high);
+		put_number(&b, item, "without", (double)spread[i].without);
 	}
 	return put_out(&b, root, out);
 }
@@ -303,11 +304,12 @@ int forecast_monte_carlo(const struct ensemble *e, size_t draws, bool json, FILE
 	for (size_t i = 0; i < e->axes; i++)
 		fprintf(out, "  %s %.6g +- %.6g\n", e->axis[i].key.key, vary_get(e->scene, &e->axis[i].key),
 		        e->axis[i].sd);
-	fprintf(out, "\n%-20s %12s %12s %14s %12s\n", "", "mean", "sd", "95 % from", "to");
+	fprintf(out, "\n%-20s %12s %12s %14s %12s %8s\n", "", "mean", "sd", "95 % from", "to", "without");
 	for (size_t i = 0; i < count; i++)
 		if (isfinite(spread[i].mean))
-			fprintf(out, "%-20s %12.6g %12.6g %14.6g %12.6g\n", outputs[i]->key, spread[i].mean,
-			        spread[i].sd, spread[i].low, spread[i].high);
+			fprintf(out, "%-20s %12.6g %12.6g %14.6g %12.6g %8zu\n", outputs[i]->key,
+			        spread[i].mean, spread[i].sd, spread[i].low, spread[i].high,
+			        spread[i].without);
 	return written(out);
 }
 

@@ -56,7 +56,8 @@ static struct scene random_scene(void)
 		s.product_balance_angle_deg = uniform(15.0, 45.0);
 		s.product_inertia_ratio = uniform(0.8, 1.4);
 		s.contact_duration_s = spread(0.0015, 0.008);
-		s.contact_mass_kg = 0.0;
+		s.contact_duration_height_m = s.drop_height_m;
+		s.contact_mass_kg = s.product_case_mass_kg;
 		s.contact_restitution = uniform(0.25, 0.9);
 		s.contact_tangential_ratio = uniform(0.0, 3.0);
 		s.contact_friction = uniform(0.0, 0.9);
@@ -187,6 +188,8 @@ static void test_widest_questions(void **unused)
 		s.product_length_m = spread(0.03, 2.0);
 		s.product_width_m = s.product_length_m * uniform(0.3, 1.0);
 		s.contact_duration_s = spread(0.5e-3, 15e-3);
+		s.contact_duration_height_m = s.drop_height_m;
+		s.contact_mass_kg = s.product_case_mass_kg;
 		s.contact_restitution = uniform(0.01, 0.99);
 		s.contact_mat_thickness_m = 10.0;
 		s.contact_stiffness_n_m15 = s.product_case_mass_kg * pow(3.3 / s.contact_duration_s, 2.5) /

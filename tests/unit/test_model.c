@@ -40,6 +40,8 @@ static struct scene box(void)
 	        .product_balance_angle_deg = 25.0,
 	        .product_inertia_ratio = 1.0,
 	        .contact_duration_s = 0.003,
+	        .contact_duration_height_m = 0.894,
+	        .contact_mass_kg = 0.173,
 	        .contact_restitution = 0.5,
 	        .sensor_s2_offset_m = 0.065,
 	};
@@ -115,7 +117,7 @@ static void test_plate_on_a_heavy_box(void **state)
 	struct model_prediction p;
 
 	(void)state;
-	scene.product_case_mass_kg = 1e15;
+	scene.product_case_mass_kg = scene.contact_mass_kg = 1e15;
 	p = predict(&scene);
 	check_close("2A", p.resultant[0].value_g, REFERENCE_G(368.323190670), 1e-11);
 	check_close("2A lag", p.lag_s, 0.00327080406287 - 0.0015, 1e-11);
@@ -445,6 +447,37 @@ static void test_through_the_mat(void **state)
 	assert_int_equal(p.notes, MODEL_NOTE_DEEP);
 }
 
+static double contact_time(const struct scene *scene, enum model_fidelity fidelity)
+{
+	const struct model_options plain = {.refinements = 0};
+
+	return solve(scene, fidelity, &plain).contact_time_s;
+}
+
+/* Hertz's exponent holds for any restitution: T is as (m/k)^(2/5) v^(-1/5), and k is the mat's. */
+static void test_contact_time_of_another_drop(void **state)
+{
+	struct scene scene = reference_scene("1"), plate = reference_scene("2A");
+	const double shipped = contact_time(&scene, MODEL_COUPLED);
+	const double half = 1.0717734625362931, twice = 1.3195079107728942; /* 2^(1/10), 2^(2/5) */
+
+	(void)state;
+	assert_true(contact_time(&scene, MODEL_SDOF) == 0.003 && contact_time(&plate, MODEL_SDOF) == 0.003);
+	scene.drop_height_m = 0.447;
+	check_close("half the height", contact_time(&scene, MODEL_SDOF), 0.003 * half, 1e-14);
+	check_close("half, coupled", contact_time(&scene, MODEL_COUPLED), shipped * half, 2e-3); /* weight */
+	check_close("half, its peak", predict(&scene).box.value_g, /* goes with v/T */
+	            REFERENCE_G(335.304309245113) / (sqrt(2.0) * half), 1e-12);
+	scene.drop_height_m = 0.894;
+	scene.product_case_mass_kg = 0.346;
+	check_close("twice the mass", contact_time(&scene, MODEL_SDOF), 0.003 * twice, 1e-14);
+	check_close("twice, coupled", contact_time(&scene, MODEL_COUPLED), shipped * twice, 2e-3);
+	plate.product_case_mass_kg = 0.346; /* geometry 1's .173 kg is what the time was measured with */
+	check_close("twice, with a plate", contact_time(&plate, MODEL_SDOF), 0.003 * twice, 1e-14);
+	plate.product_case_mass_kg = 0.173 / 2.0 - 0.014;
+	check_close("half, with its plate", contact_time(&plate, MODEL_SDOF), 0.003 / twice, 1e-14);
+}
+
 /* From the materials: a dent through the mat and twice the contact time that was seen. */
 static void test_hertz_does_not_hold(void **state)
 {
@@ -631,6 +664,7 @@ int main(void)
 	        cmocka_unit_test(test_what_rungs_say),
 	        cmocka_unit_test(test_histories_and_peaks),
 	        cmocka_unit_test(test_through_the_mat),
+	        cmocka_unit_test(test_contact_time_of_another_drop),
 	        cmocka_unit_test(test_hertz_does_not_hold),
 	        cmocka_unit_test(test_degenerate_scenes),
 	        cmocka_unit_test(test_no_gaps),

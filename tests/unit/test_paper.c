@@ -11,7 +11,7 @@
 
 #include "common/units.h"
 #include "host/model/paper.h"
-#include "host/model/steady.h"
+#include "host/model/oscillator.h"
 #include "tests/unit/near.h"
 
 /* Geometry 2 as the study has it; the mat by Gent's relation for Shore A 40. */
@@ -151,7 +151,7 @@ static void response_as_printed(void **state)
 	assert_near(r.transmissibility, 1.562, 0.0005);
 	assert_near(UNITS_DEG(r.phase_rad), -22.6, 0.05);
 	assert_int_equal(
-	        steady_response(500.0 / 3.0 * sqrt(0.84) / (121.0 * sqrt(0.99)), 0.1, &right, &phase), 0);
+	        oscillator_steady(500.0 / 3.0 * sqrt(0.84) / (121.0 * sqrt(0.99)), 0.1, &right, &phase), 0);
 	assert_near_part(r.transmissibility, right, 1e-13);
 	/* psi of (17), by which it follows (1, 2 zeta r) */
 	assert_near(UNITS_DEG(phase + atan(0.2 * 500.0 / 3.0 * sqrt(0.84) / (121.0 * sqrt(0.99)))), 157.4,
@@ -182,15 +182,15 @@ static void steady_to_twelve_digits(void **state)
 
 	(void)state;
 	for (size_t i = 0; i < sizeof(reference) / sizeof(reference[0]); i++) {
-		assert_int_equal(steady_response(reference[i].r, reference[i].zeta, &value, &phase), 0);
+		assert_int_equal(oscillator_steady(reference[i].r, reference[i].zeta, &value, &phase), 0);
 		assert_near_part(value, reference[i].transmissibility, 1e-13);
 		assert_near_part(phase, reference[i].psi - atan(2 * reference[i].zeta * reference[i].r),
 		                 1e-11);
 	}
 	/* 1/|1 - r^2| where the printed form cancels */
-	assert_int_equal(steady_response(1.0 + 1e-14, 0.0, &value, &phase), 0);
+	assert_int_equal(oscillator_steady(1.0 + 1e-14, 0.0, &value, &phase), 0);
 	assert_near_part(value, 1.0 / 1.9984014443252818e-14, 1e-13);
-	assert_int_equal(steady_response(1.0, 1e-9, &value, &phase), 0);
+	assert_int_equal(oscillator_steady(1.0, 1e-9, &value, &phase), 0);
 	assert_near_part(value, 5e8, 1e-13);
 }
 
@@ -212,10 +212,10 @@ static void refusals(void **state)
 	in = study(25);
 	in.mount_damping_ratio = 1.0;
 	assert_int_equal(paper_solve(&in, &r), DT_E_ARGUMENT);
-	assert_int_equal(steady_response(1.0, 0.0, &value, &phase), DT_E_NUMERIC);
-	assert_int_equal(steady_response(0.0, 0.1, &value, &phase), DT_E_ARGUMENT);
-	assert_int_equal(steady_response(1.0, -0.1, &value, &phase), DT_E_ARGUMENT);
-	assert_int_equal(steady_response((double)NAN, 0.1, &value, &phase), DT_E_ARGUMENT);
+	assert_int_equal(oscillator_steady(1.0, 0.0, &value, &phase), DT_E_NUMERIC);
+	assert_int_equal(oscillator_steady(0.0, 0.1, &value, &phase), DT_E_ARGUMENT);
+	assert_int_equal(oscillator_steady(1.0, -0.1, &value, &phase), DT_E_ARGUMENT);
+	assert_int_equal(oscillator_steady((double)NAN, 0.1, &value, &phase), DT_E_ARGUMENT);
 	assert_true(r.box_m_s2 == 7.0 && value == 7.0 && phase == 7.0);
 }
 

@@ -94,6 +94,8 @@ static void make_scene(struct fixture *f)
 	        .product_balance_angle_deg = 25.0,
 	        .product_inertia_ratio = 1.0,
 	        .contact_duration_s = 0.003,
+	        .contact_duration_height_m = 0.894,
+	        .contact_mass_kg = 0.169,
 	        .contact_restitution = 0.5,
 	        .mount_plate_mass_kg = 0.014,
 	        .mount_stiffness_n_m = 7550.0,

@@ -89,23 +89,23 @@ static void mistakes_are_named_by_line(void **state)
 		int result, at; /* at: line of the file, 0 = none */
 		const char *says;
 	} cases[] = {
-	        {"cube_m", "cubes_m = 0.003", DT_E_FORMAT, 37, "unknown key 'cubes_m' in [mount]"},
-	        {"[mount]", "[mounts]", DT_E_FORMAT, 33, "unknown section [mounts]"},
-	        {"restitution", "restitution = 1.5", DT_E_RANGE, 21,
+	        {"cube_m", "cubes_m = 0.003", DT_E_FORMAT, 38, "unknown key 'cubes_m' in [mount]"},
+	        {"[mount]", "[mounts]", DT_E_FORMAT, 34, "unknown section [mounts]"},
+	        {"restitution", "restitution = 1.5", DT_E_RANGE, 22,
 	         "restitution is 1.5, expected 1e-06 to 1"},
-	        {"restitution", "restitution = nan", DT_E_RANGE, 21, "expected 1e-06 to 1"},
-	        {"restitution", "restitution = inf", DT_E_RANGE, 21, "expected 1e-06 to 1"},
-	        {"restitution", "restitution = half", DT_E_FORMAT, 21, "'half' is not a number"},
-	        {"restitution", "restitution = 0.5 m", DT_E_FORMAT, 21, "is not a number"},
-	        {"restitution", "restitution", DT_E_FORMAT, 21, "not a [section] or key = value"},
-	        {"restitution", "duration_s = 0.002", DT_E_FORMAT, 21, "duration_s is given twice"},
+	        {"restitution", "restitution = nan", DT_E_RANGE, 22, "expected 1e-06 to 1"},
+	        {"restitution", "restitution = inf", DT_E_RANGE, 22, "expected 1e-06 to 1"},
+	        {"restitution", "restitution = half", DT_E_FORMAT, 22, "'half' is not a number"},
+	        {"restitution", "restitution = 0.5 m", DT_E_FORMAT, 22, "is not a number"},
+	        {"restitution", "restitution", DT_E_FORMAT, 22, "not a [section] or key = value"},
+	        {"restitution", "duration_s = 0.002", DT_E_FORMAT, 22, "duration_s is given twice"},
 	        {"height_m", "", DT_E_FORMAT, 0, "[drop] height_m is missing"},
 	        {"height_m", "height_m = 0.1", DT_E_RANGE, 0, "upper gate"},
 	        {"angle_deg", "angle_deg = 95", DT_E_RANGE, 8, "angle_deg is 95, expected 10 to 80"},
 	        {"name", "title = again", DT_E_FORMAT, 0, "name is missing"},
 	        {"name", "colour = red", DT_E_FORMAT, 3, "unknown key 'colour'"},
 	        {"stiffness_n_m ", "stiffness_n_m = 0", DT_E_RANGE, 0, "a plate needs mounts"},
-	        {"range_g", "range_g = 2000", DT_E_RANGE, 45, "range_g"},
+	        {"range_g", "range_g = 2000", DT_E_RANGE, 46, "range_g"},
 	};
 
 	(void)state;

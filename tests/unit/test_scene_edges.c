@@ -120,12 +120,56 @@ static void places_that_are_given_stay(void **state)
 	assert_near(scene.tower_dampers_m, 0.75, 1e-12);
 }
 
+/* Geometry 2A's text without the lines that begin with one of two keys. */
+static void read_without(struct scene *scene, const char *one, const char *two)
+{
+	char file[SCRATCH_MAX], line[256];
+	FILE *in = fopen("common/scenes/geometry-2A.ini", "r"),
+	     *out = fdopen(mkstemp(scratch_name(file, "scene")), "w");
+
+	assert_non_null(in);
+	assert_non_null(out);
+	while (fgets(line, sizeof(line), in) != NULL)
+		if (strncmp(line, one, strlen(one)) != 0 && strncmp(line, two, strlen(two)) != 0)
+			fputs(line, out);
+	fclose(in);
+	fclose(out);
+	assert_int_equal(scene_read(scene, file, message), 0);
+	unlink(file);
+}
+
+/* The drop in which the contact time was measured: as given, else the scene's own as read; written and read
+ * again it stays, whatever has become of height and mass. */
+static void the_drop_of_the_contact_time_stays(void **state)
+{
+	struct scene scene = good();
+	char file[SCRATCH_MAX];
+	FILE *out;
+
+	(void)state;
+	assert_true(scene.contact_duration_height_m == 0.894 && scene.contact_mass_kg == 0.173);
+	read_without(&scene, "duration_height_m", "mass_kg");
+	assert_true(scene.contact_duration_height_m == 0.894 && scene.contact_mass_kg == 0.169);
+	scene.drop_height_m = 1.2;
+	scene.product_case_mass_kg = 0.5;
+	out = fdopen(mkstemp(scratch_name(file, "scene")), "w");
+	assert_non_null(out);
+	scene_write(&scene, out);
+	fclose(out);
+	memset(&scene, 0, sizeof(scene));
+	assert_int_equal(scene_read(&scene, file, message), 0);
+	unlink(file);
+	assert_true(scene.drop_height_m == 1.2 && scene.product_case_mass_kg == 0.5);
+	assert_true(scene.contact_duration_height_m == 0.894 && scene.contact_mass_kg == 0.169);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(each_contradiction_is_said),
 	        cmocka_unit_test(texts_fit_or_are_refused),
 	        cmocka_unit_test(places_that_are_given_stay),
+	        cmocka_unit_test(the_drop_of_the_contact_time_stays),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

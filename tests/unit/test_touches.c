@@ -65,6 +65,7 @@ static struct scene random_scene(void)
 	};
 	double plate = s.mount_plate_mass_kg, omega = 2.0 * UNITS_PI * spread(0.08, 6.0) / contact_s;
 
+	s.contact_duration_height_m = s.drop_height_m;
 	s.mount_stiffness_n_m = omega * omega / (1.0 / plate + 1.0 / mass);
 	s.mount_damping_n_s_m = 2.0 * uniform(0.01, 0.5) * s.mount_stiffness_n_m / omega;
 	s.contact_stiffness_n_m15 =
