@@ -209,6 +209,15 @@ DT_MUST_USE int archive_each_event(struct archive *archive, const char *drop,
                                    int (*each)(void *context, const struct archive_event *event),
                                    void *context);
 
+/* The check of a sensor, by its serial number, in a drop that was not rejected: the last one before a time,
+ * or the first one after it. e_n NAN: there is none. */
+struct archive_check {
+	char drop[ARCHIVE_NAME_MAX + 16];
+	double e_n;
+};
+DT_MUST_USE int archive_check(struct archive *archive, const char *serial, const char *time, bool after,
+                              struct archive_check *check);
+
 /* The sensors whose files went into a drop's result of that version (NULL: the newest), without transducer.
  */
 DT_MUST_USE int archive_each_sensor(struct archive *archive, const char *drop, const char *version,

@@ -426,6 +426,34 @@ int archive_each_sensor(struct archive *archive, const char *drop, const char *v
 	return result;
 }
 
+int archive_check(struct archive *archive, const char *serial, const char *time, bool after,
+                  struct archive_check *check)
+{
+	static const char *const when[] = {"d.time < ? ORDER BY d.time DESC", "d.time > ? ORDER BY d.time"};
+	char query[480];
+	sqlite3_stmt *s;
+	int result;
+
+	*check = (struct archive_check){.e_n = (double)NAN};
+	snprintf(query, sizeof(query),
+	         "SELECT g.name || '/' || d.number, u.e_n FROM of_sensor u JOIN results r ON r.id = "
+	         "u.result_id"
+	         " JOIN drops d ON d.id = r.drop_id JOIN series g ON g.id = d.series_id"
+	         " WHERE u.e_n IS NOT NULL AND u.serial = ? AND d.decision <> 'rejected'"
+	         " AND r.id = (SELECT max(id) FROM results WHERE drop_id = d.id) AND %s LIMIT 1",
+	         when[after]);
+	result = sql_query(archive, &s, query, "ss", serial, time);
+	if (result != 0)
+		return result;
+	result = sql_step(archive, s);
+	if (result > 0) {
+		snprintf(check->drop, sizeof(check->drop), "%s", sql_text(s, 0));
+		check->e_n = sqlite3_column_double(s, 1);
+	}
+	sqlite3_finalize(s);
+	return result < 0 ? result : 0;
+}
+
 int archive_analysis(struct archive *archive, const char *drop, const char *version, struct result *said)
 {
 	int64_t row = 0;

@@ -95,6 +95,23 @@ static int read_log(struct series_page *page, struct series_drop *drop, const ch
 	return 0;
 }
 
+/* What was decided when it was analysed, with the sensors' files of then. */
+static int read_verdict(struct series_page *page, struct series_drop *drop, const char *name)
+{
+	char *json;
+	int result;
+
+	if (!page->scene.limits[0] || !series_is_drawn(drop))
+		return 0;
+	result = archive_json(page->request->archive, name, drop->a.version, &json);
+	if (result)
+		return result;
+	drop->said = cJSON_Parse(json);
+	free(json);
+	drop->judged = verdict_read(&drop->verdict, drop->said);
+	return 0;
+}
+
 static int read_drop(struct series_page *page, struct series_drop *drop)
 {
 	struct result said = result_of(&drop->record, &drop->analysis, &drop->options);
@@ -121,12 +138,9 @@ static int read_drop(struct series_page *page, struct series_drop *drop)
 	if (result)
 		return result == DT_E_FORMAT ? 0 : result;
 	drop->has_result = true;
-	if (!plan_is_empty(&page->plan) && series_is_drawn(drop)) {
-		result = verdict_judge(&drop->verdict, &page->plan, &said);
-		drop->judged = result == 0;
-		if (result)
-			return result;
-	}
+	result = read_verdict(page, drop, name);
+	if (result)
+		return result;
 	drop->report = (struct report){.record = &drop->record, .analysis = &drop->analysis};
 	drop->zero = report_zero(&drop->report);
 	for (size_t i = 0; i < drop->analysis.resultant_count && page->has_model; i++)
@@ -235,16 +249,6 @@ static int tell_all_lacking(struct series_page *page)
 	return DT_E_CORRUPT;
 }
 
-static int read_plan(struct series_page *page)
-{
-	char message[SCENE_MESSAGE_MAX];
-	int result = plan_read(&page->plan, page->scene.limits, page->series.name, message);
-
-	if (result)
-		snprintf(page->page.message, page->page.size, "%s", message);
-	return result;
-}
-
 static int series_gather(struct series_page *page)
 {
 	struct archive *archive = page->request->archive;
@@ -260,10 +264,10 @@ static int series_gather(struct series_page *page)
 		result = archive_seal(archive, &page->seal);
 	if (result == 0)
 		result = solve_model(page);
-	if (result == 0 && read_plan(page) != 0)
-		return DT_E_FORMAT;
 	for (size_t i = 0; i < page->count && result == 0; i++)
 		result = read_drop(page, page->drop[i]);
+	if (result == 0)
+		result = series_check_sensors(page);
 	archive_cell_close(&page->cell);
 	if (result != 0)
 		snprintf(page->page.message, page->page.size, "%s",
@@ -271,10 +275,11 @@ static int series_gather(struct series_page *page)
 		                                                               : archive_message(archive));
 	if (result == 0)
 		result = tell_all_lacking(page);
-	if (result == 0 && page->request->strict && series_is_overdue(page)) {
+	if (result == 0 && page->request->strict && (series_is_overdue(page) || series_is_suspect(page))) {
 		snprintf(page->page.message, page->page.size,
-		         "%s: a sensor's calibration was overdue at a drop, and --strict was asked for",
-		         page->series.name);
+		         "%s: a sensor's calibration was overdue at a drop%s, and --strict was asked for",
+		         page->series.name,
+		         series_is_suspect(page) ? ", or it failed its check before or after" : "");
 		result = DT_E_STATE;
 	}
 	if (result != 0)
@@ -290,6 +295,7 @@ static void series_release(struct series_page *page)
 {
 	for (size_t i = 0; i < page->count; i++) {
 		free(page->drop[i]->analysis.channels);
+		cJSON_Delete(page->drop[i]->said);
 		record_free(&page->drop[i]->record);
 		free(page->drop[i]);
 	}

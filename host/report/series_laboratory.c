@@ -3,6 +3,7 @@
  * What ISO/IEC 17025, 7.8 wants of a report beside what was measured: the laboratory's profile, what is
  * missing of it, sensors whose calibration was overdue, and the statements.
  */
+#include <math.h>
 #include <string.h>
 
 #include "host/report/series_private.h"
@@ -63,6 +64,41 @@ bool series_is_overdue(const struct series_page *page)
 	return false;
 }
 
+bool series_is_suspect(const struct series_page *page)
+{
+	for (size_t i = 0; i < page->sensors; i++)
+		if (page->sensor[i].suspect)
+			return true;
+	return false;
+}
+
+int series_check_sensors(struct series_page *page)
+{
+	const char *time[2] = {"9", ""}; /* of the first and the last drop that counts */
+
+	for (size_t i = 0; i < page->count; i++) {
+		const struct archive_drop *a = &page->drop[i]->a;
+
+		if (!page->drop[i]->counts)
+			continue;
+		time[0] = strcmp(a->time, time[0]) < 0 ? a->time : time[0];
+		time[1] = strcmp(a->time, time[1]) > 0 ? a->time : time[1];
+	}
+	for (size_t i = 0; i < 2 * page->sensors; i++) {
+		struct series_sensor *s = &page->sensor[i / 2];
+		struct archive_check check;
+		int result = archive_check(page->request->archive, s->serial, time[i % 2], i % 2, &check);
+
+		if (result)
+			return result;
+		if (isnan(check.e_n))
+			continue;
+		snprintf(s->checks[i % 2], sizeof(s->checks[0]), "%s: E_n %.2f", check.drop, check.e_n);
+		s->suspect |= fabs(check.e_n) > 1.0;
+	}
+	return 0;
+}
+
 /* Whether each drop that counts has that sensor's file. */
 static bool has_sensor(const struct series_page *page, const char *name)
 {
@@ -87,6 +123,8 @@ void series_sensors(struct series_page *page)
 	        COLUMN(CHARS, due, .title = "due"),
 	        COLUMN(YES, overdue, .title = "overdue"),
 	        COLUMN(CHARS, drops, .title = "drops"),
+	        COLUMN(CHARS, checks[0], .title = "check before"),
+	        COLUMN(CHARS, checks[1], .title = "check after"),
 	};
 #undef COLUMN
 	struct table table = {.out = page->page.out, .format = TABLE_HTML};
@@ -100,10 +138,17 @@ void series_sensors(struct series_page *page)
 	}
 	table_begin(&table, columns, TABLE_COUNT(columns));
 	for (size_t i = 0; i < page->sensors; i++) {
-		table.row_class = page->sensor[i].overdue ? " style=\"color:var(--bad)\"" : "";
+		table.row_class = page->sensor[i].overdue || page->sensor[i].suspect
+		                          ? " style=\"color:var(--bad)\""
+		                          : "";
 		table_row(&table, &page->sensor[i]);
 	}
 	(void)table_end(&table);
+	if (series_is_suspect(page))
+		fputs("<p class=\"note\">A check of a sensor against a reference is met where "
+		      "|E<sub>n</sub>| is 1 at "
+		      "most. It is not: all results back to the last good check are suspect.</p>\n",
+		      table.out);
 	for (size_t i = 0; i < page->sensors; i++) {
 		fputs(i == 0 ? "<p class=\"note\">Files, by their SHA-256: <span class=\"hash\">" : "; ",
 		      table.out);
@@ -188,11 +233,16 @@ void series_laboratory(struct series_page *page)
 		fputs("<div class=\"verdict bad\">OVERDUE when the drops were made: a sensor's calibration; "
 		      "not under accreditation</div>\n",
 		      out);
+	if (series_is_suspect(page))
+		fputs("<div class=\"verdict bad\">SUSPECT: a sensor failed its check against a reference, "
+		      "see "
+		      "the sensors</div>\n",
+		      out);
 	fputs("<table class=\"facts\">", out);
 	for (int i = 0; i < LABORATORY_FIELDS; i++)
 		laboratory_row(page, (enum laboratory_field)i);
 	sensor_row(page, "S1");
 	sensor_row(page, "S2");
 	fputs("</table>\n", out);
-	statements(page, missing == 0 && !overdue);
+	statements(page, missing == 0 && !overdue && !series_is_suspect(page));
 }

@@ -78,7 +78,7 @@ void series_limits(struct series_page *page)
 	const struct verdict *worst = NULL;
 	FILE *out = page->page.out;
 
-	if (plan_is_empty(&page->plan))
+	if (!page->scene.limits[0])
 		return;
 	for (size_t i = 0; i < page->count; i++) {
 		const struct series_drop *d = page->drop[i];

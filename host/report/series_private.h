@@ -22,7 +22,8 @@ struct series_drop {
 	struct estimate_options options; /* of the result: the high-pass that was undone */
 	struct report report;            /* of these */
 	struct report_zero zero;
-	struct verdict verdict; /* of its samples and its result, by the plan of the series */
+	cJSON *said;            /* its result, as JSON */
+	struct verdict verdict; /* of said */
 	bool judged;
 	double model_s; /* the model's first touch, after zero; NAN: no model to lay over it */
 };
@@ -32,9 +33,10 @@ struct series_sensor {
 	char name[8], serial[TRANSDUCER_TEXT_MAX], model[TRANSDUCER_TEXT_MAX],
 	        certificate[TRANSDUCER_TEXT_MAX], laboratory[TRANSDUCER_TEXT_MAX], date[12], due[12],
 	        file_sha256[DIGEST_CHARS];
-	char drops[120];
-	size_t count; /* of them */
-	bool overdue; /* at one of them */
+	char drops[120], checks[2][ARCHIVE_NAME_MAX + 32]; /* before and after */
+	size_t count;                                      /* of them */
+	bool overdue;                                      /* at one of them */
+	bool suspect;                                      /* a check before or after the series failed */
 };
 
 enum { SERIES_SENSORS_MAX = 32 };
@@ -46,7 +48,6 @@ struct series_page {
 	struct archive_seal seal;
 	char text[6][ARCHIVE_TEXT_MAX + 1];
 	struct scene scene;
-	struct plan plan;
 	bool has_model, has_below;
 	struct model_prediction prediction, below;
 	struct series_drop **drop;
@@ -97,8 +98,12 @@ struct series_drop_of_page {
 };
 int series_take_sensor(void *context, const struct sensor_used *used);
 
-/* Whether a sensor was overdue at a drop that counts. */
+/* Whether a sensor was overdue at a drop that counts, and whether a check of one failed. */
 bool series_is_overdue(const struct series_page *page);
+bool series_is_suspect(const struct series_page *page);
+
+/* The checks of the sensors. 0 or DT_E_*. */
+int series_check_sensors(struct series_page *page);
 
 /* Behind the page. */
 void series_evidence(struct series_page *page);

@@ -150,21 +150,41 @@ static const char *read_bound(const char *text, double none, double *bound)
 	return text + length + strspn(text + length, " \t");
 }
 
+/* REFERENCE +- U */
+static bool read_reference(const char *value, struct plan_limit *limit)
+{
+	const char *rest = read_bound(value, (double)NAN, &limit->lower);
+
+	if (rest == NULL || strncmp(rest, "+-", 2) != 0)
+		return false;
+	rest = read_bound(rest + 2 + strspn(rest + 2, " \t"), (double)NAN, &limit->reference_expanded);
+	limit->upper = limit->lower;
+	return rest != NULL && *rest == '\0' && isfinite(limit->lower) && limit->reference_expanded > 0.0;
+}
+
 static int read_limit(struct plan_reading *r, const char *name, const char *value)
 {
 	struct plan *plan = r->plan;
-	struct plan_limit limit;
+	struct plan_limit limit = {.reference_expanded = 0.0};
 	const char *rest;
+	bool check;
 
 	if (!plan_find(name, &limit))
 		return plan_refuse(
 		        r, "unknown key '%.60s' in [limits], expected SUBJECT.PLACE as JSON has it", name);
-	rest = read_bound(value, (double)-INFINITY, &limit.lower);
-	rest = rest != NULL ? read_bound(rest, (double)INFINITY, &limit.upper) : NULL;
-	if (rest == NULL || *rest != '\0' || !(isfinite(limit.lower) || isfinite(limit.upper)))
-		return plan_refuse(r, "%.60s is '%.60s', expected a lower and an upper limit, - for none",
-		                   name, value);
-	if (!(limit.lower < limit.upper))
+	check = read_reference(value, &limit);
+	if (!check) {
+		limit.reference_expanded = 0.0;
+		rest = read_bound(value, (double)-INFINITY, &limit.lower);
+		rest = rest != NULL ? read_bound(rest, (double)INFINITY, &limit.upper) : NULL;
+		if (rest == NULL || *rest != '\0' || !(isfinite(limit.lower) || isfinite(limit.upper)))
+			return plan_refuse(
+			        r,
+			        "%.60s is '%.60s', expected a lower and an upper limit, - for none, or a "
+			        "reference +- its U",
+			        name, value);
+	}
+	if (!check && !(limit.lower < limit.upper))
 		return plan_refuse(r, "%.60s: lower limit %g is not below upper limit %g", name, limit.lower,
 		                   limit.upper);
 	if (plan->count == PLAN_LIMITS_MAX)
@@ -253,6 +273,7 @@ static void plan_add(struct plan *plan, const char *name, double nominal, double
 
 	if (!(percent > 0.0) || !plan_find(name, limit))
 		return;
+	limit->reference_expanded = 0.0;
 	limit->lower = nominal * (1.0 - percent / 100.0);
 	limit->upper = nominal * (1.0 + percent / 100.0);
 	plan->count++;

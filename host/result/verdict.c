@@ -93,7 +93,8 @@ static struct verdict_item *verdict_new(struct judging *j, const char *subject, 
 	                              .at = (double)NAN,
 	                              .guard = (double)NAN,
 	                              .probability = (double)NAN,
-	                              .margin = (double)NAN};
+	                              .margin = (double)NAN,
+	                              .e_n = (double)NAN};
 	snprintf(item->what, sizeof(item->what), "%s%s%s", subject, subject[0] != '\0' ? "." : "", what);
 	return item;
 }
@@ -148,6 +149,50 @@ static void judge_number(struct judging *j, struct verdict_item *item, double va
 	verdict_settle(item, decide_value(value, u, lower, upper, j->plan->guard));
 }
 
+/* ---- a check of a sensor ---- */
+
+/* The sensor that a channel or a resultant is of; NULL: none. */
+static struct sensor_used *checked_sensor(const struct judging *j, const char *subject)
+{
+	struct sensors *sensors = j->result->sensors;
+	const struct sensor_used *of;
+	unsigned axis;
+
+	if (sensors == NULL)
+		return NULL;
+	of = sensors_of(sensors, subject, &axis);
+	for (size_t i = 0; i < sensors->count; i++)
+		if (of == &sensors->used[i] || (of == NULL && strcmp(sensors->used[i].name, subject) == 0))
+			return &sensors->used[i];
+	return NULL;
+}
+
+/* U of the value must be of all parts. */
+static void judge_reference(struct judging *j, struct verdict_item *item, const char *subject, double value,
+                            double sigma, bool whole, double reference, double expanded)
+{
+	struct sensor_used *used = checked_sensor(j, subject);
+	double both = hypot(DECIDE_COVERAGE * sigma, expanded);
+
+	if (!whole)
+		verdict_because(item, "", "no expanded uncertainty");
+	item->value = value;
+	item->sigma = sigma;
+	item->lower = reference - both;
+	item->upper = reference + both;
+	item->e_n = whole ? (value - reference) / both : (double)NAN;
+	item->margin = 1.0 - fabs(item->e_n);
+	verdict_settle(item, !isfinite(item->e_n)     ? DECIDE_UNDECIDED
+	                     : fabs(item->e_n) <= 1.0 ? DECIDE_PASS
+	                                              : DECIDE_FAIL);
+	if (item->decision != DECIDE_UNDECIDED)
+		snprintf(item->reason, sizeof(item->reason), "E_n %.2f", item->e_n);
+	if (used != NULL && item->decision != DECIDE_UNDECIDED && !(fabs(item->e_n) <= fabs(used->e_n)))
+		used->e_n = item->e_n;
+}
+
+/* ---- a value of the table of quantities ---- */
+
 /* Of peaks and areas the magnitude counts. */
 static bool has_direction(enum quantity_place place)
 {
@@ -172,6 +217,7 @@ static void judge_limit(struct judging *j, const struct plan_limit *limit)
 	double scale = quantity_scale(q), value = (double)NAN, sigma = (double)NAN;
 	struct verdict_item *item;
 	const void *object = NULL;
+	bool whole;
 	char what[80];
 
 	if (listed && subject[0] == '\0')
@@ -192,8 +238,13 @@ static void judge_limit(struct judging *j, const struct plan_limit *limit)
 			verdict_because(item, "status ", estimate_status_name(quantity_status(q, object)));
 		verdict_flags(j, item, subject, flags_of_value(q, object));
 	}
-	judge_number(j, item, has_direction(limit->place) ? fabs(value) : value, sigma,
-	             isfinite(half_of(j, item->what)), limit->lower * scale, limit->upper * scale);
+	whole = isfinite(half_of(j, item->what));
+	value = has_direction(limit->place) ? fabs(value) : value;
+	if (limit->reference_expanded > 0.0)
+		judge_reference(j, item, subject, value, sigma, whole, limit->lower * scale,
+		                limit->reference_expanded * scale);
+	else
+		judge_number(j, item, value, sigma, whole, limit->lower * scale, limit->upper * scale);
 }
 
 /* ---- other axes of the plan's sensor ---- */
@@ -509,6 +560,60 @@ int verdict_judge(struct verdict *v, const struct plan *plan, struct result *res
 	return code;
 }
 
+/* ---- back from JSON ---- */
+
+static const char *verdict_text(const cJSON *object, const char *key)
+{
+	const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(object, key));
+
+	return text != NULL ? text : "";
+}
+
+static enum decision verdict_decision(const cJSON *object)
+{
+	for (enum decision d = DECIDE_NONE; d <= DECIDE_FAIL; d++)
+		if (strcmp(decide_name(d), verdict_text(object, "decision")) == 0)
+			return d;
+	return DECIDE_UNDECIDED;
+}
+
+static void verdict_read_item(struct verdict_item *item, const cJSON *json)
+{
+	*item = (struct verdict_item){.unit = verdict_text(json, "unit"),
+	                              .value = said_number(json, "value"),
+	                              .sigma = said_number(json, "sigma"),
+	                              .lower = said_number(json, "lower"),
+	                              .upper = said_number(json, "upper"),
+	                              .at = said_number(json, "at"),
+	                              .guard = said_number(json, "guard_band"),
+	                              .probability = said_number(json, "probability"),
+	                              .margin = said_number(json, "margin_u95"),
+	                              .e_n = said_number(json, "e_n"),
+	                              .decision = verdict_decision(json)};
+	snprintf(item->what, sizeof(item->what), "%s", verdict_text(json, "what"));
+	snprintf(item->reason, sizeof(item->reason), "%s", verdict_text(json, "reason"));
+}
+
+bool verdict_read(struct verdict *v, const cJSON *result)
+{
+	const cJSON *json = cJSON_GetObjectItemCaseSensitive(result, "verdict"), *item;
+
+	if (!cJSON_IsObject(json))
+		return false;
+	*v = (struct verdict){.decision = verdict_decision(json),
+	                      .by = verdict_text(json, "limits_by"),
+	                      .rule = verdict_text(json, "rule"),
+	                      .rests_on = verdict_text(json, "uncertainty"),
+	                      .verified = said_number(json, "verified") > 0.0,
+	                      .guard = said_number(json, "guard_ratio"),
+	                      .risk = said_number(json, "risk")};
+	v->name = decide_name(v->decision);
+	cJSON_ArrayForEach(item,
+	                   cJSON_GetObjectItemCaseSensitive(json, "items")) if (v->count < VERDICT_ITEMS_MAX)
+	        verdict_read_item(&v->item[v->count++], item);
+	return true;
+}
+
 /* ---- for people and programs ---- */
 
 struct verdict_row {
@@ -529,6 +634,7 @@ static const struct table_column verdict_columns[] = {
         COLUMN(NUMBER, item.at, .key = "at"),
         COLUMN(NUMBER, item.guard, .key = "guard_band", .title = "guard", .width = 8, .digits = 3),
         COLUMN(NUMBER, item.margin, .key = "margin_u95", .title = "margin/U", .width = 9, .digits = 2),
+        COLUMN(NUMBER, item.e_n, .key = "e_n"),
         COLUMN(NUMBER, item.probability, .key = "probability", .title = "p", .width = 7, .digits = 4),
         COLUMN(WORDS, decision, .key = "decision"),
         COLUMN(CHARS, item.reason, .key = "reason"),

@@ -11,6 +11,7 @@
 #include "host/base/table.h"
 #include "host/result/decide.h"
 #include "host/result/plan.h"
+#include "host/result/said.h"
 
 enum { VERDICT_ITEMS_MAX = PLAN_LIMITS_MAX + 3 };
 
@@ -23,8 +24,9 @@ struct verdict_item {
 	double guard;        /* w */
 	double probability;  /* that the limits are met */
 	double margin;       /* the smaller distance to a limit over U, negative outside */
+	double e_n;          /* of a check: (value - reference) / sqrt(U^2 + its U^2); else NAN */
 	enum decision decision;
-	char reason[160]; /* why it is undecided; "" */
+	char reason[160]; /* why it is undecided, E_n of a check; "" */
 };
 
 struct verdict {
@@ -43,8 +45,11 @@ struct verdict {
 
 #define VERDICT_UNVERIFIED "The limits are not verified against the standard: entered by the laboratory"
 
-/* plan must not be empty. DT_E_MEMORY. */
+/* plan must not be empty. The largest E_n of each sensor's checks goes to it (sensor_used). DT_E_MEMORY. */
 DT_MUST_USE int verdict_judge(struct verdict *verdict, const struct plan *plan, struct result *result);
+
+/* What the JSON of a result says, as long as that lives; false: nothing was judged. */
+bool verdict_read(struct verdict *verdict, const cJSON *result);
 
 /* The items as a table. */
 int verdict_table(const struct verdict *verdict, enum table_format format, FILE *out);

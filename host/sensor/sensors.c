@@ -106,6 +106,7 @@ static int sensors_add(struct sensors *sensors, const char *file, double day,
 	(void)date_days(used->due, &due);
 	used->age_years = fmax(0.0, day - calibrated) / DAYS_A_YEAR;
 	used->overdue = floor(day) > due;
+	used->e_n = (double)NAN;
 	used->default_used = t->default_used;
 	sensors_name(used);
 	sensors->count++;

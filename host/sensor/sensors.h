@@ -23,6 +23,7 @@ struct sensor_used {
 	char digest[DIGEST_CHARS];
 	char name[8];     /* "S1": what its channels' names begin with, else the serial number's beginning */
 	double age_years; /* of the calibration at the drop */
+	double e_n;       /* the largest of its checks by this recording; NAN: none */
 	bool overdue, default_used;
 };
 

@@ -447,6 +447,44 @@ static void test_a_budget_decides(void **state)
 	trial_end(&t);
 }
 
+/* 510 +- 8 against 500 +- 6: E_n is 1; by the noise alone nothing is known. */
+static void test_a_check_against_a_reference(void **state)
+{
+	static const char limits[] = "1:channel=aX\n2:peak.value_g=500 +- 6\n";
+	struct budget_item item = {.what = "aX.peak.value_g", .value = 510, .part = {1}, .expanded = 8};
+	struct budget budget = {.count = 1, .item = &item};
+	struct sensors sensors = {.count = 2};
+	struct trial t;
+	struct result said;
+	struct plan plan;
+
+	(void)state;
+	reads(&plan, limits);
+	judge(&t, 510, 1, 1.0, limits);
+	assert_int_equal(t.verdict.decision, DECIDE_UNDECIDED);
+	assert_string_equal(t.verdict.item[0].reason, "no expanded uncertainty");
+	said = result_of(&t.record, &t.analysis, &t.options);
+	said.budget = &budget;
+	said.sensors = &sensors;
+	snprintf(sensors.used[1].transducer.channel[2], sizeof(sensors.used[1].transducer.channel[2]), "aX");
+	sensors.used[0].e_n = sensors.used[1].e_n = NAN;
+	t.analysis.channels[0].peak.value_g = -509.999;
+	assert_int_equal(verdict_judge(&t.verdict, &plan, &said), 0);
+	assert_int_equal(t.verdict.decision, DECIDE_PASS);
+	assert_near(sensors.used[1].e_n, 0.9999, 1e-9);
+	assert_true(isnan(sensors.used[0].e_n));
+	assert_near(t.verdict.item[0].lower, 490, 1e-9);
+	t.analysis.channels[0].peak.value_g = 488.2;
+	assert_int_equal(verdict_judge(&t.verdict, &plan, &said), 0);
+	assert_int_equal(t.verdict.decision, DECIDE_FAIL);
+	assert_near(sensors.used[1].e_n, -1.18, 1e-9);
+	assert_string_equal(t.verdict.item[0].reason, "E_n -1.18");
+	trial_end(&t);
+	refuses("1:S1.peak_g=500 +- 0\n", "expected a lower and an upper limit");
+	refuses("1:S1.peak_g=500 +-\n", "expected a lower and an upper limit");
+	refuses("1:S1.peak_g=- +- 5\n", "expected a lower and an upper limit");
+}
+
 static void test_what_is_flagged_or_unknown_never_passes(void **state)
 {
 	struct trial t;
@@ -534,6 +572,7 @@ int main(void)
 	        cmocka_unit_test(test_a_limit_at_the_edge),
 	        cmocka_unit_test(test_spectrum_between_curves),
 	        cmocka_unit_test(test_a_budget_decides),
+	        cmocka_unit_test(test_a_check_against_a_reference),
 	        cmocka_unit_test(test_what_is_flagged_or_unknown_never_passes),
 	        cmocka_unit_test(test_a_channel_that_is_not_there),
 	};

@@ -95,13 +95,15 @@ static void write_log(const char *file, double peak_g)
 	record_free(&record);
 }
 
+static int64_t made_s = 1000000000; /* when they are */
+
 static unsigned add_to(const char *series, double peak_g)
 {
 	struct archive_recording r;
 
 	assert_int_equal(archive_begin(archive, series, "<i>Ann</i>", ".csv", simulated, &r), 0);
 	write_log(r.log, peak_g);
-	assert_int_equal(archive_finish(archive, &r, 1000000000, "note & <u>more</u>"), 0);
+	assert_int_equal(archive_finish(archive, &r, made_s, "note & <u>more</u>"), 0);
 	return r.number;
 }
 
@@ -125,8 +127,10 @@ static struct estimate_channel channel_of(double value)
 
 static void put_result(const char *drop, struct result *said)
 {
-	struct report report = {
-	        .record = said->record, .analysis = said->analysis, .options = *said->options};
+	struct report report = {.record = said->record,
+	                        .analysis = said->analysis,
+	                        .options = *said->options,
+	                        .sensors = said->sensors};
 	struct text json;
 
 	assert_int_equal(text_open(&json), 0);
@@ -134,6 +138,8 @@ static void put_result(const char *drop, struct result *said)
 	assert_int_equal(archive_result(archive, drop, "1.0-test", said, json.bytes), 0);
 	free(json.bytes);
 }
+
+static struct sensors *chain; /* of the results to come */
 
 /* Every value of it another number. S2 X is as asked. */
 static void give_result(const char *drop, double v, enum estimate_status status, unsigned flags)
@@ -168,6 +174,7 @@ static void give_result(const char *drop, double v, enum estimate_status status,
 	struct estimate_options options = {.iepe_time_constant_s = 0.25};
 	struct result said = result_of(&record, &analysis, &options);
 
+	said.sensors = chain;
 	for (size_t i = 0; i < 6; i++) {
 		snprintf(channels[i].name, sizeof(channels[i].name), "%s", names[i]);
 		channels[i].rate_hz = names[i][2] == 'X' ? 7000 : 10000;
@@ -555,6 +562,62 @@ static void test_one_that_stands_out_is_marked(void **state)
 	free(page);
 }
 
+/* A drop of the series check at that time; e_n NAN: without a check. */
+static void check_at(int64_t time_s, double e_n, const char *serial)
+{
+	char drop[32];
+
+	made_s = time_s;
+	chain->used[0].e_n = e_n;
+	chain->used[0].serial = serial;
+	snprintf(drop, sizeof(drop), "check/%u", add_to("check", 100 + (double)(time_s % 1000)));
+	give_result(drop, 100, ESTIMATE_OK, 0);
+}
+
+/* The last check before and the first one after, of this sensor, not rejected; a failed one is told. */
+static void test_checks_of_a_sensor(void **state)
+{
+	static struct sensors sensors = {.count = 1};
+	struct sensor_used *used = &sensors.used[0];
+	char scene[96], *page;
+
+	(void)state;
+	used->serial = used->model = used->certificate = used->laboratory = used->date = used->due =
+	        used->file_sha256 = "4711";
+	snprintf(used->name, sizeof(used->name), "S1");
+	used->e_n = (double)NAN;
+	chain = &sensors;
+	snprintf(scene, sizeof(scene), "%s/scene.ini", folder);
+	assert_int_equal(archive_new_series(archive, "check", "checks", scene, 25, NAN, NULL, 2), 0);
+	for (made_s = 1000000000; made_s < 1000000200; made_s += 100) {
+		char drop[32];
+
+		snprintf(drop, sizeof(drop), "by-hand/%u", add_drop((double)(made_s % 1000) + 300));
+		give_result(drop, 300, ESTIMATE_OK, 0);
+		decide(drop, ARCHIVE_ACCEPTED, "");
+	}
+	check_at(999999000, 2.5, "4711");
+	check_at(999999100, -0.25, "4711");
+	check_at(999999200, 3, "4712");
+	check_at(999999300, NAN, "4711");
+	check_at(1000000300, -7, "4711");
+	decide("check/5", ARCHIVE_REJECTED, "not screwed on");
+	page = report();
+	assert_has(page, "check/2: E_n -0.25");
+	assert_has_not(page, "check/5");
+	assert_has_not(page, "are suspect");
+	free(page);
+	check_at(1000000500, 0.5, "4711");
+	check_at(1000000400, 1.25, "4711");
+	page = report();
+	assert_has(page, "check/2: E_n -0.25");
+	assert_has(page, "check/7: E_n 1.25");
+	assert_has(page, "are suspect");
+	free(page);
+	chain = NULL;
+	made_s = 1000000000;
+}
+
 static int find_raw(void *context, const struct archive_drop *drop)
 {
 	snprintf(context, 200, "%s/%s", folder, drop->raw);
@@ -705,6 +768,7 @@ int main(void)
 	        cmocka_unit_test_setup_teardown(test_all_rejected, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_undecided_counts_when_asked, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_one_that_stands_out_is_marked, set_up, tear_down),
+	        cmocka_unit_test_setup_teardown(test_checks_of_a_sensor, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_log_missing_or_changed, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_without_result_and_interrupted, set_up, tear_down),
 	        cmocka_unit_test_setup_teardown(test_a_simulated_tower_is_named, set_up, tear_down),
