@@ -17,8 +17,9 @@ enum { SECOND_DIFFERENCES = 255 };
 /* Noise is coloured when samples side by side tremble by less than this part of it: white noise does once in
  * a million quiet parts. Its colour is that of means so long, of no fewer, and believed up to so much. */
 #define COLOURED 0.7
-#define COLOUR_S 2e-3
+#define COLOUR_S 4e-3
 #define COLOUR_MOST 5.0
+#define COLOUR_UNSURE 1.5 /* over their number: Student's factor beyond 2, of 2 / 3 as many */
 
 enum { COLOUR_MEANS = 16 };
 
@@ -281,11 +282,11 @@ double quiet_colour(const struct trace *trace, const struct estimate_baseline *b
 {
 	size_t from = trace_index(trace, baseline->from_s), until = trace_index(trace, baseline->until_s);
 	size_t length = (size_t)ceil(COLOUR_S * trace->rate_hz), means = 0;
-	double square = 0, colour;
+	double square = 0;
 
 	if (baseline->samples == 0 || !(quiet_noise(trace, from, until) < COLOURED * trace->noise_g))
 		return 1;
-	for (; from + length <= until; from += length) {
+	for (; from + length <= until; from += length / 2) {
 		double sum = 0;
 		size_t n = 0;
 
@@ -294,15 +295,14 @@ double quiet_colour(const struct trace *trace, const struct estimate_baseline *b
 				sum += trace->value_g[k];
 				n++;
 			}
-		if (n < length)
-			continue;
-		square += sum * sum / (double)n;
-		means++;
+		square += n < length ? 0 : sum * sum / (double)n;
+		means += n == length;
 	}
 	if (means < COLOUR_MEANS)
 		return 1;
-	colour = sqrt(square / (double)means) / trace->noise_g;
-	return fmin(fmax(colour, 1), COLOUR_MOST);
+	return fmin(
+	        fmax(sqrt(square / (double)means) / trace->noise_g * (1 + COLOUR_UNSURE / (double)means), 1),
+	        COLOUR_MOST);
 }
 
 /* Whether the means of its quarters fall, or rise, each by more than noise and no faster at the end. */

@@ -52,7 +52,7 @@ double quiet_glance(const struct trace *trace, size_t from, size_t until, double
  * a smooth signal nearly vanishes; NAN of too few. */
 double quiet_noise(const struct trace *trace, size_t from, size_t until);
 
-/* Noise of means of 2 ms over what white noise of as many samples has: what estimators that look over a pulse
+/* Noise of means of 4 ms over what white noise of as many samples has: what estimators that look over a pulse
  * or a swing meet. 1 where samples side by side tremble as the whole does, or too few means tell. Zero is
  * taken off. */
 double quiet_colour(const struct trace *trace, const struct estimate_baseline *baseline);
