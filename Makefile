@@ -48,7 +48,7 @@ FIRMWARE_C = $(wildcard firmware/*.c)
 POSIX_C = $(wildcard firmware/port/posix/*.c)
 LOCKSTEP_C = firmware/port/lockstep.c
 LINK_C = $(wildcard common/base/*.c common/link/*.c common/scenes/*.c)
-HOST_C = $(filter-out host/main.c host/hdf5/% host/console/%,$(wildcard host/*.c host/*/*.c))
+HOST_C = $(filter-out host/main.c host/hdf5/% host/mat/% host/console/%,$(wildcard host/*.c host/*/*.c))
 # The page's program: its main is built by console.mk, the rest is a library that tests use too.
 CONSOLE_C = $(filter-out host/console/main.c,$(wildcard host/console/*.c))
 HIL_C = $(filter-out hil/main.c,$(wildcard hil/*.c))

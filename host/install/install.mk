@@ -11,7 +11,7 @@ SHARE = $(PREFIX)/share
 LIBDIR = $(PREFIX)/lib
 INSTALL_IN = host/install
 
-INSTALLED_PROGRAMS = $(PROGRAMS) $(CONSOLE) $(if $(HDF5),$(BUILD)/droptower-hdf5)
+INSTALLED_PROGRAMS = $(PROGRAMS) $(CONSOLE) $(if $(HDF5),$(BUILD)/droptower-hdf5) $(if $(MAT),$(BUILD)/droptower-mat)
 INSTALLED_SCENES = $(wildcard common/scenes/*.ini)
 MAN = $(BUILD)/man
 # A page's date is that of the sources, so that the same sources give the same page.
@@ -43,7 +43,7 @@ install: man $(CONSOLE) ## install below PREFIX (/usr/local), all of it below DE
 
 # Folders that others use too stay; those that are ours alone go.
 uninstall: ## remove what install has installed (same PREFIX and DESTDIR)
-	@rm -f $(foreach p,$(notdir $(PROGRAMS) $(CONSOLE)) droptower-hdf5,'$(DESTDIR)$(BINDIR)/$p') \
+	@rm -f $(foreach p,$(notdir $(PROGRAMS) $(CONSOLE)) droptower-hdf5 droptower-mat,'$(DESTDIR)$(BINDIR)/$p') \
 		'$(DESTDIR)$(SHARE)/man/man1/droptower.1' '$(DESTDIR)$(SHARE)'/man/man1/droptower-*.1 \
 		'$(DESTDIR)$(LIBDIR)/systemd/network/80-can0.network' \
 		'$(DESTDIR)$(LIBDIR)/systemd/system/droptower.service' \

@@ -13,8 +13,6 @@ static const struct {
         {0, "\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", 8,
          "a spreadsheet or other Office file: save the sheet as CSV"},
         {257, "ustar", 5, "a tar archive: unpack it"},
-        {0, "MATLAB 5.0 ", 11, "a MATLAB 5 file: save the matrix with writematrix as text, or as .npy"},
-        {0, "MATLAB 7.3 ", 11, "a MATLAB 7.3 file: save the matrix with -v6 or -v7, or as text"},
         {0, "RF64", 4, "a WAV file of more than 4 GiB (RF64): cut it"},
         {0, "\x1a\x45\xdf\xa3", 4, "an EBML file, as the IDE files of enDAQ are: export it as CSV"},
         {0, "MDF     ", 8, "an MDF file of ASAM: export it as CSV"},

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "common/units.h"
+#include "host/record/assume.h"
 #include "host/record/clock.h"
 #include "host/record/encoding.h"
 #include "host/record/header.h"
@@ -362,62 +362,22 @@ static double digit_s(const struct reading *reading, double divisor)
 	return fmax(digit, reading->largest * DBL_EPSILON) / divisor;
 }
 
-/* Of units of time the one that is plausible: 10 Hz to 20 MHz, and a velocity change that a shock has. */
-static const double RATE_LEAST_HZ = 10, RATE_MOST_HZ = 20e6, CHANGE_LEAST_M_S = 0.02, CHANGE_MOST_M_S = 200;
-
-/* Area under the largest peak down to a tenth of it, in g times rows. */
-static double largest_area(const struct record *record)
+/* Finds the unit that a time column does not tell. */
+static int assume_time(struct reading *reading)
 {
-	double peak = 0, area = 0;
-	const struct channel *of = NULL;
-	size_t at = 0;
+	double step = (reading->time_s[reading->rows - 1] - reading->time_s[0]) / (double)(reading->rows - 1);
+	struct assumed assumed;
+	int error =
+	        assume_unit(&assumed, reading->record, step, false, reading->source->file, reading->message);
 
-	for (size_t c = 0; c < record->channel_count; c++)
-		for (size_t k = 0; k < record->channels[c].count; k++)
-			if (fabs(record->channels[c].value_g[k]) > fabs(peak)) {
-				of = &record->channels[c];
-				peak = of->value_g[k];
-				at = k;
-			}
-	for (size_t k = at; of != NULL && k < of->count && of->value_g[k] / peak > 0.1; k++)
-		area += fabs(of->value_g[k]);
-	for (size_t k = at; of != NULL && k-- > 0 && of->value_g[k] / peak > 0.1;)
-		area += fabs(of->value_g[k]);
-	return area;
-}
-
-/* Finds the unit that a time column does not tell, or refuses with what each would be. */
-static int assume_unit(struct reading *reading)
-{
-	static const char *const names[] = {"s", "ms", "us", "ns"};
-	double span = reading->time_s[reading->rows - 1] - reading->time_s[0], divisor = 1, chosen = 1;
-	double step = span / (double)(reading->rows - 1), area = largest_area(reading->record);
-	unsigned plausible = 0;
-
-	for (size_t i = 0; i < 4; i++, divisor *= 1e3) {
-		double change_m_s = area * UNITS_G_M_S2 * step / divisor;
-
-		if (!(divisor / step >= RATE_LEAST_HZ && divisor / step <= RATE_MOST_HZ &&
-		      change_m_s >= CHANGE_LEAST_M_S && change_m_s <= CHANGE_MOST_M_S))
-			continue;
-		plausible++;
-		reading->assumed = names[i];
-		chosen = divisor;
-	}
-	if (plausible != 1)
-		return source_refuse(
-		        reading->message, DT_E_FORMAT, reading->source->file, 0,
-		        "the time column tells no unit: in s the rate is %.6g Hz and the largest peak %.3g "
-		        "m/s, "
-		        "in ms %.6g Hz and %.3g m/s, in us %.6g Hz and %.3g m/s; expected --columns with "
-		        "time:s, time:ms or time:us",
-		        1 / step, area * UNITS_G_M_S2 * step, 1e3 / step, area * UNITS_G_M_S2 * step / 1e3,
-		        1e6 / step, area * UNITS_G_M_S2 * step / 1e6);
+	if (error)
+		return error;
+	reading->assumed = assumed.unit;
 	for (size_t k = 0; k < reading->rows; k++)
-		reading->time_s[k] /= chosen;
+		reading->time_s[k] /= assumed.divisor;
 	for (size_t i = 0; i < reading->columns.count; i++)
 		if (reading->columns.column[i].kind == COLUMN_TIME)
-			reading->columns.column[i].divisor = chosen;
+			reading->columns.column[i].divisor = assumed.divisor;
 	return 0;
 }
 
@@ -447,7 +407,7 @@ static int find_timebase(struct reading *reading, struct timebase *timebase)
 	while (reading->columns.column[i].kind != COLUMN_TIME)
 		i++;
 	if (reading->sniff != NULL && reading->sniff->time_unit_open) {
-		error = assume_unit(reading);
+		error = assume_time(reading);
 		if (error)
 			return error;
 	}

@@ -260,7 +260,7 @@ static bool is_letter(char c)
 	return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
 }
 
-static bool is_time_name(struct piece name)
+bool sniff_is_time(struct piece name)
 {
 	static const char *const words[] = {"time", "zeit", "temps",     "tiempo",  "tempo",
 	                                    "tid",  "tijd", "timestamp", "elapsed", "x_value"};
@@ -276,7 +276,7 @@ static bool is_time_name(struct piece name)
 	return name.length > 1 && name.text[0] == 't' && !is_letter(name.text[1]);
 }
 
-static bool is_acceleration_name(struct piece name)
+bool sniff_is_acceleration(struct piece name)
 {
 	return piece_has(name, "acc") || piece_has(name, "beschl") || piece_has(name, "shock") ||
 	       piece_has(name, "vib") || piece_has(name, "impact") ||
@@ -324,13 +324,13 @@ static const struct unit *trusted(const struct unit *unit, struct piece name, st
 	             strcmp(unit->name, "ug") == 0 || strcmp(unit->name, "kilo-g") == 0);
 	bool capital = name.length > 0 && told.length == 0 && name.text[name.length - 1] == 'G';
 
-	if (unit->kind == UNIT_TIME && unit->divisor < 1 && !is_time_name(name)) /* a minimum, a height */
+	if (unit->kind == UNIT_TIME && unit->divisor < 1 && !sniff_is_time(name)) /* a minimum, a height */
 		return NULL;
 	if (!gram)
 		return unit;
-	if (is_mass_name(name) || (strcmp(unit->name, "g") != 0 && !is_acceleration_name(name)))
+	if (is_mass_name(name) || (strcmp(unit->name, "g") != 0 && !sniff_is_acceleration(name)))
 		return NULL;
-	return capital && !is_acceleration_name(name) ? NULL : unit;
+	return capital && !sniff_is_acceleration(name) ? NULL : unit;
 }
 
 static bool unit_alone(struct piece name)
@@ -345,7 +345,7 @@ static const struct unit *sniff_unit(struct piece name, struct piece told, bool 
 
 	if (name.length > 0 && !unit_alone(name)) {
 		by_name = unit_of_name(name.text, name.length,
-		                       is_time_name(name) ? UNIT_TIME : UNIT_ACCELERATION);
+		                       sniff_is_time(name) ? UNIT_TIME : UNIT_ACCELERATION);
 		if (by_name == NULL)
 			by_name = unit_of_name(name.text, name.length, UNIT_TIME);
 		by_name = by_name != NULL ? trusted(by_name, name, told) : NULL;
@@ -527,10 +527,10 @@ static int settle_names(struct sniff *sniff, const struct piece *units, struct t
 			        sniff->name[i].text);
 		if (unit != NULL && unit->kind == UNIT_ACCELERATION)
 			take_channel(sniff, i, unit);
-		if (is_time_name(sniff->name[i]) && !has_rate)
+		if (sniff_is_time(sniff->name[i]) && !has_rate)
 			times->can[i] = true; /* where it goes back is told when it is read */
 		if (times->can[i] && ((unit != NULL && unit->kind == UNIT_TIME) || times->unit[i] != NULL ||
-		                      (unit == NULL && is_time_name(sniff->name[i]))))
+		                      (unit == NULL && sniff_is_time(sniff->name[i]))))
 			offer_time(times, i, times->unit[i] != NULL ? times->unit[i] : unit);
 	}
 	if (columns->channels == 0)
@@ -594,31 +594,65 @@ static double told_number(const struct piece *text, struct cells_style style, si
 	return number_parse(text->text + from, end - from, sign, &value) && value > 0 ? value : 0;
 }
 
+/* A blank of the word is a blank, a stroke, an underscore or nothing in the text. How much of it is the word;
+ * 0: it does not begin with it. */
+static size_t begins_with(struct piece text, const char *word)
+{
+	size_t at = 0;
+
+	for (; *word != '\0'; word++) {
+		if (*word == ' ') {
+			at += at < text.length && strchr(" _-", text.text[at]) != NULL;
+			continue;
+		}
+		if (at == text.length || tolower((unsigned char)text.text[at]) != *word)
+			return 0;
+		at++;
+	}
+	return at < text.length && is_letter(text.text[at]) ? 0 : at;
+}
+
+enum sniff_key sniff_key(struct piece text, size_t *length)
+{
+	static const struct {
+		enum sniff_key key;
+		const char *word;
+	} words[] = {{SNIFF_RATE, "sample rate"},
+	             {SNIFF_RATE, "sampling rate"},
+	             {SNIFF_RATE, "sample frequency"},
+	             {SNIFF_RATE, "sampling frequency"},
+	             {SNIFF_RATE, "abtastrate"},
+	             {SNIFF_RATE, "scan rate"},
+	             {SNIFF_RATE, "fs"},
+	             {SNIFF_STEP, "sample interval"},
+	             {SNIFF_STEP, "sampling interval"},
+	             {SNIFF_STEP, "sampling period"},
+	             {SNIFF_STEP, "time step"},
+	             {SNIFF_STEP, "delta t"},
+	             {SNIFF_STEP, "dt"},
+	             {SNIFF_STEP, "interval"},
+	             {SNIFF_STEP, "abtastintervall"}};
+
+	for (size_t i = 0; i < sizeof(words) / sizeof(words[0]); i++) {
+		*length = begins_with(text, words[i].word);
+		if (*length > 0)
+			return words[i].key;
+	}
+	return SNIFF_NO_KEY;
+}
+
 /* A rate or an interval of a line like "Sample rate: 51200 Hz" or "dt = 1e-5 s"; 0 where there is none, NAN
  * where it may be one of two. */
 static double rate_of(const struct source_line *line, struct cells_style style)
 {
-	static const char *const rates[] = {"sample rate",      "sampling rate",
-	                                    "samplerate",       "sample_rate",
-	                                    "sampling_rate",    "sampling frequency",
-	                                    "sample frequency", "abtastrate",
-	                                    "scan rate",        "fs"},
-	                         *const steps[] = {"sample interval", "sampling interval", "sampling period",
-	                                           "time step",       "delta t",           "dt",
-	                                           "interval",        "abtastintervall"};
 	struct piece text = head_words(line);
-	bool rate = false, step = false;
 	const struct unit *unit;
+	enum sniff_key key;
 	double value;
 	size_t at, end;
 
-	for (size_t i = 0; i < sizeof(rates) / sizeof(rates[0]); i++)
-		rate |= begins(text, rates[i]) &&
-		        (text.length == strlen(rates[i]) || !is_letter(text.text[strlen(rates[i])]));
-	for (size_t i = 0; i < sizeof(steps) / sizeof(steps[0]); i++)
-		step |= begins(text, steps[i]) &&
-		        (text.length == strlen(steps[i]) || !is_letter(text.text[strlen(steps[i])]));
-	if (!rate && !step)
+	key = sniff_key(text, &at);
+	if (key == SNIFF_NO_KEY)
 		return 0;
 	for (at = 0; at < text.length && !(text.text[at] >= '0' && text.text[at] <= '9');)
 		at++;
@@ -634,32 +668,39 @@ static double rate_of(const struct source_line *line, struct cells_style style)
 	unit = unit_find(text.text + at, end - at);
 	if (unit == NULL) /* in the key: "Sample rate (kHz);51.2" */
 		unit = unit_of_name(text.text, at, UNIT_TIME);
-	if (step)
+	if (key == SNIFF_STEP)
 		return unit != NULL && unit->kind == UNIT_TIME && unit->divisor >= 1 ? unit->divisor / value
 		                                                                     : 0;
 	if (unit == NULL)
 		return 0;
-	return strcmp(unit->name, "Hz") == 0    ? value
-	       : strcmp(unit->name, "kHz") == 0 ? value * 1e3
-	       : strcmp(unit->name, "MHz") == 0 ? value * 1e6
-	                                        : 0;
+	return value * unit_hertz(unit);
+}
+
+static const char *const scale_words[] = {"scale",       "scale factor", "scaling",      "scaling factor",
+                                          "factor",      "scale_factor", "multiplier",   "conversion factor",
+                                          "faktor",      "skalierung",   "skalenfaktor", "skalierungsfaktor",
+                                          "y multiplier"};
+enum { SCALE_WORDS = sizeof(scale_words) / sizeof(scale_words[0]) };
+
+bool sniff_is_scale(struct piece key)
+{
+	for (size_t i = 0; i < SCALE_WORDS; i++)
+		if (key.length > 0 && begins_with(key, scale_words[i]) == key.length)
+			return true;
+	return false;
 }
 
 /* A line like "Scale factor: 2", of a number other than 1. */
 static bool tells_scale(const struct source_line *line)
 {
-	static const char *const words[] = {
-	        "scale",        "scale factor",      "scaling",           "scaling factor", "factor",
-	        "scale_factor", "multiplier",        "conversion factor", "faktor",         "skalierung",
-	        "skalenfaktor", "skalierungsfaktor", "y multiplier"};
 	struct piece text = head_words(line);
 	double value = 1;
 	size_t at;
 
-	for (size_t i = 0; i < sizeof(words) / sizeof(words[0]); i++) {
-		if (!begins(text, words[i]))
+	for (size_t i = 0; i < SCALE_WORDS; i++) {
+		if (!begins(text, scale_words[i]))
 			continue;
-		at = strlen(words[i]);
+		at = strlen(scale_words[i]);
 		while (at < text.length && strchr(" \t:=;,\"", text.text[at]))
 			at++;
 		value = at < text.length && isdigit((unsigned char)text.text[at])

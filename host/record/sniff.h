@@ -41,6 +41,16 @@ DT_MUST_USE int sniff_text(struct sniff *sniff, const struct source *source, cha
 DT_MUST_USE int sniff_names(struct sniff *sniff, size_t count, const struct piece *units, bool has_rate,
                             const char *file, char message[READ_MESSAGE_MAX]);
 
+/* Names of a time column, of an acceleration. */
+bool sniff_is_time(struct piece name);
+bool sniff_is_acceleration(struct piece name);
+
+/* What stands for a rate, an interval or a factor of the numbers, in a line above the rows or as the name of
+ * a number beside them: "Sample rate (Hz)", "dt_ms". *length: how much of it says so. */
+enum sniff_key { SNIFF_NO_KEY, SNIFF_RATE, SNIFF_STEP };
+enum sniff_key sniff_key(struct piece text, size_t *length);
+bool sniff_is_scale(struct piece key);
+
 /* "tab, decimal comma, 2 header lines; time:ms, Accel:g; left out SG1 SG2; ..." */
 void sniff_tell(const struct sniff *sniff, const char *encoding, char *text, size_t size);
 

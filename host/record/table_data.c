@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/record/assume.h"
 #include "host/record/profile.h"
 #include "host/record/sniff.h"
 #include "host/record/timebase.h"
@@ -96,6 +97,7 @@ struct making {
 	struct record *record;
 	struct columns columns;
 	struct timebase timebase;
+	bool sniffed;
 	size_t time; /* column; beyond the last: none */
 	char *message;
 };
@@ -121,7 +123,8 @@ static int make_time(struct making *making)
 		error = source_refuse(making->message, DT_E_FORMAT, making->source->file, 0,
 		                      "%zu rows, expected more", column->count);
 	if (!error) {
-		error = timebase_find(time_s, column->count, largest * (double)FLT_EPSILON, 0,
+		error = timebase_find(time_s, column->count,
+		                      largest * (column->exact ? DBL_EPSILON : (double)FLT_EPSILON), 0,
 		                      &making->timebase, &fault);
 		if (error)
 			source_refuse(making->message, error, making->source->file, 0, "row %zu: %s",
@@ -138,17 +141,25 @@ static int refuse_rate(const struct making *making, const struct table_column *c
 	                     making->columns.rate_hz);
 }
 
+/* By the time column; what tells a rate of its own, and has no time beside it, is not. */
+static bool is_timed(const struct making *making, const struct table_column *column)
+{
+	return making->time < making->table->count &&
+	       (!making->sniffed || column->timed || !(column->rate_hz > 0));
+}
+
 static int make_channel(struct making *making, size_t i)
 {
 	const struct column *spec = &making->columns.column[i];
 	const struct table_column *column = &making->table->column[i];
-	bool timed = making->time < making->table->count;
+	bool timed = is_timed(making, column), open = column->rate_open && !making->sniffed;
 	double rate_hz = timed                         ? 1 / making->timebase.step_s
 	                 : making->columns.rate_hz > 0 ? making->columns.rate_hz
+	                 : open                        ? 0
 	                                               : column->rate_hz;
 	struct channel *channel;
 
-	if (column->rate_hz > 0 && making->columns.rate_hz > 0 &&
+	if (column->rate_hz > 0 && !column->rate_open && making->columns.rate_hz > 0 &&
 	    fabs(column->rate_hz / making->columns.rate_hz - 1) > RATE_PART)
 		return refuse_rate(making, column);
 	if (!(rate_hz > 0) || !isfinite(rate_hz))
@@ -194,31 +205,188 @@ static int make_all(struct making *making)
 	return error;
 }
 
-/* What the table tells of itself. */
-static int make_sniffed(struct making *making)
+/* ---- what the table tells of itself ---- */
+
+/* A rate told beside a time column is that of its steps; an open one in some unit. The times are divided by
+ * divisor. */
+static bool rate_agrees(const struct table_column *column, double step_s)
+{
+	double part = column->rate_hz * step_s;
+
+	for (double unit = 1; unit <= (column->rate_open ? 1e6 : 1); unit *= 1e3)
+		if (fabs(part * unit - 1) <= RATE_PART)
+			return true;
+	return false;
+}
+
+/* The unit of a time column that tells none, where a rate tells it. */
+static double divisor_by_rate(const struct making *making)
+{
+	double step = making->timebase.step_s;
+
+	for (size_t i = 0; i < making->table->count; i++) {
+		const struct table_column *column = &making->table->column[i];
+
+		for (double divisor = 1;
+		     column->timed && column->rate_hz > 0 && !column->rate_open && divisor < 1e10;
+		     divisor *= 1e3)
+			if (fabs(column->rate_hz * step / divisor - 1) <= RATE_PART)
+				return divisor;
+	}
+	return 0;
+}
+
+static void apply_assumed(struct making *making, const struct assumed *assumed, bool to_timed)
+{
+	struct record *record = making->record;
+	struct channel *channel = record->channels;
+	char *text = record->read_as;
+	size_t used = strlen(text);
+
+	if (assumed->unit != NULL)
+		snprintf(text + used, sizeof(record->read_as) - used, "; assumed: %s in %s",
+		         to_timed ? "time" : "rate", assumed->unit);
+	for (size_t i = 0; i < making->columns.count; i++) {
+		const struct table_column *column = &making->table->column[i];
+
+		if (making->columns.column[i].kind != COLUMN_CHANNEL)
+			continue;
+		if (to_timed ? is_timed(making, column) : !is_timed(making, column) && column->rate_open) {
+			channel->rate_hz *= assumed->divisor;
+			channel->flags |= assumed->unit != NULL ? RECORD_FLAG_ASSUMED : 0;
+		}
+		channel++;
+	}
+}
+
+static int settle_time_unit(struct making *making)
+{
+	struct assumed assumed = {.divisor = divisor_by_rate(making)};
+	int error = assumed.divisor > 0 ? 0
+	                                : assume_unit(&assumed, making->record, making->timebase.step_s,
+	                                              false, making->source->file, making->message);
+
+	if (error)
+		return error;
+	apply_assumed(making, &assumed, true);
+	making->timebase.step_s /= assumed.divisor;
+	return 0;
+}
+
+/* The rates that tell no unit are one number. */
+static int settle_rate_unit(struct making *making)
+{
+	double rate = 0;
+	struct assumed assumed;
+	int error;
+
+	for (size_t i = 0; i < making->columns.count; i++) {
+		const struct table_column *column = &making->table->column[i];
+
+		if (making->columns.column[i].kind != COLUMN_CHANNEL || !column->rate_open ||
+		    is_timed(making, column))
+			continue;
+		if (rate > 0 && fabs(column->rate_hz / rate - 1) > 1e-9)
+			return source_refuse(making->message, DT_E_FORMAT, making->source->file, 0,
+			                     "rates %.9g and %.9g tell no unit, expected --columns", rate,
+			                     column->rate_hz);
+		rate = column->rate_hz;
+	}
+	if (!(rate > 0))
+		return 0;
+	error = assume_unit(&assumed, making->record, 1 / rate, true, making->source->file, making->message);
+	if (!error)
+		apply_assumed(making, &assumed, false);
+	return error;
+}
+
+static int refuse_doubt(const struct making *making, const struct table_column *column)
+{
+	struct columns *columns = malloc(sizeof(*columns));
+	char spec[200] = "";
+
+	if (columns != NULL) {
+		*columns = making->columns;
+		columns->rate_hz = columns->has_time ? 0 : column->rate_hz;
+		columns_text(columns, spec, sizeof(spec));
+	}
+	free(columns);
+	return source_refuse(making->message, DT_E_FORMAT, making->source->file, 0,
+	                     "%s: %s, expected --columns, as \"%s\"", column->name, column->doubt, spec);
+}
+
+static int check_told(const struct making *making)
+{
+	for (size_t i = 0; i < making->columns.count; i++) {
+		const struct table_column *column = &making->table->column[i];
+
+		if (making->columns.column[i].kind != COLUMN_CHANNEL)
+			continue;
+		if (column->doubt[0] != '\0')
+			return refuse_doubt(making, column);
+		if (making->record->channel_count > 0 && column->rate_hz > 0 && is_timed(making, column) &&
+		    !rate_agrees(column, making->timebase.step_s))
+			return source_refuse(
+			        making->message, DT_E_FORMAT, making->source->file, 0,
+			        "%s: tells a rate of %.9g Hz, but its time column steps by %.9g s "
+			        "(%.9g Hz), expected one: --columns with time:s, or name:g@%.9g",
+			        column->name, column->rate_hz, making->timebase.step_s,
+			        1 / making->timebase.step_s, column->rate_hz);
+	}
+	return 0;
+}
+
+static int sniff_table(struct making *making, struct sniff *sniff, struct piece *units)
 {
 	const struct table_data *table = making->table;
-	struct sniff *sniff = calloc(1, sizeof(*sniff));
-	struct piece *units = calloc(table->count + 1, sizeof(*units));
 	bool has_rate = true;
-	int error = sniff == NULL || units == NULL ? DT_E_MEMORY : 0;
 
-	for (size_t i = 0; i < table->count && !error; i++) {
+	for (size_t i = 0; i < table->count; i++) {
 		sniff->name[i] = (struct piece){table->column[i].name, strlen(table->column[i].name)};
 		units[i] = (struct piece){table->column[i].unit, strlen(table->column[i].unit)};
-		has_rate &= table->column[i].rate_hz > 0;
+		has_rate &= table->column[i].rate_hz > 0 && !table->column[i].timed;
+	}
+	return sniff_names(sniff, table->count, units, has_rate, making->source->file, making->message);
+}
+
+static int make_told(struct making *making, const struct sniff *sniff)
+{
+	char *text = making->record->read_as;
+	int error;
+
+	making->columns = sniff->columns;
+	sniff_tell(sniff, NULL, text, sizeof(making->record->read_as));
+	if (making->table->left_out[0] != '\0')
+		snprintf(text + strlen(text), sizeof(making->record->read_as) - strlen(text), "; left out %s",
+		         making->table->left_out);
+	error = check_told(making);
+	if (!error)
+		error = make_all(making);
+	if (!error && sniff->time_unit_open)
+		error = settle_time_unit(making);
+	if (!error)
+		error = settle_rate_unit(making);
+	return error ? error : check_told(making);
+}
+
+static int make_sniffed(struct making *making)
+{
+	struct sniff *sniff = calloc(1, sizeof(*sniff));
+	struct piece *units = calloc(making->table->count + 1, sizeof(*units));
+	size_t used;
+	int error =
+	        sniff == NULL || units == NULL ? source_no_memory(making->message, making->source->file) : 0;
+
+	making->sniffed = true;
+	if (!error) {
+		error = sniff_table(making, sniff, units);
+		used = strlen(making->message);
+		if (error && making->table->left_out[0] != '\0')
+			snprintf(making->message + used, READ_MESSAGE_MAX - used, "; left out %s",
+			         making->table->left_out);
 	}
 	if (!error)
-		error = sniff_names(sniff, table->count, units, has_rate, making->source->file,
-		                    making->message);
-	if (!error && sniff->time_unit_open)
-		error = source_refuse(making->message, DT_E_FORMAT, making->source->file, 0,
-		                      "the time column tells no unit, expected --columns");
-	if (!error) {
-		making->columns = sniff->columns;
-		sniff_tell(sniff, NULL, making->record->read_as, sizeof(making->record->read_as));
-		error = make_all(making);
-	}
+		error = make_told(making, sniff);
 	free(sniff);
 	free(units);
 	return error;
@@ -291,5 +459,5 @@ table_reader *table_reader_of(const struct source *source)
 		if (source->size > readers[i].length &&
 		    memcmp(source->bytes, readers[i].magic, readers[i].length) == 0)
 			return readers[i].reader;
-	return at2_is(source) ? read_at2 : mme_is(source) ? read_mme : NULL;
+	return at2_is(source) ? read_at2 : mme_is(source) ? read_mme : mat_is(source) ? read_mat : NULL;
 }

@@ -14,6 +14,10 @@
 struct table_column {
 	char name[64], unit[32]; /* "" where not told */
 	double rate_hz, start_s; /* rate 0 where not told */
+	bool rate_open;          /* the rate tells no unit: as if in Hz */
+	bool timed;              /* a time column stands beside it, which a rate must agree with */
+	bool exact;              /* doubles in the file: times are good to their last bits */
+	char doubt[100];         /* why it needs --columns if it is a channel; "" where it does not */
 	size_t count;
 	double *value; /* [count] */
 };
@@ -22,6 +26,7 @@ struct table_data {
 	const char *format; /* of the record: "npy" */
 	struct table_column *column;
 	size_t count;
+	char left_out[120]; /* what the file holds besides, told in read_as */
 };
 
 /* Another column with room; NULL without memory. The pointer is valid until the next call. */
@@ -33,14 +38,15 @@ DT_MUST_USE int table_data_record(const struct table_data *table, struct record 
                                   const struct source *source, const char *columns,
                                   char message[READ_MESSAGE_MAX]);
 
-/* The formats that end as a table: NumPy array, WAV, TDMS, ground motion of PEER, ISO 13499. NULL where it is
- * none. */
+/* The formats that end as a table: NumPy array, WAV, TDMS, ground motion of PEER, ISO 13499,
+ * MAT. NULL where it is none. */
 typedef int table_reader(struct table_data *table, const struct source *source,
                          char message[READ_MESSAGE_MAX]);
 table_reader *table_reader_of(const struct source *source);
-table_reader read_npy, read_wav, read_tdms, read_at2, read_mme;
+table_reader read_npy, read_wav, read_tdms, read_at2, read_mme, read_mat;
 bool at2_is(const struct source *source);
 bool mme_is(const struct source *source);
+bool mat_is(const struct source *source);
 
 /* Numbers as they stand in files. */
 enum bytes_kind {

@@ -79,6 +79,13 @@ static const struct {
         {"psi", {"psi", UNIT_OTHER, 0, 0}},
         {"hz", {"Hz", UNIT_OTHER, 0, 0}},
         {"khz", {"kHz", UNIT_OTHER, 0, 0}},
+        {"mhz", {"MHz", UNIT_OTHER, 0, 0}},
+        {"hertz", {"Hz", UNIT_OTHER, 0, 0}},
+        {"1/s", {"Hz", UNIT_OTHER, 0, 0}},
+        {"s/s", {"Hz", UNIT_OTHER, 0, 0}}, /* samples in a second */
+        {"sa/s", {"Hz", UNIT_OTHER, 0, 0}},
+        {"samples/s", {"Hz", UNIT_OTHER, 0, 0}},
+        {"sps", {"Hz", UNIT_OTHER, 0, 0}},
         {"deg", {"deg", UNIT_OTHER, 0, 0}},
         {"rad", {"rad", UNIT_OTHER, 0, 0}},
         {"deg/s", {"deg/s", UNIT_OTHER, 0, 0}},
@@ -279,4 +286,12 @@ const struct unit *unit_of_name(const char *name, size_t length, enum unit_kind 
 bool unit_same(const struct unit *a, const struct unit *b)
 {
 	return a->kind == b->kind && fabs(a->divisor - b->divisor) <= 1e-9 * fabs(a->divisor);
+}
+
+double unit_hertz(const struct unit *unit)
+{
+	return strcmp(unit->name, "Hz") == 0    ? 1
+	       : strcmp(unit->name, "kHz") == 0 ? 1e3
+	       : strcmp(unit->name, "MHz") == 0 ? 1e6
+	                                        : 0;
 }

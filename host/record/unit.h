@@ -42,4 +42,7 @@ const struct unit *unit_of_name(const char *name, size_t length, enum unit_kind 
 /* Whether both make the same number of the same thing. */
 bool unit_same(const struct unit *a, const struct unit *b);
 
+/* How many hertz one of it is; 0 of what is no frequency. */
+double unit_hertz(const struct unit *unit);
+
 #endif

@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/helper.h"
+
+#include <limits.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "host/record/source.h"
+
+static int path_of_helper(const char *program, char path[PATH_MAX])
+{
+	size_t most = PATH_MAX - strlen(program) - 1;
+	ssize_t length = readlink("/proc/self/exe", path, most);
+	char *end;
+
+	if (length <= 0)
+		return -1;
+	path[length] = '\0';
+	end = strrchr(path, '/');
+	strcpy(end ? end + 1 : path, program);
+	return access(path, X_OK);
+}
+
+/* The helper's one line of complaint. */
+static int helper_complain(const struct helper *helper, char *message, const char *file, int err, int status)
+{
+	char text[256] = "";
+	ssize_t length = pread(err, text, sizeof(text) - 1, 0);
+
+	text[length > 0 ? length : 0] = '\0';
+	text[strcspn(text, "\n")] = '\0';
+	if (status < 128 && text[0])
+		return source_refuse(message, DT_E_FORMAT, file, 0, "%s", text);
+	return source_refuse(message, DT_E_FORMAT, file, 0, "%s died of it, expected a sound file of %s",
+	                     helper->program, helper->format);
+}
+
+int helper_run(const struct helper *helper, const char *verb, const void *bytes, size_t size,
+               const char *file, struct process_streams *streams, char message[READ_MESSAGE_MAX])
+{
+	char path[PATH_MAX];
+	const char *words[] = {path, verb, NULL};
+	int error, status;
+
+	if (path_of_helper(helper->program, path) != 0)
+		return source_refuse(message, DT_E_UNKNOWN, file, 0,
+		                     "this build cannot do %s: install %s and run make again", helper->format,
+		                     helper->packages);
+	error = process_streams_open(streams, bytes, size);
+	if (error != 0)
+		return source_refuse(message, DT_E_SYSTEM, file, 0, "%s", strerror(error));
+	status = process_filter(words, streams);
+	if (status == 0)
+		return 0;
+	error = status < 0 ? source_refuse(message, DT_E_SYSTEM, file, 0, "%s: %s", helper->program,
+	                                   strerror(-status))
+	                   : helper_complain(helper, message, file, streams->fd[2], status);
+	process_streams_close(streams);
+	return error;
+}

@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_RECORD_HELPER_H
+#define DT_HOST_RECORD_HELPER_H
+/*
+ * A program of ours that stands beside this one and turns files of one library, standard input to standard
+ * output. A program of its own because the library is optional, because loading it costs every start of
+ * droptower several milliseconds, and because a file that crashes the library then ends the helper and not
+ * the reader.
+ */
+#include "common/base/process.h"
+#include "host/record/read.h"
+
+struct helper {
+	const char *program, *format; /* "droptower-hdf5", "HDF5" */
+	const char *packages;         /* what it is built with: "libhdf5-dev and pkg-config" */
+};
+
+/* Runs it on the bytes; what it gave is in streams, to be closed after success. Without it DT_E_UNKNOWN, and
+ * message says what to install. */
+DT_MUST_USE int helper_run(const struct helper *helper, const char *verb, const void *bytes, size_t size,
+                           const char *file, struct process_streams *streams, char message[READ_MESSAGE_MAX]);
+
+#endif
