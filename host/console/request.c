@@ -10,7 +10,9 @@
 
 #include "common/plain.h"
 #include "host/console/http_private.h"
+#include "host/console/metrics.h"
 #include "host/console/route.h"
+#include "host/console/state.h"
 #include "host/session/session.h"
 
 enum {
@@ -204,6 +206,24 @@ static enum MHD_Result open_stream(struct request *request)
 	return send_and_forget(request->connection, 200, response);
 }
 
+static enum MHD_Result send_metrics(struct request *request)
+{
+	struct console *console = request->http->console;
+	struct state state;
+	size_t size;
+	cJSON *tree;
+	char *text;
+
+	state_look(&state, console->tower, console->work, console->live);
+	tree = state_tree(&state);
+	text = metrics_text(tree, &size);
+	cJSON_Delete(tree);
+	if (text == NULL)
+		return request_refuse(request->connection, 503, error_text(DT_E_MEMORY), NULL, NULL);
+	job_answer_bytes(&request->job, "text/plain; version=0.0.4; charset=utf-8", text, size);
+	return request_answer(request);
+}
+
 static bool parse_body(struct request *request)
 {
 	bool post = strcmp(request->route->method, "POST") == 0;
@@ -261,6 +281,8 @@ static enum MHD_Result request_begin(struct request *request)
 		                      NULL);
 	if (request->route->kind == ROUTE_STREAM)
 		return open_stream(request);
+	if (request->route->kind == ROUTE_METRICS)
+		return send_metrics(request);
 	if (request->route->kind == ROUTE_HOLD) {
 		run_hold(request);
 		return request_answer(request);
@@ -430,10 +452,14 @@ static enum MHD_Result look_at(struct http *http, struct MHD_Connection *connect
 		return request_refuse(connection, 403, "Host is not this console's", NULL, NULL);
 	if (!guard_origin_agrees(header(connection, MHD_HTTP_HEADER_ORIGIN), host))
 		return request_refuse(connection, 403, "Origin is not this console's", NULL, NULL);
-	if (strncmp(url, "/api/", 5) != 0)
+	if (strncmp(url, "/api/", 5) == 0)
+		url += 5;
+	else if (strcmp(url, "/metrics") == 0) /* where it is looked for */
+		url += 1;
+	else
 		return send_part(http, connection, method, url[0] == '/' ? url + 1 : url);
 	result = check_token(http, connection, &passed);
-	return passed ? open_request(http, connection, method, url + 5, context) : result;
+	return passed ? open_request(http, connection, method, url, context) : result;
 }
 
 /* What stands for the request then: whatever else of it is here is not done. */

@@ -8,6 +8,7 @@
 
 static const struct route routes[] = {
         {.method = "GET", .path = "stream", .kind = ROUTE_STREAM},
+        {.method = "GET", .path = "metrics", .kind = ROUTE_METRICS},
         {.method = "POST", .path = "hold", .kind = ROUTE_HOLD},
         {.method = "POST", .path = "abort", .kind = ROUTE_TOWER, .run = tower_abort, .always = true},
         {.method = "POST", .path = "arm", .kind = ROUTE_TOWER, .run = tower_arm, .needs_hold = true},

@@ -9,10 +9,11 @@
 #include "host/console/job.h"
 
 enum route_kind {
-	ROUTE_TOWER,  /* run at once on http: it goes its own way */
-	ROUTE_WORK,   /* put into work's queue */
-	ROUTE_HOLD,   /* http's own: the lease of the arm */
-	ROUTE_STREAM, /* http's own: server-sent events */
+	ROUTE_TOWER,   /* run at once on http: it goes its own way */
+	ROUTE_WORK,    /* put into work's queue */
+	ROUTE_HOLD,    /* http's own: the lease of the arm */
+	ROUTE_STREAM,  /* http's own: server-sent events */
+	ROUTE_METRICS, /* http's own: the state for Prometheus */
 };
 
 enum route_tail {

@@ -192,11 +192,10 @@ static void add_simulation(cJSON *root, const struct tower_view *view)
 	}
 }
 
-char *state_json(const struct state *state)
+cJSON *state_tree(const struct state *state)
 {
 	cJSON *root = cJSON_CreateObject();
 	unsigned io = state->tower.session.io;
-	char *text;
 
 	add_tower(root, state);
 	add_checks(root, &state->tower.session);
@@ -207,7 +206,14 @@ char *state_json(const struct state *state)
 	add_series(root, state);
 	add_simulation(root, &state->tower);
 	cJSON_AddStringToObject(root, "version", DT_VERSION);
-	text = cJSON_PrintUnformatted(root);
+	return root;
+}
+
+char *state_json(const struct state *state)
+{
+	cJSON *root = state_tree(state);
+	char *text = cJSON_PrintUnformatted(root);
+
 	cJSON_Delete(root);
 	return text;
 }

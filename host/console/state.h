@@ -5,6 +5,8 @@
  * What the page always shows, as JSON (README.md has its form), without who holds the arm: that differs from
  * page to page.
  */
+#include <cjson/cJSON.h>
+
 #include "host/console/live.h"
 #include "host/console/tower.h"
 #include "host/console/work.h"
@@ -21,7 +23,10 @@ void state_look(struct state *state, struct tower *tower, struct work *work, str
 /* Something that a technician must see at once is not the same: not ages, rates or counters. */
 bool state_changed(const struct state *before, const struct state *now);
 
-/* To be freed; NULL without memory. */
+/* To be deleted; NULL or not all of it without memory. */
+cJSON *state_tree(const struct state *state);
+
+/* The same as text. To be freed; NULL without memory. */
 char *state_json(const struct state *state);
 
 #endif
