@@ -3,6 +3,7 @@
 // A series of five in gloves: what decides each drop is in view with the buttons, presses are counted, one drop is
 // rejected and one has flags. Then a foot switch, a bar-code scanner, and a display across the hall.
 import assert from "node:assert/strict";
+import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { Desk, browse } from "./desk.mjs";
 import { look } from "./looks.mjs";
@@ -33,9 +34,20 @@ function count() {
 	}, 20);
 }
 
+/* The scene with the example sensors, whose calibration holds. */
+function withSensors(folder) {
+	for (const name of ["S1", "S2"])
+		writeFileSync(join(folder, `${name}.ini`), readFileSync(`common/scenes/sensors/example-${name}.ini`, "utf8")
+			.replace(/^date = .*$/m, "date = 2026-01-15").replace(/^due = .*$/m, "due = 2199-01-14"));
+	writeFileSync(join(folder, "geometry-2B.ini"), "chain = S1.ini, S2.ini\n" + readFileSync("common/scenes/geometry-2B.ini", "utf8"));
+	return join(folder, "geometry-2B.ini");
+}
+
 async function begin() {
-	archive = join(makeFolder(), "archive");
-	({ child: server, address } = await serve(join(build, "droptower"), ["serve", "--port", "0", "--archive", archive]));
+	const folder = makeFolder();
+	archive = join(folder, "archive");
+	({ child: server, address } = await serve(join(build, "droptower"),
+		["serve", "--port", "0", "--archive", archive, "--scene", withSensors(folder)]));
 	browser = await browse();
 	desk = await Desk.open(browser, SCREENS[0]);
 	await desk.page.addInitScript(count);
@@ -94,11 +106,26 @@ async function drop(number, decide, decision) {
 	assert.ok(await desk.page.evaluate(() => window.presses) - pressed <= 3, `drop ${number}`);
 }
 
+/* Each number of a sensor has U of its budget, to the same place, in the table of the card. */
+async function expanded() {
+	const { budget } = JSON.parse(await droptower("series", "result", `${SERIES}/1`, "--archive", archive));
+	const rows = { s2_x: ["S2X.peak.value_g", 1], s1_r: ["S1.peak_g", 1], s2_duration: ["S2X.pulse.duration_s", 1000],
+		s1_velocity: ["S1X.pulse.velocity_change_m_s", 1] };
+	for (const [key, [what, scale]] of Object.entries(rows)) {
+		const text = await desk.text(`.peaks [data-key="${key}"] .sigma`);
+		const wanted = scale * budget.find((item) => item.what === what).expanded;
+		assert.match(text, /^ ?± [0-9.]+ U$/, `${key}: ${text}`);
+		assert.ok(Math.abs(parseFloat(text.split("±")[1]) - wanted) <= 0.051 * wanted, `${key}: ${text} for ${wanted}`);
+	}
+	assert.equal(await desk.page.locator(".peaks tbody .sigma").count(), await desk.page.locator(".peaks tbody .sigma", { hasText: "U" }).count());
+}
+
 async function plain() {
 	await look(desk, "20-ready");
 	await drop(1, async () => {
 		assert.match(await desk.text("#verdict"), /NO FLAGS/);
 		assert.equal(await desk.data("tone"), "good");
+		await expanded();
 		await inView(false);
 		await desk.click("#accept");
 	}, "accepted");

@@ -8,21 +8,20 @@ const LEAST = 3; /* drops: of fewer the SD says little */
 
 let shown = { name: "", doubts: [] };
 
-/* The value is what is read from afar. */
-function valueAndSigma(text) {
-	const [value, sigma] = text.split(" ± ");
-	return sigma ? [value, el("span", { class: "sigma" }, ` ± ${sigma}`)] : [value];
-}
-
-function cell(key, value, sigma, status, decimals = 1) {
-	const ok = !status || status === "ok";
+/* The value is what is read from afar. Behind it U by the sensor's file, else the standard uncertainty of noise alone. */
+function cell(key, value, { sigma, status, budget, scale = 1, decimals = 1 }) {
+	const [read, unsure] = withSigma(value, budget ? scale * budget.expanded : sigma, decimals).split(" ± ");
+	const title = budget ? `U, k = ${number(budget.k, 2)}: ${budget.largest}` : "one standard uncertainty, noise alone";
 	return el(
 		"td",
 		{ class: "number", data: { key, value: value ?? "" } },
-		...valueAndSigma(withSigma(value, sigma, decimals)),
-		ok ? null : el("b", { class: "warn" }, ` ⚠ ${statusWords(status)}`),
+		read,
+		unsure ? el("span", { class: "sigma", title }, ` ± ${unsure}${budget ? " U" : ""}`) : null,
+		!status || status === "ok" ? null : el("b", { class: "warn" }, ` ⚠ ${statusWords(status)}`),
 	);
 }
+
+const budgetOf = (result, what) => result.budget?.find((item) => item.what === what);
 
 /* How many SDs the value is from the mean of the other accepted drops of its series; NaN of fewer than three. */
 function deviation(key, value, others) {
@@ -59,7 +58,8 @@ function peakRow(axis, result, others) {
 					? result.resultants.find((r) => r.sensor === sensor)
 					: result.channels.find((c) => c.name === sensor + axis)?.peak;
 			const value = of?.peak_g ?? of?.value_g;
-			return [cell(key, value, of?.sigma_g, of?.status), deviationCell(key, value, others)];
+			const budget = budgetOf(result, axis === "XY" ? `${sensor}.peak_g` : `${sensor}${axis}.peak.value_g`);
+			return [cell(key, value, { sigma: of?.sigma_g, status: of?.status, budget }), deviationCell(key, value, others)];
 		}),
 	);
 }
@@ -69,7 +69,7 @@ function pulseRow(head, result, what) {
 		head,
 		SENSORS.map((sensor) => {
 			const pulse = result.channels.find((c) => c.name === `${sensor}X`)?.pulse ?? {};
-			return [what(sensor.toLowerCase(), pulse), el("td", {})];
+			return [what(sensor.toLowerCase(), pulse, (key) => budgetOf(result, `${sensor}X.pulse.${key}`)), el("td", {})];
 		}),
 	);
 }
@@ -87,11 +87,21 @@ function numbers(result, others) {
 			"tbody",
 			{},
 			...["X", "Y", "Z", "XY"].map((axis) => peakRow(axis, result, others)),
-			pulseRow("pulse X, ms", result, (sensor, { duration_s: value, sigma_duration_s: sigma, status }) =>
-				cell(`${sensor}_duration`, milli(value), milli(sigma), status, 2),
+			pulseRow("pulse X, ms", result, (sensor, { duration_s, sigma_duration_s, status }, by) =>
+				cell(`${sensor}_duration`, milli(duration_s), {
+					sigma: milli(sigma_duration_s),
+					status,
+					budget: by("duration_s"),
+					scale: 1000,
+					decimals: 2,
+				}),
 			),
-			pulseRow("ΔV X, m/s", result, (sensor, { velocity_change_m_s: value, sigma_velocity_m_s: sigma }) =>
-				cell(`${sensor}_velocity`, value, sigma, "", 2),
+			pulseRow("ΔV X, m/s", result, (sensor, { velocity_change_m_s, sigma_velocity_m_s }, by) =>
+				cell(`${sensor}_velocity`, velocity_change_m_s, {
+					sigma: sigma_velocity_m_s,
+					budget: by("velocity_change_m_s"),
+					decimals: 2,
+				}),
 			),
 		),
 	);
