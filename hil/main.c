@@ -83,7 +83,8 @@ static const struct option_row rows[] = {
         OPTION_TEXT("link", "URL", struct line, bench.link,
                     "the host's CAN: unix:PATH, can:IF, ...; by the clock, until SIGINT or "
                     "SIGTERM"),
-        OPTION_FLAG("operate", struct line, operate, "no host: a scripted operator in virtual time, as fast as it goes"),
+        OPTION_FLAG("operate", struct line, operate,
+                    "no host: a scripted operator in virtual time, as fast as it goes"),
         OPTION_UNSIGNED("drops", "N", struct line, bench.script.drops, 1, 1000000,
                         "as many drops of the operator (1)"),
         OPTION_TEXT("firmware", "COMMAND", struct line, bench.firmware,
@@ -191,6 +192,8 @@ static int main_run_scene(struct line *line)
 		scene->drop_angle_deg = line->angle_deg;
 		result = scene_check(scene, "--angle", message);
 	}
+	if (result == 0)
+		result = scene_check_tower(scene, line->scene_file, message);
 	if (result == 0)
 		return bench_run(&line->bench);
 	bench_say("%s", message);

@@ -245,6 +245,8 @@ int scenario_scene(const struct scenario *scenario, struct scene *scene, char me
 	         scenario->override_count > 0 ? ", changed by [scene]" : "");
 	result = scene_check(&wanted, where, message);
 	if (result == 0)
+		result = scene_check_tower(&wanted, where, message);
+	if (result == 0)
 		*scene = wanted;
 	return result;
 }

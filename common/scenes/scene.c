@@ -214,6 +214,12 @@ static int scene_read_entry(struct settings *settings, const char *section, cons
 	return settings_fail(settings, DT_E_FORMAT, "unknown key '%.60s' in [%.60s]", name, section);
 }
 
+/* Left out, it is placed by the height. */
+static bool by_height(const struct key *key)
+{
+	return key->initial == 0.0 && strcmp(key->section, "tower") == 0;
+}
+
 static void place_tower(struct scene *scene)
 {
 	if (scene->tower_separation_m == 0.0)
@@ -313,9 +319,8 @@ void scene_write(const struct scene *scene, FILE *out)
 		fprintf(out, "chain = %.*s\n", (int)length, at);
 	for (size_t i = 0; i < KEYS; i++) {
 		double value = value_in(scene, &keys[i]);
-		bool by_height = keys[i].initial == 0.0 && strcmp(keys[i].section, "tower") == 0;
 
-		if (value == keys[i].initial || (by_height && value == value_in(&placed, &keys[i])))
+		if (value == keys[i].initial || (by_height(&keys[i]) && value == value_in(&placed, &keys[i])))
 			continue;
 		if (strcmp(section, keys[i].section) != 0)
 			fprintf(out, "\n[%s]\n", keys[i].section);
@@ -342,7 +347,7 @@ void scene_limits(const char *section, const char *key, double *min, double *max
 }
 
 /* What must hold between keys; the text says it as a person would. */
-static const char *contradiction(const struct scene *scene)
+static const char *contradiction_of_tower(const struct scene *scene)
 {
 	if (!(scene->tower_gate_upper_m > 0.0))
 		return "the upper gate is above the latch, expected gate_upper_m > 0: is the height too "
@@ -355,6 +360,11 @@ static const char *contradiction(const struct scene *scene)
 		return "the frame is braked before the product leaves, expected separation_m <= dampers_m";
 	if (!(scene->tower_dampers_m < scene->drop_height_m))
 		return "the product lands before the frame is braked, expected dampers_m < height_m";
+	return NULL;
+}
+
+static const char *contradiction(const struct scene *scene)
+{
 	if (scene->mount_plate_mass_kg > 0.0 &&
 	    !(scene->mount_stiffness_n_m > 0.0 && scene->mount_cube_m > 0.0))
 		return "a plate needs mounts, expected stiffness_n_m and cube_m above 0";
@@ -363,18 +373,29 @@ static const char *contradiction(const struct scene *scene)
 	return NULL;
 }
 
+/* wrong: NULL, nothing is. */
+static int scene_say(const char *wrong, const char *where, char message[SCENE_MESSAGE_MAX])
+{
+	if (wrong != NULL)
+		snprintf(message, SCENE_MESSAGE_MAX, "%.300s: %s", where, wrong);
+	return wrong != NULL ? DT_E_RANGE : 0;
+}
+
+int scene_check_tower(const struct scene *scene, const char *where, char message[SCENE_MESSAGE_MAX])
+{
+	return scene_say(contradiction_of_tower(scene), where, message);
+}
+
 int scene_check(const struct scene *scene, const char *where, char message[SCENE_MESSAGE_MAX])
 {
-	const char *wrong = contradiction(scene); /* first: it says more than a derived value out of range */
+	int result = scene_say(contradiction(scene), where, message);
 
-	if (wrong != NULL) {
-		snprintf(message, SCENE_MESSAGE_MAX, "%.300s: %s", where, wrong);
-		return DT_E_RANGE;
-	}
+	if (result != 0)
+		return result;
 	for (size_t i = 0; i < KEYS; i++) {
 		double value = value_in(scene, &keys[i]);
 
-		if (value >= keys[i].min && value <= keys[i].max)
+		if ((value >= keys[i].min && value <= keys[i].max) || by_height(&keys[i]))
 			continue;
 		snprintf(message, SCENE_MESSAGE_MAX, "%.300s: %s is %g, expected %g to %g", where,
 		         keys[i].name, value, keys[i].min, keys[i].max);

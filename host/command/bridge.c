@@ -383,6 +383,8 @@ int command_bridge(int argc, char **argv)
 	code = bridge_check(&bridge);
 	if (code == COMMAND_DONE && bridge.scene_file != NULL)
 		code = evaluate_read_scene(&bridge.scene, bridge.scene_file, bridge.angle_deg);
+	if (code == COMMAND_DONE && bridge.scene_file != NULL)
+		code = evaluate_check_tower(&bridge.scene, bridge.scene_file);
 	if (code == COMMAND_DONE && bridge.key_file != NULL)
 		code = bridge_read_key(&bridge);
 	if (code != COMMAND_DONE)

@@ -487,3 +487,13 @@ int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg)
 	command_error("%s", message);
 	return COMMAND_INPUT;
 }
+
+int evaluate_check_tower(const struct scene *scene, const char *where)
+{
+	char message[SCENE_MESSAGE_MAX];
+
+	if (scene_check_tower(scene, where, message) == 0)
+		return COMMAND_DONE;
+	command_error("%s", message);
+	return COMMAND_INPUT;
+}

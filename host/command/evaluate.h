@@ -96,4 +96,7 @@ const char *evaluate_chain(const struct evaluate_options *options);
 /* Reads a scene and lays angle_deg over it when that is not NAN. 0 or a COMMAND_* code, errors printed. */
 int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg);
 
+/* Whether a tower can let it fall; where names it. 0 or COMMAND_INPUT, the error printed. */
+int evaluate_check_tower(const struct scene *scene, const char *where);
+
 #endif

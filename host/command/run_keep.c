@@ -48,6 +48,8 @@ static int begin_in_folder(struct run *run)
 {
 	int code = evaluate_read_scene(&run->scene, run->scene_file, run->angle_deg);
 
+	if (code == COMMAND_DONE)
+		code = evaluate_check_tower(&run->scene, run->scene_file);
 	if (code == COMMAND_DONE && run->chain != NULL)
 		code = evaluate_check_chain(run->chain);
 	if (code == COMMAND_DONE)
@@ -66,8 +68,11 @@ static int begin_in_archive(struct run *run)
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}
-	if (archive_scene(run->archive, run->series, &run->scene) != 0 ||
-	    archive_begin(run->archive, run->series, run->operator_name, ".log", run->link == NULL,
+	if (archive_scene(run->archive, run->series, &run->scene) != 0)
+		return archived_failed(run->archive);
+	if (evaluate_check_tower(&run->scene, run->series) != COMMAND_DONE)
+		return COMMAND_INPUT;
+	if (archive_begin(run->archive, run->series, run->operator_name, ".log", run->link == NULL,
 	                  &run->recording) != 0)
 		return archived_failed(run->archive);
 	snprintf(run->log, sizeof(run->log), "%s", run->recording.log);

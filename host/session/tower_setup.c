@@ -159,8 +159,13 @@ int tower_setup_write(struct session *session, const struct scene *scene, char m
 	        settings[TOWER_SETTINGS]; /* these in the order in which they are left */
 	const struct tower_setting *beyond;
 	size_t count = TOWER_SETTINGS;
-	int result;
+	char wrong[SCENE_MESSAGE_MAX];
+	int result = scene_check_tower(scene, scene->name, wrong);
 
+	if (result != 0) {
+		snprintf(message, SESSION_MESSAGE_MAX, "%.*s", SESSION_MESSAGE_MAX - 1, wrong);
+		return result;
+	}
 	tower_setup_settings(scene, wanted);
 	beyond = out_of_range(wanted, count);
 	if (beyond != NULL)

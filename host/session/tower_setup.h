@@ -24,10 +24,10 @@ void tower_setup_settings(const struct scene *scene, struct tower_setting settin
 DT_MUST_USE int tower_setup_hear(struct session *session, char message[SESSION_MESSAGE_MAX]);
 
 /* Writes the parameters, in an order in which the tower takes them: it refuses a place that is not in order
- * with the others that it has. What no tower can have is refused before anything is written. Over LCM nothing
- * is written. Then the tower's whole set is read: it is the one that ARM will name. 0, or DT_E_* with
- * one line in message: DT_E_RANGE, DT_E_STATE, DT_E_PARAMETERS when another writes as well, or an error of
- * the link. */
+ * with the others that it has. A scene whose gates are in no order, and what no tower can have, is refused
+ * before anything is written. Over LCM nothing is written. Then the tower's whole set is read: it is the one
+ * that ARM will name. 0, or DT_E_* with one line in message: DT_E_RANGE, DT_E_STATE, DT_E_PARAMETERS when
+ * another writes as well, or an error of the link. */
 DT_MUST_USE int tower_setup_write(struct session *session, const struct scene *scene,
                                   char message[SESSION_MESSAGE_MAX]);
 

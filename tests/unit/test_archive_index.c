@@ -355,8 +355,11 @@ static void test_a_series_from_another_height(void **state)
 		assert_int_equal(archive_scene(archive, name, &scene), 0);
 		assert_memory_equal(&scene, &expected, sizeof(scene));
 	}
-	assert_int_equal(archive_new_series(archive, "low", "trial", path, NAN, 0.1, NULL, 5), DT_E_RANGE);
-	assert_non_null(strstr(archive_message(archive), "is the height too small?"));
+	assert_int_equal(archive_new_series(archive, "flat", "trial", path, NAN, 0.04, NULL, 5), DT_E_RANGE);
+	assert_int_equal(archive_new_series(archive, "low", "trial", path, NAN, 0.1, NULL, 5), 0);
+	assert_int_equal(archive_scene(archive, "low", &scene), 0);
+	assert_int_equal(scene_check_tower(&scene, "low", trial_message), DT_E_RANGE);
+	assert_non_null(strstr(trial_message, "is the height too small?"));
 	assert_int_equal(archive_new_series(archive, "high", "trial", path, NAN, 5.5, NULL, 5), DT_E_RANGE);
 	archive_close(archive);
 	assert_int_equal(unlink(path), 0);

@@ -626,7 +626,7 @@ static void test_a_series_from_another_height(void **state)
 	expect(400, work_new_series, NULL, NULL,
 	       "{\"name\":\"a\",\"scene\":\"geometry-1\",\"angle_deg\":85}");
 	expect(400, work_new_series, NULL, NULL,
-	       "{\"name\":\"a\",\"scene\":\"geometry-1\",\"height_m\":0.06}");
+	       "{\"name\":\"a\",\"scene\":\"geometry-1\",\"height_m\":0.04}");
 	expect(400, work_new_series, NULL, NULL,
 	       "{\"name\":\"a\",\"scene\":\"geometry-1\",\"height_m\":\"1\"}");
 	expect(400, work_new_series, NULL, NULL, "{\"name\":\"a\",\"scene\":\"geometry-1\",\"planned\":2.5}");
