@@ -169,6 +169,26 @@ void product_carry(struct product *p, double down_m_s2)
 	p->rate[PRODUCT_VY] = p->rate[PRODUCT_PLATE_VY] = -down_m_s2;
 }
 
+/* Steps of an elastic contact, and of a radian of the plate on its mounts. */
+#define STEPS_A_CONTACT 80.0
+#define STEPS_A_RADIAN 10.0
+
+/* The whole box on the corner that strikes, as stiff as hysteresis makes it at first. */
+static double longest_step_s(const struct product *p, double speed_m_s)
+{
+	const double k = p->stiffness_n_m15[0] * (1 + p->hysteresis);
+	const double contact_s = 2.943 * pow(1.25 * p->case_mass_kg / k, 0.4) * pow(speed_m_s, -0.2);
+	double step_s = fmin(PRODUCT_STEP_S, contact_s / STEPS_A_CONTACT);
+
+	if (p->plate_mass_kg > 0) {
+		const double per_mass = 1 / p->plate_mass_kg + 1 / p->case_mass_kg;
+		const double swing = sqrt(p->mount_n_m * (1 + p->softening) * per_mass);
+
+		step_s = fmin(step_s, 1 / (STEPS_A_RADIAN * fmax(swing, p->mount_damping_n_s_m * per_mass)));
+	}
+	return step_s;
+}
+
 void product_strike(struct product *p, double speed_m_s)
 {
 	const double angle = p->state[PRODUCT_ANGLE];
@@ -181,6 +201,7 @@ void product_strike(struct product *p, double speed_m_s)
 	p->state[PRODUCT_VY] = p->state[PRODUCT_PLATE_VY] = -speed_m_s;
 	corners_renew(p);
 	product_rates(p, p->state, p->rate);
+	p->longest_step_s = longest_step_s(p, speed_m_s);
 }
 
 void product_step(struct product *p, double step_s)

@@ -44,7 +44,7 @@ enum product_state {
 	PRODUCT_STATES = PRODUCT_GRIP + PRODUCT_CORNERS
 };
 
-#define PRODUCT_STEP_S 20e-6 /* the longest step; its error stays below a converter code */
+#define PRODUCT_STEP_S 20e-6 /* the longest step of any product; its error stays below a converter code */
 #define PRODUCT_APPROACH_MIN_M_S 0.1
 
 struct product {
@@ -58,6 +58,7 @@ struct product {
 	double state[PRODUCT_STATES];
 	double rate[PRODUCT_STATES]; /* of state, now */
 	double stiffness_n_m15[PRODUCT_CORNERS], approach_m_s[PRODUCT_CORNERS];
+	double longest_step_s; /* of product_step, by contact and mounts; from product_strike on */
 };
 
 /* What the sensors feel, m/s^2 along their axes: acceleration plus the reaction to gravity, so 0 in free

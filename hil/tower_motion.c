@@ -290,7 +290,7 @@ static void go_on(struct tower *t, double time_s)
 {
 	const double span_s = time_s - t->now_s;
 	const bool contact = t->place == PLACE_MAT;
-	const long steps = contact ? (long)ceil(span_s / PRODUCT_STEP_S) : 1;
+	const long steps = contact ? (long)ceil(span_s / t->product.longest_step_s) : 1;
 
 	for (long i = 0; i < steps; i++) {
 		if (contact)

@@ -55,6 +55,7 @@ struct run {
 	struct ode ode;
 	double released_s; /* corner 0 left the mat first; NAN: not yet */
 	double second_s;   /* the second touch of any corner; NAN: none yet */
+	double touched_s;  /* the last one */
 	int second_corner;
 	struct event event;
 	double contact_end_s; /* whoever has not left the mat by then will not */
@@ -211,6 +212,7 @@ static struct event first_change(const struct run *c, double *first)
 static void course_touch(struct run *c, int corner)
 {
 	c->touching |= 1u << corner;
+	c->touched_s = c->ode.t;
 	if (isnan(c->second_s)) {
 		c->second_s = c->ode.t;
 		c->second_corner = corner;
@@ -395,17 +397,21 @@ static bool course_peaks_in_flight(const struct course *in)
 }
 
 /* Steps until the window of peaks ends: the release and, if anything may peak then, a share of the plate's
- * period after it. */
+ * period after it. What touches by then is followed likewise; the next touch after that ends it. */
 static int follow(struct run *c, struct watch *watch, struct course_result *r)
 {
 	const struct course *in = c->in;
 	bool flies = course_peaks_in_flight(in);
 	/* such a plate may throw the box down once more */
 	bool heavy = in->body.plate_mass_kg > LIGHT_PLATE * in->body.case_mass_kg;
-	double end = c->contact_end_s;
+	double end = c->contact_end_s, window = (double)NAN, flight = FLIGHT_SHARE * c->period_s;
 	int error = 0;
 
-	while (!error && c->ode.t < end) {
+	while (!error) {
+		if (c->ode.t >= end && !(c->touching && end == window))
+			break;
+		if (c->ode.t >= end)
+			end += c->contact_end_s;
 		error = course_step(c, end);
 		if (error)
 			break;
@@ -422,10 +428,14 @@ static int follow(struct run *c, struct watch *watch, struct course_result *r)
 		watch_end(watch, &c->ode);
 		if (course_turn_over(c)) {
 			conclude_contact(c, r);
-			flies = flies || course_may_strike(c, FLIGHT_SHARE * c->period_s);
-			end = flies ? c->ode.t + FLIGHT_SHARE * c->period_s : c->ode.t;
+			flies = flies || course_may_strike(c, flight);
+			window = end = c->ode.t + (flies ? flight : 0.0);
 			if (in->count_ring)
 				error = ring_down(c, r);
+		} else if (!c->touching && c->touched_s <= window) {
+			end = c->ode.t + flight;
+		} else if (c->touched_s > window && !(c->touching & (c->touching - 1))) {
+			end = c->ode.t;
 		}
 		watch_resume(watch, &c->ode);
 	}

@@ -13,8 +13,7 @@ struct oscillator {
 	double omega; /* undamped, rad/s */
 	double zeta;
 	double decay;   /* zeta omega */
-	double split;   /* omega sqrt|1 - zeta^2|: the damped frequency, or half the distance of the two rates
-	                 */
+	double split;   /* omega sqrt|1 - zeta^2|: damped frequency, or half the distance of the two rates */
 	int overdamped; /* which of the two */
 };
 

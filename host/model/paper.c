@@ -49,8 +49,7 @@ static void box(const struct paper_input *in, struct paper_result *r)
 
 	/* (13) */
 	r->speed_m_s = fabs(r->impulse_speed_m_s + (in->speed_signed ? -in->speed_m_s : in->speed_m_s));
-	/* (14) twice differentiated is largest where its third derivative vanishes, or at its very beginning
-	 */
+	/* (14) twice differentiated is largest where its third derivative vanishes, or at its beginning */
 	if (zeta < 0.5)
 		turn = atan2(s * (1.0 - 4.0 * square(zeta)), zeta * (3.0 - 4.0 * square(zeta))) / s;
 	r->box_m_s2 = r->speed_m_s * omega * (zeta < 0.5 ? exp(-zeta * turn) : 2.0 * zeta);

@@ -91,8 +91,7 @@ static int paper_history(const struct drop *drop, const struct model_options *op
 const struct rung rung_paper = {
         .name = "paper",
         .says = "the study's equations as printed, for comparison only: several are wrong, and none gives S2 "
-                "or "
-                "a lag",
+                "or a lag",
         .says_without_plate = "the study's equations as printed, for comparison only: several are wrong",
         .predict = paper_predict,
         .history = paper_history,
@@ -158,8 +157,7 @@ static int steady_of(const struct drop *drop, double *transmissibility, double *
 	if (error)
 		return drop_refuse(
 		        message, error,
-		        "damping_ratio is 0 and the plate is in resonance with the pulse: no steady "
-		        "state");
+		        "damping_ratio is 0 and the plate resonates with the pulse: no steady state");
 	return 0;
 }
 
@@ -266,8 +264,7 @@ static int sdof_history(const struct drop *drop, const struct model_options *opt
 const struct rung rung_sdof = {
         .name = "sdof",
         .says = "explains the plate's peak, frequency and damping; understates the box's peak, whose real "
-                "pulse "
-                "is no half-sine",
+                "pulse is no half-sine",
         .says_without_plate =
                 "explains velocity change and direction; understates the box's peak, whose real "
                 "pulse is no half-sine",

@@ -78,7 +78,9 @@ int forecast_text(const struct forecast *f, FILE *out)
 		fprintf(out, "\nnote: the dent is %.0f %% of the mat: its floor begins to be felt\n",
 		        100.0 * p->dent_share);
 	if (p->notes & MODEL_NOTE_STUCK)
-		fprintf(out, "\nnote: the box does not leave the mat\n");
+		fprintf(out,
+		        "\nnote: the box does not leave the mat within %.3g ms: the peaks are up to then\n",
+		        1e3 * p->until_s);
 	if (p->notes & MODEL_NOTE_STRUCK)
 		fprintf(out, "\nnote: %s after %.3g ms: the peaks take it in\n",
 		        p->second_corner == 0 ? "the corner strikes again" : "another corner strikes",

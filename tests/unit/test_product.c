@@ -167,6 +167,30 @@ static void peaks_agree_with_reference(void **state)
 	compare_with_reference(PRODUCT_STEP_S, 2e-5, 1e-3);
 }
 
+/* Ten times as short a contact, on mounts ten times as fast. */
+static void short_contacts_get_short_steps(void **state)
+{
+	struct scene scene = scene_of("2A");
+	struct peak coarse[PEAKS], fine[PEAKS];
+	struct product p;
+
+	(void)state;
+	for (int angle = 15; angle <= 35; angle += 5) {
+		product_init(&p, &scene, UNITS_RAD(angle));
+		product_strike(&p, IMPACT_M_S);
+		assert_true(p.longest_step_s == PRODUCT_STEP_S);
+	}
+	scene.contact_stiffness_n_m15 *= pow(10, 2.5);
+	scene.mount_stiffness_n_m *= 100;
+	scene.mount_damping_n_s_m *= 10;
+	product_init(&p, &scene, UNITS_RAD(25));
+	product_strike(&p, IMPACT_M_S);
+	peaks_of(&scene, 25, p.longest_step_s, coarse);
+	peaks_of(&scene, 25, p.longest_step_s / 20, fine);
+	for (int which = 0; which < PEAKS; which++)
+		assert_near_part(coarse[which].value, fine[which].value, 1e-3);
+}
+
 /* A sharp nominal corner, no tangential force, linear mounts, stiffness the same at every angle. */
 static struct scene plain_scene(const char *geometry, double angle_deg)
 {
@@ -512,6 +536,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(peaks_agree_with_reference),
+	        cmocka_unit_test(short_contacts_get_short_steps),
 	        cmocka_unit_test(peaks_agree_with_plain_models),
 	        cmocka_unit_test(hysteresis_follows_restitution),
 	        cmocka_unit_test(momentum_balances),

@@ -17,6 +17,7 @@
 #include "common/units.h"
 #include "hil/product.h"
 #include "host/model/model.h"
+#include "tests/unit/near.h"
 
 /* Steps of the plant in a contact time: a slip begins and ends with one of them. */
 enum { STEPS = 40000, DROPS = 60 };
@@ -148,9 +149,70 @@ static void touches_like_the_plant(void **state)
 	assert_true(worst_s <= TIME_SHARE);
 }
 
+/* A light plate and a heavy one; the second touch comes just before 0.6 plate periods from the release are
+ * over, and shakes the plate (the first) or turns the box (the second) more than the first one did. */
+static void a_late_touch_is_not_cut(void **state)
+{
+	struct scene s[] = {{.drop_height_m = 2.01797434,
+	                     .drop_angle_deg = 54.6043678,
+	                     .product_case_mass_kg = 0.428668356,
+	                     .product_length_m = 0.0387434064,
+	                     .product_width_m = 0.0178070345,
+	                     .product_balance_angle_deg = 17.8831284,
+	                     .product_inertia_ratio = 0.80734242,
+	                     .contact_duration_s = 0.00214750607,
+	                     .contact_restitution = 0.110237451,
+	                     .contact_stiffness_n_m15 = 15819898.7,
+	                     .contact_tangential_ratio = 1.00567653,
+	                     .contact_friction = 0.757061161,
+	                     .sensor_s2_offset_m = 0.0126506631,
+	                     .mount_plate_mass_kg = 0.000444237316,
+	                     .mount_stiffness_n_m = 1328.98761,
+	                     .mount_damping_n_s_m = 0.0692781967,
+	                     .mount_softening = 0.110681439},
+	                    {.drop_height_m = 2.27057211,
+	                     .drop_angle_deg = 25.6575285,
+	                     .product_case_mass_kg = 15.0969698,
+	                     .product_length_m = 0.0365085479,
+	                     .product_width_m = 0.0345629621,
+	                     .product_balance_angle_deg = 17.2021464,
+	                     .product_inertia_ratio = 0.982443021,
+	                     .contact_duration_s = 0.011251824,
+	                     .contact_restitution = 0.0106797465,
+	                     .contact_stiffness_n_m15 = 8608863.44,
+	                     .contact_tangential_ratio = 2.93986163,
+	                     .contact_friction = 0.0906101145,
+	                     .sensor_s2_offset_m = 0.0118747757,
+	                     .mount_plate_mass_kg = 1.56152624,
+	                     .mount_stiffness_n_m = 806785.808,
+	                     .mount_damping_n_s_m = 114.377587,
+	                     .mount_softening = 0.708705301}};
+
+	(void)state;
+	for (size_t k = 0; k < sizeof(s) / sizeof(s[0]); k++) {
+		double peak[PEAKS], when[PEAKS];
+		struct model_prediction p;
+
+		s[k].drop_gravity_m_s2 = UNITS_G_M_S2;
+		s[k].contact_duration_height_m = s[k].drop_height_m;
+		s[k].contact_mass_kg = s[k].product_case_mass_kg;
+		s[k].contact_mat_thickness_m = 10.0;
+		s[k].mount_cube_m = 0.003;
+		s[k].mount_softening_strain = 0.8;
+		assert_int_equal(model_solve(&s[k], MODEL_PLANAR, NULL, &p, NULL), 0);
+		assert_true(p.notes & MODEL_NOTE_STRUCK);
+		plant_peaks(&s[k], s[k].contact_duration_s / 4000, p.until_s + s[k].contact_duration_s, peak,
+		            when);
+		for (int i = 0; i < PEAKS; i++)
+			assert_near_part((i == BOX ? p.box : p.resultant[i]).value_g * UNITS_G_M_S2, peak[i],
+			                 1e-3);
+	}
+}
+
 int main(int argc, char **argv)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(touches_like_the_plant)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(touches_like_the_plant),
+	                                   cmocka_unit_test(a_late_touch_is_not_cut)};
 
 	if (argc > 3) /* after the builds */
 		drops = atoi(argv[3]);

@@ -67,13 +67,20 @@ static struct tower *make_ideal(void)
 }
 
 /* Magnet on, latch energised at 0.1 s: open at 0.112 s. */
-static struct tower *falling(void)
+static struct tower *falling_of(const struct scene *scene)
 {
-	struct tower *tower = make_ideal();
+	struct tower *tower = make(scene, true, 1);
 
 	tower_output(tower, MAGNET, true, 0.01);
 	tower_output(tower, LATCH, true, 0.1);
 	return tower;
+}
+
+static struct tower *falling(void)
+{
+	const struct scene scene = test_scene();
+
+	return falling_of(&scene);
 }
 
 static double fall_time(double travel_m)
@@ -190,9 +197,10 @@ static double between(const struct product_reading *r, double place, size_t offs
 	return low + (high - low) * (place - (double)i);
 }
 
-static void codes_are_the_products_readings(void **state)
+/* Within tolerance, where the converter is not at its end. Returns S2's largest X. */
+static int16_t codes_are_readings_of(const struct scene *scene, double tolerance)
 {
-	enum { STEPS = 40000 };
+	enum { STEPS = 40000, FINER = 10 };
 	static const size_t part[4] = {
 	        offsetof(struct product_reading, s1_x), offsetof(struct product_reading, s1_y),
 	        offsetof(struct product_reading, s2_x), offsetof(struct product_reading, s2_y)};
@@ -201,19 +209,18 @@ static void codes_are_the_products_readings(void **state)
 	static double time_s[TRACE];
 	static struct product_reading r[STEPS];
 	struct product p;
-	const struct scene scene = test_scene();
-	struct tower *tower = falling();
+	struct tower *tower = falling_of(scene);
 	const struct tower_truth *truth = tower_truth(tower);
 	int16_t largest = 0;
 
-	(void)state;
 	tower_output(tower, MAGNET, false, fall_time(0.78) - 0.008);
 	trace(tower, 0.53, codes, time_s);
-	product_init(&p, &scene, UNITS_RAD(25));
+	product_init(&p, scene, UNITS_RAD(25));
 	product_strike(&p, truth->impact_speed_m_s);
 	for (int i = 0; i < STEPS; i++) {
 		product_read(&p, &r[i]);
-		product_step(&p, 1e-6);
+		for (int k = 0; k < FINER; k++)
+			product_step(&p, 1e-6 / FINER);
 	}
 	for (int i = 0; i < TRACE; i++) {
 		const double place = (time_s[i] - truth->impact_s) * 1e6;
@@ -221,15 +228,37 @@ static void codes_are_the_products_readings(void **state)
 		for (int c = 0; c < 4 && place < STEPS - 1; c++) {
 			const double g = place < 0 ? 0 : between(r, place, part[c]) / G_M_S2;
 
-			if (time_s[i] > truth->separation_s)
-				assert_near(codes[i][channel[c]], g * 32, 0.6);
+			if (time_s[i] > truth->separation_s && fabs(g) < 1000)
+				assert_near(codes[i][channel[c]], g * 32, tolerance);
 		}
-		assert_near(codes[i][2], 0.094 * codes[i][0], 0.6); /* Z of S1 and S2 over their X */
-		assert_near(codes[i][5], -0.005 * codes[i][3], 0.6);
+		if (abs(codes[i][0]) < 32000) /* Z of S1 and S2 over their X */
+			assert_near(codes[i][2], 0.094 * codes[i][0], 0.6);
+		if (abs(codes[i][3]) < 32000)
+			assert_near(codes[i][5], -0.005 * codes[i][3], 0.6);
 		largest = codes[i][3] > largest ? codes[i][3] : largest;
 	}
-	assert_in_range(largest, 460 * 32, 480 * 32);
 	tower_destroy(tower);
+	return largest;
+}
+
+static void codes_are_the_products_readings(void **state)
+{
+	const struct scene scene = test_scene();
+
+	(void)state;
+	assert_in_range(codes_are_readings_of(&scene, 0.6), 460 * 32, 480 * 32);
+}
+
+/* A tenth of the contact time, mounts ten times as fast: what is left of errors is in the flight. */
+static void short_contacts_are_followed_too(void **state)
+{
+	struct scene scene = test_scene();
+
+	(void)state;
+	scene.contact_stiffness_n_m15 *= pow(10, 2.5);
+	scene.mount_stiffness_n_m *= 100;
+	scene.mount_damping_n_s_m *= 10;
+	codes_are_readings_of(&scene, 32);
 }
 
 static void sensors_at_rest_and_in_fall(void **state)
@@ -798,6 +827,7 @@ int main(void)
 	        cmocka_unit_test(gates_see_the_frame_at_its_time),
 	        cmocka_unit_test(product_separates_where_planned),
 	        cmocka_unit_test(codes_are_the_products_readings),
+	        cmocka_unit_test(short_contacts_are_followed_too),
 	        cmocka_unit_test(sensors_at_rest_and_in_fall),
 	        cmocka_unit_test(magnet_off_at_rest_drops_the_product),
 	        cmocka_unit_test(braking_tears_the_product_off),
