@@ -10,7 +10,7 @@ HDF5 := $(shell pkg-config --cflags --libs hdf5 2>/dev/null || h5cc -show 2>/dev
 
 ifneq ($(HDF5),)
 all: $(BUILD)/droptower-hdf5
-HDF5_O = $(BUILD)/obj/host/hdf5/main.o
+HDF5_O = $(call obj,$(wildcard host/hdf5/*.c))
 ALL_O += $(HDF5_O)
 $(HDF5_O): CPPFLAGS += $(LINUX) $(patsubst -I%,-isystem %,$(filter -I%,$(HDF5)))
 

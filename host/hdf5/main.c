@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * droptower-hdf5 read|write: HDF5 on standard input to our CSV on standard output, or CSV to HDF5. Started by
- * droptower (host/record/hdf5.h); works by itself, too. README.md tells the layout.
+ * droptower-hdf5 read|write: HDF5 of ours on standard input to our CSV on standard output, of others to a
+ * tree (host/record/tree.h), or CSV to HDF5. Started by droptower (host/record/hdf5.h); works by itself, too.
+ * README.md tells the layout.
  */
 #include <hdf5.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/hdf5/foreign.h"
 #include "host/record/drop.h"
 #include "host/record/fields.h"
 #include "host/record/digest.h"
@@ -470,20 +472,24 @@ static int get_record(struct record *record, hid_t file, char seal[DIGEST_CHARS]
 	return result == 0 && record->is_drop ? check_samples(record) : result;
 }
 
-/* seal: the digits the file says; "" in one of a version before it. */
-static int read_image(struct record *record, const struct source *source, char seal[DIGEST_CHARS])
+/* By the mark or, where that was altered, by the seal. */
+static bool is_ours(hid_t file)
+{
+	char format[16];
+
+	return H5Aexists(file, "sha256") > 0 ||
+	       (get_text(file, "format", format, sizeof(format)) == 0 && strcmp(format, "droptower") == 0);
+}
+
+static hid_t open_image(const struct source *source)
 {
 	hid_t access = H5Pcreate(H5P_FILE_ACCESS), file = -1;
-	int result;
 
 	H5Pset_fapl_core(access, IMAGE_STEP, false);
 	if (H5Pset_file_image(access, source->bytes, source->size) >= 0)
 		file = H5Fopen("record", H5F_ACC_RDONLY, access);
-	result = file >= 0 ? get_record(record, file, seal) : refuse("damaged", "a whole file");
-	if (file >= 0)
-		H5Fclose(file);
 	H5Pclose(access);
-	return result;
+	return file;
 }
 
 /* The CSV with its seal when the file has that seal, too; without one when it has none. */
@@ -507,17 +513,29 @@ static int put_out(const struct record *record, const char *seal)
 	return result;
 }
 
-static int hdf5_to_csv(const struct source *source)
+static int record_to_csv(hid_t file)
 {
-	char seal[DIGEST_CHARS];
+	char seal[DIGEST_CHARS]; /* the digits that the file says; "" in one of a version before it */
 	struct record record;
 	int result;
 
 	record_init(&record);
-	result = read_image(&record, source, seal);
+	result = get_record(&record, file, seal);
 	if (result == 0)
 		result = put_out(&record, seal);
 	record_free(&record);
+	return result;
+}
+
+static int read_image(const struct source *source)
+{
+	hid_t file = open_image(source);
+	int result;
+
+	if (file < 0)
+		return refuse("damaged", "a whole file");
+	result = is_ours(file) ? record_to_csv(file) : foreign_put(file);
+	H5Fclose(file);
 	return result;
 }
 
@@ -536,7 +554,7 @@ int main(int argc, char **argv)
 		fprintf(stderr, "%s\n", message);
 		return 3;
 	}
-	result = strcmp(argv[1], "read") == 0 ? hdf5_to_csv(&source) : csv_to_hdf5(&source);
+	result = strcmp(argv[1], "read") == 0 ? read_image(&source) : csv_to_hdf5(&source);
 	source_free(&source);
 	H5close();
 	return result == 0 ? 0 : 3;

@@ -8,6 +8,7 @@
 #include "common/base/text.h"
 #include "host/record/helper.h"
 #include "host/record/seal.h"
+#include "host/record/tree.h"
 #include "host/record/write.h"
 
 static const struct helper helper = {"droptower-hdf5", "HDF5", "libhdf5-dev and pkg-config"};
@@ -26,8 +27,10 @@ bool hdf5_is(const struct source *source)
 {
 	static const char signature[] = "\x89HDF\r\n\x1a\n";
 
-	return source->size >= sizeof(signature) - 1 &&
-	       memcmp(source->bytes, signature, sizeof(signature) - 1) == 0;
+	for (size_t at = 0; at + sizeof(signature) <= source->size; at = at == 0 ? 512 : 2 * at)
+		if (memcmp(source->bytes + at, signature, sizeof(signature) - 1) == 0)
+			return true;
+	return false;
 }
 
 /* What the helper made of it, as a source of its own that goes by the name of the file. */
@@ -50,14 +53,38 @@ static int read_csv_of(struct record *record, int fd, const char *file, char *me
 	return error;
 }
 
-int read_hdf5(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX])
+static int read_foreign_of(struct record *record, const char *bytes, size_t size, const struct source *source,
+                           const char *columns, char *message)
+{
+	struct table_data table = {.format = NULL};
+	int error = read_tree(&table, "hdf5", bytes, size, source, message);
+
+	if (!error)
+		error = table_data_record(&table, record, source, columns, message);
+	table_data_free(&table);
+	return error;
+}
+
+int read_hdf5(struct record *record, const struct source *source, const char *columns,
+              char message[READ_MESSAGE_MAX])
 {
 	struct process_streams streams;
 	int error = helper_run(&helper, "read", source->bytes, source->size, source->file, &streams, message);
+	size_t size = 0;
+	char *bytes;
 
 	if (error != 0)
 		return error;
-	error = read_csv_of(record, streams.fd[1], source->file, message);
+	bytes = process_read(streams.fd[1], &size);
+	if (bytes == NULL)
+		error = source_no_memory(message, source->file);
+	else if (tree_is(bytes, size))
+		error = read_foreign_of(record, bytes, size, source, columns, message);
+	else if (columns != NULL)
+		error = read_refuse_columns(source->file, message);
+	else
+		error = read_csv_of(record, streams.fd[1], source->file, message);
+	free(bytes);
 	if (error == 0)
 		strcpy(record->format, "hdf5");
 	process_streams_close(&streams);

@@ -11,10 +11,13 @@
 
 #include "host/record/source.h"
 
+/* The signature is at 0, or behind somebody's head of 512, 1024, 2048 ... bytes. */
 bool hdf5_is(const struct source *source);
 
-/* As every reader; without the helper DT_E_UNKNOWN, and message says what to install. */
-DT_MUST_USE int read_hdf5(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX]);
+/* Of ours, which names its channels itself, or of others (tree.h). Without the helper DT_E_UNKNOWN, and
+ * message says what to install. */
+DT_MUST_USE int read_hdf5(struct record *record, const struct source *source, const char *columns,
+                          char message[READ_MESSAGE_MAX]);
 
 /* As every writer, file being named in message only. */
 DT_MUST_USE int write_hdf5(const struct record *record, FILE *out, const char *file,

@@ -21,7 +21,7 @@ static bool is_csv(const struct source *source)
 	return source->size >= sizeof(head) - 1 && memcmp(source->bytes, head, sizeof(head) - 1) == 0;
 }
 
-static int refuse_columns(const char *file, char *message)
+int read_refuse_columns(const char *file, char message[READ_MESSAGE_MAX])
 {
 	return source_refuse(message, DT_E_ARGUMENT, file, 0,
 	                     "this format names its channels itself, expected no --columns");
@@ -51,16 +51,16 @@ static int read_dispatch(struct record *record, struct source *source, const cha
 	int (*reader)(struct record *, const struct source *, char *) = NULL;
 	int sealed, result;
 
-	if (hdf5_is(source))
-		reader = read_hdf5;
-	else if (is_csv(source))
+	if (!mat_is(source) && hdf5_is(source))
+		return read_hdf5(record, source, columns, message);
+	if (is_csv(source))
 		reader = read_csv;
 	else if (uff58_is(source))
 		reader = read_uff58;
 	if (!reader)
 		return read_foreign(record, source, columns, message);
 	if (columns)
-		return refuse_columns(source->file, message);
+		return read_refuse_columns(source->file, message);
 	sealed = reader == read_csv || reader == read_uff58 ? seal_check(source, message) : 0;
 	if (sealed < 0)
 		return sealed;
@@ -102,7 +102,7 @@ static int open_recording(struct log_file *log, const char *file, const char *co
 	if (error || columns == NULL || !log_is(log))
 		return error;
 	log_file_close(log);
-	return refuse_columns(file, message);
+	return read_refuse_columns(file, message);
 }
 
 static int refuse_empty(struct log_file *log, const struct log_contents *contents, char *message)

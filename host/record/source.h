@@ -44,6 +44,9 @@ __attribute__((format(printf, 5, 6))) int source_refuse(char message[READ_MESSAG
 /* The same where memory was not there. */
 int source_no_memory(char message[READ_MESSAGE_MAX], const char *file);
 
+/* Of a format that needs none. */
+int read_refuse_columns(const char *file, char message[READ_MESSAGE_MAX]);
+
 /* The formats that are no logs. Each fills *record, initialised by the call, except for its file name.
  * Delimited text becomes UTF-8 in its source; without columns it must tell them itself (sniff.h). */
 DT_MUST_USE int read_csv(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX]);

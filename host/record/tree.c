@@ -44,7 +44,7 @@ int tree_put_text(FILE *out, const char *path, enum tree_kind kind, const char *
 	return tree_put(out, path, (struct tree_entry){.bytes = strlen(text), .kind = kind}, text);
 }
 
-static bool tree_is(const char *bytes, size_t size)
+bool tree_is(const char *bytes, size_t size)
 {
 	return size >= strlen(TREE_HEAD) && memcmp(bytes, TREE_HEAD, strlen(TREE_HEAD)) == 0;
 }

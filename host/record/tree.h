@@ -43,6 +43,9 @@ struct tree_entry {
 DT_MUST_USE int tree_put(FILE *out, const char *path, struct tree_entry entry, const void *data);
 DT_MUST_USE int tree_put_text(FILE *out, const char *path, enum tree_kind kind, const char *text);
 
+/* Whether that is what a helper gave. */
+bool tree_is(const char *bytes, size_t size);
+
 /* The columns of a helper's bytes; format goes to the record. */
 DT_MUST_USE int read_tree(struct table_data *table, const char *format, const char *bytes, size_t size,
                           const struct source *source, char message[READ_MESSAGE_MAX]);

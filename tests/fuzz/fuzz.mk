@@ -15,6 +15,7 @@ endif
 $(FUZZ_O): CPPFLAGS += $(LINUX)
 $(FUZZ_O): | $(LCM_H)
 $(BUILD)/obj/tests/fuzz/fuzz_hdf5.o: CPPFLAGS += $(patsubst -I%,-isystem %,$(filter -I%,$(HDF5)))
+$(BUILD)/fuzz/fuzz_hdf5: $(filter-out %/main.o,$(HDF5_O))
 $(BUILD)/fuzz/fuzz_hdf5: LIBRARIES += $(filter-out -I%,$(HDF5))
 ifneq ($(and $(SANITIZE),$(findstring clang,$(CC))),)
 $(FUZZ_O): CFLAGS += -fsanitize=fuzzer-no-link
