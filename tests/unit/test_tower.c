@@ -258,7 +258,7 @@ static void short_contacts_are_followed_too(void **state)
 	scene.contact_stiffness_n_m15 *= pow(10, 2.5);
 	scene.mount_stiffness_n_m *= 100;
 	scene.mount_damping_n_s_m *= 10;
-	codes_are_readings_of(&scene, 32);
+	codes_are_readings_of(&scene, 4);
 }
 
 static void sensors_at_rest_and_in_fall(void **state)
