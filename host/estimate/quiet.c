@@ -286,7 +286,7 @@ double quiet_colour(const struct trace *trace, const struct estimate_baseline *b
 
 	if (baseline->samples == 0 || !(quiet_noise(trace, from, until) < COLOURED * trace->noise_g))
 		return 1;
-	for (; from + length <= until; from += length / 2) {
+	for (; from + length <= until; from += (length + 1) / 2) {
 		double sum = 0;
 		size_t n = 0;
 

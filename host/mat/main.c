@@ -19,7 +19,11 @@
 #include "host/record/mat.h"
 #include "host/record/tree.h"
 
-enum { HEAD = 128, MATRIX = 14, COMPRESSED = 15, DEEPEST = 16, ELEMENTS_MOST = 4096 };
+enum { HEAD = 128, MATRIX = 14, COMPRESSED = 15, DEEPEST = 16, ELEMENTS_MOST = 4096, DEFLATE_MOST = 1032 };
+
+/* As many numbers as the file can hold, which are a byte each at least: a dimension that is damaged may be
+ * any. */
+static size_t numbers_most;
 
 static int refuse(const char *what)
 {
@@ -116,8 +120,8 @@ static int put_numbers(const char *path, const matvar_t *variable)
 		return put_other(path, "of more than two dimensions");
 	if (count == 0)
 		return 0;
-	if (variable->data == NULL || !kind_of(variable->data_type, &kind) || count > UINT32_MAX ||
-	    variable->nbytes != count * bytes_size(kind))
+	if (count > numbers_most || variable->data == NULL || !kind_of(variable->data_type, &kind) ||
+	    count > UINT32_MAX || variable->nbytes != count * bytes_size(kind))
 		return refuse("is damaged: a matrix without its numbers");
 	value = malloc(count * sizeof(*value));
 	if (value == NULL)
@@ -340,6 +344,7 @@ static int mat_to_tree(const struct source *source)
 	if (expected < 0)
 		return refuse(
 		        "is cut or damaged: its elements do not come out even, or a checksum does not agree");
+	numbers_most = is_7 ? SIZE_MAX : is_5 ? DEFLATE_MOST * source->size : source->size;
 	Mat_LogInitFunc("droptower-mat", on_complaint);
 	mat = is_7 ? open_7_3(source) : Mat_Open("/dev/stdin", MAT_ACC_RDONLY);
 	if (mat == NULL)
