@@ -6,9 +6,9 @@
  * libmatio ends silently where a file ends or is damaged: what stands between its marks is counted here
  * first, and what is compressed is unpacked to its checksum.
  */
+#include <fcntl.h>
 #include <matio.h>
 #include <stdio.h>
-#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -16,6 +16,7 @@
 
 #include "common/base/process.h"
 #include "common/base/text.h"
+#include "common/link/temporary.h"
 #include "host/record/mat.h"
 #include "host/record/tree.h"
 
@@ -316,19 +317,20 @@ static int put_all(mat_t *mat, long expected)
 /* HDF5 opens no link to a file without a name, as our input may be: it gets one until it is open. */
 static mat_t *open_7_3(const struct source *source)
 {
-	const char *folder = getenv("TMPDIR");
-	char path[PATH_MAX];
+	struct temporary folder;
+	char path[TEMPORARY_PATH_MAX + 8];
 	mat_t *mat = NULL;
-	int descriptor;
+	int fd;
 
-	snprintf(path, sizeof(path), "%s/droptower-mat-XXXXXX", folder != NULL ? folder : "/tmp");
-	descriptor = mkstemp(path);
-	if (descriptor < 0)
+	if (temporary_make(&folder, "mat") != 0)
 		return NULL;
-	if (process_write(descriptor, source->bytes, source->size) == 0)
+	snprintf(path, sizeof(path), "%s/in.mat", folder.path);
+	fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+	if (fd >= 0 && process_write(fd, source->bytes, source->size) == 0)
 		mat = Mat_Open(path, MAT_ACC_RDONLY);
-	close(descriptor);
-	unlink(path);
+	if (fd >= 0)
+		close(fd);
+	temporary_remove(&folder);
 	return mat;
 }
 

@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "common/base/text.h"
 #include "host/record/helper.h"
@@ -53,11 +54,11 @@ static int read_csv_of(struct record *record, int fd, const char *file, char *me
 	return error;
 }
 
-static int read_foreign_of(struct record *record, const char *bytes, size_t size, const struct source *source,
-                           const char *columns, char *message)
+static int read_foreign_of(struct record *record, int fd, const struct source *source, const char *columns,
+                           char *message)
 {
 	struct table_data table = {.format = NULL};
-	int error = read_tree(&table, "hdf5", bytes, size, source, message);
+	int error = read_tree_of(&table, "hdf5", fd, source, message);
 
 	if (!error)
 		error = table_data_record(&table, record, source, columns, message);
@@ -70,21 +71,18 @@ int read_hdf5(struct record *record, const struct source *source, const char *co
 {
 	struct process_streams streams;
 	int error = helper_run(&helper, "read", source->bytes, source->size, source->file, &streams, message);
-	size_t size = 0;
-	char *bytes;
+	char head[sizeof(TREE_HEAD)];
+	ssize_t size;
 
 	if (error != 0)
 		return error;
-	bytes = process_read(streams.fd[1], &size);
-	if (bytes == NULL)
-		error = source_no_memory(message, source->file);
-	else if (tree_is(bytes, size))
-		error = read_foreign_of(record, bytes, size, source, columns, message);
+	size = pread(streams.fd[1], head, sizeof(head), 0);
+	if (size > 0 && tree_is(head, (size_t)size))
+		error = read_foreign_of(record, streams.fd[1], source, columns, message);
 	else if (columns != NULL)
 		error = read_refuse_columns(source->file, message);
 	else
 		error = read_csv_of(record, streams.fd[1], source->file, message);
-	free(bytes);
 	if (error == 0)
 		strcpy(record->format, "hdf5");
 	process_streams_close(&streams);

@@ -74,16 +74,11 @@ int read_mat(struct table_data *table, const struct source *source, char message
 {
 	static const struct helper helper = {"droptower-mat", "MAT files", "libmatio-dev and pkg-config"};
 	struct process_streams streams;
-	size_t size = 0;
-	char *bytes;
 	int error = helper_run(&helper, "read", source->bytes, source->size, source->file, &streams, message);
 
 	if (error)
 		return error;
-	bytes = process_read(streams.fd[1], &size);
-	error = bytes != NULL ? read_tree(table, "mat", bytes, size, source, message)
-	                      : source_no_memory(message, source->file);
-	free(bytes);
+	error = read_tree_of(table, "mat", streams.fd[1], source, message);
 	process_streams_close(&streams);
 	return error;
 }

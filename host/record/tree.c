@@ -7,6 +7,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "common/base/process.h"
 #include "host/record/cells.h"
 #include "host/record/sniff.h"
 
@@ -620,5 +621,17 @@ int read_tree(struct table_data *table, const char *format, const char *bytes, s
 		                      "no array of numbers whose samples go one way%s%s",
 		                      table->left_out[0] != '\0' ? ", but " : "", table->left_out);
 	free(tree.node);
+	return error;
+}
+
+int read_tree_of(struct table_data *table, const char *format, int fd, const struct source *source,
+                 char message[READ_MESSAGE_MAX])
+{
+	size_t size;
+	char *bytes = process_read(fd, &size);
+	int error = bytes != NULL ? read_tree(table, format, bytes, size, source, message)
+	                          : source_no_memory(message, source->file);
+
+	free(bytes);
 	return error;
 }

@@ -50,4 +50,8 @@ bool tree_is(const char *bytes, size_t size);
 DT_MUST_USE int read_tree(struct table_data *table, const char *format, const char *bytes, size_t size,
                           const struct source *source, char message[READ_MESSAGE_MAX]);
 
+/* The same of all that a stream of process.h holds. */
+DT_MUST_USE int read_tree_of(struct table_data *table, const char *format, int fd,
+                             const struct source *source, char message[READ_MESSAGE_MAX]);
+
 #endif

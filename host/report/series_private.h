@@ -68,6 +68,9 @@ bool series_traces_drop(FILE *out, const struct series_page *page, const struct 
 /* Whether there is a trace to draw of it. */
 bool series_is_drawn(const struct series_drop *drop);
 
+/* A sensor's channel along an axis; NULL where it has none, or there is no trace. */
+const struct channel *series_channel(const struct series_drop *drop, size_t sensor, char axis);
+
 /* How many drops go into the means. */
 size_t series_counted(const struct series_page *page);
 

@@ -16,7 +16,8 @@ static const struct spectrum_options options = {
 /* The spectra of the drops that count and are drawn; the others have no channel. */
 struct series_spectra {
 	const struct series_page *page;
-	struct spectrum *of; /* [page->count] */
+	struct spectrum *of;       /* [page->count] */
+	struct script_range range; /* of all, so that heights compare by eye */
 };
 
 static bool has_spectra(const struct series_drop *drop)
@@ -28,7 +29,7 @@ static int spectra_open(struct series_spectra *spectra, const struct series_page
 {
 	int result = 0;
 
-	*spectra = (struct series_spectra){page, calloc(page->count + 1, sizeof(*spectra->of))};
+	*spectra = (struct series_spectra){.page = page, .of = calloc(page->count + 1, sizeof(*spectra->of))};
 	if (!spectra->of)
 		return DT_E_MEMORY;
 	for (size_t i = 0; i < page->count && result == 0; i++)
@@ -46,18 +47,15 @@ static void spectra_close(struct series_spectra *spectra)
 	free(spectra->of);
 }
 
-static const struct spectrum_channel *channel_of(const struct spectrum *spectrum, size_t sensor, char axis)
+static const struct spectrum_channel *curve_of(const struct series_spectra *spectra, size_t drop,
+                                               size_t sensor, char axis)
 {
-	for (size_t c = 0; c < spectrum->channel_count; c++) {
-		const char *name = spectrum->channel[c].name;
+	const struct series_drop *d = spectra->page->drop[drop];
+	const struct channel *c = series_channel(d, sensor, axis);
 
-		if (name[0] == 'S' && name[1] == (char)('1' + sensor) && name[2] == axis && name[3] == '\0')
-			return &spectrum->channel[c];
-	}
-	return NULL;
+	return c && spectra->of[drop].channel ? &spectra->of[drop].channel[c - d->record.channels] : NULL;
 }
 
-/* One range for all pictures, so that heights compare by eye. */
 static struct script_range range_of(const struct series_spectra *spectra)
 {
 	struct script_range range = {INFINITY, 0.0};
@@ -66,7 +64,7 @@ static struct script_range range_of(const struct series_spectra *spectra)
 		for (size_t picture = 0; picture < 4; picture++) {
 			const struct spectrum *s = &spectra->of[i];
 			const struct spectrum_channel *c =
-			        channel_of(s, picture % 2, picture < 2 ? 'X' : 'Y');
+			        curve_of(spectra, i, picture % 2, picture < 2 ? 'X' : 'Y');
 
 			for (size_t k = 0; c && k < s->count; k++)
 				if (c->side[SRS_MAXIMAX][k] > 0) {
@@ -99,7 +97,7 @@ static size_t write_curves(FILE *out, const struct series_spectra *spectra, size
 	size_t drawn = 0;
 
 	for (size_t i = 0; i < spectra->page->count; i++) {
-		const struct spectrum_channel *c = channel_of(&spectra->of[i], sensor, axis);
+		const struct spectrum_channel *c = curve_of(spectra, i, sensor, axis);
 
 		if (c && write_curve(out, drawn, &spectra->of[i], c)) {
 			last = &spectra->of[i];
@@ -108,7 +106,7 @@ static size_t write_curves(FILE *out, const struct series_spectra *spectra, size
 	}
 	if (last)
 		script_spectrum_axes(out, 560, 300, last->frequency_hz[0],
-		                     last->frequency_hz[last->count - 1], range_of(spectra));
+		                     last->frequency_hz[last->count - 1], spectra->range);
 	for (size_t i = 0; i < drawn; i++)
 		fprintf(out, "%s$d%zu with lines linewidth 1.3 linecolor rgb '%s'", i > 0 ? ", " : "plot ", i,
 		        sensor == 0 ? SCRIPT_COLOUR_S1 : SCRIPT_COLOUR_S2);
@@ -148,6 +146,7 @@ void series_spectra(struct series_page *page)
 	if (page->page.error) {
 		snprintf(page->page.message, page->page.size, "%s", error_text(page->page.error));
 	} else {
+		spectra.range = range_of(&spectra);
 		fputs("<h2>Shock response spectra of the drops that count</h2>\n<p class=\"soft\">What an "
 		      "oscillator "
 		      "on the sensor's place would reach: the largest acceleration, of either sign, during "

@@ -12,7 +12,7 @@ static enum model_axis model_axis(size_t sensor, char axis)
 	return sensor == 0 ? (axis == 'X' ? MODEL_S1X : MODEL_S1Y) : (axis == 'X' ? MODEL_S2X : MODEL_S2Y);
 }
 
-static const struct channel *channel_of(const struct series_drop *drop, size_t sensor, char axis)
+const struct channel *series_channel(const struct series_drop *drop, size_t sensor, char axis)
 {
 	char name[] = {'S', (char)('1' + sensor), axis, '\0'};
 
@@ -39,7 +39,7 @@ static struct script_range range_of(const struct series_page *page, char axis)
 	for (size_t i = 0; i < page->count; i++)
 		for (size_t sensor = 0; sensor < 2; sensor++) {
 			const struct series_drop *d = page->drop[i];
-			const struct channel *c = channel_of(d, sensor, axis);
+			const struct channel *c = series_channel(d, sensor, axis);
 
 			if (c)
 				script_reach_samples(&range, c, offset_of(d, c), window_of(page, d));
@@ -87,7 +87,7 @@ bool series_traces_over(FILE *out, const struct series_page *page, size_t sensor
 
 	for (size_t i = 0; i < page->count; i++) {
 		const struct series_drop *d = page->drop[i];
-		const struct channel *c = d->counts ? channel_of(d, sensor, axis) : NULL;
+		const struct channel *c = d->counts ? series_channel(d, sensor, axis) : NULL;
 		char name[16];
 
 		snprintf(name, sizeof(name), "d%zu", drawn);
@@ -116,7 +116,7 @@ struct layer {
 static struct layer series_traces_write_layer(FILE *out, const struct series_page *page,
                                               const struct series_drop *drop, size_t sensor, char axis)
 {
-	const struct channel *c = channel_of(drop, sensor, axis);
+	const struct channel *c = series_channel(drop, sensor, axis);
 	struct script_window window = window_of(page, drop);
 	struct layer layer = {false, false, false};
 	char name[24];

@@ -13,10 +13,10 @@
  *     chain_percent = 1.4                 standard uncertainty of the measuring chain, common to all samples
  *     S2X.peak.value_g = 400 600          lower and upper of anything in quantity.def, by its place in JSON;
  *     S1.peak_g = - 300                   a lone - is none
- *     S2X.peak.value_g = 500 +- 5         a check of the sensor: a reference and its U; met where |E_n| is 1
- * at most (ISO/IEC 17043) spectrum = 10:5:20 100:100:400      FREQUENCY_HZ:LOWER_G:UPPER_G, maximax, absolute
- * acceleration spectrum_q = 10 spectrum_share = 90                 percent of the frequencies that must be
- * within
+ *     S2X.peak.value_g = 500 +- 5         a check of the sensor: a reference and its U; met at |E_n| <= 1
+ *     spectrum = 10:5:20 100:100:400      FREQUENCY_HZ:LOWER_G:UPPER_G, maximax, absolute acceleration
+ *     spectrum_q = 10
+ *     spectrum_share = 90                 percent of the frequencies that must be within
  *
  * Of peaks and velocity changes the magnitude counts. Long lists go on in lines that begin with blanks.
  */
