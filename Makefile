@@ -11,7 +11,7 @@ JOBS ?= $(shell nproc)
 # ---- what must be installed ------------------------------------------------------------------------
 
 PACKAGES_RUN = gcc libc6-dev libgsl-dev liblcm-dev liblcm-bin libinih-dev libcjson-dev gnuplot-nox \
-	libsqlite3-dev nettle-dev
+	libsqlite3-dev nettle-dev zlib1g-dev
 PACKAGES_TEST = $(PACKAGES_RUN) libcmocka-dev clang llvm libclang-rt-14-dev can-utils python3-canmatrix \
 	iproute2 util-linux gawk libmicrohttpd-dev
 
@@ -29,7 +29,7 @@ endif
 CPPFLAGS = -I. -I$(BUILD)/generated
 # The posix side may use all of Linux; common/ and the firmware core get only what C11 has.
 LINUX = -D_GNU_SOURCE
-LIBRARIES = -lgsl -lgslcblas -llcm -linih -lcjson -lsqlite3 -lnettle -lm -lpthread
+LIBRARIES = -lgsl -lgslcblas -llcm -linih -lcjson -lsqlite3 -lnettle -lz -lm -lpthread
 
 VERSION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 

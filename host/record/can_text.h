@@ -5,12 +5,12 @@
  * CAN logs of other programs as candump text, in memory, before anything else looks at them: all that is done
  * with candump text is done with them.
  *
- *     ASC      Vector's text: base hex or dec, absolute or relative times, CAN and CAN FD, logs of CANoe,
- *              python-can and log2asc; what is no frame (statistics, J1939TP, error frames) is left out
- *     pcapng   (draft-ietf-opsawg-pcapng) and pcap: frames of interfaces of link type 227, SocketCAN
- *              (tcpdump.org/linktypes/LINKTYPE_CAN_SOCKETCAN.html)
+ *     ASC      Vector's text (can_asc.c), logs of CANoe, python-can and log2asc
+ *     pcapng   and pcap, of SocketCAN (can_pcap.c)
+ *     BLF      Vector's binary log (can_blf.c)
  *
- * A line of a frame, or a block, that does not make sense becomes a line that is none, and counts as corrupt.
+ * A line of a frame, a block or an object that does not make sense becomes a line that is none, and counts as
+ * corrupt.
  */
 #include <stdbool.h>
 #include <stddef.h>

@@ -16,7 +16,7 @@ static const struct {
         {0, "RF64", 4, "a WAV file of more than 4 GiB (RF64): cut it"},
         {0, "\x1a\x45\xdf\xa3", 4, "an EBML file, as the IDE files of enDAQ are: export it as CSV"},
         {0, "MDF     ", 8, "an MDF file of ASAM: export it as CSV"},
-        {0, "LOGG", 4, "a CAN log of Vector (BLF): save it as ASC or candump text"},
+        {0, "UnFinMF ", 8, "an MDF file of ASAM that was not finished: finish it, and export it as CSV"},
         {0, ";$FILEVERSION", 13, "a CAN trace of PEAK (TRC): save it as ASC or candump text"},
         {0, "%PDF", 4, "a PDF"},
         {0, "\x89PNG", 4, "a picture"},

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Binary tables: the first byte chooses a format, whose magic is put in front, and what the columns are said
- * to be.
+ * Binary tables and CAN logs: the first byte chooses a format, whose magic is put in front, and what the
+ * columns are said to be.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -14,8 +14,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	static const struct {
 		const char *magic;
 		size_t length;
-	} magics[] = {
-	        {"\x93NUMPY\1", 7}, {"RIFF", 4}, {"TDSm", 4}, {"UNITS OF G\n", 11}, {"    -1\n    58b ", 15}};
+	} magics[] = {{"\x93NUMPY\1", 7},
+	              {"RIFF", 4},
+	              {"TDSm", 4},
+	              {"UNITS OF G\n", 11},
+	              {"    -1\n    58b ", 15},
+	              {"LOGG\x20\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", 32}};
 	static const char *const columns[] = {NULL, "a:g@1000", "time:s,a:g"};
 	char message[READ_MESSAGE_MAX] = "";
 	struct record record;
@@ -25,7 +29,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 
 	if (size < 1)
 		return 0;
-	i = bytes[0] % (sizeof(magics) / sizeof(magics[0]));
+	i = bytes[0] % 16 % (sizeof(magics) / sizeof(magics[0]));
 	length = magics[i].length;
 	whole = malloc(length + size);
 	if (whole == NULL)
