@@ -4,7 +4,8 @@
 # of the C library, of the port, of the firmware or of the console are programs of their own. `make unit` and
 # `make check-fast` are the fast loop.
 
-UNITS_ALONE = $(addprefix $(BUILD)/tests/,test_promises test_port_faults test_link_faults test_console_work)
+UNITS_ALONE = $(addprefix $(BUILD)/tests/,test_promises test_port_faults test_link_faults test_console_work \
+	test_multibody)
 UNITS_TOGETHER = $(filter-out $(UNITS_ALONE),$(UNITS))
 DISPATCH_O = $(BUILD)/obj/tests/dispatch/dispatch.o
 UNIT_LIBRARIES = $(foreach l,console host hil firmware link common,$(call lib,$l))
@@ -31,6 +32,9 @@ $(BUILD)/tests/unit: $(DISPATCH_O) $(UNITS_TOGETHER:$(BUILD)/tests/%=$(BUILD)/ob
 
 $(UNITS_TOGETHER): $(BUILD)/tests/unit
 	$(Q)ln -sf unit $@
+
+# Another's mechanics, to hold ours against.
+$(BUILD)/tests/test_multibody: LIBRARIES += -lode
 
 $(UNITS_ALONE): $(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(call obj,$(UNIT_HELPER_C)) $(UNIT_LIBRARIES)
 	$(call say,LINK,$@)

@@ -17,6 +17,7 @@
 #include "common/units.h"
 #include "hil/product.h"
 #include "host/model/model.h"
+#include "tests/unit/drawn_scene.h"
 #include "tests/unit/near.h"
 
 /* Steps of the plant in a contact time: a slip begins and ends with one of them. */
@@ -26,53 +27,6 @@ enum { STEPS = 40000, DROPS = 60 };
 
 static int drops = DROPS;
 static uint64_t seed = 7;
-
-static double uniform(double low, double high)
-{
-	seed = seed * 6364136223846793005u + 1442695040888963407u;
-	return low + (high - low) * (double)(seed >> 11) / 9007199254740992.0;
-}
-
-static double spread(double low, double high)
-{
-	return low * pow(high / low, uniform(0.0, 1.0));
-}
-
-/* Cubes to crates; the mat is thicker than any dent. */
-static struct scene random_scene(void)
-{
-	double side = spread(0.03, 2.0), contact_s = spread(0.5e-3, 15e-3), mass = spread(0.05, 50.0);
-	struct scene s = {
-	        .drop_height_m = spread(0.05, 2.4),
-	        .drop_gravity_m_s2 = UNITS_G_M_S2,
-	        .drop_angle_deg = uniform(8.0, 60.0),
-	        .product_case_mass_kg = mass,
-	        .product_length_m = side,
-	        .product_width_m = side * uniform(0.3, 1.0),
-	        .product_balance_angle_deg = uniform(15.0, 45.0),
-	        .product_inertia_ratio = uniform(0.7, 1.6),
-	        .contact_duration_s = contact_s,
-	        .contact_restitution = uniform(0.01, 0.99),
-	        .contact_mass_kg = mass,
-	        .contact_mat_thickness_m = 10.0,
-	        .contact_tangential_ratio = uniform(0.0, 3.0),
-	        .contact_friction = uniform(0.05, 1.0),
-	        .sensor_s2_offset_m = side * uniform(0.0, 0.4),
-	        .mount_plate_mass_kg = mass * spread(0.001, 2.0),
-	        .mount_cube_m = 0.003,
-	        .mount_softening = uniform(0.0, 1.0),
-	        .mount_softening_strain = 0.8,
-	        .mount_damping_ratio = 0.1,
-	};
-	double plate = s.mount_plate_mass_kg, omega = 2.0 * UNITS_PI * spread(0.08, 6.0) / contact_s;
-
-	s.contact_duration_height_m = s.drop_height_m;
-	s.mount_stiffness_n_m = omega * omega / (1.0 / plate + 1.0 / mass);
-	s.mount_damping_n_s_m = 2.0 * uniform(0.01, 0.5) * s.mount_stiffness_n_m / omega;
-	s.contact_stiffness_n_m15 =
-	        mass * pow(3.3 / contact_s, 2.5) / pow(2.0 * UNITS_G_M_S2 * s.drop_height_m, 0.25);
-	return s;
-}
 
 enum { S1, S2, BOX, PEAKS };
 
@@ -110,7 +64,7 @@ static void touches_like_the_plant(void **state)
 
 	(void)state;
 	for (int drop = 0; drop < drops; drop++) {
-		struct scene s = random_scene();
+		struct scene s = drawn_scene(&seed);
 		double step_s = s.contact_duration_s / STEPS, peak[PEAKS], when[PEAKS];
 		struct model_prediction p;
 		char message[MODEL_MESSAGE_MAX];
