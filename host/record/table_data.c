@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "host/record/assume.h"
+#include "host/record/ide.h"
 #include "host/record/profile.h"
 #include "host/record/sniff.h"
 #include "host/record/timebase.h"
@@ -176,12 +177,12 @@ static int make_channel(struct making *making, size_t i)
 	if (channel == NULL)
 		return source_no_memory(making->message, making->source->file);
 	channel->start_s = timed ? 0 : column->start_s;
-	channel->flags = timed && making->timebase.uneven ? RECORD_FLAG_UNEVEN : 0;
+	channel->flags = (timed ? making->timebase.uneven : column->uneven) ? RECORD_FLAG_UNEVEN : 0;
 	for (size_t k = 0; k < column->count; k++) {
 		bool good = isfinite(column->value[k] / spec->divisor);
 
 		channel->value_g[k] = good ? column->value[k] / spec->divisor : NAN;
-		channel->sample[k] = good ? 0 : SAMPLE_BAD;
+		channel->sample[k] = good ? 0 : column->gaps ? SAMPLE_LOST : SAMPLE_BAD;
 	}
 	if (timed && timebase_spread(&making->timebase, channel) != 0)
 		return source_no_memory(making->message, making->source->file);
@@ -459,5 +460,9 @@ table_reader *table_reader_of(const struct source *source)
 		if (source->size > readers[i].length &&
 		    memcmp(source->bytes, readers[i].magic, readers[i].length) == 0)
 			return readers[i].reader;
-	return at2_is(source) ? read_at2 : mme_is(source) ? read_mme : mat_is(source) ? read_mat : NULL;
+	return ide_is(source)   ? read_ide
+	       : at2_is(source) ? read_at2
+	       : mme_is(source) ? read_mme
+	       : mat_is(source) ? read_mat
+	                        : NULL;
 }

@@ -16,6 +16,8 @@ struct table_column {
 	double rate_hz, start_s; /* rate 0 where not told */
 	bool rate_open;          /* the rate tells no unit: as if in Hz */
 	bool timed;              /* a time column stands beside it, which a rate must agree with */
+	bool uneven;             /* samples lie up to half a step off their grid */
+	bool gaps;               /* what is no number was not recorded */
 	bool exact;              /* doubles in the file: times are good to their last bits */
 	char doubt[100];         /* why it needs --columns if it is a channel; "" where it does not */
 	size_t count;
@@ -38,12 +40,12 @@ DT_MUST_USE int table_data_record(const struct table_data *table, struct record 
                                   const struct source *source, const char *columns,
                                   char message[READ_MESSAGE_MAX]);
 
-/* The formats that end as a table: NumPy array, WAV, TDMS, ground motion of PEER, ISO 13499,
- * MAT. NULL where it is none. */
+/* The formats that end as a table: NumPy array, WAV, TDMS, ground motion of PEER, ISO 13499, MAT, IDE. NULL
+ * where it is none. */
 typedef int table_reader(struct table_data *table, const struct source *source,
                          char message[READ_MESSAGE_MAX]);
 table_reader *table_reader_of(const struct source *source);
-table_reader read_npy, read_wav, read_tdms, read_at2, read_mme, read_mat;
+table_reader read_npy, read_wav, read_tdms, read_at2, read_mme, read_mat, read_ide;
 bool at2_is(const struct source *source);
 bool mme_is(const struct source *source);
 bool mat_is(const struct source *source);

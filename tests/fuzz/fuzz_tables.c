@@ -19,7 +19,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	              {"TDSm", 4},
 	              {"UNITS OF G\n", 11},
 	              {"    -1\n    58b ", 15},
-	              {"LOGG\x20\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", 32}};
+	              {"LOGG\x20\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", 32},
+	              {"\x1a\x45\xdf\xa3\x87\x42\x82\x84mide", 12}};
 	static const char *const columns[] = {NULL, "a:g@1000", "time:s,a:g"};
 	char message[READ_MESSAGE_MAX] = "";
 	struct record record;
