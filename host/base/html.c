@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <stdlib.h>
 #include <string.h>
 
 void html_text_part(FILE *out, const char *text, size_t length)
@@ -35,12 +36,15 @@ void html_text(FILE *out, const char *text)
 	html_text_part(out, text, strlen(text));
 }
 
+enum { SIGMA_DIGITS = -3 }; /* of a value with significant digits */
+
 void html_number(FILE *out, int decimals, double value)
 {
-	bool negative = value < -0.5 * pow(10.0, -decimals); /* as it is rounded: no -0.0 */
+	bool negative = value < (decimals < 0 ? 0.0 : -0.5 * pow(10.0, -decimals)); /* as rounded: no -0.0 */
 
 	if (isfinite(value))
-		fprintf(out, "%s%.*f", negative ? "&minus;" : "", decimals, fabs(value));
+		fprintf(out, decimals < 0 ? "%s%.*g" : "%s%.*f", negative ? "&minus;" : "", abs(decimals),
+		        fabs(value));
 	else
 		fputs("&ndash;", out);
 }
@@ -50,6 +54,6 @@ void html_with_sigma(FILE *out, int decimals, double value, double sigma)
 	html_number(out, decimals, value);
 	if (isfinite(value) && isfinite(sigma)) {
 		fputs(" &plusmn; ", out);
-		html_number(out, decimals, sigma);
+		html_number(out, decimals < 0 ? SIGMA_DIGITS : decimals, sigma);
 	}
 }

@@ -11,7 +11,7 @@
 void html_text(FILE *out, const char *text);
 void html_text_part(FILE *out, const char *text, size_t length);
 
-/* A dash when it is not known. */
+/* A dash when it is not known; negative decimals: so many significant digits, three of the uncertainty. */
 void html_number(FILE *out, int decimals, double value);
 void html_with_sigma(FILE *out, int decimals, double value, double sigma);
 

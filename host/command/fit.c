@@ -7,17 +7,19 @@
 #include <string.h>
 #include <unistd.h>
 
+#include <droptower_version.h>
+
 #include "common/base/number.h"
-#include "host/base/table.h"
 #include "host/base/whole.h"
 #include "host/command/archived.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
 #include "host/fit/fit.h"
 #include "host/record/read.h"
+#include "host/report/fitted.h"
 
 struct arguments {
-	const char *scene_file, *output, *archive;
+	const char *scene_file, *output, *html, *archive;
 	double angle_sd_deg, speed_sd, gain_sd, common_gain_sd;
 	bool json;
 };
@@ -27,6 +29,8 @@ static const struct option_row rows[] = {
                     "masses, sizes and sensors, and where to start: a factor of three off is near enough"),
         OPTION_TEXT("output", "NEW.ini", struct arguments, output,
                     "write the scene with what was found, its standard uncertainties and their correlations"),
+        OPTION_TEXT("html", "PAGE", struct arguments, html,
+                    "write a page: tables, residuals, and what is predicted over the angle"),
         OPTION_TEXT("archive", "DIR", struct arguments, archive,
                     "the archive of a SERIES (default $DROPTOWER_ARCHIVE or ./archive)"),
         OPTION_NUMBER("angle-sd", "DEG", struct arguments, angle_sd_deg, 0.01, 10,
@@ -65,6 +69,7 @@ struct fitting {
 	char name[FIT_DROPS_MAX][128];
 	struct fit_drop drop[FIT_DROPS_MAX];
 	unsigned count;
+	struct fit_options options;
 	struct fit fit;
 };
 
@@ -193,227 +198,6 @@ static int fit_add_word(struct fitting *f, const char *word)
 
 /* ---- output ---- */
 
-struct parameter_row {
-	const char *name, *status;
-	struct table_value value;
-};
-
-static const struct table_column parameter_columns[] = {
-        TABLE_COLUMN(WORDS, struct parameter_row, name, .key = "name", .title = "parameter", .width = -18),
-        TABLE_COLUMN(VALUE, struct parameter_row, value, .key = "value", .sigma = "u", .title = "value",
-                     .width = 12, .digits = TABLE_DIGITS_G),
-        TABLE_COLUMN(NUMBER, struct parameter_row, value.sigma, .title = "+-", .width = 11, .digits = -3),
-        TABLE_COLUMN(WORDS, struct parameter_row, status, .key = "status", .title = "", .width = -16,
-                     .gap = " "),
-};
-
-struct drop_row {
-	const char *name;
-	struct table_value angle, contact, restitution, spin, lag, s1, s2;
-	double pull;
-};
-
-static const struct table_column drop_columns[] = {
-        TABLE_COLUMN(WORDS, struct drop_row, name, .key = "drop", .title = "drop", .width = -16),
-        TABLE_COLUMN(VALUE, struct drop_row, angle, .key = "angle_deg", .sigma = "sigma_angle_deg",
-                     .title = "angle", .unit = "deg", .width = 7, .digits = 2),
-        TABLE_COLUMN(VALUE, struct drop_row, contact, .key = "contact_time_s",
-                     .sigma = "sigma_contact_time_s", .title = "contact", .unit = "ms", .width = 7,
-                     .digits = 3, .scale = 1e3),
-        TABLE_COLUMN(NUMBER, struct drop_row, contact.sigma, .title = "+-", .width = 7, .digits = 3,
-                     .scale = 1e3),
-        TABLE_COLUMN(VALUE, struct drop_row, restitution, .key = "restitution_of_centre",
-                     .sigma = "sigma_restitution_of_centre", .title = "e of c.o.g.", .width = 7, .digits = 4),
-        TABLE_COLUMN(NUMBER, struct drop_row, restitution.sigma, .title = "+-", .width = 7, .digits = 4),
-        TABLE_COLUMN(VALUE, struct drop_row, spin, .key = "spin_rad_s", .sigma = "sigma_spin_rad_s",
-                     .title = "spin", .unit = "rad/s", .width = 7, .digits = 2),
-        TABLE_COLUMN(VALUE, struct drop_row, lag, .key = "lag_s", .sigma = "sigma_lag_s", .title = "lag",
-                     .unit = "ms", .width = 7, .digits = 4, .scale = 1e3),
-        TABLE_COLUMN(NUMBER, struct drop_row, lag.sigma, .title = "+-", .width = 7, .digits = 4,
-                     .scale = 1e3),
-        TABLE_COLUMN(VALUE, struct drop_row, s1, .key = "s1_resultant_g", .sigma = "sigma_s1_resultant_g",
-                     .title = "S1", .unit = "g", .width = 7, .digits = 1),
-        TABLE_COLUMN(VALUE, struct drop_row, s2, .key = "s2_resultant_g", .sigma = "sigma_s2_resultant_g",
-                     .title = "S2", .unit = "g", .width = 7, .digits = 1),
-        TABLE_COLUMN(NUMBER, struct drop_row, pull, .key = "pull"),
-};
-
-static bool fit_holds(const struct fit *fit)
-{
-	bool holds = fit->doubt.words[0] == '\0';
-
-	for (size_t i = 0; i < MOTION_SHARED; i++)
-		holds = holds && fit->status[i] != FIT_BEYOND;
-	return holds;
-}
-
-/* Where the model does not hold, no bar does. */
-static double fit_bar(const struct fit *fit, double sd)
-{
-	return fit_holds(fit) ? sd : (double)NAN;
-}
-
-static void fit_parameters(const struct fit *fit, enum table_format format)
-{
-	static const char *const status[] = {"identified", "not identified", "beyond what is allowed",
-	                                     "no plate"};
-	struct table table = {.out = stdout, .format = format};
-
-	table_begin(&table, parameter_columns, TABLE_COUNT(parameter_columns));
-	for (size_t i = 0; i < MOTION_SHARED; i++) {
-		double slope, value = motion_value((enum motion_shared)i, fit->common[i], &slope);
-		struct parameter_row row = {
-		        scene_fitted[i],
-		        fit_holds(fit) || fit->status[i] == FIT_BEYOND ? status[fit->status[i]] : "doubtful",
-		        {value, 0, false}};
-
-		row.value.sigma = fit_bar(fit, slope * fit->sd[i]);
-		if (fit->status[i] != FIT_ABSENT)
-			table_row(&table, &row);
-	}
-	(void)table_end(&table);
-}
-
-static struct table_value fit_derived(const struct fit *fit, unsigned k, enum motion_derived d)
-{
-	return (struct table_value){fit->drop[k].derived[d], fit_bar(fit, fit->drop[k].derived_sd[d]), false};
-}
-
-static void fit_drops_table(const struct fitting *f, enum table_format format)
-{
-	struct table table = {.out = stdout, .format = format};
-
-	table_begin(&table, drop_columns, TABLE_COUNT(drop_columns));
-	for (unsigned k = 0; k < f->count; k++) {
-		const struct fit_drop_result *r = &f->fit.drop[k];
-		struct drop_row row = {f->name[k],
-		                       {r->own[FIT_GAMMA_DEG], fit_bar(&f->fit, r->sd[FIT_GAMMA_DEG]), false},
-		                       fit_derived(&f->fit, k, MOTION_CONTACT_S),
-		                       fit_derived(&f->fit, k, MOTION_RESTITUTION),
-		                       fit_derived(&f->fit, k, MOTION_SPIN_RAD_S),
-		                       fit_derived(&f->fit, k, MOTION_LAG_S),
-		                       fit_derived(&f->fit, k, MOTION_S1R_G),
-		                       fit_derived(&f->fit, k, MOTION_S2R_G),
-		                       r->pull};
-
-		table_row(&table, &row);
-	}
-	(void)table_end(&table);
-}
-
-struct prediction_row {
-	double angle_deg;
-	struct table_value contact, restitution, lag, s1, s2;
-};
-
-static const struct table_column prediction_columns[] = {
-        TABLE_COLUMN(NUMBER, struct prediction_row, angle_deg, .key = "angle_deg", .title = "predicted",
-                     .unit = "deg", .width = 13),
-        TABLE_COLUMN(VALUE, struct prediction_row, contact, .key = "contact_time_s",
-                     .sigma = "sigma_contact_time_s", .title = "contact", .unit = "ms", .width = 8,
-                     .digits = 3, .scale = 1e3),
-        TABLE_COLUMN(NUMBER, struct prediction_row, contact.sigma, .title = "+-", .width = 7, .digits = 3,
-                     .scale = 1e3),
-        TABLE_COLUMN(VALUE, struct prediction_row, restitution, .key = "restitution_of_centre",
-                     .sigma = "sigma_restitution_of_centre", .title = "e of c.o.g.", .width = 8, .digits = 4),
-        TABLE_COLUMN(NUMBER, struct prediction_row, restitution.sigma, .title = "+-", .width = 7,
-                     .digits = 4),
-        TABLE_COLUMN(VALUE, struct prediction_row, lag, .key = "lag_s", .sigma = "sigma_lag_s",
-                     .title = "lag", .unit = "ms", .width = 8, .digits = 4, .scale = 1e3),
-        TABLE_COLUMN(NUMBER, struct prediction_row, lag.sigma, .title = "+-", .width = 7, .digits = 4,
-                     .scale = 1e3),
-        TABLE_COLUMN(VALUE, struct prediction_row, s1, .key = "s1_resultant_g",
-                     .sigma = "sigma_s1_resultant_g", .title = "S1", .unit = "g", .width = 8, .digits = 1),
-        TABLE_COLUMN(NUMBER, struct prediction_row, s1.sigma, .title = "+-", .width = 7, .digits = 2),
-        TABLE_COLUMN(VALUE, struct prediction_row, s2, .key = "s2_resultant_g",
-                     .sigma = "sigma_s2_resultant_g", .title = "S2", .unit = "g", .width = 8, .digits = 1),
-        TABLE_COLUMN(NUMBER, struct prediction_row, s2.sigma, .title = "+-", .width = 7, .digits = 2),
-};
-
-enum { PREDICT_FROM_DEG = 15, PREDICT_TO_DEG = 45, PREDICT_STEP_DEG = 5 };
-
-static void fit_predictions(const struct fit *fit, enum table_format format)
-{
-	struct table table = {.out = stdout, .format = format};
-	struct scene at = fit->scene;
-
-	table_begin(&table, prediction_columns, TABLE_COUNT(prediction_columns));
-	for (int angle = PREDICT_FROM_DEG; angle <= PREDICT_TO_DEG && fit_holds(fit);
-	     angle += PREDICT_STEP_DEG) {
-		double value[MOTION_DERIVED], sd[MOTION_DERIVED];
-		struct prediction_row row;
-
-		at.drop_angle_deg = angle;
-		if (fit_predict(&at, value, sd) != 0)
-			continue;
-		row = (struct prediction_row){angle,
-		                              {value[MOTION_CONTACT_S], sd[MOTION_CONTACT_S], false},
-		                              {value[MOTION_RESTITUTION], sd[MOTION_RESTITUTION], false},
-		                              {value[MOTION_LAG_S], sd[MOTION_LAG_S], false},
-		                              {value[MOTION_S1R_G], sd[MOTION_S1R_G], false},
-		                              {value[MOTION_S2R_G], sd[MOTION_S2R_G], false}};
-		table_row(&table, &row);
-	}
-	(void)table_end(&table);
-}
-
-static void fit_json(const struct fitting *f)
-{
-	const struct fit *fit = &f->fit;
-
-	printf("{\"holds\":%s,\"parameters\":", fit_holds(fit) ? "true" : "false");
-	fit_parameters(fit, TABLE_JSON);
-	printf(",\"drops\":");
-	fit_drops_table(f, TABLE_JSON);
-	printf(",\"predicted\":");
-	fit_predictions(fit, TABLE_JSON);
-	printf(",\"covariance\":");
-	for (size_t i = 0; i < MOTION_SHARED; i++)
-		for (size_t j = 0; j < MOTION_SHARED; j++)
-			printf("%s%.9g", j > 0 ? "," : i > 0 ? "],[" : "[[", fit->covariance[i][j]);
-	printf("]]");
-	printf(",\"chi2\":%.9g,\"samples\":%zu,\"starts\":%u,\"agreed\":%u,\"windows\":{", fit->doubt.chi2,
-	       fit->doubt.samples, fit->starts, fit->agreed);
-	for (size_t a = 0; a < MOTION_AXES; a++) {
-		printf("%s\"%s\":", a > 0 ? "," : "", fit_axis_names[a]);
-		for (size_t w = 0; w < FIT_WINDOWS; w++)
-			printf("%s%.4g", w > 0 ? "," : "[", fit->doubt.window_z[a][w]);
-		printf("]");
-	}
-	printf("},\"widened\":%.4g", fit->widened);
-	printf(",\"periodogram\":%.6g,\"periodogram_hz\":%.6g,\"pull\":%.6g,\"group\":%.6g",
-	       fit->doubt.periodogram, fit->doubt.periodogram_hz, fit->doubt.pull, fit->doubt.group);
-	printf(",\"next\":{\"angle_deg\":%.4g,\"height_m\":%.6g,\"gain\":%.4g,\"largest\":\"%s\",\"u\":%.4g}}"
-	       "\n",
-	       fit->next.angle_deg, fit->next.height_m, fit->next.d_gain,
-	       fit->next.largest >= 0 ? scene_fitted[fit->next.largest] : "", fit->next.largest_sd);
-}
-
-static void fit_text(const struct fitting *f)
-{
-	const struct fit *fit = &f->fit;
-
-	fit_parameters(fit, TABLE_TEXT);
-	printf("\n");
-	fit_drops_table(f, TABLE_TEXT);
-	printf("\n");
-	fit_predictions(fit, TABLE_TEXT);
-	printf("\nresiduals: %.3f of the noise's squares over %zu samples; largest oscillation left %.1f at "
-	       "%.0f Hz; "
-	       "drops pull %.1f, gains together %.1f\n",
-	       fit->doubt.chi2 / (double)fit->doubt.samples, fit->doubt.samples, fit->doubt.periodogram,
-	       fit->doubt.periodogram_hz, fit->doubt.pull, fit->doubt.group);
-	if (fit->widened > 1.0)
-		printf("gains scatter more than --gain-sd says: all variances are taken %.1f times\n",
-		       fit->widened);
-	printf("starts: %u of %u came to the same\n", fit->agreed, fit->starts);
-	if (fit->next.largest >= 0 && fit_holds(fit))
-		printf("next drop: %.0f deg from %.3f m tells most of %d to %d deg (%.1f in the log of the "
-		       "information); the weakest is then %s\n",
-		       fit->next.angle_deg, fit->next.height_m, FIT_JUDGED_FROM_DEG, FIT_JUDGED_TO_DEG,
-		       fit->next.d_gain, scene_fitted[fit->next.largest]);
-}
-
 static int fit_write(const struct fitting *f)
 {
 	char message[READ_MESSAGE_MAX];
@@ -428,14 +212,28 @@ static int fit_write(const struct fitting *f)
 	return COMMAND_INPUT;
 }
 
+static int fit_page(const struct fitted *fitted, const char *file)
+{
+	char message[READ_MESSAGE_MAX];
+	struct whole whole;
+	int error = whole_open(&whole, file, message, sizeof(message));
+
+	if (error == 0)
+		error = whole_close(&whole, fitted_page(fitted, whole.out, message, sizeof(message)), message,
+		                    sizeof(message));
+	if (error != 0)
+		command_error("%s", message);
+	return error != 0 ? COMMAND_INPUT : COMMAND_DONE;
+}
+
 static int fit_told(const struct fitting *f)
 {
 	const struct fit *fit = &f->fit;
+	const struct fitted fitted = {fit, f->name, &f->scene, f->drop, &f->options, DT_VERSION};
 
-	if (f->a->json)
-		fit_json(f);
-	else
-		fit_text(f);
+	(f->a->json ? fitted_json : fitted_text)(&fitted, stdout);
+	if (f->a->html != NULL && fit_page(&fitted, f->a->html) != COMMAND_DONE)
+		return COMMAND_INPUT;
 	if (fit->doubt.words[0] != '\0') {
 		command_error("these drops are not the model's: %s; no uncertainty holds", fit->doubt.words);
 		return COMMAND_INPUT;
@@ -455,18 +253,18 @@ static int fit_told(const struct fitting *f)
 
 static int fit_work(struct fitting *f)
 {
-	struct fit_options options = fit_options_usual(&f->scene);
 	char message[FIT_MESSAGE_MAX];
 
+	f->options = fit_options_usual(&f->scene);
 	if (f->a->angle_sd_deg > 0)
-		options.angle_sd_deg = f->a->angle_sd_deg;
+		f->options.angle_sd_deg = f->a->angle_sd_deg;
 	if (f->a->speed_sd > 0)
-		options.speed_sd = f->a->speed_sd;
+		f->options.speed_sd = f->a->speed_sd;
 	if (f->a->common_gain_sd > 0)
-		options.common_gain_sd = f->a->common_gain_sd;
+		f->options.common_gain_sd = f->a->common_gain_sd;
 	if (f->a->gain_sd > 0)
-		options.gain_sd[0] = options.gain_sd[1] = f->a->gain_sd;
-	if (fit_drops(&f->scene, f->drop, f->count, &options, &f->fit, message) == 0)
+		f->options.gain_sd[0] = f->options.gain_sd[1] = f->a->gain_sd;
+	if (fit_drops(&f->scene, f->drop, f->count, &f->options, &f->fit, message) == 0)
 		return fit_told(f);
 	command_error("%s", message);
 	return COMMAND_INPUT;
@@ -492,8 +290,10 @@ int command_fit(int argc, char **argv)
 	f->a = &arguments;
 	code = evaluate_read_scene(&f->scene, arguments.scene_file, (double)NAN);
 	for (int i = optind; i < argc && code == COMMAND_DONE; i++)
-		code = command_is_input("fit", arguments.output, argv[i]) ? COMMAND_USAGE
-		                                                          : fit_add_word(f, argv[i]);
+		code = command_is_input("fit", arguments.output, argv[i]) ||
+		                       command_is_input("fit", arguments.html, argv[i])
+		               ? COMMAND_USAGE
+		               : fit_add_word(f, argv[i]);
 	if (code == COMMAND_DONE)
 		code = fit_work(f);
 	for (unsigned k = 0; k < f->count; k++)

@@ -471,6 +471,51 @@ int fit_drops(const struct scene *start, const struct fit_drop *drops, unsigned 
 	return error;
 }
 
+/* ---- traces ---- */
+
+static void traces_of(const struct solve_drop *d, const double *residual,
+                      void (*each)(void *context, const struct fit_trace *trace), void *context)
+{
+	for (size_t i = 0; i < d->count; i++) {
+		const struct solve_sample *sample = &d->sample[i];
+		double value = sample->value_g - d->own[FIT_ZERO + sample->axis];
+		struct fit_trace trace = {sample->axis, sample->t_s - d->own[FIT_ONSET_MS] * 1e-3, value,
+		                          value - residual[i] * d->noise_g[sample->axis]};
+
+		if (!isnan(residual[i]))
+			each(context, &trace);
+	}
+}
+
+int fit_traces(const struct fit *fit, unsigned k, const struct scene *start, const struct fit_drop *drop,
+               const struct fit_options *options, void (*each)(void *context, const struct fit_trace *trace),
+               void *context)
+{
+	struct solve_drop d = {.count = 0};
+	struct solve s = {.scene = start, .drop = &d, .drops = 1, .nodes = MOTION_NODES};
+	char message[FIT_MESSAGE_MAX];
+	double *residual = NULL;
+	int error = prepare_drop(start, drop, options, &d, message);
+
+	if (error == 0) {
+		s.motion = malloc(sizeof(*s.motion));
+		residual = malloc((d.count + 1) * sizeof(*residual));
+		error = s.motion && residual ? 0 : DT_E_MEMORY;
+	}
+	if (error == 0) {
+		memcpy(s.common, fit->common, sizeof(s.common));
+		memcpy(d.own, fit->drop[k].own, sizeof(d.own));
+		if (solve_residuals(&s, &d, residual))
+			traces_of(&d, residual, each, context);
+		else
+			error = DT_E_NUMERIC;
+	}
+	free(residual);
+	free(s.motion);
+	prepare_free(&d);
+	return error;
+}
+
 /* ---- predictions ---- */
 
 int fit_predict(const struct scene *scene, double derived[MOTION_DERIVED], double sd[MOTION_DERIVED])

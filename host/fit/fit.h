@@ -112,6 +112,18 @@ struct fit {
 DT_MUST_USE int fit_drops(const struct scene *start, const struct fit_drop *drops, unsigned count,
                           const struct fit_options *options, struct fit *fit, char message[FIT_MESSAGE_MAX]);
 
+/* What a channel read, less its zero, and what the fit makes of it; time from the touch. */
+struct fit_trace {
+	unsigned axis;
+	double time_s, measured_g, fitted_g;
+};
+
+/* Calls each for every sample that the fit of drop number k used, a channel after the other. start, drop and
+ * options are what fit_drops had. 0; DT_E_MEMORY; DT_E_NUMERIC: nothing converged there. */
+DT_MUST_USE int fit_traces(const struct fit *fit, unsigned k, const struct scene *start,
+                           const struct fit_drop *drop, const struct fit_options *options,
+                           void (*each)(void *context, const struct fit_trace *trace), void *context);
+
 /* The drop of a scene with [fit], at its angle and height, and what the uncertainty of the parameters alone
  * makes of it. DT_E_ARGUMENT: the scene has no [fit]; DT_E_NUMERIC: it makes no drop. */
 DT_MUST_USE int fit_predict(const struct scene *scene, double derived[MOTION_DERIVED],

@@ -145,16 +145,15 @@ void script_limits(FILE *out, const struct channel *c, double offset, struct scr
 			        limits[i] - offset, limits[i] - offset);
 }
 
-/* Terminal, border, tics and grid of a picture whose x is in that unit and whose y is in g. */
-static void script_paper(FILE *out, int width, int height, const char *unit)
+void script_paper(FILE *out, int width, int height, const char *x_unit, const char *y_unit)
 {
 	fprintf(out, "set terminal svg size %d,%d dynamic noenhanced font 'sans-serif,15'\n", width, height);
 	fprintf(out, "set encoding utf8\nunset key\nset border 3 linecolor rgb '#777777'\n");
 	fprintf(out, "set tics nomirror out scale 0.5 textcolor rgb 'black'\nset grid linecolor rgb "
 	             "'#999999' linewidth 0.4 "
 	             "dashtype 1\n");
-	fprintf(out, "set xlabel '%s' offset 0,0.7\nset label 'g' at graph 0, graph 1 right offset -1,1\n",
-	        unit);
+	fprintf(out, "set xlabel '%s' offset 0,0.7\nset label '%s' at graph 0, graph 1 right offset -1,1\n",
+	        x_unit, y_unit);
 	fprintf(out, "set tmargin 1.5\nset rmargin 1\nset lmargin 7\nset bmargin 2.6\n");
 }
 
@@ -165,7 +164,7 @@ void script_axes(FILE *out, int width, int height, struct script_window window, 
 
 	if (!(margin > 0.0))
 		margin = 1.0;
-	script_paper(out, width, height, "ms");
+	script_paper(out, width, height, "ms", "g");
 	fprintf(out, "set xrange [%.6f:%.6f]\n", (window.from_s - zero_s) * 1e3,
 	        (window.to_s - zero_s) * 1e3);
 	fprintf(out, "set yrange [%.4f:%.4f]\n", range.low - margin, range.high + margin);
@@ -174,7 +173,7 @@ void script_axes(FILE *out, int width, int height, struct script_window window, 
 void script_spectrum_axes(FILE *out, int width, int height, double from_hz, double to_hz,
                           struct script_range range)
 {
-	script_paper(out, width, height, "Hz");
+	script_paper(out, width, height, "Hz", "g");
 	fprintf(out, "set logscale xy\nset rmargin 3\nset xrange [%.6g:%.6g]\nset yrange [%.4g:%.4g]\n",
 	        from_hz, to_hz, 0.8 * range.low, 1.25 * range.high);
 }

@@ -2,8 +2,8 @@
 #ifndef DT_HOST_REPORT_SCRIPT_H
 #define DT_HOST_REPORT_SCRIPT_H
 /*
- * The parts of a gnuplot script: axes, samples, curves, shading. What traces*.c and series*.c share; private
- * to them.
+ * The parts of a gnuplot script: axes, samples, curves, shading. What traces*.c, series*.c and fitted*.c
+ * share; private to them.
  *
  * Times given are s after the record's first instant, those in the script ms after zero_s; values are less
  * offset, in g. A data block that has no point ($name empty) must not be plotted.
@@ -43,7 +43,10 @@ void script_reach(struct script_range *range, double value);
 void script_reach_samples(struct script_range *range, const struct channel *c, double offset,
                           struct script_window window);
 
-/* Terminal, size in pixels, labels and both ranges. */
+/* Terminal, size in pixels, border, tics, grid and the axes' units. */
+void script_paper(FILE *out, int width, int height, const char *x_unit, const char *y_unit);
+
+/* The same of g over ms, with both ranges. */
 void script_axes(FILE *out, int width, int height, struct script_window window, double zero_s,
                  struct script_range range);
 

@@ -83,6 +83,51 @@ static void test_product_is_found_from_a_start_three_times_off(void **state)
 	assert_true(fabs(fit.scene.contact_tangential_ratio - 2.5) < .1);
 }
 
+struct seen {
+	size_t count[4];
+	double squares[4], largest_g[4];
+};
+
+static void see(void *context, const struct fit_trace *trace)
+{
+	struct seen *seen = context;
+	double left = trace->measured_g - trace->fitted_g;
+
+	seen->count[trace->axis]++;
+	seen->squares[trace->axis] += left * left;
+	seen->largest_g[trace->axis] = fmax(seen->largest_g[trace->axis], fabs(trace->measured_g));
+}
+
+/* Samples of each channel from 5 ms before to 36 ms behind the touch, at 7 and 10 kHz; what is left is the
+ * noise. */
+static void test_traces_are_the_samples_and_leave_the_noise(void **state)
+{
+	const double angles[] = {15, 35};
+	const struct by_hand h = product();
+	struct by_hand at = h;
+	const struct fit_options options = fit_options_usual(&h.truth);
+	char message[FIT_MESSAGE_MAX];
+
+	(void)state;
+	make(&at, 2, angles);
+	assert_int_equal(try_fit(&h.truth, 2, message), 0);
+	for (unsigned k = 0; k < 2; k++) {
+		struct seen seen = {.count = {0}};
+
+		assert_int_equal(fit_traces(&fit, k, &h.truth, &given[k], &options, see, &seen), 0);
+		for (int a = 0; a < 4; a++) {
+			const struct fit_channel *c = &given[k].axis[a];
+			double largest = 0;
+
+			for (size_t i = 0; i < c->count; i++)
+				largest = fmax(largest, fabs(c->value_g[i]));
+			assert_true(fabs((double)seen.count[a] - 41e-3 * c->rate_hz) < 4);
+			assert_true(fabs(seen.largest_g[a] - largest) < 0.5); /* its zero is taken off */
+			assert_true(fabs(sqrt(seen.squares[a] / (double)seen.count[a]) - h.noise_g) < 0.1);
+		}
+	}
+}
+
 static void test_derived_are_the_true_motion_s(void **state)
 {
 	const double angle = 35;
@@ -307,6 +352,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(test_product_is_found_from_a_start_three_times_off),
+	        cmocka_unit_test(test_traces_are_the_samples_and_leave_the_noise),
 	        cmocka_unit_test(test_derived_are_the_true_motion_s),
 	        cmocka_unit_test(test_tangential_stiffness_is_not_told_where_nothing_slides),
 	        cmocka_unit_test(test_a_ringing_case_is_named),
