@@ -57,6 +57,7 @@ enum {
 	CYCLES_WATCHDOG =
 	        (LOCKSTEP_WATCHDOG_MS + 2) * CYCLES_PER_MS, /* later than main, of a hang it was asked for */
 	CYCLES_PER_US = CYCLES_PER_MS / 1000,
+	WATCHDOG_EVERY_US = 1000,
 	CLOCK_ERROR_MAX = 25, /* cycles between a sample timer and the dual timer: reading takes a few */
 	LINE_BYTES = 256,
 	LAST_X = LOCKSTEP_INSTANTS - 2, /* instant of a tick's last X sample */
@@ -134,8 +135,11 @@ int port_random(uint32_t *value)
 
 void port_watchdog_kick(void)
 {
-	WATCHDOG->interrupt_clear = 1;
-	kicked_us = port_time_us();
+	uint32_t now_us = port_time_us();
+
+	if (now_us - kicked_us >= WATCHDOG_EVERY_US) /* the emulator takes long for it */
+		WATCHDOG->interrupt_clear = 1;
+	kicked_us = now_us;
 }
 
 /* ---- the sensor bus ---- */
@@ -273,12 +277,13 @@ static void delivered(bool control)
 	if (control)
 		ICSR = ICSR_PENDSVSET;
 	poll_due = true;
-	if (!options.preempt)
+	if (options.timers && !options.preempt)
 		NVIC_DISABLE = IRQS;
 }
 
-/* A sample whose time has come; the timers' interrupts only wake. Of what came while control or app_poll took
- * long nothing is lost: one interrupt takes all that is due with --preempt, else each asks for the next. */
+/* A sample whose time has come; the timers' interrupts, or ask(), only wake. Of what came while control or
+ * app_poll took long nothing is lost: one interrupt takes all that is due with --preempt, else each asks for
+ * the next. */
 static void sample(void)
 {
 	while (is_due()) {
@@ -405,8 +410,6 @@ static void start_clocks(void)
 	NVIC_ENABLE = IRQS;
 	if (options.timers)
 		start_timer(TIMER_YZ, CYCLES_YZ, 0);
-	else
-		NVIC_PEND = 1 << IRQ_YZ;
 }
 
 static _Noreturn void restart(enum port_reset cause)
@@ -426,13 +429,24 @@ void board_watchdog(void)
 		restart(PORT_RESET_WATCHDOG);
 }
 
+/* Without timers nothing wakes: a sample is taken where its interrupt would have come. */
+static void ask(void)
+{
+	set_base_priority(PRIORITY_SAMPLES);
+	sample();
+	set_base_priority(0);
+}
+
 static void polled(void)
 {
 	if (lockstep_reset_wanted())
 		restart(PORT_RESET_COMMAND);
-	if (!options.preempt && is_due())
+	if (!options.timers)
+		ask();
+	else if (!options.preempt && is_due())
 		NVIC_PEND = 1 << IRQ_YZ;
-	NVIC_ENABLE = IRQS;
+	if (options.timers)
+		NVIC_ENABLE = IRQS;
 }
 
 /* Not "wait for interrupt": the emulator then loses timer periods or invents some. */
@@ -455,6 +469,8 @@ _Noreturn void board_main(void)
 	}
 	lockstep_boot(kept.cause, kept.byte, options.classic, !options.preempt);
 	start_clocks();
+	if (!options.timers)
+		ask();
 	for (;;) {
 		wait_for_sample();
 		poll_due = false;
