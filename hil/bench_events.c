@@ -46,6 +46,17 @@ void bench_event(struct bench *bench, const struct event *event)
 	case EVENT_DROPOUT:
 		tower_set_dropout(bench->tower, event->duration_s);
 		break;
+	case EVENT_FRICTION:
+		tower_set_friction(bench->tower, event->value);
+		break;
+	case EVENT_SPIKE:
+		tower_spike(bench->tower, event->number, event->value);
+		break;
+	case EVENT_LET_GO:
+		tower_let_go(bench->tower);
+		if (bench->watch != NULL)
+			hazard_let_go(&bench->watch->observe.hazard);
+		break;
 	case EVENT_GLITCH:
 		tower_glitch(bench->tower, event->number, event->pulses);
 		break;

@@ -14,6 +14,9 @@ enum event_action {
 	EVENT_FAULT,       /* of the tower: number is an enum tower_fault */
 	EVENT_REPAIR,      /* the same, taken away */
 	EVENT_DROPOUT,     /* the magnet's, from now on duration_s */
+	EVENT_FRICTION,    /* the rails', from now on `value` N */
+	EVENT_SPIKE,       /* `value` g on top of the next conversions of sensor `number` */
+	EVENT_LET_GO,      /* a hand lets the product go */
 	EVENT_GLITCH,      /* of gate `number`: `pulses` of them, one with each sample */
 	EVENT_SEND,        /* a frame of whoever */
 	EVENT_VERB,        /* a command: of the scripted operator, or `second` of the second host */
@@ -40,7 +43,7 @@ enum {
 struct event {
 	enum event_action action;
 	unsigned number, pulses;
-	double duration_s;
+	double duration_s, value;
 	struct frame frame;
 	struct wire_command
 	        command; /* host, and the argument if not `forged`, are filled in when it is sent */

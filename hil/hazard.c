@@ -49,6 +49,11 @@ void hazard_acknowledged(struct hazard *hazard)
 		hazard->loss_s = NAN;
 }
 
+void hazard_let_go(struct hazard *hazard)
+{
+	hazard->dropping = true; /* as if it had been seen */
+}
+
 /* ---- outputs ---- */
 
 static void latch_energised(struct hazard *hazard, bool asked, double tower_s)

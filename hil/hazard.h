@@ -52,6 +52,9 @@ void hazard_sample(struct hazard *hazard, uint16_t inputs, unsigned captures, co
 void hazard_block(struct hazard *hazard, uint8_t state, uint16_t io);
 void hazard_state(struct hazard *hazard, uint8_t state, const struct tower_truth *truth, double tower_s);
 
+/* A hand lets the product go: that it falls is wanted. Before the next sample. */
+void hazard_let_go(struct hazard *hazard);
+
 /* CLEAR was taken. */
 void hazard_acknowledged(struct hazard *hazard);
 

@@ -401,7 +401,7 @@ static void see_truth(struct observe *observe, const struct tower_truth *truth)
 {
 	observe->truth.frame_away = truth->frame_away;
 	observe->truth.frame_moving = truth->frame_moving;
-	if (isnan(truth->latch_open_s))
+	if (isnan(truth->latch_open_s) && isnan(truth->separation_s))
 		return;
 	if (isfinite(truth->impact_s) && truth->impact_s != observe->truth.impact_s) {
 		observe->impacts++;
@@ -479,6 +479,7 @@ void observe_results(const struct observe *observe, double results[SCENARIO_RESU
 	results[SCENARIO_gaps_permille] = 1e3 * all_gaps(observe) / all_blocks(observe);
 	results[SCENARIO_separation_mm] = 1e3 * truth->separation_travel_m;
 	results[SCENARIO_impact_m_s] = truth->impact_speed_m_s;
+	results[SCENARIO_impact_deg] = truth->angle_deg;
 	results[SCENARIO_latch_edge_us] = observe->latch_us;
 	results[SCENARIO_magnet_edge_us] = 1e6 * (truth->separation_travel_m - observe->planned_travel_m) /
 	                                   truth->frame_speed_at_separation_m_s;

@@ -191,13 +191,15 @@ static double longest_step_s(const struct product *p, double speed_m_s)
 
 void product_strike(struct product *p, double speed_m_s)
 {
-	const double angle = p->state[PRODUCT_ANGLE];
-	struct corner lowest;
+	const double angle = p->state[PRODUCT_ANGLE], spin = p->state[PRODUCT_SPIN];
+	double height_m = 0;
 
 	memset(p->state, 0, sizeof(p->state));
 	p->state[PRODUCT_ANGLE] = angle;
-	lowest = corner_at(p, p->state, 0, sin(angle), cos(angle));
-	p->state[PRODUCT_Y] = p->state[PRODUCT_PLATE_Y] = -lowest.arm_y_m;
+	p->state[PRODUCT_SPIN] = spin;
+	for (int i = 0; i < PRODUCT_CORNERS; i++)
+		height_m = fmax(height_m, -corner_at(p, p->state, i, sin(angle), cos(angle)).arm_y_m);
+	p->state[PRODUCT_Y] = p->state[PRODUCT_PLATE_Y] = height_m;
 	p->state[PRODUCT_VY] = p->state[PRODUCT_PLATE_VY] = -speed_m_s;
 	corners_renew(p);
 	product_rates(p, p->state, p->rate);

@@ -73,7 +73,8 @@ void product_init(struct product *p, const struct scene *scene, double angle_rad
 /* Carried, or in free fall, without turning: from now on it accelerates downwards. Sets what is read. */
 void product_carry(struct product *p, double down_m_s2);
 
-/* The lowest corner touches the mat now, falling straight at this speed. */
+/* The lowest corner touches the mat now, the centre of gravity falling straight at this speed; a spin that
+ * the caller has put into the state stays. */
 void product_strike(struct product *p, double speed_m_s);
 
 /* After product_strike: one step of time. */

@@ -142,11 +142,32 @@ static bool parse_dropout(unsigned count, char **words, struct event *event)
 	return count == 2 && number_read(words[1], 0.002, 0.05, &event->duration_s);
 }
 
+static bool parse_friction(unsigned count, char **words, struct event *event)
+{
+	event->action = EVENT_FRICTION;
+	return count == 2 && number_read(words[1], 0, 1000, &event->value);
+}
+
+static bool parse_spike(unsigned count, char **words, struct event *event)
+{
+	event->action = EVENT_SPIKE;
+	event->number = count == 3 && strcmp(words[1], "s2") == 0;
+	return count == 3 && (event->number == 1 || strcmp(words[1], "s1") == 0) &&
+	       number_read(words[2], -2000, 2000, &event->value);
+}
+
+static bool parse_let_go(unsigned count, char **words, struct event *event)
+{
+	event->action = EVENT_LET_GO;
+	return count == 2 && strcmp(words[1], "product") == 0;
+}
+
 const char scenario_actions[] =
         "fault FAULT, repair FAULT, send VERB [second] [ARGUMENT], send set NAME VALUE, send frame ID#DATA, "
         "bus silent|blocked|off|passive|babble SECONDS, bus burst N, host silent|second|replay|forge "
         "SECONDS, "
-        "gate upper|lower PULSES, dropout SECONDS, reset power_on|command|watchdog|brown_out|pin, hang "
+        "gate upper|lower PULSES, dropout SECONDS, friction N, spike s1|s2 G, let_go product, reset "
+        "power_on|command|watchdog|brown_out|pin, hang "
         "main_loop";
 
 bool scenario_parse_action(unsigned count, char **words, uint8_t sequence, struct event *event)
@@ -163,6 +184,12 @@ bool scenario_parse_action(unsigned count, char **words, uint8_t sequence, struc
 		return parse_gate(count, words, event);
 	if (strcmp(words[0], "dropout") == 0)
 		return parse_dropout(count, words, event);
+	if (strcmp(words[0], "friction") == 0)
+		return parse_friction(count, words, event);
+	if (strcmp(words[0], "spike") == 0)
+		return parse_spike(count, words, event);
+	if (strcmp(words[0], "let_go") == 0)
+		return parse_let_go(count, words, event);
 	return parse_bus(count, words, event);
 }
 

@@ -36,6 +36,9 @@ static const char *const fault_names[TOWER_FAULTS] = {
         [TOWER_CABLE_S2] = "cable_s2",
         [TOWER_SHORT_S1] = "short_s1",
         [TOWER_SHORT_S2] = "short_s2",
+        [TOWER_SENSORS_SWAPPED] = "sensors_swapped",
+        [TOWER_S1_REVERSED] = "s1_reversed",
+        [TOWER_S2_REVERSED] = "s2_reversed",
 };
 
 /* ---- what the bench calls ---- */
@@ -79,14 +82,31 @@ void tower_output(struct tower *t, unsigned bit, bool on, double time_s)
 	tower_sensors_feel(t, 0);
 }
 
+/* The sensor on a cable. */
+static int plugged(const struct tower *t, int cable)
+{
+	return t->fault[TOWER_SENSORS_SWAPPED] ? SENSORS - 1 - cable : cable;
+}
+
 void tower_sample(struct tower *t, unsigned group, int16_t codes[CHANNELS])
 {
 	for (int i = 0; i < CHANNELS; i++) {
 		const unsigned member = i % AXES == 0 ? SENSORBUS_X : SENSORBUS_YZ;
+		const int from = plugged(t, i / AXES) * AXES + i % AXES;
+		struct sensor sensor = t->sensor[from];
 
-		if (group & member)
-			codes[i] = sensor_convert(&t->sensor[i], t->noise);
+		if (!(group & member))
+			continue;
+		sensor.output_g += t->spike_g[from];
+		t->spike_g[from] = 0;
+		codes[i] = sensor_convert(&sensor, t->noise);
 	}
+}
+
+void tower_spike(struct tower *t, unsigned sensor, double spike_g)
+{
+	for (unsigned axis = 0; sensor < SENSORS && axis < AXES; axis++)
+		t->spike_g[sensor * AXES + axis] += spike_g;
 }
 
 static bool gate_broken(const struct tower *t, enum mark mark, enum tower_fault dead, enum tower_fault wire)
@@ -127,14 +147,16 @@ uint16_t tower_inputs(const struct tower *t)
 	                  ? WIRE_IO_GATE_LOWER
 	                  : 0;
 	inputs |= frame_reads_down(t) ? WIRE_IO_FRAME_DOWN : 0;
-	inputs |= tower_sensor_cut_off(t, 0) ? 0 : WIRE_IO_IEPE_S1;
-	inputs |= tower_sensor_cut_off(t, 1) ? 0 : WIRE_IO_IEPE_S2;
+	inputs |= tower_sensor_cut_off(t, plugged(t, 0)) ? 0 : WIRE_IO_IEPE_S1;
+	inputs |= tower_sensor_cut_off(t, plugged(t, 1)) ? 0 : WIRE_IO_IEPE_S2;
 	return (uint16_t)inputs;
 }
 
 uint8_t tower_bias_high(const struct tower *t)
 {
-	return (uint8_t)(t->fault[TOWER_CABLE_S1] | t->fault[TOWER_CABLE_S2] << 1);
+	const bool *open = &t->fault[TOWER_CABLE_S1];
+
+	return (uint8_t)(open[plugged(t, 0)] | open[plugged(t, 1)] << 1);
 }
 
 void tower_stamp(struct tower *t, unsigned which)
@@ -167,6 +189,21 @@ void tower_glitch(struct tower *t, unsigned gate, unsigned pulses)
 void tower_set_dropout(struct tower *t, double dropout_s)
 {
 	t->scene.tower_magnet_dropout_s = dropout_s;
+}
+
+void tower_set_friction(struct tower *t, double friction_n)
+{
+	t->scene.tower_frame_friction_n = friction_n;
+	tower_motion_renew(t);
+}
+
+void tower_let_go(struct tower *t)
+{
+	if (t->place != PLACE_PIN && t->place != PLACE_MAGNET)
+		return;
+	tower_product_leave(t);
+	tower_motion_renew(t);
+	tower_sensors_feel(t, 0);
 }
 
 const struct tower_truth *tower_truth(const struct tower *t)
@@ -230,7 +267,7 @@ void tower_lift(struct tower *t)
 	for (unsigned i = 0; i < SENSORBUS_CAPTURES; i++)
 		t->captured[i] = false;
 	t->place = output_on(t, WIRE_IO_MAGNET_HOLD) ? PLACE_MAGNET : PLACE_PIN;
-	t->magnet_drops_s = INFINITY;
+	t->magnet_drops_s = t->calm_s = INFINITY;
 	t->truth = (struct tower_truth){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, false, false};
 	scatter_draw(t);
 	product_init(&t->product, &t->scene, UNITS_RAD(t->truth.angle_deg));

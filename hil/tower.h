@@ -44,7 +44,7 @@ struct tower_truth {
 	double impact_s;     /* the first */
 	double frame_down_s; /* the frame meets the dampers */
 	double impact_speed_m_s;
-	double angle_deg; /* of this drop, from the start */
+	double angle_deg; /* of this drop, from the start; from the impact on as it landed */
 	double separation_travel_m;
 	double frame_speed_at_separation_m_s;
 	bool frame_away;   /* now: neither in its latch nor met by the dampers */
@@ -72,6 +72,9 @@ enum tower_fault {
 	TOWER_CABLE_S2,
 	TOWER_SHORT_S1, /* of the cable: bias too low, and the same */
 	TOWER_SHORT_S2,
+	TOWER_SENSORS_SWAPPED, /* each on the other's cable */
+	TOWER_S1_REVERSED,     /* mounted turned by 180 deg about Z */
+	TOWER_S2_REVERSED,
 	TOWER_FAULTS
 };
 
@@ -106,6 +109,15 @@ void tower_glitch(struct tower *tower, unsigned gate, unsigned pulses);
 
 /* Of the magnet, from its next switching off on. */
 void tower_set_dropout(struct tower *tower, double dropout_s);
+
+/* Of the rails, from now on. */
+void tower_set_friction(struct tower *tower, double friction_n);
+
+/* Each axis of sensor 0 or 1 reads so much more, when it is converted next. */
+void tower_spike(struct tower *tower, unsigned sensor, double spike_g);
+
+/* A hand lets the product go, wherever the frame is. */
+void tower_let_go(struct tower *tower);
 
 /* Valid as long as the tower; changes as it goes on. */
 const struct tower_truth *tower_truth(const struct tower *tower);

@@ -8,6 +8,8 @@
 #define RELIEVED_SHARE 0.25 /* of the braking that relieved dampers still give */
 #define MAGNET_WEIGHTS 5.0  /* the magnet pulls this many times the product's weight */
 #define JAM_WEIGHTS 3.0     /* a frame that jams is slowed down with so many g: the product stays on */
+#define KNOCK_STEPS 100     /* of its one swing */
+#define SPIN_STEPS 40       /* each takes a digit or more off when a spinning corner lands */
 
 /* ---- uniform motion ---- */
 
@@ -63,10 +65,11 @@ void tower_sensors_feel(struct tower *t, double step_s)
 		const double y = (s == 0 ? r.s1_y : r.s2_y) / UNITS_G_M_S2;
 		const double felt_x = off ? 0 : t->mix[s][0][0] * x + t->mix[s][0][1] * y;
 		const double felt_y = off ? 0 : t->mix[s][1][0] * x + t->mix[s][1][1] * y;
+		const double sign = t->fault[TOWER_S1_REVERSED + s] ? -1 : 1;
 		struct sensor *sensor = &t->sensor[s * AXES];
 
-		sensor_advance(&sensor[0], step_s, felt_x);
-		sensor_advance(&sensor[1], step_s, felt_y);
+		sensor_advance(&sensor[0], step_s, sign * felt_x);
+		sensor_advance(&sensor[1], step_s, sign * felt_y);
 		sensor_advance(&sensor[2], step_s, z_ratio[s] * felt_x);
 	}
 }
@@ -126,7 +129,7 @@ static bool product_carried(const struct tower *t)
 	       MAGNET_WEIGHTS * t->scene.drop_gravity_m_s2;
 }
 
-static void product_leave(struct tower *t)
+void tower_product_leave(struct tower *t)
 {
 	t->place = PLACE_AIR;
 	tower_stamp(t, KEEPER);
@@ -135,6 +138,8 @@ static void product_leave(struct tower *t)
 	t->fall.distance_m = tower_motion_distance(&t->frame, t->now_s);
 	t->fall.speed_m_s = motion_speed(&t->frame, t->now_s);
 	t->fall.acceleration_m_s2 = t->scene.drop_gravity_m_s2;
+	t->taut = false;
+	t->spin_rad_s = 0;
 	product_carry(&t->product, t->scene.drop_gravity_m_s2);
 	t->truth.separation_s = t->now_s;
 	t->truth.separation_travel_m = t->fall.distance_m;
@@ -148,7 +153,7 @@ void tower_motion_renew(struct tower *t)
 
 	*f = (struct motion){t->now_s, distance_m, speed_m_s, 0};
 	if (product_on_frame(t) && !product_carried(t))
-		product_leave(t);
+		tower_product_leave(t);
 	f->acceleration_m_s2 = frame_acceleration(t);
 	if (product_on_frame(t))
 		product_carry(&t->product, f->acceleration_m_s2);
@@ -159,6 +164,56 @@ static void frame_stop(struct tower *t, double distance_m)
 	t->frame_state = FRAME_STOPPED;
 	t->truth.frame_moving = false;
 	t->frame = (struct motion){t->now_s, distance_m, 0, 0};
+}
+
+/* What the frame's swing, as the latch opens, adds to what its product feels. */
+static double frame_knock(const struct tower *t, double time_s)
+{
+	const double hz = t->scene.tower_knock_hz;
+
+	return -t->scene.tower_knock_g * UNITS_G_M_S2 * sin(2 * UNITS_PI * hz * (t->calm_s - time_s));
+}
+
+/* When the wires have no slack left: the product runs ahead of the frame. */
+static double product_taut(const struct tower *t)
+{
+	const struct motion *a = &t->fall, *b = &t->frame;
+	const struct motion ahead = {
+	        t->now_s,
+	        tower_motion_distance(a, t->now_s) - tower_motion_distance(b, t->now_s),
+	        motion_speed(a, t->now_s) - motion_speed(b, t->now_s),
+	        a->acceleration_m_s2 - b->acceleration_m_s2,
+	};
+
+	return t->taut || t->scene.tower_wire_pull_ratio <= 0
+	               ? INFINITY
+	               : motion_reach(&ahead, t->scene.tower_wire_slack_m);
+}
+
+/* How far the lowest corner is below the centre of gravity. */
+static double product_reach(const struct tower *t, double time_s)
+{
+	const double turned = t->spin_rad_s * (time_s - t->truth.separation_s);
+	const double angle = t->product.state[PRODUCT_ANGLE] + turned;
+
+	return fabs(t->product.lever_x_m * cos(angle)) + fabs(t->product.lever_y_m * sin(angle));
+}
+
+/* When the lowest corner is at the mat. */
+static double product_landing(const struct tower *t)
+{
+	const double height_m = t->scene.drop_height_m;
+	double time_s;
+
+	if (t->place == PLACE_MAT)
+		return INFINITY;
+	time_s = motion_reach(t->place == PLACE_AIR ? &t->fall : &t->frame, height_m);
+	if (t->place != PLACE_AIR || t->spin_rad_s == 0)
+		return time_s;
+	for (int i = 0; i < SPIN_STEPS; i++)
+		time_s = motion_reach(&t->fall, height_m + product_reach(t, t->truth.separation_s) -
+		                                        product_reach(t, time_s));
+	return time_s;
 }
 
 /* ---- events ---- */
@@ -188,10 +243,9 @@ static enum event event_next(const struct tower *t, double *time_s)
 	        [EVENT_DROPOUT] = t->magnet_drops_s,
 	        [EVENT_MARK] = moving ? motion_reach(&t->frame, tower_mark_travel(t, t->passed)) : INFINITY,
 	        [EVENT_STOP] = moving ? motion_stop(&t->frame) : INFINITY,
-	        [EVENT_MAT] = t->place == PLACE_MAT
-	                              ? INFINITY
-	                              : motion_reach(t->place == PLACE_AIR ? &t->fall : &t->frame,
-	                                             t->scene.drop_height_m),
+	        [EVENT_CALM] = t->calm_s,
+	        [EVENT_TAUT] = t->place == PLACE_AIR ? product_taut(t) : INFINITY,
+	        [EVENT_MAT] = product_landing(t),
 	};
 	enum event next = 0;
 
@@ -211,6 +265,8 @@ static void latch_opens(struct tower *t)
 	t->frame_state = FRAME_MOVING;
 	t->truth.latch_open_s = t->now_s;
 	t->truth.frame_away = t->truth.frame_moving = true;
+	if (t->scene.tower_knock_g > 0)
+		t->calm_s = t->now_s + 1 / t->scene.tower_knock_hz;
 	tower_motion_renew(t);
 }
 
@@ -238,7 +294,7 @@ static void frame_passes(struct tower *t)
 		break;
 	case MARK_END: /* the hard stop: nothing but the pin holds on */
 		if (t->place == PLACE_MAGNET)
-			product_leave(t);
+			tower_product_leave(t);
 		frame_stop(t, travel_m);
 		tower_motion_renew(t);
 		break;
@@ -250,13 +306,26 @@ static void frame_passes(struct tower *t)
 static void product_lands(struct tower *t)
 {
 	if (product_on_frame(t)) { /* the mat knocks it off */
-		product_leave(t);
+		tower_product_leave(t);
 		tower_motion_renew(t);
 	}
 	t->place = PLACE_MAT;
+	t->product.state[PRODUCT_ANGLE] += t->spin_rad_s * (t->now_s - t->truth.separation_s);
+	if (t->spin_rad_s != 0)
+		t->truth.angle_deg = UNITS_DEG(t->product.state[PRODUCT_ANGLE]);
 	t->truth.impact_s = t->now_s;
 	t->truth.impact_speed_m_s = motion_speed(&t->fall, t->now_s);
 	product_strike(&t->product, t->truth.impact_speed_m_s);
+}
+
+static void wires_pull(struct tower *t)
+{
+	const double a = (1 - t->scene.tower_wire_pull_ratio) * t->scene.drop_gravity_m_s2;
+	const double distance_m = tower_motion_distance(&t->fall, t->now_s);
+
+	t->fall = (struct motion){t->now_s, distance_m, motion_speed(&t->fall, t->now_s), a};
+	t->taut = true;
+	product_carry(&t->product, a);
 }
 
 static void event_happen(struct tower *t, enum event event)
@@ -266,7 +335,8 @@ static void event_happen(struct tower *t, enum event event)
 		latch_opens(t);
 		break;
 	case EVENT_DROPOUT:
-		product_leave(t);
+		tower_product_leave(t);
+		t->spin_rad_s = t->product.state[PRODUCT_SPIN] = UNITS_RAD(t->scene.tower_magnet_kick_deg_s);
 		tower_motion_renew(t);
 		break;
 	case EVENT_MARK:
@@ -275,6 +345,13 @@ static void event_happen(struct tower *t, enum event event)
 	case EVENT_STOP:
 		frame_stop(t, tower_motion_distance(&t->frame, t->now_s));
 		tower_motion_renew(t);
+		break;
+	case EVENT_CALM:
+		t->calm_s = INFINITY;
+		tower_motion_renew(t);
+		break;
+	case EVENT_TAUT:
+		wires_pull(t);
 		break;
 	case EVENT_MAT:
 		product_lands(t);
@@ -290,11 +367,20 @@ static void go_on(struct tower *t, double time_s)
 {
 	const double span_s = time_s - t->now_s;
 	const bool contact = t->place == PLACE_MAT;
-	const long steps = contact ? (long)ceil(span_s / t->product.longest_step_s) : 1;
+	const bool knocked = product_on_frame(t) && isfinite(t->calm_s);
+	const double longest_s = contact   ? t->product.longest_step_s
+	                         : knocked ? 1 / (KNOCK_STEPS * t->scene.tower_knock_hz)
+	                                   : INFINITY;
+	const long steps = isfinite(longest_s) ? (long)ceil(span_s / longest_s) : 1;
 
 	for (long i = 0; i < steps; i++) {
 		if (contact)
 			product_step(&t->product, span_s / (double)steps);
+		if (knocked)
+			product_carry(
+			        &t->product,
+			        t->frame.acceleration_m_s2 -
+			                frame_knock(t, t->now_s + span_s / (double)steps * (double)(i + 1)));
 		tower_sensors_feel(t, span_s / (double)steps);
 	}
 	t->now_s = time_s;

@@ -21,7 +21,7 @@ enum place { PLACE_PIN, PLACE_MAGNET, PLACE_AIR, PLACE_MAT };
 /* What the frame passes on its way down, in this order. */
 enum mark { MARK_GATE_UPPER, MARK_GATE_LOWER, MARK_DAMPERS, MARK_END, MARKS };
 
-enum event { EVENT_LATCH, EVENT_DROPOUT, EVENT_MARK, EVENT_STOP, EVENT_MAT, EVENTS };
+enum event { EVENT_LATCH, EVENT_DROPOUT, EVENT_MARK, EVENT_STOP, EVENT_CALM, EVENT_TAUT, EVENT_MAT, EVENTS };
 
 /* Uniformly accelerated, downwards positive; distance from where the drop began. */
 struct motion {
@@ -38,6 +38,7 @@ struct tower {
 	bool fault[TOWER_FAULTS];
 	double latch_opens_s, magnet_drops_s; /* INFINITY: not under way */
 	bool latch_energised;                 /* its coil */
+	double calm_s; /* when the knock of the latch is over, INFINITY: there is none */
 
 	enum frame_state frame_state;
 	struct motion frame;
@@ -47,10 +48,13 @@ struct tower {
 	unsigned glitches[2]; /* of the gates, to come */
 
 	enum place place;
-	struct motion fall; /* of the lowest corner, in PLACE_AIR */
+	struct motion fall; /* in PLACE_AIR, of where the lowest corner was as it left */
+	bool taut;          /* the wires pull */
+	double spin_rad_s;  /* in PLACE_AIR */
 	struct product product;
 	double mix[SENSORS][2][2]; /* this drop's gain and cross-axis errors */
 	struct sensor sensor[CHANNELS];
+	double spike_g[CHANNELS]; /* on top of the next conversion */
 
 	struct tower_truth truth;
 };
@@ -84,5 +88,7 @@ void tower_sensors_set_up(struct tower *t);
 void tower_sensors_settle(struct tower *t);
 
 bool tower_sensor_cut_off(const struct tower *t, int sensor);
+
+void tower_product_leave(struct tower *t);
 
 #endif

@@ -160,6 +160,10 @@ static void reads_events_of_the_tower_and_of_other_hosts(void **state)
 	        {.action = EVENT_GLITCH, .number = 0, .pulses = 3},
 	        {.action = EVENT_GLITCH, .number = 1, .pulses = 1000},
 	        {.action = EVENT_DROPOUT, .duration_s = 0.02},
+	        {.action = EVENT_FRICTION, .value = 7.5},
+	        {.action = EVENT_SPIKE, .number = 0, .value = 300},
+	        {.action = EVENT_SPIKE, .number = 1, .value = -80},
+	        {.action = EVENT_LET_GO},
 	        {.action = EVENT_HOST_SECOND, .duration_s = 2},
 	        {.action = EVENT_HOST_REPLAY, .duration_s = 3},
 	        {.action = EVENT_HOST_FORGE, .duration_s = 4},
@@ -176,7 +180,8 @@ static void reads_events_of_the_tower_and_of_other_hosts(void **state)
 
 	(void)state;
 	good(&s,
-	     "[at]\ngate = upper 3 at 1\ngate = lower 1000 at 1\ndropout = 0.02 at 1\nhost = second 2 at 1\n"
+	     "[at]\ngate = upper 3 at 1\ngate = lower 1000 at 1\ndropout = 0.02 at 1\nfriction = 7.5 at 1\n"
+	     "spike = s1 300 at 1\nspike = s2 -80 at 1\nlet_go = product at 1\nhost = second 2 at 1\n"
 	     "host = replay 3 at 1\nhost = forge 4 at 1\nbus = passive 0.5 at 1\nreset = pin at 1\n"
 	     "fault = frame_jammed at 1\nsend = arm second at 1\nsend = arm second 7 at 1\n");
 	assert_int_equal(s.event_count, sizeof(known) / sizeof(known[0]));
@@ -185,6 +190,7 @@ static void reads_events_of_the_tower_and_of_other_hosts(void **state)
 		assert_int_equal(s.event[i].number, known[i].number);
 		assert_int_equal(s.event[i].pulses, known[i].pulses);
 		assert_true(s.event[i].duration_s == known[i].duration_s);
+		assert_true(s.event[i].value == known[i].value);
 		assert_int_equal(s.event[i].command.op, known[i].command.op);
 		assert_int_equal(s.event[i].command.argument, known[i].command.argument);
 		assert_int_equal(s.event[i].second, known[i].second);

@@ -594,6 +594,224 @@ static void friction_can_hold_the_frame(void **state)
 	tower_destroy(tower);
 }
 
+/* From rest with 0.3 N for 0.188 s, then with 6 N. */
+static void friction_changes_on_the_way(void **state)
+{
+	const double before_s = 0.188, speed = ALL_M_S2 * before_s,
+	             way_m = ALL_M_S2 * before_s * before_s / 2;
+	const double rougher = G - 6 / 3.183;
+	struct tower *tower = falling();
+	uint32_t us = 0;
+
+	(void)state;
+	tower_advance(tower, 0.112 + before_s);
+	tower_set_friction(tower, 6);
+	tower_advance(tower, 1);
+	assert_true(tower_capture(tower, 1, &us));
+	assert_near(us,
+	            1e6 * (0.3 + (sqrt(speed * speed + 2 * rougher * (0.7 - way_m)) - speed) / rougher) - 0.5,
+	            0.5 + 1e-3);
+	assert_near(tower_truth(tower)->frame_down_s,
+	            0.3 + (sqrt(speed * speed + 2 * rougher * (0.8 - way_m)) - speed) / rougher, 1e-11);
+	tower_destroy(tower);
+}
+
+/* 20 mm of slack, then three tenths of the weight. */
+static void wires_pull_when_they_are_taut(void **state)
+{
+	const double speed = sqrt(2 * ALL_M_S2 * 0.78), away = G - FRAME_M_S2;
+	const double down_s = (sqrt(speed * speed + 2 * FRAME_M_S2 * 0.02) - speed) / FRAME_M_S2;
+	const double lead_m = away * down_s * down_s / 2, lead_m_s = away * down_s, braked = G + BRAKE_M_S2;
+	const double taut_s =
+	        down_s + (sqrt(lead_m_s * lead_m_s + 2 * braked * (0.02 - lead_m)) - lead_m_s) / braked;
+	const double taut_m_s = speed + G * taut_s, taut_m = 0.78 + speed * taut_s + G * taut_s * taut_s / 2;
+	const double hits_m_s = sqrt(taut_m_s * taut_m_s + 2 * 0.7 * G * (HEIGHT_M - taut_m));
+	struct scene scene = test_scene();
+	struct tower *tower;
+	int16_t codes[6];
+
+	(void)state;
+	scene.tower_wire_slack_m = 0.02;
+	scene.tower_wire_pull_ratio = 0.3;
+	tower = falling_of(&scene);
+	tower_output(tower, MAGNET, false, fall_time(0.78) - 0.008);
+	tower_advance(tower, fall_time(0.78) + taut_s - 1e-6);
+	tower_sample(tower, SENSORBUS_X, codes);
+	assert_int_equal(codes[3], 0);
+	tower_advance(tower, fall_time(0.78) + taut_s + 1e-6);
+	tower_sample(tower, SENSORBUS_X, codes);
+	assert_near(codes[3], 32 * 0.3 * G / G_M_S2 * cos(UNITS_RAD(25)), 0.51);
+	tower_advance(tower, 1);
+	assert_near(tower_truth(tower)->impact_speed_m_s, hits_m_s, 1e-10);
+	assert_near(tower_truth(tower)->impact_s,
+	            fall_time(0.78) + taut_s + (hits_m_s - taut_m_s) / (0.7 * G), 1e-11);
+	tower_destroy(tower);
+	tower = falling_of(&scene); /* the same if nobody looks */
+	tower_output(tower, MAGNET, false, fall_time(0.78) - 0.008);
+	tower_advance(tower, 1);
+	assert_near(tower_truth(tower)->impact_speed_m_s, hits_m_s, 1e-10);
+	tower_destroy(tower);
+}
+
+/* Below the centre of gravity. */
+static double corner_m(double angle)
+{
+	const double half_m = 0.0505;
+
+	return half_m / tan(UNITS_RAD(25)) * fabs(cos(angle)) + half_m * fabs(sin(angle));
+}
+
+static void a_kick_turns_the_product_in_its_fall(void **state)
+{
+	static const double kick_deg_s[3] = {100, -60, 500}; /* the last turns it over */
+
+	(void)state;
+	for (int i = 0; i < 3; i++) {
+		const double spin = UNITS_RAD(kick_deg_s[i]), angle = UNITS_RAD(15);
+		double low = 0.3, high = 0.6;
+		struct scene scene = test_scene();
+		struct tower *tower;
+		int16_t codes[6];
+
+		scene.tower_magnet_kick_deg_s = kick_deg_s[i];
+		scene.drop_angle_deg = 15;
+		for (int k = 0; k < 60; k++) {
+			const double s = (low + high) / 2;
+
+			if (G * s * s / 2 + corner_m(angle + spin * s) < HEIGHT_M + corner_m(angle))
+				low = s;
+			else
+				high = s;
+		}
+		tower = make(&scene, true, 1);
+		tower_output(tower, MAGNET, true, 0.1);
+		tower_output(tower, MAGNET, false, 1);
+		tower_advance(tower, 1.3);
+		assert_true(tower_truth(tower)->angle_deg == 15);
+		tower_advance(tower, 2);
+		assert_near(tower_truth(tower)->impact_s, 1.008 + low, 1e-11);
+		assert_near(tower_truth(tower)->impact_speed_m_s, G * low, 1e-10);
+		assert_near(tower_truth(tower)->angle_deg, 15 + kick_deg_s[i] * low, 1e-9);
+		tower_destroy(tower);
+		/* S2 is 65 mm off the centre: w^2 s, in the air and as the corner touches */
+		tower = make(&scene, true, 1);
+		tower_output(tower, MAGNET, true, 0.1);
+		tower_output(tower, MAGNET, false, 1);
+		for (int k = 0; k < 2; k++) {
+			tower_advance(tower, 1.008 + low + (k ? 1e-8 : -1e-8));
+			tower_sample(tower, SENSORBUS_X, codes);
+			assert_near(codes[3], -32 * spin * spin * 0.065 / G_M_S2, 0.6);
+		}
+		tower_advance(tower, 1.008 + low + 30e-6);
+		tower_sample(tower, SENSORBUS_X | SENSORBUS_YZ, codes);
+		assert_in_range(abs(codes[3]) + abs(codes[4]), 32 * 3, 32 * 40);
+		tower_destroy(tower);
+	}
+}
+
+/* One swing of 50 g at 500 Hz: a quarter of it up, three quarters down, then nothing. */
+static void the_latch_knocks_once(void **state)
+{
+	static const double at_s[4] = {0.0005, 0.001, 0.0015, 0.0025}, swing_g[4] = {50, 0, -50, 0};
+	struct scene scene = test_scene();
+	struct tower *tower;
+	int16_t codes[6];
+	uint32_t us;
+
+	(void)state;
+	scene.tower_knock_g = 50;
+	scene.tower_knock_hz = 500;
+	tower = falling_of(&scene);
+	for (int i = 0; i < 4; i++) {
+		tower_advance(tower, 0.112 + at_s[i]);
+		tower_sample(tower, SENSORBUS_X, codes);
+		assert_near(codes[3], 32 * ((G - ALL_M_S2) / G_M_S2 + swing_g[i]) * cos(UNITS_RAD(25)), 0.6);
+	}
+	tower_advance(tower, 1);
+	assert_true(tower_capture(tower, 1, &us));
+	assert_near(us, 1e6 * fall_time(0.7) - 0.5, 0.5 + 1e-3);
+	tower_destroy(tower);
+	/* not felt by a product that has left */
+	tower = make(&scene, true, 1);
+	tower_output(tower, LATCH, true, 0.1);
+	tower_let_go(tower);
+	tower_advance(tower, 0.1125);
+	tower_sample(tower, SENSORBUS_X, codes);
+	assert_int_equal(codes[3], 0);
+	tower_destroy(tower);
+}
+
+/* The study's rebound: let go from a standing frame, the speed changes by 1.5 times that of the fall, 6.28
+ * m/s. */
+static void a_hand_lets_the_product_go(void **state)
+{
+	struct scene scene = test_scene();
+	struct tower *tower;
+	int16_t codes[6];
+	double change_m_s = 0;
+
+	(void)state;
+	if (scene_read(&scene, "common/scenes/geometry-1.ini", (char[SCENE_MESSAGE_MAX]){0}) != 0)
+		fail();
+	scene.drop_height_m = HEIGHT_M;
+	scene.drop_gravity_m_s2 = G;
+	tower = make(&scene, true, 1);
+	tower_advance(tower, 1);
+	tower_let_go(tower);
+	tower_let_go(tower); /* it has no other */
+	tower_advance(tower, 1 + sqrt(2 * HEIGHT_M / G) - 1e-5);
+	assert_true(tower_truth(tower)->separation_s == 1 && isnan(tower_truth(tower)->impact_s));
+	assert_int_equal(tower_inputs(tower) & (WIRE_IO_LATCH_CLOSED | WIRE_IO_PRODUCT_HELD),
+	                 WIRE_IO_LATCH_CLOSED);
+	for (int i = 0; i < 500; i++) {
+		tower_advance(tower, 1 + sqrt(2 * HEIGHT_M / G) + 10e-6 * i);
+		tower_sample(tower, SENSORBUS_X | SENSORBUS_YZ, codes);
+		change_m_s +=
+		        (codes[0] * cos(UNITS_RAD(25)) + codes[1] * sin(UNITS_RAD(25))) / 32 * G_M_S2 * 10e-6;
+	}
+	assert_near(tower_truth(tower)->impact_speed_m_s, 4.18811174636, 1e-9);
+	assert_near_part(change_m_s, 6.28, 0.01);
+	tower_destroy(tower);
+}
+
+static void sensors_are_swapped_turned_and_disturbed(void **state)
+{
+	static const struct {
+		enum tower_fault fault;
+		int16_t codes[6];
+	} known[] = {/* 32 cos, sin 25 deg; Z by its ratio */
+	             {TOWER_SENSORS_SWAPPED, {29, 14, 0, 29, 14, 3}},
+	             {TOWER_S1_REVERSED, {-29, -14, 3, 29, 14, 0}},
+	             {TOWER_S2_REVERSED, {29, 14, 3, -29, -14, 0}}};
+	struct tower *tower = make_ideal();
+	int16_t codes[6];
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(known) / sizeof(known[0]); i++) {
+		tower_fault(tower, known[i].fault, true);
+		tower_sample(tower, SENSORBUS_X | SENSORBUS_YZ, codes);
+		assert_memory_equal(codes, known[i].codes, sizeof(codes));
+		tower_fault(tower, known[i].fault, false);
+	}
+	tower_fault(tower, TOWER_SENSORS_SWAPPED, true);
+	tower_fault(tower, TOWER_CABLE_S1, true);
+	assert_int_equal(tower_inputs(tower) & (WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2), WIRE_IO_IEPE_S1);
+	assert_int_equal(tower_bias_high(tower), 2);
+	tower_destroy(tower);
+	tower = make_ideal();
+	tower_spike(tower, 1, 100);
+	tower_spike(tower, 2, 100); /* there is none */
+	tower_sample(tower, SENSORBUS_X, codes);
+	assert_int_equal(codes[0], 29);
+	assert_int_equal(codes[3], 29 + 3200);
+	tower_sample(tower, SENSORBUS_X | SENSORBUS_YZ, codes);
+	assert_int_equal(codes[3], 29);
+	assert_int_equal(codes[4], 14 + 3200);
+	tower_sample(tower, SENSORBUS_YZ, codes);
+	assert_int_equal(codes[4], 14);
+	tower_destroy(tower);
+}
+
 static void each_fault_shows_on_its_input(void **state)
 {
 	static const struct {
@@ -621,6 +839,9 @@ static void each_fault_shows_on_its_input(void **state)
 	        {TOWER_CABLE_S2, "cable_s2", WIRE_IO_IEPE_S2, 0},
 	        {TOWER_SHORT_S1, "short_s1", WIRE_IO_IEPE_S1, 0},
 	        {TOWER_SHORT_S2, "short_s2", WIRE_IO_IEPE_S2, 0},
+	        {TOWER_SENSORS_SWAPPED, "sensors_swapped", 0, 0},
+	        {TOWER_S1_REVERSED, "s1_reversed", 0, 0},
+	        {TOWER_S2_REVERSED, "s2_reversed", 0, 0},
 	};
 	struct tower *tower = make_ideal();
 	const unsigned quiet = tower_inputs(tower);
@@ -839,6 +1060,12 @@ int main(void)
 	        cmocka_unit_test(switches_lie_and_wires_break),
 	        cmocka_unit_test(gates_glitch),
 	        cmocka_unit_test(friction_can_hold_the_frame),
+	        cmocka_unit_test(friction_changes_on_the_way),
+	        cmocka_unit_test(wires_pull_when_they_are_taut),
+	        cmocka_unit_test(a_kick_turns_the_product_in_its_fall),
+	        cmocka_unit_test(the_latch_knocks_once),
+	        cmocka_unit_test(a_hand_lets_the_product_go),
+	        cmocka_unit_test(sensors_are_swapped_turned_and_disturbed),
 	        cmocka_unit_test(each_fault_shows_on_its_input),
 	        cmocka_unit_test(dead_gates_and_open_cables_say_nothing),
 	        cmocka_unit_test(product_comes_to_lie_still),
