@@ -10,6 +10,7 @@
 #include <droptower_version.h>
 
 #include "common/base/number.h"
+#include "common/base/text.h"
 #include "host/base/whole.h"
 #include "host/command/archived.h"
 #include "host/command/command.h"
@@ -214,15 +215,17 @@ static int fit_write(const struct fitting *f)
 
 static int fit_page(const struct fitted *fitted, const char *file)
 {
-	char message[READ_MESSAGE_MAX];
-	struct whole whole;
-	int error = whole_open(&whole, file, message, sizeof(message));
+	char message[READ_MESSAGE_MAX] = "no memory";
+	struct text text;
+	int error = text_open(&text);
 
 	if (error == 0)
-		error = whole_close(&whole, fitted_page(fitted, whole.out, message, sizeof(message)), message,
-		                    sizeof(message));
+		error = text_close(&text, fitted_page(fitted, text.out, message, sizeof(message)));
+	if (error == 0)
+		error = whole_write(file, text.bytes, text.size, message, sizeof(message));
 	if (error != 0)
 		command_error("%s", message);
+	free(text.bytes);
 	return error != 0 ? COMMAND_INPUT : COMMAND_DONE;
 }
 

@@ -226,9 +226,9 @@ static void fitted_residuals(struct page *page, const struct fitted *f)
 	pictures_left(page, f, worst, 1, true);
 }
 
-int fitted_page(const struct fitted *f, FILE *out, char *message, size_t size)
+static void fitted_write(struct page *page, const struct fitted *f)
 {
-	struct page page = {.out = out, .message = message, .size = size};
+	FILE *out = page->out;
 
 	fitted_head(out, f);
 	fputs("<h2>Parameters</h2>\n", out);
@@ -243,15 +243,26 @@ int fitted_page(const struct fitted *f, FILE *out, char *message, size_t size)
 		      "parameters; the drops' points have their own.</p>\n<div class=\"grid\">",
 		      out);
 		for (size_t i = 0; i < TABLE_COUNT(over_angle); i++)
-			picture_over_angle(&page, f->fit, &over_angle[i]);
+			picture_over_angle(page, f->fit, &over_angle[i]);
 		fputs("</div>\n", out);
 		fitted_predictions(f->fit, TABLE_HTML, out);
 		fputs("<p>", out);
 		fitted_next(f->fit, out);
 		fputs("</p>\n", out);
 	}
-	fitted_residuals(&page, f);
+	fitted_residuals(page, f);
 	fputs("<footer>", out);
 	page_end(out, f->version);
-	return page.error;
+}
+
+int fitted_page(const struct fitted *f, FILE *out, char *message, size_t size)
+{
+	struct page page = {.message = message, .size = size};
+	int result = page_open(&page, out);
+
+	snprintf(message, size, "%s", error_text(DT_E_MEMORY));
+	if (result != 0)
+		return result;
+	fitted_write(&page, f);
+	return page_close(&page);
 }

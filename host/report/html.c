@@ -218,20 +218,20 @@ static void html_write_page(struct page *page)
 
 int report_html(const struct report *report, const char *file, char *message, size_t size)
 {
+	struct page page = {.report = report, .zero = report_zero(report), .message = message, .size = size};
 	struct text text;
 	int result = text_open(&text);
-	struct page page = {.out = text.out,
-	                    .report = report,
-	                    .zero = report_zero(report),
-	                    .message = message,
-	                    .size = size};
 
 	snprintf(message, size, "%s", error_text(DT_E_MEMORY));
-	if (result)
+	if (result != 0)
 		return result;
-	html_write_page(&page);
-	result = text_close(&text, page.error);
-	if (!result)
+	result = page_open(&page, text.out);
+	if (result == 0) {
+		html_write_page(&page);
+		result = page_close(&page);
+	}
+	result = text_close(&text, result);
+	if (result == 0)
 		result = whole_write(file, text.bytes, text.size, message, size);
 	free(text.bytes);
 	return result;

@@ -9,13 +9,17 @@
 #include "common/base/text.h"
 #include "host/report/facts.h"
 
-/* The first picture that fails is remembered and the rest are left out. */
+/* page_open, write to out, page_close in any case. What is written stays in memory until all pictures can be
+ * drawn. */
 struct page {
-	FILE *out;
+	FILE *out;                   /* of the body */
+	FILE *whole;                 /* where all of it goes in the end */
+	struct text body, scripts;   /* page_draw's, one behind the other */
+	size_t *picture_at;          /* places in the body where they come in */
 	const struct report *report; /* of a drop; NULL: of a series */
 	struct report_zero zero;     /* of the report */
 	size_t pictures;
-	int error; /* DT_E_* of that picture, its line in message */
+	int error; /* DT_E_* of what failed first, its line in message */
 	char *message;
 	size_t size;
 };
@@ -40,10 +44,16 @@ void page_end(FILE *out, const char *version);
 void page_begin_card(FILE *out, const char *label);
 void page_end_card(FILE *out, const char *unit, const char *note);
 
+/* 0 or DT_E_MEMORY, with nothing to close. Sets out; what the caller gave of the rest stays. */
+DT_MUST_USE int page_open(struct page *page, FILE *out);
+
+/* Draws the pictures and writes the page: 0, DT_E_MEMORY, DT_E_SYSTEM of a picture, or the page's error. */
+DT_MUST_USE int page_close(struct page *page);
+
 /* Opens a gnuplot script; false, with the page's error set, without memory or after an earlier error. */
 bool page_begin_script(struct page *page, struct text *script);
 
-/* Closes and frees it and puts its picture into the page. drawn: whether there is something to see. */
+/* Closes and frees it; its picture comes in here. drawn: whether there is something to see. */
 void page_draw(struct page *page, struct text *script, bool drawn, const char *label);
 
 /* The sections of a drop that are pictures, and those that are tables. */

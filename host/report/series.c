@@ -317,7 +317,7 @@ size_t series_counted(const struct series_page *page)
 	return counted;
 }
 
-static int series_write_page(struct series_page *page)
+static void series_write_page(struct series_page *page)
 {
 	series_head(page);
 	series_laboratory(page);
@@ -333,9 +333,19 @@ static int series_write_page(struct series_page *page)
 		fputs("<p><b>End of the report.</b></p>\n", page->page.out);
 	page_end(page->page.out, page->request->version);
 	series_evidence(page);
-	if (page->page.error)
-		return page->page.error;
-	if (fflush(page->page.out) == 0 && !ferror(page->page.out))
+}
+
+static int series_make_page(struct series_page *page, FILE *out)
+{
+	int result = page_open(&page->page, out);
+
+	if (result != 0)
+		return result;
+	series_write_page(page);
+	result = page_close(&page->page);
+	if (result != 0)
+		return result;
+	if (fflush(out) == 0 && !ferror(out))
 		return 0;
 	snprintf(page->page.message, page->page.size, "the report cannot be written");
 	return DT_E_SYSTEM;
@@ -350,10 +360,10 @@ int series_report_html(const struct series_report *request, FILE *out, char *mes
 	if (!page)
 		return DT_E_MEMORY;
 	page->request = request;
-	page->page = (struct page){.out = out, .message = message, .size = size};
+	page->page = (struct page){.message = message, .size = size};
 	result = series_gather(page);
 	if (result == 0)
-		result = series_write_page(page);
+		result = series_make_page(page, out);
 	series_release(page);
 	return result;
 }
