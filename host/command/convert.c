@@ -135,9 +135,12 @@ static const struct option_table known_options = {
                 "Writes a logged drop in another format, chosen by OUT's ending: .log candump text, .lcm LCM "
                 "event "
                 "log,\n"
-                ".csv, .unv or .uff universal file (dataset 58), .h5 or .hdf5 HDF5. IN is recognised by its "
+                ".csv, .unv or .uff universal file (dataset 58), .h5 or .hdf5 HDF5, .pcapng frames for "
+                "Wireshark,\n"
+                ".mat MATLAB version 5, .mme a test of ISO 13499 with its folder Channel. IN is recognised "
+                "by its "
                 "content.\n"
-                "Foreign recordings become CSV, universal files or HDF5.\n"
+                "Foreign recordings become CSV, universal files, HDF5, MAT or ISO 13499.\n"
                 "\n",
         OPTION_ROWS(rows),
         .words = true,

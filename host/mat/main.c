@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * droptower-mat read: a MAT file on standard input, which has to be a file, as a tree (host/record/tree.h) on
- * standard output. Started by droptower (host/record/read_mat.c).
+ * droptower-mat read|write: a MAT file on standard input, which has to be a file, as a tree
+ * (host/record/tree.h) on standard output; our CSV as a MAT file (put.h). Started by droptower
+ * (host/record/read_mat.c).
  *
  * libmatio ends silently where a file ends or is damaged: what stands between its marks is counted here
  * first, and what is compressed is unpacked to its checksum.
@@ -17,6 +18,7 @@
 #include "common/base/process.h"
 #include "common/base/text.h"
 #include "common/link/temporary.h"
+#include "host/mat/put.h"
 #include "host/record/mat.h"
 #include "host/record/tree.h"
 
@@ -358,21 +360,36 @@ static int mat_to_tree(const struct source *source)
 	return result;
 }
 
+static int csv_to_mat(const struct source *source)
+{
+	char message[READ_MESSAGE_MAX];
+	struct record record;
+	int result;
+
+	if (read_csv(&record, source, message) != 0) {
+		fprintf(stderr, "%s\n", message);
+		return -1;
+	}
+	result = put_record(&record);
+	record_free(&record);
+	return result;
+}
+
 int main(int argc, char **argv)
 {
 	char message[READ_MESSAGE_MAX];
 	struct source source;
 	int result;
 
-	if (argc != 2 || strcmp(argv[1], "read") != 0) {
-		fputs("usage: droptower-mat read <IN >OUT\n", stderr);
+	if (argc != 2 || (strcmp(argv[1], "read") != 0 && strcmp(argv[1], "write") != 0)) {
+		fputs("usage: droptower-mat read|write <IN >OUT\n", stderr);
 		return 2;
 	}
-	if (source_load(&source, "/dev/stdin", "a MAT file", message) != 0) {
+	if (source_load(&source, "/dev/stdin", "a recording", message) != 0) {
 		fprintf(stderr, "%s\n", message);
 		return 3;
 	}
-	result = mat_to_tree(&source);
+	result = strcmp(argv[1], "read") == 0 ? mat_to_tree(&source) : csv_to_mat(&source);
 	source_free(&source);
 	return result == 0 ? 0 : 3;
 }

@@ -9,7 +9,7 @@ MAT := $(shell pkg-config --cflags --libs matio zlib 2>/dev/null)
 
 ifneq ($(MAT),)
 all: $(BUILD)/droptower-mat
-MAT_O = $(BUILD)/obj/host/mat/main.o
+MAT_O = $(call obj,$(wildcard host/mat/*.c))
 ALL_O += $(MAT_O)
 $(MAT_O): CPPFLAGS += $(LINUX) $(patsubst -I%,-isystem %,$(filter -I%,$(MAT)))
 

@@ -1,28 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/hdf5.h"
 
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "common/base/text.h"
 #include "host/record/helper.h"
 #include "host/record/seal.h"
 #include "host/record/tree.h"
-#include "host/record/write.h"
 
 static const struct helper helper = {"droptower-hdf5", "HDF5", "libhdf5-dev and pkg-config"};
-
-static int copy_all(int fd, FILE *out)
-{
-	size_t size = 0;
-	char *bytes = process_read(fd, &size);
-	bool whole = bytes != NULL && fwrite(bytes, 1, size, out) == size && fflush(out) == 0;
-
-	free(bytes);
-	return whole ? 0 : DT_E_SYSTEM;
-}
 
 bool hdf5_is(const struct source *source)
 {
@@ -91,20 +78,5 @@ int read_hdf5(struct record *record, const struct source *source, const char *co
 
 int write_hdf5(const struct record *record, FILE *out, const char *file, char message[READ_MESSAGE_MAX])
 {
-	struct process_streams streams;
-	struct text text;
-	int error = text_open(&text);
-
-	if (error == 0)
-		error = text_close(&text, write_csv(record, text.out));
-	if (error != 0)
-		return source_refuse(message, error, file, 0, "%s", error_text(error));
-	error = helper_run(&helper, "write", text.bytes, text.size, file, &streams, message);
-	free(text.bytes);
-	if (error != 0)
-		return error;
-	if (copy_all(streams.fd[1], out) != 0)
-		error = source_refuse(message, DT_E_SYSTEM, file, 0, "%s", strerror(errno));
-	process_streams_close(&streams);
-	return error;
+	return helper_write(&helper, record, out, file, message);
 }

@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/helper.h"
 
+#include <errno.h>
 #include <limits.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "common/base/text.h"
 #include "host/record/source.h"
+#include "host/record/write.h"
 
 static int path_of_helper(const char *program, char path[PATH_MAX])
 {
@@ -56,5 +60,36 @@ int helper_run(const struct helper *helper, const char *verb, const void *bytes,
 	                                   strerror(-status))
 	                   : helper_complain(helper, message, file, streams->fd[2], status);
 	process_streams_close(streams);
+	return error;
+}
+
+static int copy_all(int fd, FILE *out)
+{
+	size_t size = 0;
+	char *bytes = process_read(fd, &size);
+	bool whole = bytes != NULL && fwrite(bytes, 1, size, out) == size && fflush(out) == 0;
+
+	free(bytes);
+	return whole ? 0 : DT_E_SYSTEM;
+}
+
+int helper_write(const struct helper *helper, const struct record *record, FILE *out, const char *file,
+                 char message[READ_MESSAGE_MAX])
+{
+	struct process_streams streams;
+	struct text text;
+	int error = text_open(&text);
+
+	if (error == 0)
+		error = text_close(&text, write_csv(record, text.out));
+	if (error != 0)
+		return source_refuse(message, error, file, 0, "%s", error_text(error));
+	error = helper_run(helper, "write", text.bytes, text.size, file, &streams, message);
+	free(text.bytes);
+	if (error != 0)
+		return error;
+	if (copy_all(streams.fd[1], out) != 0)
+		error = source_refuse(message, DT_E_SYSTEM, file, 0, "%s", strerror(errno));
+	process_streams_close(&streams);
 	return error;
 }

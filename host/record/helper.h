@@ -7,6 +7,8 @@
  * droptower several milliseconds, and because a file that crashes the library then ends the helper and not
  * the reader.
  */
+#include <stdio.h>
+
 #include "common/base/process.h"
 #include "host/record/read.h"
 
@@ -19,5 +21,9 @@ struct helper {
  * message says what to install. */
 DT_MUST_USE int helper_run(const struct helper *helper, const char *verb, const void *bytes, size_t size,
                            const char *file, struct process_streams *streams, char message[READ_MESSAGE_MAX]);
+
+/* Its verb "write": our CSV of the record to what it gives, all of it to out. */
+DT_MUST_USE int helper_write(const struct helper *helper, const struct record *record, FILE *out,
+                             const char *file, char message[READ_MESSAGE_MAX]);
 
 #endif

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  *
- * MAT files of versions 4, 5 and 7.3 through droptower-mat (host/mat), which tells what they hold.
+ * MAT files of versions 4, 5 and 7.3 through droptower-mat (host/mat), which tells what they hold, and writes
+ * version 5.
  */
 #include <ctype.h>
 #include <stdio.h>
@@ -70,9 +71,10 @@ bool mat_is(const struct source *source)
 	return mat4_count(source->bytes, source->size) != 0;
 }
 
+static const struct helper helper = {"droptower-mat", "MAT files", "libmatio-dev and pkg-config"};
+
 int read_mat(struct table_data *table, const struct source *source, char message[READ_MESSAGE_MAX])
 {
-	static const struct helper helper = {"droptower-mat", "MAT files", "libmatio-dev and pkg-config"};
 	struct process_streams streams;
 	int error = helper_run(&helper, "read", source->bytes, source->size, source->file, &streams, message);
 
@@ -81,4 +83,9 @@ int read_mat(struct table_data *table, const struct source *source, char message
 	error = read_tree_of(table, "mat", streams.fd[1], source, message);
 	process_streams_close(&streams);
 	return error;
+}
+
+int write_mat(const struct record *record, FILE *out, const char *file, char message[READ_MESSAGE_MAX])
+{
+	return helper_write(&helper, record, out, file, message);
 }

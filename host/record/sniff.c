@@ -357,21 +357,37 @@ static const struct unit *sniff_unit(struct piece name, struct piece told, bool 
 	return by_told != NULL ? by_told : by_name;
 }
 
+enum { NUMBER_ROOM = 5 }; /* "_123" */
+
+/* Ends a name that may have been cut within a character of several bytes, or before a blank. */
+static size_t end_name(char *name, size_t length)
+{
+	size_t behind = 0, wanted;
+	unsigned char first;
+
+	while (behind < length && ((unsigned char)name[length - 1 - behind] & 0xC0) == 0x80)
+		behind++;
+	first = behind < length ? (unsigned char)name[length - 1 - behind] : 0;
+	wanted = first >= 0xF0 ? 3 : first >= 0xE0 ? 2 : first >= 0xC0 ? 1 : 0;
+	if (behind != wanted)
+		length -= behind + (wanted > 0);
+	while (length > 0 && name[length - 1] == ' ')
+		length--;
+	name[length] = '\0';
+	return length;
+}
+
 static void take_name(struct columns *columns, size_t i, struct piece name)
 {
 	struct column *column = &columns->column[i];
 	size_t used = 0;
 
-	for (size_t k = 0; k < name.length && used + 5 < sizeof(column->name); k++) {
+	for (size_t k = 0; k < name.length && used + 1 < sizeof(column->name); k++) {
 		char c = name.text[k];
 
 		column->name[used++] = strchr(",:@*\"", c) || (unsigned char)c < ' ' ? '_' : c;
 	}
-	while (used > 0 && ((unsigned char)column->name[used - 1] & 0xC0) == 0x80)
-		used--; /* a character of several bytes may have been cut */
-	while (used > 0 && column->name[used - 1] == ' ')
-		used--;
-	column->name[used] = '\0';
+	used = end_name(column->name, used);
 	if (used == 0 || strcmp(column->name, "time") == 0)
 		snprintf(column->name, sizeof(column->name), "column_%zu", i + 1);
 }
@@ -396,7 +412,9 @@ static void take_channel(struct sniff *sniff, size_t i, const struct unit *unit)
 	take_name(&sniff->columns, i, stem);
 	if (is_taken(&sniff->columns, i)) {
 		sniff->twins = true;
-		snprintf(column->name + strlen(column->name), 5, "_%zu", (i + 1) % 1000);
+		if (strlen(column->name) + NUMBER_ROOM > sizeof(column->name))
+			end_name(column->name, sizeof(column->name) - NUMBER_ROOM);
+		snprintf(column->name + strlen(column->name), NUMBER_ROOM, "_%zu", (i + 1) % 1000);
 	}
 	sniff->columns.channels++;
 }

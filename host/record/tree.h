@@ -17,6 +17,7 @@
  *             its only array, or to those that are named as accelerations
  *     rate    "fs", "sample rate", "dt" ... of the array itself, beside it or above it, the nearest; its unit
  *             in the name, in its own "units", or open (assume.h)
+ *     start   "start_s", "t0_s" or "wf_start_offset", found as a rate is
  *     time    a vector that is named so; one that is there twice is taken once
  *
  * A factor or offset beside numbers, elements of an array of structs without names, and a column of a matrix

@@ -17,6 +17,8 @@
 #include "host/record/lcm_codec.h"
 #include "common/base/number.h"
 #include "host/record/lcm_log.h"
+#include "host/record/mat.h"
+#include "host/record/mme.h"
 #include "host/record/seal.h"
 #include "common/base/text.h"
 #include "host/record/uff58.h"
@@ -318,11 +320,13 @@ static int put_uff58(const struct record *record, FILE *out)
 	return error ? error : fflush(out) ? DT_E_SYSTEM : 0;
 }
 
+typedef int helper_writer(const struct record *, FILE *, const char *, char *);
+
 /* With a message of its own, which tells more than the code. */
-static int write_whole_hdf5(const struct record *record, struct whole *whole, char message[READ_MESSAGE_MAX])
+static int write_whole(const struct record *record, helper_writer *write, struct whole *whole, char *message)
 {
 	char why[READ_MESSAGE_MAX];
-	int result = write_hdf5(record, whole->out, whole->file, why);
+	int result = write(record, whole->out, whole->file, why);
 	int closed = whole_close(whole, result, message, READ_MESSAGE_MAX);
 
 	if (result != 0)
@@ -330,16 +334,20 @@ static int write_whole_hdf5(const struct record *record, struct whole *whole, ch
 	return closed;
 }
 
-/* What the endings mean; write is NULL for HDF5, which its helper seals. */
+/* What the endings mean; one writer each: of bytes, by a helper, of several files. */
 static const struct format {
 	const char *ending;
-	int (*write)(const struct record *, FILE *);
 	bool drops_only;
+	int (*write)(const struct record *, FILE *);
+	helper_writer *by_helper;
+	int (*files)(const struct record *, const char *, char *);
 } formats[] = {
-        {".csv", put_csv, false},      {".lcm", write_lcm, true},
-        {".log", write_candump, true}, {".candump", write_candump, true},
-        {".unv", put_uff58, false},    {".uff", put_uff58, false},
-        {".h5", NULL, false},          {".hdf5", NULL, false},
+        {".csv", false, .write = put_csv},         {".lcm", true, .write = write_lcm},
+        {".log", true, .write = write_candump},    {".candump", true, .write = write_candump},
+        {".pcapng", true, .write = write_pcapng},  {".unv", false, .write = put_uff58},
+        {".uff", false, .write = put_uff58},       {".h5", false, .by_helper = write_hdf5},
+        {".hdf5", false, .by_helper = write_hdf5}, {".mat", false, .by_helper = write_mat},
+        {".mme", false, .files = write_mme},
 };
 
 static const struct format *format_of(const char *file)
@@ -359,20 +367,23 @@ int write_record(const struct record *record, const char *file, char message[REA
 	int error;
 
 	if (!format)
-		return source_refuse(
-		        message, DT_E_ARGUMENT, file, 0,
-		        "unknown ending, expected .csv, .lcm, .log, .candump, .unv, .uff, .h5 or .hdf5");
+		return source_refuse(message, DT_E_ARGUMENT, file, 0,
+		                     "unknown ending, expected .csv, .lcm, .log, .candump, .pcapng, .unv, "
+		                     ".uff, .h5, .hdf5, .mat or .mme");
 	if (format->drops_only && !record->is_drop)
 		return source_refuse(message, DT_E_ARGUMENT, file, 0,
-		                     "not a drop of a tower, which only .csv, .unv and .h5 can hold");
-	if (format->write == write_candump && record->seal_known && !record->seal_agrees)
+		                     "not a drop of a tower: expected .csv, .unv, .h5, .mat or .mme");
+	if ((format->write == write_candump || format->write == write_pcapng) && record->seal_known &&
+	    !record->seal_agrees)
 		return source_refuse(message, DT_E_ARGUMENT, file, 0,
 		                     "altered: the capture end is not what the tower sealed, and a log of "
 		                     "frames cannot say so; expected .csv, .lcm, .unv or .h5");
+	if (format->files != NULL)
+		return format->files(record, file, message);
 	error = whole_open(&whole, file, message, READ_MESSAGE_MAX);
 	if (error)
 		return error;
-	if (!format->write)
-		return write_whole_hdf5(record, &whole, message);
+	if (format->by_helper != NULL)
+		return write_whole(record, format->by_helper, &whole, message);
 	return whole_close(&whole, format->write(record, whole.out), message, READ_MESSAGE_MAX);
 }

@@ -3,8 +3,9 @@
 #define DT_HOST_RECORD_WRITE_H
 /*
  * A record to a file that read_record reads back equal: our CSV, universal files and HDF5 take any record,
- * candump text and LCM event logs take drops. README.md describes the CSV and what is ours of a universal
- * file.
+ * candump text, pcapng and LCM event logs take drops. MAT and ISO 13499 are for other programs: samples,
+ * names, units, rates and times come back, a drop as a recording. README.md describes the CSV and what is
+ * ours of a universal file.
  *
  * Times in candump text and LCM logs are the tower's clock: a record does not know the time of day. What a
  * record does not keep of its blocks is written as state CAPTURED, inputs and outputs 0.
@@ -16,8 +17,7 @@
 #include "common/base/text.h"
 
 /* Writes file in the format its name ends in: .csv, .lcm, .log or .candump, .unv or .uff,
- * .h5 or .hdf5. 0 or DT_E_* with one line in
- * message. */
+ * .h5 or .hdf5, .pcapng, .mat, .mme. 0 or DT_E_* with one line in message. */
 DT_MUST_USE int write_record(const struct record *record, const char *file, char message[READ_MESSAGE_MAX]);
 
 /* 0; DT_E_ARGUMENT if a channel's name cannot be written; DT_E_SYSTEM if out did not take it all. */
@@ -25,6 +25,9 @@ DT_MUST_USE int write_csv(const struct record *record, FILE *out);
 
 /* The same with its SHA-256 in the last line (seal.h), as a file has it; bytes are the caller's after 0. */
 DT_MUST_USE int write_sealed_csv(const struct record *record, struct text *text);
+
+/* The frames of a drop as pcapng. DT_E_ARGUMENT: not a drop. */
+DT_MUST_USE int write_pcapng(const struct record *record, FILE *out);
 
 /* The frames of a drop, each given to send at its turn with time_us in the tower's clock: every block held,
  * then the capture end if one is known. Ends early with what send returns if that is not 0.
