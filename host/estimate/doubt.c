@@ -10,6 +10,7 @@
 enum {
 	PLATEAU_SAMPLES = 3,
 	REST_SAMPLES = 4,   /* at rest after a step */
+	LEFT_RISES = 4,     /* a pulse that has an end has ended so many rises after its peak */
 	WIDTH_SAMPLES = 12, /* of a pulse whose width straight lines and curves tell without a bias */
 	BATCHES_MIN = 8,    /* of the quiet part, for the scatter of their means */
 	ROUGH_SAMPLES = 12,
@@ -403,6 +404,32 @@ static void doubt_after(const struct trace *trace, const struct estimate_baselin
 	}
 }
 
+/* What a pulse that never ends has come back to, long after its peak: how far from zero before. 0: the record
+ * ends in it. */
+static double doubt_left_over(const struct trace *trace, const struct peak *peak)
+{
+	double edge = LIMIT_EDGE * fabs(peak->result.value_g), mean = 0;
+	size_t top = trace_index(trace, peak->result.time_s), rise = 1, from;
+
+	while (rise <= top && peak->sign * trace->value_g[top - rise] > edge)
+		rise++;
+	from = top + LEFT_RISES * rise;
+	if (rise > top || from + rise > trace->count || !doubt_mean(trace, from, trace->count - from, &mean))
+		return 0;
+	return fabs(mean);
+}
+
+static void doubt_endless(const struct trace *trace, struct peak *peak)
+{
+	struct estimate_peak *top = &peak->result;
+	double left_g = isfinite(top->value_g) ? doubt_left_over(trace, peak) : 0;
+
+	if (left_g > LIMIT_PART * fabs(top->value_g)) {
+		top->sigma_g = hypot(top->sigma_g, left_g);
+		top->how.flags |= ESTIMATE_FLAG_TAIL;
+	}
+}
+
 static void doubt_flag(struct peak *peak, struct estimate_pulse *pulse, unsigned flag)
 {
 	peak->result.how.flags |= flag;
@@ -415,8 +442,10 @@ void doubt_channel(const struct trace *trace, const struct estimate_baseline *ba
 	double samples = pulse->duration_s * trace->rate_hz;
 	struct plateau top;
 
-	if (!isfinite(pulse->duration_s))
+	if (!isfinite(pulse->duration_s)) {
+		doubt_endless(trace, peak);
 		return;
+	}
 	if (doubt_step(trace, peak, pulse))
 		pulse->flags |= ESTIMATE_FLAG_STEP;
 	if (doubt_step_inside(trace, peak, pulse))
