@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 #
-# awk -v name=SCENARIO -f differences.awk differences SCENARIO.ini: the scenario with what is expected of the board. A
-# ledger that the scenario does not mention is added; a list that goes on there stands in as many lines here.
+# awk -v name=SCENARIO [-v clocks=N] -f differences.awk differences SCENARIO.ini: the scenario with what is expected of the
+# board, with N clocks an instruction (1). A ledger that the scenario does not mention is added; a list that goes on there
+# stands in as many lines here.
+BEGIN { if (clocks == "") clocks = 1 }
 FNR == NR {
 	split($0, column, "\t")
-	if (column[1] == "*" || column[1] == name)
+	if (column[1] == "*" || column[1] == name || column[1] == "*@" clocks || column[1] == name "@" clocks)
 		limits[column[2]] = (column[2] in limits ? limits[column[2]] "\n" column[2] " = " : "") column[3]
 	next
 }
