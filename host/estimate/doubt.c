@@ -10,6 +10,7 @@
 enum {
 	PLATEAU_SAMPLES = 3,
 	REST_SAMPLES = 4,   /* at rest after a step */
+	AFTER_FEWEST = 3,   /* of them, in a record that ends soon */
 	LEFT_RISES = 4,     /* a pulse that has an end has ended so many rises after its peak */
 	WIDTH_SAMPLES = 12, /* of a pulse whose width straight lines and curves tell without a bias */
 	BATCHES_MIN = 8,    /* of the quiet part, for the scatter of their means */
@@ -349,13 +350,15 @@ static double after_shift(const struct after *after)
 	double mean = 0, first = 0, square = 0, n = (double)after->n, sigma;
 	bool below = true;
 
-	if (after->n < AFTER_BLOCKS / 2)
+	if (after->n < AFTER_FEWEST)
 		return 0;
 	for (size_t i = 0; i < after->n; i++) {
 		mean += after->mean_g[i] / n;
 		first += i < AFTER_BLOCKS / 2 ? after->mean_g[i] / (AFTER_BLOCKS / 2) : 0;
 		below = below && after->mean_g[i] < 0;
 	}
+	if (after->n < AFTER_BLOCKS / 2) /* too few to tell a shift from a swing, but what never turns back is none */
+		return below && -mean > LIMIT_SIGNIFICANT * after->sigma_g ? -mean : 0;
 	for (size_t i = 0; i < after->n; i++)
 		square += pow(after->mean_g[i] - mean, 2) / (n - 1);
 	sigma = fmax(after->sigma_g, sqrt(square)) / sqrt(n);

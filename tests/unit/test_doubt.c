@@ -239,9 +239,41 @@ static void spoilt(void **state)
 		}
 }
 
+/* A half-sine of 4 ms behind a high-pass of 20 ms; the record ends 8 ms after it. */
+static void a_high_pass_in_a_short_record(void **state)
+{
+	enum { UNTIL = 784 };
+	struct synth_random random = {3};
+	struct channel channel = synth_channel("a", RATE_HZ, 0, UNTIL);
+	const struct record record = {.channels = &channel, .channel_count = 1};
+
+	(void)state;
+	for (unsigned i = 0; i < DOUBT_DROPS; i++) {
+		const struct estimate_options options = {0};
+		double height_g = 100 * pow(8, synth_uniform(&random)), passed_g = 0, before_g = 0;
+		struct analysis analysis;
+
+		for (size_t k = 0; k < UNTIL; k++) {
+			double t = ((double)k / RATE_HZ - ONSET_S) / 4e-3;
+			double now_g = t > 0 && t < 1 ? height_g * sin(3.14159265358979 * t) : 0;
+
+			passed_g = (passed_g + now_g - before_g) * exp(-1 / (RATE_HZ * 20e-3));
+			before_g = now_g;
+			channel.value_g[k] = passed_g + height_g / 1000 * synth_normal(&random);
+		}
+		assert_int_equal(estimate_record(&record, &options, &analysis), 0);
+		assert_true(analysis.channels[0].peak.how.flags & ESTIMATE_FLAG_TAIL);
+		assert_true(fabs(analysis.channels[0].peak.value_g - height_g) <
+		            3 * analysis.channels[0].peak.sigma_g);
+		estimate_free(&analysis);
+	}
+	synth_free(&channel);
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(whole), cmocka_unit_test(spoilt)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(whole), cmocka_unit_test(spoilt),
+	                                   cmocka_unit_test(a_high_pass_in_a_short_record)};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
