@@ -10,13 +10,13 @@
 enum {
 	PLATEAU_SAMPLES = 3,
 	REST_SAMPLES = 4,   /* at rest after a step */
-	AFTER_FEWEST = 3,   /* of them, in a record that ends soon */
 	LEFT_RISES = 4,     /* a pulse that has an end has ended so many rises after its peak */
 	WIDTH_SAMPLES = 12, /* of a pulse whose width straight lines and curves tell without a bias */
 	BATCHES_MIN = 8,    /* of the quiet part, for the scatter of their means */
 	ROUGH_SAMPLES = 12,
 	ROUGH_WIDTHS = 4,
 	AFTER_BLOCKS = 12, /* of half a width, that follow the pulse */
+	AFTER_FEWEST = 3,  /* of them, in a record that ends soon */
 };
 
 /* A limit trembles less than noise would in so many of as many tops. */
@@ -45,6 +45,9 @@ enum {
 
 /* What a width of n samples is off, times n squared: kinks between the samples. */
 #define WIDTH_BIAS 1.4
+
+/* How far from whole numbers of steps readings may be that a drift was taken off. */
+#define WHOLE_STEPS 0.02
 
 /* The samples of a flat top, both included. */
 struct plateau {
@@ -357,7 +360,8 @@ static double after_shift(const struct after *after)
 		first += i < AFTER_BLOCKS / 2 ? after->mean_g[i] / (AFTER_BLOCKS / 2) : 0;
 		below = below && after->mean_g[i] < 0;
 	}
-	if (after->n < AFTER_BLOCKS / 2) /* too few to tell a shift from a swing, but what never turns back is none */
+	if (after->n <
+	    AFTER_BLOCKS / 2) /* too few to tell a shift from a swing, but what never turns back is none */
 		return below && -mean > LIMIT_SIGNIFICANT * after->sigma_g ? -mean : 0;
 	for (size_t i = 0; i < after->n; i++)
 		square += pow(after->mean_g[i] - mean, 2) / (n - 1);
@@ -433,6 +437,28 @@ static void doubt_endless(const struct trace *trace, struct peak *peak)
 	}
 }
 
+/* The step that all readings of the pulse are multiples of, where noise does not spread them over several; 0:
+ * none. */
+static double doubt_resolution(const struct trace *trace, const struct estimate_pulse *pulse)
+{
+	size_t from = trace_index(trace, pulse->start_s), until = trace_index(trace, pulse->end_s);
+	double step_g = INFINITY;
+
+	for (size_t k = from + 1; k <= until && k < trace->count; k++) {
+		double rise = fabs(trace->value_g[k] - trace->value_g[k - 1]);
+
+		if (rise > 0)
+			step_g = fmin(step_g, rise);
+	}
+	for (size_t k = from + 1; k <= until && k < trace->count; k++) {
+		double steps = fabs(trace->value_g[k] - trace->value_g[k - 1]) / step_g;
+
+		if (!(fabs(steps - round(steps)) < WHOLE_STEPS))
+			return 0;
+	}
+	return isfinite(step_g) && trace->noise_g < step_g / 2 ? step_g : 0;
+}
+
 static void doubt_flag(struct peak *peak, struct estimate_pulse *pulse, unsigned flag)
 {
 	peak->result.how.flags |= flag;
@@ -460,5 +486,6 @@ void doubt_channel(const struct trace *trace, const struct estimate_baseline *ba
 	if (samples < WIDTH_SAMPLES)
 		pulse->sigma_duration_s =
 		        hypot(pulse->sigma_duration_s, WIDTH_BIAS / (samples * samples) * pulse->duration_s);
+	peak->result.sigma_g = hypot(peak->result.sigma_g, doubt_resolution(trace, pulse) / sqrt(12.0));
 	doubt_after(trace, baseline, peak, pulse);
 }

@@ -270,10 +270,53 @@ static void a_high_pass_in_a_short_record(void **state)
 	synth_free(&channel);
 }
 
+/* A converter of 16 to 80 steps a pulse, and nothing that spreads its readings: the fit's own bars alone
+ * cover 87 %.
+ */
+static void a_coarse_converter(void **state)
+{
+	enum { DROPS = 400 };
+	struct synth_random random = {4};
+	struct channel channel = synth_channel("a", RATE_HZ, 0, SAMPLES);
+	const struct record record = {.channels = &channel, .channel_count = 1};
+	unsigned told = 0, covered = 0;
+
+	(void)state;
+	for (unsigned i = 0; i < DROPS; i++) {
+		const struct estimate_options options = {0};
+		double height_g = 100 * pow(8, synth_uniform(&random)),
+		       base_s = 3e-3 + 9e-3 * synth_uniform(&random);
+		double step_g = height_g / (16 + 64 * synth_uniform(&random)),
+		       onset_s = ONSET_S + synth_uniform(&random) / RATE_HZ;
+		const struct estimate_peak *peak;
+		struct analysis analysis;
+
+		for (size_t k = 0; k < SAMPLES; k++) {
+			double t = ((double)k / RATE_HZ - onset_s) / base_s;
+
+			channel.value_g[k] =
+			        t > 0 && t < 1 ? step_g * round(height_g * sin(3.14159265358979 * t) / step_g)
+			                       : 0;
+		}
+		assert_int_equal(estimate_record(&record, &options, &analysis), 0);
+		peak = &analysis.channels[0].peak;
+		if (peak->how.status == ESTIMATE_OK) {
+			told++;
+			covered += fabs(peak->value_g - height_g) < 2 * peak->sigma_g;
+		}
+		estimate_free(&analysis);
+	}
+	print_message("%u told, %u within two bars\n", told, covered);
+	assert_true(told >= 20);
+	assert_true(covered >= 0.93 * told);
+	synth_free(&channel);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(whole), cmocka_unit_test(spoilt),
-	                                   cmocka_unit_test(a_high_pass_in_a_short_record)};
+	                                   cmocka_unit_test(a_high_pass_in_a_short_record),
+	                                   cmocka_unit_test(a_coarse_converter)};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
