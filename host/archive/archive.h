@@ -115,6 +115,8 @@ struct archive_log {
 	char raw[ARCHIVE_NAME_MAX + 64]; /* its place in the archive's folder */
 	char file[32];                   /* to read it by, until it is closed */
 	int64_t time_s;                  /* of the drop */
+	char operator_name[ARCHIVE_NAME_MAX + 1];
+	bool simulated;
 	int copy;
 	char fault[ARCHIVE_MESSAGE_MAX]; /* one line on a result that is not what was recorded; "" */
 };

@@ -527,6 +527,26 @@ static int proof_open_log(struct archive *archive, const struct archive_place *p
 	return result;
 }
 
+static int find_origin(struct archive *archive, int64_t drop, struct archive_log *log)
+{
+	sqlite3_stmt *statement;
+	int result = sql_query(archive, &statement,
+	                       "SELECT CAST(strftime('%s', time) AS INTEGER), operator, simulated FROM drops"
+	                       " WHERE id = ?",
+	                       "i", drop);
+
+	if (result != 0)
+		return result;
+	result = sql_step(archive, statement);
+	if (result == 1) {
+		log->time_s = sqlite3_column_int64(statement, 0);
+		snprintf(log->operator_name, sizeof(log->operator_name), "%s", sql_text(statement, 1));
+		log->simulated = sqlite3_column_int64(statement, 2) != 0;
+	}
+	sqlite3_finalize(statement);
+	return result < 0 ? result : 0;
+}
+
 int archive_open_log(struct archive *archive, const char *drop, struct archive_log *log)
 {
 	struct archive_log opened = {.copy = -1};
@@ -544,9 +564,7 @@ int archive_open_log(struct archive *archive, const char *drop, struct archive_l
 	strcpy(opened.raw, place.raw);
 	opened.number = place.number;
 	snprintf(opened.file, sizeof(opened.file), "/proc/self/fd/%d", opened.copy);
-	result = sql_number(archive, &opened.time_s,
-	                    "SELECT CAST(strftime('%s', time) AS INTEGER) FROM drops WHERE id = ?", "i",
-	                    place.drop);
+	result = find_origin(archive, place.drop, &opened);
 	if (result == 0)
 		result = proof_open_log(archive, &place, &opened);
 	if (result == 0)

@@ -12,6 +12,7 @@
 
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
+#include "host/record/fields.h"
 #include "host/record/read.h"
 
 const char *archived_folder(const char *given)
@@ -96,11 +97,14 @@ int archived_read(struct archive *archive, const char *drop, struct record *reco
 		return DT_E_CORRUPT;
 	}
 	result = read_record(record, log.file, NULL, said);
-	record->time_s = log.time_s;
-	if (result == 0)
+	if (result == 0) {
+		record->time_s = log.time_s;
+		fields_take_words(record->operator_name, log.operator_name);
+		record->simulated = log.simulated;
 		snprintf(record->file, sizeof(record->file), "%s", log.raw);
-	else
+	} else {
 		name_log(&log, said, message);
+	}
 	archive_close_log(&log);
 	return result;
 }

@@ -1,15 +1,19 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/command/command.h"
 
+#include <errno.h>
+#include <limits.h>
 #include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "common/base/number.h"
 #include "common/error.h"
 #include "common/scenes/scene.h"
+#include "host/base/whole.h"
 
 void command_error(const char *format, ...)
 {
@@ -40,6 +44,20 @@ int command_output_failed(const char *why)
 	if (poll(&out, 1, 0) > 0 && (out.revents & POLLERR) != 0)
 		return COMMAND_DONE;
 	command_error("standard output: %s", why);
+	return COMMAND_INPUT;
+}
+
+int command_write(const char *file, const void *bytes, size_t size)
+{
+	char message[PATH_MAX + 128];
+
+	if (strcmp(file, "-") == 0)
+		return fwrite(bytes, 1, size, stdout) == size && fflush(stdout) == 0
+		               ? COMMAND_DONE
+		               : command_output_failed(strerror(errno));
+	if (whole_write(file, bytes, size, message, sizeof(message)) == 0)
+		return COMMAND_DONE;
+	command_error("%s", message);
 	return COMMAND_INPUT;
 }
 

@@ -58,6 +58,9 @@ bool command_is_input(const char *name, const char *out, const char *in);
 /* A call on a session or link failed with result: says so and returns COMMAND_LINK. */
 int command_link_failed(const char *doing, int result);
 
+/* A file at once, - is standard output. COMMAND_DONE, or COMMAND_INPUT and said why. */
+int command_write(const char *file, const void *bytes, size_t size);
+
 /* A tower that was not heard, or not set up (tower_setup.h): says why, returns COMMAND_LINK or _REFUSED. */
 int command_tower_failed(int result, const char *message);
 

@@ -9,30 +9,25 @@
 #include "host/record/log_capture.h"
 #include "host/record/dbc.h"
 #include "host/record/read.h"
-#include "host/base/whole.h"
+#include "common/base/text.h"
 #include "host/record/write.h"
 
 enum { CONVERT_TOLD = 1 }; /* what was wrong was printed */
 
 static int write_dbc(const char *file)
 {
-	char message[READ_MESSAGE_MAX];
-	struct whole whole;
-	int result;
+	struct text text;
+	int code, result = text_open(&text);
 
-	if (strcmp(file, "-") == 0) {
-		if (dbc_write(stdout) == 0 && fflush(stdout) == 0)
-			return COMMAND_DONE;
-		return command_output_failed(strerror(errno));
+	if (result == 0)
+		result = text_close(&text, dbc_write(text.out));
+	if (result != 0) {
+		command_error("%s: %s", file, error_text(result));
+		return COMMAND_INPUT;
 	}
-	result = whole_open(&whole, file, message, sizeof(message));
-
-	if (result == 0)
-		result = whole_close(&whole, dbc_write(whole.out), message, sizeof(message));
-	if (result == 0)
-		return COMMAND_DONE;
-	command_error("%s", message);
-	return COMMAND_INPUT;
+	code = command_write(file, text.bytes, text.size);
+	free(text.bytes);
+	return code;
 }
 
 static int convert(const char *in, const char *out, const char *columns, unsigned number)

@@ -16,6 +16,7 @@
 #include "host/estimate/cfc.h"
 #include "host/estimate/filter.h"
 #include "host/record/drop.h"
+#include "host/record/fields.h"
 #include "common/base/text.h"
 #include "host/base/whole.h"
 #include "host/model/ensemble.h"
@@ -320,6 +321,24 @@ int evaluate_check_chain(const char *list)
 	else
 		return COMMAND_DONE;
 	return COMMAND_INPUT;
+}
+
+int evaluate_sign(struct record *record, const struct evaluate_options *options, const char *operator_name)
+{
+	char message[SETTINGS_MESSAGE_MAX], serials[FIELDS_TEXT_MAX];
+	struct sensors sensors;
+
+	record->time_s = time(NULL);
+	record->simulated = options->simulated;
+	fields_take_words(record->operator_name, operator_name);
+	fields_take_words(record->scene, options->scene != NULL ? options->scene->name : "");
+	if (sensors_read(&sensors, evaluate_chain(options), 0.0, message) != 0) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	sensors_serials(&sensors, serials, sizeof(serials));
+	fields_take_words(record->sensors, serials);
+	return COMMAND_DONE;
 }
 
 struct result evaluate_said(struct evaluated *e)

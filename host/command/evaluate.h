@@ -73,6 +73,10 @@ DT_MUST_USE int evaluate_open(struct evaluated *e, const struct record *record,
 void evaluate_close(struct evaluated *e);
 
 /* All that was found, for the table of quantities. */
+/* What a record that was just made does not know of itself: when, by whom, of what, measured by which
+ * sensors. */
+int evaluate_sign(struct record *record, const struct evaluate_options *options, const char *operator_name);
+
 struct result evaluate_said(struct evaluated *e);
 
 /* Prints and writes what was asked for. Returns a COMMAND_* exit code; errors were printed. */

@@ -11,7 +11,6 @@
 #include "host/command/command.h"
 #include "host/record/seal.h"
 #include "common/base/text.h"
-#include "host/base/whole.h"
 #include "host/report/pdf.h"
 #include "host/report/pdf_attach.h"
 #include "host/report/series.h"
@@ -26,7 +25,8 @@ static const struct option_row rows[] = {
                     "one page that holds all of it and needs nothing else"),
         OPTION_TEXT("pdf", "FILE", struct arguments, pdf,
                     "the same on paper; needs chromium, chromium-browser or google-chrome"),
-        OPTION_TEXT("csv", "FILE", struct arguments, csv, "the table for spreadsheets, as series show --csv"),
+        OPTION_TEXT("csv", "FILE", struct arguments, csv,
+                    "the table for spreadsheets, as series show --csv; - is standard output, here and above"),
         OPTION_TEXT(
                 "laboratory", "FILE", struct arguments, laboratory,
                 "a report under ISO/IEC 17025, 7.8: laboratory, customer, item, sensors from this .ini file; "
@@ -107,8 +107,8 @@ static int write_pdf(const struct series_report *request, const struct text *pag
 	struct pdf_file data = {.name = name, .bytes = request->data, .size = request->data_size};
 	struct text sealed = {.bytes = NULL};
 	size_t length = 0;
-	int result =
-	        pdf_print(page->bytes, page->size, interrupt_came, &pdf, &length, message, sizeof(message));
+	int code, result = pdf_print(page->bytes, page->size, interrupt_came, &pdf, &length, message,
+	                             sizeof(message));
 
 	snprintf(name, sizeof(name), "%s.csv", request->series);
 	if (result == 0)
@@ -117,11 +117,10 @@ static int write_pdf(const struct series_report *request, const struct text *pag
 		result = text_close(&sealed, put_evidence(page->bytes, pdf, length, &data, sealed.out));
 	if (result == 0)
 		result = seal_fill(sealed.bytes, sealed.size);
-	if (result == 0)
-		result = whole_write(file, sealed.bytes, sealed.size, message, sizeof(message));
+	code = result == 0 ? command_write(file, sealed.bytes, sealed.size) : failed(message);
 	free(sealed.bytes);
 	free(pdf);
-	return result == 0 ? COMMAND_DONE : failed(message);
+	return code;
 }
 
 static void report_tell(void *context, const char *text)
@@ -162,11 +161,9 @@ static int report_make(const struct series_report *request, struct text *page)
 static int report_write_page(const struct series_report *request, const struct arguments *a,
                              const struct text *page)
 {
-	char message[ARCHIVE_MESSAGE_MAX];
+	int code = a->html != NULL ? command_write(a->html, page->bytes, page->size) : COMMAND_DONE;
 
-	if (a->html != NULL && whole_write(a->html, page->bytes, page->size, message, sizeof(message)) != 0)
-		return failed(message);
-	return a->pdf != NULL ? write_pdf(request, page, a->pdf) : COMMAND_DONE;
+	return code == COMMAND_DONE && a->pdf != NULL ? write_pdf(request, page, a->pdf) : code;
 }
 
 static int report_write_all(struct archive *archive, const char *series, const struct arguments *a)
@@ -195,9 +192,8 @@ static int report_write_all(struct archive *archive, const char *series, const s
 	if (code == COMMAND_DONE)
 		code = a->html != NULL || a->pdf != NULL ? report_make(&request, &page)
 		                                         : report_look(&request);
-	if (code == COMMAND_DONE && a->csv != NULL &&
-	    whole_write(a->csv, data.bytes, data.size, message, sizeof(message)) != 0)
-		code = failed(message);
+	if (code == COMMAND_DONE && a->csv != NULL)
+		code = command_write(a->csv, data.bytes, data.size);
 	if (code == COMMAND_DONE)
 		code = report_write_page(&request, a, &page);
 	free(page.bytes);

@@ -41,7 +41,7 @@ static const struct option_row rows[] = {
                     "knows scene and angle"),
         OPTION_TEXT("archive", "DIR", struct run, archive_folder,
                     "where that series is; without it $DROPTOWER_ARCHIVE or ./archive"),
-        OPTION_TEXT("operator", "NAME", struct run, operator_name, "who drops into a series ($USER)"),
+        OPTION_TEXT("operator", "NAME", struct run, operator_name, "who drops ($USER)"),
         OPTION_FLAG("json", struct run, json, "one JSON object on standard output instead of the table"),
         OPTION_FLAG("strict", struct run, strict, "a flagged record or channel is a failure (exit 3)"),
         OPTION_WORDS("bench", "WORD", struct run, bench, RUN_BENCH_WORDS_MAX,
@@ -69,8 +69,8 @@ static const struct option_table known_options = {
 /* A series says what is dropped, and where the files go. */
 static int check_archive(struct run *run)
 {
-	if (run->series == NULL && (run->archive_folder != NULL || run->operator_name != NULL))
-		return command_usage("run", "--archive and --operator go with --series NAME");
+	if (run->series == NULL && run->archive_folder != NULL)
+		return command_usage("run", "--archive goes with --series NAME");
 	if (run->series != NULL && (run->out != NULL || run->scene_file != NULL || run->chain != NULL ||
 	                            run->limits != NULL || !isnan(run->angle_deg)))
 		return command_usage("run",

@@ -144,6 +144,9 @@ static int report_archived(struct run *run, struct record *record)
 	FILE *out = run->json ? stderr : stdout;
 	int code, shown;
 
+	options.simulated = run->link == NULL;
+	if (evaluate_sign(record, &options, run->operator_name) != COMMAND_DONE)
+		return COMMAND_INPUT;
 	if (run->log_failed || archive_finish(run->archive, &run->recording, 0, note) != 0) {
 		(void)evaluate(record, &options);
 		return run->log_failed ? run_keep_tell_lost(run) : archived_failed(run->archive);
@@ -181,6 +184,9 @@ static int report_files(struct run *run, struct record *record)
 	snprintf(json, sizeof(json), "%s.json", run->stem);
 	snprintf(html, sizeof(html), "%s.html", run->stem);
 	snprintf(record->file, sizeof(record->file), "%.4000s.log", run->stem);
+	code = evaluate_sign(record, &options, run->operator_name);
+	if (code != COMMAND_DONE)
+		return code;
 	if (run->log_failed || write_record(record, csv, message) != 0) {
 		options.html = options.json_file = NULL;
 		(void)evaluate(record, &options);

@@ -69,7 +69,8 @@ static const struct option_row rows[] = {
         OPTION_FLAG("simulated", struct series_arguments, simulated, "for add: made on a simulated tower"),
         OPTION_TEXT("operator", "NAME", struct series_arguments, operator_name, "who decides ($USER)"),
         OPTION_FLAG("json", struct series_arguments, json, "JSON on standard output"),
-        OPTION_TEXT("csv", "FILE", struct series_arguments, csv, "a table for spreadsheets, instead"),
+        OPTION_TEXT("csv", "FILE", struct series_arguments, csv,
+                    "a table for spreadsheets, instead; - is standard output"),
 };
 
 static const struct option_table known_options = {

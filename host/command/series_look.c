@@ -41,8 +41,12 @@ static int print(struct job *job)
 	struct whole whole;
 	int result;
 
-	if (a->csv == NULL) {
-		result = job->print(job, a->json ? TABLE_JSON : TABLE_TEXT, stdout);
+	if (a->csv == NULL || strcmp(a->csv, "-") == 0) {
+		result = job->print(job,
+		                    a->csv != NULL ? TABLE_CSV
+		                    : a->json      ? TABLE_JSON
+		                                   : TABLE_TEXT,
+		                    stdout);
 		return result == 0 ? COMMAND_DONE : print_failed(job->archive, result);
 	}
 	result = whole_open(&whole, a->csv, message, sizeof(message));

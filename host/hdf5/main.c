@@ -223,13 +223,17 @@ static int put_seal(hid_t file, const struct record *record)
 static int put_record(hid_t file, const struct record *record)
 {
 	const struct fields_entry *entry;
+	char text[FIELDS_TEXT_MAX];
 	int result = put_text(file, "format", "droptower") | put_whole(file, "version", LAYOUT) |
 	             put_seal(file, record);
 
 	for (size_t i = 0; (entry = fields_entry(i)) != NULL && result == 0; i++) {
 		if (!fields_known(record, entry))
 			continue;
-		if (entry->kind == FIELDS_REAL)
+		fields_format(record, entry, text);
+		if (entry->kind >= FIELDS_TIME)
+			result = put_text(file, entry->name, text);
+		else if (entry->kind == FIELDS_REAL)
 			result = put_real(file, entry->name, fields_real(record, entry));
 		else
 			result = put_whole(file, entry->name, fields_whole(record, entry));
@@ -401,12 +405,20 @@ static int get_fields(struct record *record, hid_t file)
 	const struct fields_entry *entry;
 
 	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++) {
+		char text[FIELDS_TEXT_MAX];
 		double value;
+		int result;
 
 		if (H5Aexists(file, entry->name) <= 0)
 			continue;
-		if (get_real(file, entry->name, &value) != 0 || fields_set(record, entry, value) != 0)
-			return refuse(entry->name, "a number that fits");
+		if (entry->kind >= FIELDS_TIME)
+			result = get_text(file, entry->name, text, sizeof(text)) != 0 ||
+			         fields_parse(record, entry, text) != 0;
+		else
+			result = get_real(file, entry->name, &value) != 0 ||
+			         fields_set(record, entry, value) != 0;
+		if (result != 0)
+			return refuse(entry->name, "a value that fits");
 	}
 	return 0;
 }

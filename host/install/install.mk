@@ -28,7 +28,7 @@ put = @install -d '$(DESTDIR)$(3)' && install -m $(1) $(2) '$(DESTDIR)$(3)/'
 install: man $(CONSOLE) ## install below PREFIX (/usr/local), all of it below DESTDIR
 	$(call put,755,$(INSTALLED_PROGRAMS),$(BINDIR))
 	$(call put,644,$(INSTALLED_SCENES),$(SHARE)/droptower/scenes)
-	$(call put,644,host/batch/droptower.sbatch,$(SHARE)/droptower)
+	$(call put,644,host/batch/droptower.sbatch $(wildcard $(INSTALL_IN)/droptower_example.*),$(SHARE)/droptower)
 	$(call put,644,$(wildcard common/scenes/sensors/*.ini),$(SHARE)/droptower/scenes/sensors)
 	$(call put,644,$(MAN)/*.1,$(SHARE)/man/man1)
 	$(call put,644,$(INSTALL_IN)/80-can0.network,$(LIBDIR)/systemd/network)
@@ -50,7 +50,7 @@ uninstall: ## remove what install has installed (same PREFIX and DESTDIR)
 		'$(DESTDIR)$(LIBDIR)/sysctl.d/80-droptower.conf' \
 		'$(DESTDIR)$(LIBDIR)/udev/rules.d/80-droptower-slcan.rules' \
 		'$(DESTDIR)$(SHARE)/bash-completion/completions/droptower'
-	@rm -f '$(DESTDIR)$(SHARE)/droptower/droptower.sbatch'
+	@rm -f $(foreach f,droptower.sbatch droptower_example.py droptower_example.m,'$(DESTDIR)$(SHARE)/droptower/$f')
 	@rm -rf '$(DESTDIR)$(SHARE)/droptower/scenes'
 	@rmdir '$(DESTDIR)$(SHARE)/droptower' 2>/dev/null || true
 

@@ -119,15 +119,19 @@ static int put_drop(mat_t *mat, const struct record *record)
 	int result = variable != NULL ? 0 : -1;
 
 	for (size_t i = 0; result == 0 && (entry = fields_entry(i)) != NULL; i++) {
+		char text[FIELDS_TEXT_MAX];
 		double value;
 
 		if (!fields_known(record, entry))
 			continue;
+		fields_format(record, entry, text);
 		value = entry->kind == FIELDS_REAL ? fields_real(record, entry)
 		                                   : (double)fields_whole(record, entry);
 		result = Mat_VarAddStructField(variable, entry->name);
 		if (result == 0)
-			result = set(variable, entry->name, number(entry->name, value));
+			result = set(variable, entry->name,
+			             entry->kind >= FIELDS_TIME ? words(entry->name, text)
+			                                        : number(entry->name, value));
 	}
 	return write_and_free(mat, variable, result);
 }

@@ -1,15 +1,29 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/fields.h"
 
+#include <inttypes.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
+#include <time.h>
 
-#define FIELD(name, kind, member)                           \
-	{                                                   \
-		name, kind, offsetof(struct record, member) \
+#include "common/base/number.h"
+
+#define FIELD(name, kind, member)                                 \
+	{                                                         \
+		name, kind, offsetof(struct record, member), true \
+	}
+#define FIELD_OF_ANY(name, kind, member)                           \
+	{                                                          \
+		name, kind, offsetof(struct record, member), false \
 	}
 
 static const struct fields_entry entries[] = {
+        FIELD_OF_ANY("date", FIELDS_TIME, time_s),
+        FIELD_OF_ANY("operator", FIELDS_TEXT, operator_name),
+        FIELD_OF_ANY("scene", FIELDS_TEXT, scene),
+        FIELD_OF_ANY("sensors", FIELDS_TEXT, sensors),
+        FIELD_OF_ANY("simulated", FIELDS_U16, simulated),
         FIELD("drop_id", FIELDS_U16, drop_id),
         FIELD("marks", FIELDS_U16, marks),
         FIELD("first_tick_ms", FIELDS_U32, first_tick_ms),
@@ -83,8 +97,16 @@ static uint32_t of_parameters(const struct fields_entry *entry)
 	               : 0;
 }
 
+static const char *fields_words(const struct record *record, const struct fields_entry *entry)
+{
+	return (const char *)record + entry->offset;
+}
+
 bool fields_known(const struct record *record, const struct fields_entry *entry)
 {
+	if (!entry->of_drop)
+		return entry->kind == FIELDS_TEXT ? fields_words(record, entry)[0] != '\0'
+		                                  : fields_whole(record, entry) != 0;
 	if (entry->offset == offsetof(struct record, seal) && !record->seal_known)
 		return false;
 	if (entry->offset == offsetof(struct record, trigger_us) && isfinite(record->trigger_s))
@@ -114,8 +136,12 @@ int64_t fields_whole(const struct record *record, const struct fields_entry *ent
 	uint16_t u16;
 	uint32_t u32;
 	uint64_t u64;
+	int64_t i64;
 
 	switch (entry->kind) {
+	case FIELDS_TIME:
+		memcpy(&i64, at, sizeof(i64));
+		return i64;
 	case FIELDS_I16:
 		memcpy(&i16, at, sizeof(i16));
 		return i16;
@@ -129,9 +155,83 @@ int64_t fields_whole(const struct record *record, const struct fields_entry *ent
 		memcpy(&u64, at, sizeof(u64));
 		return (int64_t)u64;
 	case FIELDS_REAL:
+	case FIELDS_TEXT:
 		break;
 	}
 	return 0;
+}
+
+#define DATE_FORM "%Y-%m-%dT%H:%M:%S"
+#define DATE_OFFSET "+00:00"
+
+void fields_format(const struct record *record, const struct fields_entry *entry, char text[FIELDS_TEXT_MAX])
+{
+	time_t seconds = (time_t)fields_whole(record, entry);
+	struct tm utc;
+
+	text[0] = '\0';
+	if (entry->kind == FIELDS_TEXT)
+		snprintf(text, FIELDS_TEXT_MAX, "%.*s", FIELDS_TEXT_MAX - 1, fields_words(record, entry));
+	else if (entry->kind == FIELDS_REAL)
+		number_format(text, fields_real(record, entry), 15);
+	else if (entry->kind != FIELDS_TIME)
+		snprintf(text, FIELDS_TEXT_MAX, "%" PRId64, fields_whole(record, entry));
+	else if (gmtime_r(&seconds, &utc) != NULL)
+		strftime(text, FIELDS_TEXT_MAX, DATE_FORM DATE_OFFSET, &utc);
+}
+
+static int parse_time(struct record *record, const struct fields_entry *entry, const char *text)
+{
+	struct tm utc = {.tm_mday = 0};
+	const char *rest = strptime(text, DATE_FORM, &utc);
+	int64_t time_s = rest != NULL && strcmp(rest, DATE_OFFSET) == 0 ? timegm(&utc) : 0;
+
+	if (time_s <= 0)
+		return DT_E_RANGE;
+	memcpy((char *)record + entry->offset, &time_s, sizeof(time_s));
+	return 0;
+}
+
+static bool can_hold(char letter)
+{
+	return (unsigned char)letter >= ' ' && letter != ',' && letter != '"' && letter != 0x7f;
+}
+
+int fields_parse(struct record *record, const struct fields_entry *entry, const char *text)
+{
+	size_t length = strlen(text);
+	double value;
+
+	if (entry->kind == FIELDS_TIME)
+		return parse_time(record, entry, text);
+	if (entry->kind != FIELDS_TEXT)
+		return number_parse(text, length, '.', &value) ? fields_set(record, entry, value)
+		                                               : DT_E_RANGE;
+	if (length == 0 || length >= FIELDS_TEXT_MAX)
+		return DT_E_RANGE;
+	for (size_t i = 0; i < length; i++)
+		if (!can_hold(text[i]))
+			return DT_E_RANGE;
+	memcpy((char *)record + entry->offset, text, length + 1);
+	return 0;
+}
+
+void fields_take_words(char text[FIELDS_TEXT_MAX], const char *words)
+{
+	size_t length;
+
+	words += strspn(words, " \t\r\n");
+	length = strnlen(words, FIELDS_TEXT_MAX - 1);
+	while (length > 0 && words[length] != '\0' && ((unsigned char)words[length] & 0xc0u) == 0x80u)
+		length--; /* no half of a letter */
+	for (size_t i = 0; i < length; i++)
+		text[i] = can_hold(words[i]) ? words[i]
+		          : words[i] == ','  ? ';'
+		          : words[i] == '"'  ? '\''
+		                             : ' ';
+	while (length > 0 && text[length - 1] == ' ')
+		length--;
+	text[length] = '\0';
 }
 
 static void set_whole(char *at, enum fields_kind kind, double value)
@@ -162,8 +262,8 @@ int fields_set(struct record *record, const struct fields_entry *entry, double v
 	};
 	char *at = (char *)record + entry->offset;
 
-	if (!isfinite(value) || value < range[entry->kind].min || value > range[entry->kind].max ||
-	    (entry->kind != FIELDS_REAL && value != trunc(value)))
+	if (entry->kind >= FIELDS_TIME || !isfinite(value) || value < range[entry->kind].min ||
+	    value > range[entry->kind].max || (entry->kind != FIELDS_REAL && value != trunc(value)))
 		return DT_E_RANGE;
 	if (entry->kind == FIELDS_REAL)
 		memcpy(at, &value, sizeof(value));

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "common/wire_table.h"
+#include "host/record/fields.h"
 #include "host/record/lcm_log.h"
 
 enum {
@@ -404,6 +405,17 @@ void log_walk_sealed(struct log_walk *walk)
 	forget_places(walk, walk->next);
 	if (walk->held_record != NULL)
 		walk->held_record->file_sealed = true;
+}
+
+int log_walk_told(struct log_walk *walk, const char *name, const char *value)
+{
+	const struct fields_entry *entry = fields_find(name);
+	struct record unwanted = {.file = ""};
+
+	if (entry == NULL || entry->of_drop)
+		return DT_E_FORMAT;
+	return fields_parse(walk->has_held && walk->held_record != NULL ? walk->held_record : &unwanted,
+	                    entry, value);
 }
 
 void log_walk_altered(struct log_walk *walk, const char *found, const char *expected)

@@ -124,7 +124,10 @@ void log_walk_frame(struct log_walk *walk, const struct frame *frame);
 void log_walk_drop(struct log_walk *walk, struct record *record); /* which belongs to it from here on */
 /* Behind a drop that log_walk_drop was given: its message is what was sealed. It ends where the seal does. */
 void log_walk_sealed(struct log_walk *walk);
-/* Or it is not: the walk ends with DT_E_CORRUPT. */
+/* A value of fields.h that any record can have, of the same drop. DT_E_FORMAT: none; DT_E_RANGE: not as it
+ * is. */
+DT_MUST_USE int log_walk_told(struct log_walk *walk, const char *name, const char *value);
+/* Or it is not what was sealed: the walk ends with DT_E_CORRUPT. */
 void log_walk_altered(struct log_walk *walk, const char *found, const char *expected);
 
 void read_candump(struct log_walk *walk, struct log_file *log, uint64_t from, uint64_t to);

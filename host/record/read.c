@@ -14,13 +14,6 @@
 
 /* ---- what is no log ---- */
 
-static bool is_csv(const struct source *source)
-{
-	static const char head[] = "# droptower csv";
-
-	return source->size >= sizeof(head) - 1 && memcmp(source->bytes, head, sizeof(head) - 1) == 0;
-}
-
 int read_refuse_columns(const char *file, char message[READ_MESSAGE_MAX])
 {
 	return source_refuse(message, DT_E_ARGUMENT, file, 0,
@@ -53,7 +46,7 @@ static int read_dispatch(struct record *record, struct source *source, const cha
 
 	if (!mat_is(source) && hdf5_is(source))
 		return read_hdf5(record, source, columns, message);
-	if (is_csv(source))
+	if (read_csv_is(source))
 		reader = read_csv;
 	else if (uff58_is(source))
 		reader = read_uff58;

@@ -10,10 +10,13 @@
 #include "host/record/log_walk.h"
 #include "host/record/seal.h"
 
+enum { ORIGIN_MAX = 1024 };
+
 struct reading {
 	struct log_walk *walk;
-	bool has_drop; /* the event before was a drop, decoded or not; this is its SHA-256 */
-	char digest[DIGEST_CHARS];
+	bool has_drop; /* the event before was a drop, decoded or not, or what is known of it; SHA-256 of both
+	                */
+	struct sha256_ctx digest;
 };
 
 static int read_lcm_take_drop(struct log_walk *walk, const struct lcm_log_event *event)
@@ -49,33 +52,61 @@ static int take_seal(struct reading *reading, const struct lcm_log_event *event)
 {
 	size_t word = strlen(SEAL_WORD);
 	const char *expected = (const char *)event->data + word;
+	char found[DIGEST_CHARS];
 
 	if (!reading->has_drop || event->size != word + DIGEST_CHARS - 1 ||
 	    memcmp(event->data, SEAL_WORD, word) != 0)
 		return DT_E_FORMAT;
-	if (memcmp(expected, reading->digest, DIGEST_CHARS - 1) == 0)
+	digest_end(&reading->digest, found);
+	if (memcmp(expected, found, DIGEST_CHARS - 1) == 0)
 		log_walk_sealed(reading->walk);
 	else
-		log_walk_altered(reading->walk, reading->digest, expected);
+		log_walk_altered(reading->walk, found, expected);
+	return 0;
+}
+
+/* What is known of the drop message before it. */
+static int take_origin(struct reading *reading, const struct lcm_log_event *event)
+{
+	char text[ORIGIN_MAX + 1], *rest = text;
+
+	if (!reading->has_drop || event->size > ORIGIN_MAX)
+		return DT_E_FORMAT;
+	sha256_update(&reading->digest, event->size, event->data);
+	memcpy(text, event->data, event->size);
+	text[event->size] = '\0';
+	for (char *line = strtok_r(text, "\n", &rest); line != NULL; line = strtok_r(NULL, "\n", &rest)) {
+		char *value = strchr(line, ' ');
+
+		if (value == NULL)
+			return DT_E_FORMAT;
+		*value++ = '\0';
+		if (log_walk_told(reading->walk, line, value) != 0)
+			return DT_E_FORMAT;
+	}
 	return 0;
 }
 
 static int take_event(struct reading *reading, const struct lcm_log_event *event)
 {
-	bool is_drop = strcmp(event->channel, LCM_CODEC_DROP) == 0;
+	bool is_drop = strcmp(event->channel, LCM_CODEC_DROP) == 0, is_origin = false;
 	int error = 0;
 
 	if (event->data == NULL || (event->cut && !is_drop))
 		return 0;
 	if (is_drop) {
-		digest_of(event->data, event->size, reading->digest);
+		sha256_init(&reading->digest);
+		sha256_update(&reading->digest, event->size, event->data);
 		error = read_lcm_take_drop(reading->walk, event);
+	} else if (strcmp(event->channel, LCM_LOG_ORIGIN) == 0) {
+		is_origin = true;
+		error = take_origin(reading, event);
 	} else if (strcmp(event->channel, LCM_LOG_SEAL) == 0) {
 		error = take_seal(reading, event);
 	} else if (strcmp(event->channel, LCM_CODEC_BLOCK) == 0) {
 		error = read_lcm_take_block(reading->walk, event);
 	}
-	reading->has_drop = is_drop;
+	reading->has_drop = is_drop || (is_origin && reading->has_drop);
 	return error;
 }
 

@@ -161,6 +161,23 @@ static int read_uff58_channel(struct reading *reading, const struct uff58_head *
 
 /* ---- what our own say beside ---- */
 
+/* "operator=Ann Smith", alone in its line. */
+static int read_words(struct reading *reading, const char *line)
+{
+	const char *value = strchr(line, '=');
+	const struct fields_entry *entry;
+	char name[32];
+
+	if (strcmp(line, "NONE") == 0)
+		return 0;
+	snprintf(name, sizeof(name), "%.*s", (int)(value ? value - line : 0), line);
+	entry = fields_find(name);
+	if (!entry || entry->kind != FIELDS_TEXT || fields_parse(reading->record, entry, value + 1) != 0)
+		return UFF58_REFUSE(&reading->text, DT_E_FORMAT,
+		                    "identification \"%.80s\", expected NONE or name=words", line);
+	return 0;
+}
+
 /* "drop_id=3 marks=8 ..." */
 static int read_fields(struct reading *reading, const char *line)
 {
@@ -172,13 +189,11 @@ static int read_fields(struct reading *reading, const char *line)
 	for (char *word = strtok_r(text, " ", &rest); word; word = strtok_r(NULL, " ", &rest)) {
 		char *value = strchr(word, '=');
 		const struct fields_entry *entry;
-		double number;
 
 		if (value)
 			*value++ = '\0';
 		entry = value ? fields_find(word) : NULL;
-		if (!entry || !number_parse(value, strlen(value), '.', &number) ||
-		    fields_set(reading->record, entry, number) != 0)
+		if (!entry || fields_parse(reading->record, entry, value) != 0)
 			return UFF58_REFUSE(&reading->text, DT_E_FORMAT,
 			                    "identification \"%.80s\", expected name=value words", line);
 	}
@@ -189,7 +204,7 @@ static int read_own_channel(struct reading *reading, const struct uff58_head *he
 {
 	struct channel *channel = &reading->record->channels[reading->record->channel_count - 1];
 	double rate_hz, start_s, range_g;
-	int uneven, end = 0, end_2 = 0;
+	int uneven, error, end = 0, end_2 = 0;
 
 	if (sscanf(head->id[1], UFF58_OWN "rate_hz=%lf start_s=%lf%n", &rate_hz, &start_s, &end) != 2 ||
 	    head->id[1][end] ||
@@ -204,8 +219,10 @@ static int read_own_channel(struct reading *reading, const struct uff58_head *he
 	channel->start_s = start_s;
 	channel->range_g = range_g;
 	channel->flags = uneven ? RECORD_FLAG_UNEVEN : 0;
-	return strncmp(head->id[4], SEAL_WORD, strlen(SEAL_WORD)) == 0 ? 0
-	                                                               : read_fields(reading, head->id[4]);
+	error = read_words(reading, head->id[2]);
+	if (error != 0 || strncmp(head->id[4], SEAL_WORD, strlen(SEAL_WORD)) == 0)
+		return error;
+	return read_fields(reading, head->id[4]);
 }
 
 /* The line of sample k of one of the first channels of ours; 0 of another. */

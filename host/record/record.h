@@ -102,10 +102,13 @@ struct record_counters {
 };
 
 struct record {
-	char file[4096];        /* as given on the command line, or the link's URL */
-	char format[16];        /* "live" "candump" "lcm" "csv" "uff58" "hdf5" "delimited" "lvm" ... */
-	char read_as[400];      /* of a foreign file, what was understood of it without --columns; else "" */
-	int64_t time_s;         /* when it was made, since 1970; 0: not known */
+	char file[4096];   /* as given on the command line, or the link's URL */
+	char format[16];   /* "live" "candump" "lcm" "csv" "uff58" "hdf5" "delimited" "lvm" ... */
+	char read_as[400]; /* of a foreign file, what was understood of it without --columns; else "" */
+	int64_t time_s;    /* when it was made, since 1970; 0: not known */
+	char operator_name[64], scene[64], sensors[64]; /* who dropped it, the scene's name, serial numbers of
+	                                                 * sensors; "": not known */
+	uint16_t simulated;                             /* 1: no product fell */
 	unsigned shock, shocks; /* of a long record: which of its shocks this is a stretch about; else 0 */
 	bool file_sealed;       /* the file says its own SHA-256, and that is so */
 	struct channel *channels;

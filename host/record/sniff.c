@@ -730,7 +730,8 @@ static bool tells_scale(const struct source_line *line)
 
 static bool is_of_ours(const struct source *source)
 {
-	static const char *const marks[] = {"droptower csv", "# channel rate_hz=", "***End_of_Header***"};
+	static const char *const marks[] = {"droptower csv", "droptower_csv",
+	                                    "channel rate_hz=", "***End_of_Header***"};
 	size_t length = source->size < 8192 ? source->size : 8192;
 	const char *tail = source->bytes + (source->size > 160 ? source->size - 160 : 0);
 

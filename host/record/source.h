@@ -49,6 +49,7 @@ int read_refuse_columns(const char *file, char message[READ_MESSAGE_MAX]);
 
 /* The formats that are no logs. Each fills *record, initialised by the call, except for its file name.
  * Delimited text becomes UTF-8 in its source; without columns it must tell them itself (sniff.h). */
+bool read_csv_is(const struct source *source);
 DT_MUST_USE int read_csv(struct record *record, const struct source *source, char message[READ_MESSAGE_MAX]);
 DT_MUST_USE int read_delimited(struct record *record, struct source *source, const char *columns,
                                char message[READ_MESSAGE_MAX]);

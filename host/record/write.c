@@ -85,6 +85,13 @@ static int send_told(const struct record *record, int (*send)(void *context, con
 	return result;
 }
 
+/* When the capture was complete: in the tower's clock, on the day where that is known. */
+static int64_t write_end_us(const struct record *record)
+{
+	return record->time_s != 0 ? record->time_s * 1000000
+	                           : ((int64_t)record->first_tick_ms + drop_ticks(record)) * 1000;
+}
+
 int write_frames(const struct record *record, int (*send)(void *context, const struct frame *frame),
                  void *context)
 {
@@ -95,7 +102,7 @@ int write_frames(const struct record *record, int (*send)(void *context, const s
 		return DT_E_ARGUMENT;
 	for (uint32_t tick = 0; tick < drop_ticks(record) && result == 0; tick++) {
 		/* a block can leave when its last sample is taken */
-		frame.time_us = ((int64_t)record->first_tick_ms + tick + 1) * 1000;
+		frame.time_us = write_end_us(record) - ((int64_t)drop_ticks(record) - tick - 1) * 1000;
 		for (unsigned sensor = 1; sensor <= WIRE_SENSORS && result == 0; sensor++)
 			if (make_block(record, sensor, tick, &frame))
 				result = send(context, &frame);
@@ -119,25 +126,23 @@ static void write_put_number(FILE *out, double value)
 	fputs(text, out);
 }
 
-static void write_put_drop(const struct record *record, FILE *out)
+/* What is known of it by name, a line each behind a mark; of_drop: what only a drop has, too. */
+static void put_fields(const struct record *record, const char *mark, bool of_drop, FILE *out)
 {
 	const struct fields_entry *entry;
+	char text[FIELDS_TEXT_MAX];
 
 	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++) {
-		if (!fields_known(record, entry))
+		if (!fields_known(record, entry) || (entry->of_drop && !of_drop))
 			continue;
-		fprintf(out, "# %s ", entry->name);
-		if (entry->kind == FIELDS_REAL)
-			write_put_number(out, fields_real(record, entry));
-		else
-			fprintf(out, "%" PRId64, fields_whole(record, entry));
-		fputc('\n', out);
+		fields_format(record, entry, text);
+		fprintf(out, "%s%s %s\n", mark, entry->name, text);
 	}
 }
 
-static void write_put_channel(const struct channel *channel, FILE *out)
+static void write_put_channel(const struct channel *channel, const char *mark, FILE *out)
 {
-	fputs("# channel rate_hz=", out);
+	fprintf(out, "%schannel rate_hz=", mark);
 	write_put_number(out, channel->rate_hz);
 	fputs(" start_s=", out);
 	write_put_number(out, channel->start_s);
@@ -147,16 +152,35 @@ static void write_put_channel(const struct channel *channel, FILE *out)
 	        (channel->flags & RECORD_FLAG_UNEVEN) != 0, channel->name);
 }
 
-static void write_put_cell(const struct channel *channel, size_t k, FILE *out)
+static void put_about_all(const struct record *record, const char *mark, FILE *out)
+{
+	put_fields(record, mark, true, out);
+	for (size_t i = 0; i < record->channel_count; i++)
+		write_put_channel(&record->channels[i], mark, out);
+}
+
+/* "" for a sample that is a number. */
+static const char *word_of(const struct channel *channel, size_t k)
 {
 	if (channel->sample[k] & SAMPLE_LOST)
-		fputs("lost", out);
-	else if (channel->sample[k] & SAMPLE_BAD || !isfinite(channel->value_g[k]))
-		fputs("bad", out);
-	else
+		return "lost";
+	return channel->sample[k] & SAMPLE_BAD || !isfinite(channel->value_g[k]) ? "bad" : "";
+}
+
+static bool is_clipped(const struct channel *channel, size_t k)
+{
+	return (channel->sample[k] & SAMPLE_CLIPPED) != 0;
+}
+
+/* As text with its marks; in a table the number alone. */
+static void write_put_cell(const struct channel *channel, size_t k, bool table, FILE *out)
+{
+	const char *word = word_of(channel, k);
+
+	if (word[0] == '\0')
 		write_put_number(out, channel->value_g[k]);
-	if (channel->sample[k] & SAMPLE_CLIPPED)
-		fputc('*', out);
+	if (!table)
+		fprintf(out, "%s%s", word, is_clipped(channel, k) ? "*" : "");
 }
 
 static double sample_time(const struct channel *channel, size_t k)
@@ -164,8 +188,41 @@ static double sample_time(const struct channel *channel, size_t k)
 	return channel->start_s + (double)k / channel->rate_hz;
 }
 
-/* One row per instant at which any channel has a sample. */
-static void write_put_rows(const struct record *record, size_t *next, FILE *out)
+static bool is_due(const struct channel *channel, size_t k, double now)
+{
+	return k < channel->count && sample_time(channel, k) <= now;
+}
+
+/* "S1X lost;S1Y clipped" of the samples of this instant. */
+static void put_marks(const struct record *record, const size_t *next, double now, FILE *out)
+{
+	const char *between = "";
+
+	for (size_t i = 0; i < record->channel_count; i++) {
+		const struct channel *channel = &record->channels[i];
+		const char *word = is_due(channel, next[i], now) ? word_of(channel, next[i]) : "";
+		bool clipped = is_due(channel, next[i], now) && is_clipped(channel, next[i]);
+
+		if (word[0] == '\0' && !clipped)
+			continue;
+		fprintf(out, "%s%s%s%s%s", between, channel->name, word[0] ? " " : "", word,
+		        clipped ? " clipped" : "");
+		between = ";";
+	}
+}
+
+/* The next line of what is known of the record, in a cell of its own. */
+static const char *put_about(const char *about, FILE *out)
+{
+	size_t length = strcspn(about, "\n");
+
+	fprintf(out, ",%.*s", (int)length, about);
+	return about + length + (about[length] == '\n');
+}
+
+/* One row per instant at which any channel has a sample; about: a table, with these lines beside it, and
+ * below where there are more of them. */
+static void write_put_rows(const struct record *record, size_t *next, const char *about, FILE *out)
 {
 	for (;;) {
 		double now = INFINITY;
@@ -174,15 +231,26 @@ static void write_put_rows(const struct record *record, size_t *next, FILE *out)
 			if (next[i] < record->channels[i].count)
 				now = fmin(now, sample_time(&record->channels[i], next[i]));
 		if (isinf(now))
-			return;
+			break;
 		write_put_number(out, now);
 		for (size_t i = 0; i < record->channel_count; i++) {
-			const struct channel *channel = &record->channels[i];
-
 			fputc(',', out);
-			if (next[i] < channel->count && sample_time(channel, next[i]) <= now)
-				write_put_cell(channel, next[i]++, out);
+			if (is_due(&record->channels[i], next[i], now))
+				write_put_cell(&record->channels[i], next[i], about != NULL, out);
 		}
+		if (about != NULL) {
+			fputc(',', out);
+			put_marks(record, next, now, out);
+			about = put_about(about, out);
+		}
+		for (size_t i = 0; i < record->channel_count; i++)
+			next[i] += is_due(&record->channels[i], next[i], now);
+		fputc('\n', out);
+	}
+	while (about != NULL && *about != '\0') {
+		for (size_t i = 0; i <= record->channel_count; i++)
+			fputc(',', out);
+		about = put_about(about, out);
 		fputc('\n', out);
 	}
 }
@@ -195,28 +263,37 @@ static bool write_can_name(const char *name)
 	return name[0] != '\0';
 }
 
-int write_csv(const struct record *record, FILE *out)
+/* Columns and rows. */
+static int put_columns(const struct record *record, const char *about, FILE *out)
 {
-	size_t *next;
+	size_t *next = calloc(record->channel_count + 1, sizeof(*next));
 
-	for (size_t i = 0; i < record->channel_count; i++)
-		if (!write_can_name(record->channels[i].name))
-			return DT_E_ARGUMENT;
-	next = calloc(record->channel_count + 1, sizeof(*next));
 	if (!next)
 		return DT_E_MEMORY;
-	fputs("# droptower csv 1\n", out);
-	if (record->is_drop)
-		write_put_drop(record, out);
-	for (size_t i = 0; i < record->channel_count; i++)
-		write_put_channel(&record->channels[i], out);
 	fputs("time_s", out);
 	for (size_t i = 0; i < record->channel_count; i++)
 		fprintf(out, ",%s_g", record->channels[i].name);
-	fputc('\n', out);
-	write_put_rows(record, next, out);
+	fputs(about != NULL ? "," CSV_TABLE "\n" : "\n", out);
+	write_put_rows(record, next, about, out);
 	free(next);
 	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
+}
+
+static bool can_name_all(const struct record *record)
+{
+	for (size_t i = 0; i < record->channel_count; i++)
+		if (!write_can_name(record->channels[i].name))
+			return false;
+	return true;
+}
+
+int write_csv(const struct record *record, FILE *out)
+{
+	if (!can_name_all(record))
+		return DT_E_ARGUMENT;
+	fputs("# droptower csv 1\n", out);
+	put_about_all(record, "# ", out);
+	return put_columns(record, NULL, out);
 }
 
 /* ---- the formats, by name ---- */
@@ -254,10 +331,35 @@ static int write_put_event(FILE *out, int64_t time_us, char *channel, uint8_t *b
 	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
 }
 
+/* The drop message, what else is known of the drop, and the seal of both. */
+static int put_events(const struct record *record, int64_t time_us, uint8_t *bytes, int size, FILE *out)
+{
+	char of_drop[] = LCM_CODEC_DROP, of_origin[] = LCM_LOG_ORIGIN, of_seal[] = LCM_LOG_SEAL,
+	     seal[] = SEAL_BLANK;
+	struct sha256_ctx digest;
+	struct text origin;
+	int error = text_open(&origin);
+
+	if (error)
+		return error;
+	put_fields(record, "", false, origin.out);
+	error = text_close(&origin, 0);
+	sha256_init(&digest);
+	sha256_update(&digest, (size_t)size, bytes);
+	if (!error)
+		error = write_put_event(out, time_us, of_drop, bytes, size);
+	if (!error && origin.size > 0) {
+		sha256_update(&digest, origin.size, (const uint8_t *)origin.bytes);
+		error = write_put_event(out, time_us, of_origin, (uint8_t *)origin.bytes, (int)origin.size);
+	}
+	digest_end(&digest, seal + strlen(SEAL_WORD));
+	free(origin.bytes);
+	return error ? error : write_put_event(out, time_us, of_seal, (uint8_t *)seal, sizeof(seal) - 1);
+}
+
 static int write_lcm(const struct record *record, FILE *out)
 {
-	int64_t time_us = ((int64_t)record->first_tick_ms + drop_ticks(record)) * 1000;
-	char channel[] = LCM_CODEC_DROP, of_seal[] = LCM_LOG_SEAL, seal[] = SEAL_BLANK;
+	int64_t time_us = write_end_us(record);
 	droptower_drop drop;
 	int error = lcm_codec_drop(record, time_us, &drop), size;
 	uint8_t *bytes;
@@ -271,11 +373,7 @@ static int write_lcm(const struct record *record, FILE *out)
 	else if (droptower_drop_encode(bytes, 0, size, &drop) != size)
 		error = DT_E_FORMAT;
 	else
-		error = write_put_event(out, time_us, channel, bytes, size);
-	if (!error) {
-		digest_of(bytes, (size_t)size, seal + strlen(SEAL_WORD));
-		error = write_put_event(out, time_us, of_seal, (uint8_t *)seal, sizeof(seal) - 1);
-	}
+		error = put_events(record, time_us, bytes, size, out);
 	free(bytes);
 	lcm_codec_free_drop(&drop);
 	return error;
@@ -294,30 +392,47 @@ int write_sealed_csv(const struct record *record, struct text *text)
 	return error ? error : seal_fill(text->bytes, text->size);
 }
 
-static int put_csv(const struct record *record, FILE *out)
+/* The table, with what is known of the record in its last column. */
+static int put_table(const struct record *record, FILE *out)
 {
-	struct text text;
-	int error = write_sealed_csv(record, &text);
+	struct text about;
+	int error = can_name_all(record) ? text_open(&about) : DT_E_ARGUMENT;
 
-	if (!error && fwrite(text.bytes, 1, text.size, out) != text.size)
-		error = DT_E_SYSTEM;
-	free(text.bytes);
-	return error ? error : fflush(out) ? DT_E_SYSTEM : 0;
+	if (error)
+		return error;
+	put_about_all(record, "", about.out);
+	fputs(SEAL_BLANK "\n", about.out);
+	error = text_close(&about, 0);
+	if (!error)
+		error = put_columns(record, about.bytes, out);
+	free(about.bytes);
+	return error;
 }
 
-static int put_uff58(const struct record *record, FILE *out)
+/* What a writer makes, with its SHA-256 in it. */
+static int put_sealed(const struct record *record, int (*write)(const struct record *, FILE *), FILE *out)
 {
 	struct text text;
 	int error = text_open(&text);
 
 	if (!error)
-		error = text_close(&text, write_uff58(record, text.out));
+		error = text_close(&text, write(record, text.out));
 	if (!error)
 		error = seal_fill(text.bytes, text.size);
 	if (!error && fwrite(text.bytes, 1, text.size, out) != text.size)
 		error = DT_E_SYSTEM;
 	free(text.bytes);
 	return error ? error : fflush(out) ? DT_E_SYSTEM : 0;
+}
+
+static int put_csv(const struct record *record, FILE *out)
+{
+	return put_sealed(record, put_table, out);
+}
+
+static int put_uff58(const struct record *record, FILE *out)
+{
+	return put_sealed(record, write_uff58, out);
 }
 
 typedef int helper_writer(const struct record *, FILE *, const char *, char *);

@@ -7,8 +7,8 @@
  * names, units, rates and times come back, a drop as a recording. README.md describes the CSV and what is
  * ours of a universal file.
  *
- * Times in candump text and LCM logs are the tower's clock: a record does not know the time of day. What a
- * record does not keep of its blocks is written as state CAPTURED, inputs and outputs 0.
+ * Times in candump text and LCM logs are the tower's clock, moved to the day where the record knows it. What
+ * a record does not keep of its blocks is written as state CAPTURED, inputs and outputs 0.
  */
 #include <stdio.h>
 
@@ -20,16 +20,20 @@
  * .h5 or .hdf5, .pcapng, .mat, .mme. 0 or DT_E_* with one line in message. */
 DT_MUST_USE int write_record(const struct record *record, const char *file, char message[READ_MESSAGE_MAX]);
 
-/* 0; DT_E_ARGUMENT if a channel's name cannot be written; DT_E_SYSTEM if out did not take it all. */
+/* What the last columns of our CSV are called. */
+#define CSV_TABLE "marks,droptower_csv_2"
+
+/* As text with a head (version 1), which is what HDF5 is made of and sealed by. 0; DT_E_ARGUMENT if a
+ * channel's name cannot be written; DT_E_SYSTEM if out did not take it all. */
 DT_MUST_USE int write_csv(const struct record *record, FILE *out);
 
-/* The same with its SHA-256 in the last line (seal.h), as a file has it; bytes are the caller's after 0. */
+/* The same with its SHA-256 in the last line (seal.h); bytes are the caller's after 0. */
 DT_MUST_USE int write_sealed_csv(const struct record *record, struct text *text);
 
 /* The frames of a drop as pcapng. DT_E_ARGUMENT: not a drop. */
 DT_MUST_USE int write_pcapng(const struct record *record, FILE *out);
 
-/* The frames of a drop, each given to send at its turn with time_us in the tower's clock: every block held,
+/* The frames of a drop, each given to send at its turn with time_us as above: every block held,
  * then the capture end if one is known. Ends early with what send returns if that is not 0.
  * DT_E_ARGUMENT: not a drop. */
 DT_MUST_USE int write_frames(const struct record *record,

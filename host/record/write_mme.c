@@ -36,7 +36,7 @@ static void put_number(FILE *out, const char *key, double value)
 static int put_test(const struct record *record, FILE *out, const char *title)
 {
 	const struct fields_entry *entry;
-	char key[80];
+	char key[80], text[FIELDS_TEXT_MAX];
 
 	put_text(out, "Data format edition number", "1.6");
 	put_text(out, "Laboratory name", "");
@@ -47,9 +47,13 @@ static int put_test(const struct record *record, FILE *out, const char *title)
 		if (!fields_known(record, entry))
 			continue;
 		snprintf(key, sizeof(key), ".droptower %s ", entry->name);
-		put_number(out, key,
-		           entry->kind == FIELDS_REAL ? fields_real(record, entry)
-		                                      : (double)fields_whole(record, entry));
+		fields_format(record, entry, text);
+		if (entry->kind >= FIELDS_TIME)
+			put_text(out, key, text);
+		else
+			put_number(out, key,
+			           entry->kind == FIELDS_REAL ? fields_real(record, entry)
+			                                      : (double)fields_whole(record, entry));
 	}
 	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
 }

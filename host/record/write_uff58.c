@@ -2,7 +2,6 @@
  *
  * A record as a universal file: two datasets 58 for each channel, its samples and what is known of them.
  */
-#include <inttypes.h>
 #include <math.h>
 #include <string.h>
 
@@ -88,6 +87,22 @@ static unsigned mask_of(const struct channel *channel, size_t k)
 	return isfinite(channel->value_g[k]) || mask & SAMPLE_LOST ? mask : mask | SAMPLE_BAD;
 }
 
+/* The which-th of what a record knows in words, in a line of its own; "NONE" if there are not so many. */
+static void fill_words(const struct record *record, size_t which, char line[UFF58_ID_CHARS + 1])
+{
+	const struct fields_entry *entry;
+	char text[FIELDS_TEXT_MAX];
+
+	strcpy(line, "NONE");
+	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++) {
+		if (entry->kind != FIELDS_TEXT || !fields_known(record, entry) || which-- != 0)
+			continue;
+		fields_format(record, entry, text);
+		snprintf(line, UFF58_ID_CHARS + 1, "%s=%s", entry->name, text);
+		return;
+	}
+}
+
 /* As many of the drop's numbers as fit into one line, from *next on; "NONE" if none is left. */
 static void fill_line(const struct record *record, size_t *next, char line[UFF58_ID_CHARS + 1])
 {
@@ -96,15 +111,12 @@ static void fill_line(const struct record *record, size_t *next, char line[UFF58
 
 	strcpy(line, "NONE");
 	for (; (entry = fields_entry(*next)) != NULL; ++*next) {
-		char number[NUMBER_CHARS], word[UFF58_ID_CHARS];
+		char number[FIELDS_TEXT_MAX], word[2 * UFF58_ID_CHARS];
 		size_t length;
 
-		if (!fields_known(record, entry))
+		if (!fields_known(record, entry) || entry->kind == FIELDS_TEXT)
 			continue;
-		if (entry->kind == FIELDS_REAL)
-			number_format(number, fields_real(record, entry), 15);
-		else
-			snprintf(number, sizeof(number), "%" PRId64, fields_whole(record, entry));
+		fields_format(record, entry, number);
 		length =
 		        (size_t)snprintf(word, sizeof(word), "%s%s=%s", used ? " " : "", entry->name, number);
 		if (used + length > ID_MAX)
@@ -118,9 +130,10 @@ static void write_uff58_put_channel(const struct record *record, size_t i, size_
 {
 	const struct channel *channel = &record->channels[i];
 	char rate[NUMBER_CHARS], start[NUMBER_CHARS], range[NUMBER_CHARS];
-	char own[UFF58_ID_CHARS + 1], more[UFF58_ID_CHARS + 1], line[4][UFF58_ID_CHARS + 1];
+	char own[UFF58_ID_CHARS + 1], more[UFF58_ID_CHARS + 1], words[UFF58_ID_CHARS + 1],
+	        line[4][UFF58_ID_CHARS + 1];
 	struct dataset dataset = {
-	        .id = {channel->name, own, "NONE", more, i == 0 ? SEAL_BLANK : line[0]},
+	        .id = {channel->name, own, words, more, i == 0 ? SEAL_BLANK : line[0]},
 	        .function = UFF58_TIME_RESPONSE,
 	        .precision = UFF58_DOUBLE,
 	        .count = channel->count,
@@ -135,6 +148,7 @@ static void write_uff58_put_channel(const struct record *record, size_t i, size_
 	snprintf(own, sizeof(own), UFF58_OWN "rate_hz=%s start_s=%s", rate, start);
 	snprintf(more, sizeof(more), "range_g=%s uneven=%d", range,
 	         (channel->flags & RECORD_FLAG_UNEVEN) != 0);
+	fill_words(record, i, words);
 	for (int k = i == 0; k < 4; k++)
 		fill_line(record, next_field, line[k]);
 	write_uff58_place(record, i, &dataset);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "host/base/whole.h"
+#include "host/record/fields.h"
 #include "host/result/measured.h"
 #include "host/report/page.h"
 #include "host/report/shock.h"
@@ -16,6 +17,20 @@ static const char *title(const struct report *report)
 	if (report->scene)
 		return report->scene->title[0] ? report->scene->title : report->scene->name;
 	return slash ? slash + 1 : report->record->file;
+}
+
+/* When and by whom. */
+static void put_origin(const struct record *r, FILE *out)
+{
+	char date[FIELDS_TEXT_MAX];
+
+	if (r->time_s == 0)
+		return;
+	fields_format(r, fields_find("date"), date);
+	fprintf(out, "<time>%s</time>", date);
+	fputs(r->operator_name[0] != '\0' ? ", " : "", out);
+	html_text(out, r->operator_name);
+	fputs(". ", out);
 }
 
 static void html_head(struct page *page)
@@ -36,12 +51,13 @@ static void html_head(struct page *page)
 	if (r->is_drop && isfinite(r->frame_speed_m_s))
 		fprintf(out, ", frame %.3f m/s between the light gates", r->frame_speed_m_s);
 	fputs(r->is_drop ? ". " : "", out);
+	put_origin(r, out);
 	fputs("<span class=\"soft file\">", out);
 	html_text(out, r->file);
 	fprintf(out, " (%s%s)</span></p>\n<div class=\"verdict %s\">%s %s</div>\n", r->format,
 	        record_lacks_seal(r) ? ", not sealed" : "", good ? "good" : "bad",
 	        good ? "&#10003;" : "&#9888;", verdict);
-	if (report->simulated)
+	if (report->simulated || r->simulated != 0)
 		fputs("<p><b>Simulated tower: no product fell.</b></p>\n", out);
 	if (report_processing(report, processing, sizeof(processing)))
 		fprintf(out, "<p class=\"soft\">Processing: %s.</p>\n", processing);

@@ -8,9 +8,11 @@
 #include "host/model/ensemble.h"
 #include "common/base/text.h"
 #include "host/estimate/cfc.h"
+#include "host/record/fields.h"
 #include "host/report/facts.h"
 #include "host/base/put.h"
 #include "host/report/shock.h"
+
 #include "host/result/quantity.h"
 
 static void put_names(struct builder *b, cJSON *object, const char *key, const char *const *names)
@@ -270,6 +272,33 @@ static void put_chain(struct builder *b, cJSON *root, const struct report *repor
 	}
 }
 
+/* When, by whom, of what, measured by which sensors, on a simulated tower: null is not known. */
+static void json_put_origin(struct builder *b, cJSON *root, const struct report *report)
+{
+	struct record known = {.time_s = report->record->time_s,
+	                       .simulated = report->simulated || report->record->simulated != 0};
+	cJSON *origin = put_object(b, root, "origin");
+	const struct fields_entry *entry;
+	char text[FIELDS_TEXT_MAX];
+
+	strcpy(known.operator_name, report->record->operator_name);
+	strcpy(known.scene, report->record->scene);
+	strcpy(known.sensors, report->record->sensors);
+	if (report->scene != NULL)
+		fields_take_words(known.scene, report->scene->name);
+	if (report->sensors != NULL)
+		sensors_serials(report->sensors, known.sensors, sizeof(known.sensors));
+	for (size_t i = 0; (entry = fields_entry(i)) != NULL && !entry->of_drop; i++) {
+		fields_format(&known, entry, text);
+		if (entry->kind == FIELDS_U16)
+			put_bool(b, origin, entry->name, known.simulated != 0);
+		else if (fields_known(&known, entry))
+			put_text(b, origin, entry->name, text);
+		else
+			put_item(b, origin, entry->name, cJSON_CreateNull());
+	}
+}
+
 static cJSON *build(struct builder *b, const struct report *report)
 {
 	const struct record *r = report->record;
@@ -281,6 +310,7 @@ static cJSON *build(struct builder *b, const struct report *report)
 	put_text(b, root, "format", r->format);
 	if (r->read_as[0] != '\0')
 		put_text(b, root, "read_as", r->read_as);
+	json_put_origin(b, root, report);
 	if (r->shock > 0) {
 		cJSON *shock = put_object(b, root, "shock");
 

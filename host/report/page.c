@@ -12,18 +12,21 @@
 void page_begin_compared(FILE *out, const struct report_row *row)
 {
 	fprintf(out, "<tr><td>%s%s%s</td><td>", row->label, row->unit[0] ? ", " : "", row->unit);
-	html_with_sigma(out, row->decimals, row->predicted * row->scale,
-	                (isnan(row->predicted_u) ? row->rungs_apart : row->predicted_u) * row->scale);
+	html_with_sigma(out, row->decimals, row->predicted * row->scale, row->predicted_u * row->scale);
 	fputs("</td><td>", out);
 }
 
-void page_end_compared(FILE *out, const struct report_row *row)
+void page_end_compared(FILE *out, const struct report_row *row, bool simpler)
 {
 	fprintf(out, "</td><td>%s", row->difference_percent > 0.0 ? "+" : "");
 	html_number(out, 1, row->difference_percent);
 	fputs(isfinite(row->difference_percent) ? " %" : "", out);
 	if (row->verdict[0])
 		fprintf(out, ", %s", row->verdict);
+	if (simpler) {
+		fputs("</td><td>", out);
+		html_number(out, row->decimals, row->rungs_apart * row->scale);
+	}
 	fputs("</td></tr>\n", out);
 }
 

@@ -24,9 +24,11 @@ struct page {
 	size_t size;
 };
 
-/* A row of model against measured: up to the measured value's cell, which is open, and from its end on. */
+/* A row of model against measured: up to the measured value's cell, which is open, and from its end on;
+ * simpler: with how far the next simpler model is from this one, under PAGE_SIMPLER. */
+#define PAGE_SIMPLER "<th>next simpler model</th>"
 void page_begin_compared(FILE *out, const struct report_row *row);
-void page_end_compared(FILE *out, const struct report_row *row);
+void page_end_compared(FILE *out, const struct report_row *row, bool simpler);
 
 /* "S1X" as "S1 X"; other names as they are. */
 void page_channel_name(FILE *out, const char *name);

@@ -114,6 +114,8 @@ static void model(struct page *page)
 {
 	struct report_row rows[REPORT_ROWS_MAX];
 	size_t count = report_compare(page->report, rows);
+	bool fitted = count > 0 && ensemble_fitted(page->report->scene),
+	     simpler = !fitted && page->report->below != NULL;
 	FILE *out = page->out;
 
 	if (!count)
@@ -124,18 +126,19 @@ static void model(struct page *page)
 	html_text(out, page->report->prediction->reason);
 	fputs(".</p>\n<div class=\"scroll\"><table "
 	      "class=\"small\"><tr><th>quantity</th><th>model</th><th>measured</th>"
-	      "<th>difference</th></tr>\n",
+	      "<th>difference</th>",
 	      out);
+	fputs(simpler ? PAGE_SIMPLER "</tr>\n" : "</tr>\n", out);
 	for (size_t i = 0; i < count; i++) {
 		page_begin_compared(out, &rows[i]);
 		html_with_sigma(out, rows[i].decimals, rows[i].measured * rows[i].scale,
 		                rows[i].sigma * rows[i].scale);
-		page_end_compared(out, &rows[i]);
+		page_end_compared(out, &rows[i], simpler);
 	}
 	fputs("</table></div>\n<p class=\"note\">Difference: model less measured, over measured. A dash: not "
 	      "known well enough to compare.",
 	      out);
-	if (ensemble_fitted(page->report->scene))
+	if (fitted)
 		fputs(" Behind the model's value, &plusmn;: the standard uncertainty of what one drop may "
 		      "show, by the "
 		      "fit of the scene, angle and speed about what was set and the sensors' gains; the "
@@ -144,10 +147,8 @@ static void model(struct page *page)
 		      "possible: "
 		      "beyond four times.",
 		      out);
-	else if (page->report->below)
-		fprintf(out,
-		        " Behind the model's value, &plusmn;: how far the next simpler model, %s, is from "
-		        "it.",
+	else if (simpler)
+		fprintf(out, " Next simpler model: how far %s is from the model.",
 		        page->report->below->fidelity);
 	fputs("</p>\n", out);
 }

@@ -119,6 +119,7 @@ int report_schema(FILE *out)
 	version = within(&b, within(&b, root, "properties"), "quantities");
 	put_text(&b, version, "description", "version of this table");
 	put_text(&b, version, "const", quantity_version());
+	put_type(&b, within(&b, within(&b, root, "properties"), "origin"), "object", false);
 	for (int p = 0; p < QUANTITY_PLACES; p++) {
 		cJSON *node = schema_at(&b, root, &quantity_homes[p]);
 		cJSON *properties = within(&b, node, "properties"),

@@ -250,15 +250,16 @@ static void model_rows(const struct series_page *page)
 	count = report_compare(&means.report, rows);
 	fputs("<div class=\"scroll\"><table "
 	      "class=\"small\"><thead><tr><th>quantity</th><th>model</th><th>mean of "
-	      "drops</th><th>SD</th><th>difference</th></tr></thead><tbody>\n",
+	      "drops</th><th>SD</th><th>difference</th>",
 	      out);
+	fputs(page->has_below ? PAGE_SIMPLER "</tr></thead><tbody>\n" : "</tr></thead><tbody>\n", out);
 	for (size_t i = 0; i < count; i++) {
 		page_begin_compared(out, &rows[i]);
 		html_number(out, rows[i].decimals, rows[i].measured * rows[i].scale);
 		fputs("</td><td>", out);
 		html_number(out, rows[i].decimals,
 		            row_sd(&means, page->cell.value, &rows[i]) * rows[i].scale);
-		page_end_compared(out, &rows[i]);
+		page_end_compared(out, &rows[i], page->has_below);
 	}
 	fputs("</tbody></table></div>\n", out);
 }
@@ -280,7 +281,6 @@ void series_model(struct series_page *page)
 	model_rows(page);
 	fputs("<p class=\"note\">Difference: model less measured, over measured. A dash: not known well "
 	      "enough "
-	      "to compare. Behind the model's value, &plusmn;: how far the next simpler model is from "
-	      "it.</p>\n",
+	      "to compare. Next simpler model: how far that one is from the model.</p>\n",
 	      out);
 }

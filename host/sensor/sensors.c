@@ -132,6 +132,16 @@ int sensors_read(struct sensors *sensors, const char *list, double day, char mes
 	return result;
 }
 
+void sensors_serials(const struct sensors *sensors, char text[], size_t size)
+{
+	size_t used = 0;
+
+	text[0] = '\0';
+	for (size_t i = 0; i < sensors->count && used < size; i++)
+		used += (size_t)snprintf(text + used, size - used, "%s%s %s", i > 0 ? ";" : "",
+		                         sensors->used[i].name, sensors->used[i].serial);
+}
+
 const struct sensor_used *sensors_of(const struct sensors *sensors, const char *channel, unsigned *axis)
 {
 	for (size_t s = 0; s < sensors->count; s++)

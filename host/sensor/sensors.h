@@ -37,6 +37,10 @@ struct sensors {
 DT_MUST_USE int sensors_read(struct sensors *sensors, const char *list, double day,
                              char message[SETTINGS_MESSAGE_MAX]);
 
+/* "S1 12345;S2 12346": names and serial numbers, as a record has them (record.sensors); cut where it is full.
+ */
+void sensors_serials(const struct sensors *sensors, char text[], size_t size);
+
 /* The one that a channel belongs to, and which axis of it; NULL: none. */
 const struct sensor_used *sensors_of(const struct sensors *sensors, const char *channel, unsigned *axis);
 

@@ -58,6 +58,25 @@ def within(value, low, high, what=""):
         raise AssertionError(f"{what}: {value} is not within {low} to {high}")
 
 
+def csv_text(file):
+    """Lines of our CSV as text with a head (version 1), by host/record/README.md: tests read and edit that form."""
+    with open(file) as f:
+        lines = f.read().splitlines()
+    if not lines[0].endswith(",marks,droptower_csv_2"):
+        return lines
+    names, head, rows = lines[0].split(",")[:-2], [], []
+    for line in lines[1:]:
+        *cells, marks, about = line.split(",")
+        for mark in filter(None, marks.split(";")):
+            i = next(i for i in reversed(range(len(names))) if mark.startswith(names[i].removesuffix("_g") + " "))
+            words = mark[len(names[i]) - 1:].split(" ")
+            cells[i] = next((word for word in words if word in ("lost", "bad")), cells[i]) + "*" * ("clipped" in words)
+        head += ["# " + about] if about else []
+        rows += [",".join(cells)] if any(cells) else []
+    seal = [line for line in head if line.startswith("# sha256 ")]
+    return ["# droptower csv 1"] + [line for line in head if line not in seal] + [",".join(names)] + rows + seal
+
+
 def stretch():
     """How many times longer than on an idle machine things take now: wall time over processor time, 1 at least."""
     begun, spent = time.monotonic(), time.process_time()

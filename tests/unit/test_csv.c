@@ -12,6 +12,7 @@
 #include "host/record/join.h"
 #include "host/record/read.h"
 #include "host/record/seal.h"
+#include "host/record/fields.h"
 #include "host/record/write.h"
 #include "tests/unit/drop_by_hand.h"
 
@@ -157,18 +158,16 @@ static void test_any_record_comes_back_exactly(void **state)
 static void test_the_layout(void **state)
 {
 	static const char expected[] =
-	        "# droptower csv 1\n"
-	        "# channel rate_hz=4 start_s=0 range_g=500 count=3 uneven=0 name=A\n"
-	        "# channel rate_hz=2 start_s=0.25 range_g=0 count=2 uneven=1 name=B\n"
-	        "time_s,A_g,B_g\n"
-	        "0,0.1,\n"
-	        "0.25,600*,lost\n"
-	        "0.5,-0.03125,\n"
-	        "0.75,,bad\n"
+	        "time_s,A_g,B_g,marks,droptower_csv_2\n"
+	        "0,0.1,,,date 2026-11-27T23:18:58+00:00\n"
+	        "0.25,600,,A clipped;B lost,operator Ann; B.\n"
+	        "0.5,-0.03125,,,simulated 1\n"
+	        "0.75,,,B bad,channel rate_hz=4 start_s=0 range_g=500 count=3 uneven=0 name=A\n"
+	        ",,,,channel rate_hz=2 start_s=0.25 range_g=0 count=2 uneven=1 name=B\n"
 	        /* by sha256sum, of this text with 64 times '0' here */
-	        "# sha256 76b620e8dffc8eb6fa6ce25530227826f35fe285e1ecd4eb60171d633c12ac7d\n";
+	        ",,,,sha256 c01d60105dad24e4ca3782dca5ac2e61f445aebeb5969cff1aff32f303c5c7c5\n";
 	char message[READ_MESSAGE_MAX], *file = hand_file(".csv", "", 0), *bytes;
-	struct record record;
+	struct record record, again;
 	struct channel *a, *b;
 	size_t size;
 
@@ -185,10 +184,22 @@ static void test_the_layout(void **state)
 	b->start_s = 0.25;
 	b->flags = RECORD_FLAG_UNEVEN;
 	b->sample[1] = SAMPLE_BAD;
+	record.time_s = 1795821538;
+	record.simulated = 1;
+	fields_take_words(record.operator_name, " Ann, B.\n");
 	assert_int_equal(write_record(&record, file, message), 0);
 	bytes = hand_read(file, &size);
 	assert_string_equal(bytes, expected);
 	free(bytes);
+	/* and back */
+	read_back(file, "csv", &again);
+	assert_true(again.time_s == record.time_s && again.simulated == 1);
+	assert_string_equal(again.operator_name, "Ann; B.");
+	assert_int_equal(again.channels[0].sample[1], SAMPLE_CLIPPED);
+	assert_int_equal(again.channels[1].sample[0], SAMPLE_LOST);
+	assert_int_equal(again.channels[1].sample[1], SAMPLE_BAD);
+	assert_true(again.channels[0].value_g[1] == 600 && again.file_sealed);
+	record_free(&again);
 	hand_unlink(file);
 	record_free(&record);
 }
@@ -204,15 +215,15 @@ static const char good[] = "# droptower csv 1\n"
                            "0.5,4,5\n";
 
 /* The good text with one stretch replaced must be refused at the line. */
-static void refuse(const char *from, const char *to, unsigned line, const char *why)
+static void refuse_of(const char *whole, const char *from, const char *to, unsigned line, const char *why)
 {
-	char text[2 * sizeof(good)], message[READ_MESSAGE_MAX] = "", place[16];
-	const char *at = strstr(good, from);
+	char text[1024], message[READ_MESSAGE_MAX] = "", place[16];
+	const char *at = strstr(whole, from);
 	struct record record;
 	char *file;
 
 	assert_non_null(at);
-	snprintf(text, sizeof(text), "%.*s%s%s", (int)(at - good), good, to, at + strlen(from));
+	snprintf(text, sizeof(text), "%.*s%s%s", (int)(at - whole), whole, to, at + strlen(from));
 	file = hand_file(".csv", text, strlen(text));
 	if (read_record(&record, file, NULL, message) == 0)
 		fail_msg("\"%s\" for \"%s\" was read", to, from);
@@ -224,12 +235,17 @@ static void refuse(const char *from, const char *to, unsigned line, const char *
 	hand_unlink(file);
 }
 
+static void refuse(const char *from, const char *to, unsigned line, const char *why)
+{
+	refuse_of(good, from, to, line, why);
+}
+
 static void test_refusals(void **state)
 {
 	(void)state;
 	refuse("csv 1", "csv 2", 1, "version");
 	refuse("csv 1\n", "csv 1\n# colour 3\n", 2, "unknown key \"colour\"");
-	refuse("csv 1\n", "csv 1\n# drop_id\n", 2, "expected \"# key value\"");
+	refuse("csv 1\n", "csv 1\n# drop_id\n", 2, "expected \"key value\"");
 	refuse("csv 1\n", "csv 1\n# drop_id 65536\n", 2, "drop_id \"65536\"");
 	refuse("csv 1\n", "csv 1\n# blocks -1\n", 2, "blocks \"-1\"");
 	refuse("csv 1\n", "csv 1\n# blocks 18446744073709551616\n", 2, "blocks");
@@ -262,6 +278,33 @@ static void test_refusals(void **state)
 	refuse("0.5,4,5\n", "", 6, "A ends after 2 samples, expected 3");
 	refuse("0.5,4,5\n", "0.5,4,5\n0.75,6,\n", 8, "A has more samples than the 3");
 	refuse("0.5,4,5\n", "0.5,4,", 7, "B ends after 1 samples, expected 2");
+}
+
+/* The same as a table, with what is known of it in the last column. */
+static const char table[] = "time_s,A_g,B_g,marks,droptower_csv_2\n"
+                            "0,1,2,,channel rate_hz=4 start_s=0 range_g=500 count=3 uneven=0 name=A\n"
+                            "0.25,,,A lost,channel rate_hz=2 start_s=0 range_g=0 count=2 uneven=0 name=B\n"
+                            "0.5,4,5,A clipped;B clipped,\n"
+                            ",,,,operator Ann\n";
+
+static void test_refusals_of_tables(void **state)
+{
+	(void)state;
+	refuse_of(table, "A_g,B_g", "B_g,A_g", 1, "column names");
+	refuse_of(table, ",,operator", ",operator", 5, "4 columns, expected 5");
+	refuse_of(table, "operator Ann", "colour red", 5, "unknown key \"colour\"");
+	refuse_of(table, "operator Ann", "operator", 5, "expected \"key value\"");
+	refuse_of(table, "operator Ann", "date 2026-11-27", 5, "expected a time as");
+	refuse_of(table, "operator Ann", "date 2026-13-27T23:18:58+00:00", 5, "expected a time as");
+	refuse_of(table, ",,,,operator", ",7,,,operator", 5, "A has more samples");
+	refuse_of(table, ",,,,operator", ",,,A lost,operator", 5, "more samples");
+	refuse_of(table, "A lost", "A found", 3, "marks \"A found\"");
+	refuse_of(table, "A lost", "C lost", 3, "marks \"C lost\"");
+	refuse_of(table, "A clipped;B clipped", "B clipped;A clipped", 4, "marks \"A clipped\"");
+	refuse_of(table, "0.25,,", "0.25,3,", 3, "marked as lost or bad");
+	refuse_of(table, "0,1,2", "0,lost,2", 2, "\"lost\" for A");
+	refuse_of(table, "0,1,2", "0,1*,2", 2, "\"1*\" for A");
+	refuse_of(table, "0,1,2", "0,1,", 4, "sample of B at 0.5 s, expected at 0 s");
 }
 
 static void test_line_ends_of_other_systems(void **state)
@@ -390,6 +433,23 @@ static unsigned replace(const char *file, const char *after, const char *from, c
 	return line;
 }
 
+/* The first row with 101 g: another cell in its place, and this in the column of marks. */
+static unsigned put_marked(const char *file, const char *cell, const char *marks)
+{
+	size_t size;
+	char *text = hand_read(file, &size), *place, *comma, from[256], to[512];
+	unsigned line;
+
+	place = memmem(text, size, ",101,", 5);
+	assert_non_null(place);
+	comma = memrchr(place, ',', (size_t)(strchr(place, '\n') - place));
+	snprintf(from, sizeof(from), "%.*s", (int)(comma - place), place);
+	snprintf(to, sizeof(to), "%s%s%s", cell, from + 5, marks);
+	line = replace(file, "time_s,", from, to);
+	free(text);
+	return line;
+}
+
 static void expect_refused(char *file, unsigned line, const char *why)
 {
 	char message[READ_MESSAGE_MAX] = "", place[16] = "";
@@ -424,16 +484,18 @@ static void test_samples_are_counts(void **state)
 		expect_refused(file, line, "expected a whole count of 1/32 g");
 	}
 	for (int i = 0; i < 4; i++) { /* what is beyond the range is marked, and nothing else */
-		static const char *const cells[] = {",101*,", ",501,", ",-501,", ",lost*,"};
+		static const char *const cells[] = {",101,", ",501,", ",-501,", ",,"};
+		static const char *const marks[] = {"S1X clipped", "", "", "S1X lost clipped"};
 		char *file = round_trip(&record, ".csv", "csv");
-		unsigned line = replace(file, "time_s,", ",101,", cells[i]);
+		unsigned line = put_marked(file, cells[i], marks[i]);
 
-		expect_refused(file, line, "for S1X, expected * behind a sample beyond 500 g and no other");
+		expect_refused(file, line,
+		               "for S1X, expected a mark as clipped for samples beyond 500 g and no other");
 	}
 	for (int i = 0; i < 2; i++) {
 		char *file = round_trip(&record, i == 0 ? ".csv" : ".unv", i == 0 ? "csv" : "uff58");
 
-		replace(file, i == 0 ? "# channel" : "S1X", "range_g=500", "range_g=400");
+		replace(file, i == 0 ? "channel" : "S1X", "range_g=500", "range_g=400");
 		expect_refused(file, 0, "and a range of 500 g");
 	}
 	{
@@ -465,6 +527,7 @@ int main(void)
 	        cmocka_unit_test(test_any_record_comes_back_exactly),
 	        cmocka_unit_test(test_the_layout),
 	        cmocka_unit_test(test_refusals),
+	        cmocka_unit_test(test_refusals_of_tables),
 	        cmocka_unit_test(test_line_ends_of_other_systems),
 	        cmocka_unit_test(test_what_cannot_be_written),
 	        cmocka_unit_test(test_a_full_disk),
