@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "host/record/sniff_private.h"
+
+#include <ctype.h>
+#include <math.h>
+
+#include "common/base/number.h"
+
+/* A line of a head without the marks before its words. */
+static struct piece head_words(const struct source_line *line)
+{
+	struct piece text = {line->text, line->length};
+
+	while (text.length > 0 && strchr("#\"; \t%/", text.text[0])) {
+		text.text++;
+		text.length--;
+	}
+	return text;
+}
+
+/* The number at *at of a line, and *at behind it. NAN: it may be one of two, as 20,000; 0: there is none. */
+static double told_number(const struct piece *text, struct cells_style style, size_t *at)
+{
+	size_t from = *at, end = from, digits = 0;
+	double value = 0;
+	char sign = '.';
+
+	while (end < text->length && strchr("0123456789.+-eE", text->text[end]))
+		end++;
+	if (end < text->length && text->text[end] == ',') {
+		while (end + 1 + digits < text->length &&
+		       isdigit((unsigned char)text->text[end + 1 + digits]))
+			digits++;
+		if (digits == 3 && style.decimal != ',')
+			return NAN;
+		if (digits > 0 && style.separator != ',') {
+			sign = ',';
+			end += 1 + digits;
+		}
+	}
+	*at = end;
+	if (sign == '.' && style.decimal == ',' && memchr(text->text + from, '.', end - from) != NULL)
+		return NAN; /* where a comma is the decimal sign a point may stand for thousands */
+	return number_parse(text->text + from, end - from, sign, &value) && value > 0 ? value : 0;
+}
+
+/* A blank of the word is a blank, a stroke, an underscore or nothing in the text. How much of it is the word;
+ * 0: it does not begin with it. */
+static size_t begins_with(struct piece text, const char *word)
+{
+	size_t at = 0;
+
+	for (; *word != '\0'; word++) {
+		if (*word == ' ') {
+			at += at < text.length && strchr(" _-", text.text[at]) != NULL;
+			continue;
+		}
+		if (at == text.length || tolower((unsigned char)text.text[at]) != *word)
+			return 0;
+		at++;
+	}
+	return at < text.length && sniff_is_letter(text.text[at]) ? 0 : at;
+}
+
+enum sniff_key sniff_key(struct piece text, size_t *length)
+{
+	static const struct {
+		enum sniff_key key;
+		const char *word;
+	} words[] = {{SNIFF_RATE, "sample rate"},
+	             {SNIFF_RATE, "sampling rate"},
+	             {SNIFF_RATE, "sample frequency"},
+	             {SNIFF_RATE, "sampling frequency"},
+	             {SNIFF_RATE, "abtastrate"},
+	             {SNIFF_RATE, "scan rate"},
+	             {SNIFF_RATE, "fs"},
+	             {SNIFF_STEP, "sample interval"},
+	             {SNIFF_STEP, "sampling interval"},
+	             {SNIFF_STEP, "sampling period"},
+	             {SNIFF_STEP, "time step"},
+	             {SNIFF_STEP, "delta t"},
+	             {SNIFF_STEP, "dt"},
+	             {SNIFF_STEP, "interval"},
+	             {SNIFF_STEP, "abtastintervall"}};
+
+	for (size_t i = 0; i < sizeof(words) / sizeof(words[0]); i++) {
+		*length = begins_with(text, words[i].word);
+		if (*length > 0)
+			return words[i].key;
+	}
+	return SNIFF_NO_KEY;
+}
+
+double sniff_rate(const struct source_line *line, struct cells_style style)
+{
+	struct piece text = head_words(line);
+	const struct unit *unit;
+	enum sniff_key key;
+	double value;
+	size_t at, end;
+
+	key = sniff_key(text, &at);
+	if (key == SNIFF_NO_KEY)
+		return 0;
+	for (at = 0; at < text.length && !(text.text[at] >= '0' && text.text[at] <= '9');)
+		at++;
+	end = at;
+	value = told_number(&text, style, &end);
+	if (!(value > 0))
+		return value;
+	while (end < text.length && strchr(" \t,;\"", text.text[end]))
+		end++;
+	at = end;
+	while (end < text.length && !strchr(" \t,;\"", text.text[end]))
+		end++;
+	unit = unit_find(text.text + at, end - at);
+	if (unit == NULL) /* in the key: "Sample rate (kHz);51.2" */
+		unit = unit_of_name(text.text, at, UNIT_TIME);
+	if (key == SNIFF_STEP)
+		return unit != NULL && unit->kind == UNIT_TIME && unit->divisor >= 1 ? unit->divisor / value
+		                                                                     : 0;
+	if (unit == NULL)
+		return 0;
+	return value * unit_hertz(unit);
+}
+
+static const char *const scale_words[] = {"scale",       "scale factor", "scaling",      "scaling factor",
+                                          "factor",      "scale_factor", "multiplier",   "conversion factor",
+                                          "faktor",      "skalierung",   "skalenfaktor", "skalierungsfaktor",
+                                          "y multiplier"};
+enum { SCALE_WORDS = sizeof(scale_words) / sizeof(scale_words[0]) };
+
+bool sniff_is_scale(struct piece key)
+{
+	for (size_t i = 0; i < SCALE_WORDS; i++)
+		if (key.length > 0 && begins_with(key, scale_words[i]) == key.length)
+			return true;
+	return false;
+}
+
+bool sniff_tells_scale(const struct source_line *line)
+{
+	struct piece text = head_words(line);
+	double value = 1;
+	size_t at;
+
+	for (size_t i = 0; i < SCALE_WORDS; i++) {
+		if (!sniff_begins(text, scale_words[i]))
+			continue;
+		at = strlen(scale_words[i]);
+		while (at < text.length && strchr(" \t:=;,\"", text.text[at]))
+			at++;
+		value = at < text.length && isdigit((unsigned char)text.text[at])
+		                ? told_number(&text, (struct cells_style){0}, &at)
+		                : value;
+	}
+	return !(fabs(value - 1) < 1e-12);
+}
