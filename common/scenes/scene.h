@@ -25,6 +25,7 @@ struct scene {
 #define SCENE_KEY(section, key, min, max, initial, doc) double section##_##key;
 #include "common/scenes/scene.def"
 #undef SCENE_KEY
+	double predicted_u;            /* relative, of a stiffness_n_m15 that was `corner`; 0: it was not */
 	double fitted_u[SCENE_FITTED]; /* 0: not known */
 	double fitted_correlation[SCENE_FITTED][SCENE_FITTED];
 	/* Section [limits] as it stands, "LINE:KEY=VALUE\n" each: what it means is the host's
@@ -35,8 +36,8 @@ struct scene {
 /* Reads and checks file. 0, or DT_E_* with "FILE:LINE: what is wrong, what was expected" in message and
  * *scene unchanged. Unknown sections and keys, missing or repeated keys, text that is no number, values
  * out of range or not finite are all errors, and so are combinations that make no product: a plate without
- * stiffness. The drop that a contact time is of,
- * where it is not given, is this one, and stays it when height or mass are changed after reading. */
+ * stiffness. A stiffness_n_m15 or duration_s that is `corner` comes as NAN. The drop that a contact time is
+ * of, where it is not given, is this one, and stays it when height or mass are changed after reading. */
 DT_MUST_USE int scene_read(struct scene *scene, const char *file, char message[SCENE_MESSAGE_MAX]);
 
 /* The same for values changed after reading, e.g. an angle from the command line; where names it in the

@@ -15,6 +15,7 @@
 #include "host/command/command.h"
 #include "host/estimate/cfc.h"
 #include "host/estimate/filter.h"
+#include "host/model/corner.h"
 #include "host/record/drop.h"
 #include "host/record/fields.h"
 #include "common/base/text.h"
@@ -491,7 +492,7 @@ char *evaluate_json(struct evaluated *e, const struct record *record, const stru
 
 int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg)
 {
-	char message[SCENE_MESSAGE_MAX], path[PATH_MAX];
+	char message[SCENE_MESSAGE_MAX], reason[MODEL_MESSAGE_MAX], path[PATH_MAX];
 	int result = scene_read(scene, beside_scene_file(file, path), message);
 	struct plan plan;
 
@@ -500,6 +501,10 @@ int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg)
 	if (result == 0 && !isnan(angle_deg)) {
 		scene->drop_angle_deg = angle_deg;
 		result = scene_check(scene, "--angle", message);
+	}
+	if (result == 0 && corner_fill(scene, reason) != 0) {
+		command_error("%s: %s", file, reason);
+		return COMMAND_INPUT;
 	}
 	if (result == 0)
 		return evaluate_check_chain(scene->chain);

@@ -321,6 +321,8 @@ int command_model(int argc, char **argv)
 		code = evaluate_read_scene(&scene, a.scene_file, a.angle_deg);
 	if (code != COMMAND_DONE)
 		return code;
+	if (scene.predicted_u > 0.0)
+		scene.fitted_u[0] = scene.predicted_u;
 	a.ensemble.scene = &scene;
 	a.ensemble.seed = a.seed != NO_SEED ? a.seed : 1;
 	if (a.design_keys)

@@ -5,6 +5,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "host/model/corner.h"
+
 static const struct vary_key keys[] = {
 #define SCENE_KEY(section, key, min, max, initial, doc) \
 	{#section "." #key, #key, offsetof(struct scene, section##_##key), min, max, false},
@@ -67,7 +69,10 @@ void vary_set(struct scene *scene, const struct vary_key *key, double value)
 {
 	double *at = (double *)(void *)((char *)scene + key->offset), times = value / *at;
 
-	*at = value;
+	if (scene->predicted_u > 0.0 && at != &scene->contact_stiffness_n_m15)
+		corner_follow(scene, at, value);
+	else
+		*at = value;
 	if (!key->linked || !(times > 0.0) || !isfinite(times))
 		return;
 	if (at == &scene->contact_duration_s) {

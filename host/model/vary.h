@@ -13,6 +13,9 @@
  * The contact time is that of the height and the mass it was measured with (contact.duration_height_m,
  * mass_kg): the model has it follow another height or mass.
  *
+ * A contact that was predicted (corner.h) is predicted again for what is changed; where that cannot be, the
+ * scene makes no drop.
+ *
  * Pure functions, any thread; a scene that comes out is the caller's to check.
  */
 #include <stdbool.h>

@@ -71,7 +71,11 @@ int forecast_text(const struct forecast *f, FILE *out)
 		text_row(out, outputs[i]->key, ensemble_value(p, outputs[i]),
 		         f->u ? f->u[outputs[i] - ensemble_outputs] : none,
 		         f->next ? ensemble_value(f->next, outputs[i]) : none);
-	if (f->u)
+	if (f->scene->predicted_u > 0.0)
+		fprintf(out,
+		        "\nthe contact is predicted: %.3g N/m^1.5 +- %.0f %%, for which the bars stand\n",
+		        p->stiffness_n_m15, 100.0 * f->scene->predicted_u);
+	else if (f->u)
 		fputs("\n+-: standard uncertainty by [fit] of the scene; the law's own error is not in it\n",
 		      out);
 	if (p->notes & MODEL_NOTE_DEEP)
