@@ -11,7 +11,7 @@ BOARD = $(if $(wildcard /usr/include/unicorn/unicorn.h),$(BUILD)/droptower-firmw
 
 $(call obj,$(BOARD_C)): CPPFLAGS += $(LINUX)
 
-.PHONY: board size mistakes preempt
+.PHONY: board size mistakes preempt mutate-board
 board: $(BOARD) stm32g474 ## build the program that runs the board's image, if libunicorn is there
 size: $(BUILD)/droptower-bench board ## size, stack and instruction counts of the image that is flashed, against their budgets
 	@hil/board/size $(BUILD)
@@ -19,6 +19,11 @@ size: $(BUILD)/droptower-bench board ## size, stack and instruction counts of th
 MISTAKES ?=
 mistakes: $(BUILD)/droptower-bench board ## build the board's image with mistakes (MISTAKES= some) and see that a drop, or preemption, finds each
 	@hil/board/mistakes $(BUILD) '$(STM32G474_CC) $(STM32G474_CFLAGS)' $(MISTAKES)
+
+EVERY ?= 30
+DRIVERS ?=
+mutate-board: $(BUILD)/droptower-bench board ## make each EVERY=th small mistake in the board's drivers, see a scenario on the board notice it (DRIVERS= some)
+	@hil/board/mutate $(BUILD) '$(STM32G474_CC) $(STM32G474_CFLAGS)' $(EVERY) $(DRIVERS)
 
 preempt: $(BUILD)/droptower-bench board ## interrupt the board's image after every instruction of its longest polls and of control
 	@hil/board/preempt $(BUILD)
