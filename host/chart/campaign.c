@@ -2,12 +2,18 @@
 #include "host/chart/campaign.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
+#include "host/base/progress.h"
+
 enum { PROCESSES_MAX = 64 };
+
+static const double TOLD_AFTER_S = 2.0;
 
 void tally_add(struct tally *tally, double value, double truth, double sigma, double gross)
 {
@@ -49,7 +55,7 @@ void campaign_free(void *memory, size_t bytes)
 	munmap(memory, bytes);
 }
 
-static int campaign_run_scene(const struct campaign *campaign, size_t i)
+static int campaign_run_scene(const struct campaign *campaign, size_t i, atomic_size_t *done)
 {
 	struct synthetic synthetic;
 	int status = synthetic_open(&synthetic, campaign->scene(campaign->context, i));
@@ -60,6 +66,8 @@ static int campaign_run_scene(const struct campaign *campaign, size_t i)
 	for (unsigned drop = 0; drop < campaign->drops && !status; drop++) {
 		synthetic_drop(&synthetic, drop);
 		status = campaign->drop(campaign->context, i, &synthetic, drop);
+		if (done != NULL)
+			atomic_fetch_add(done, 1);
 	}
 	synthetic_close(&synthetic);
 	return status;
@@ -75,10 +83,32 @@ static size_t processes(const struct campaign *campaign)
 	return (size_t)jobs < most ? (size_t)jobs : most;
 }
 
+/* The next process that ends, as wait; meanwhile a terminal sees how far they are. */
+static pid_t campaign_wait(const struct campaign *campaign, const atomic_size_t *done,
+                           struct progress *progress, int *status)
+{
+	static const struct timespec look = {.tv_nsec = 100000000};
+	size_t all = campaign->count * campaign->drops;
+	pid_t ended;
+
+	while (done != NULL && progress->terminal && (ended = waitpid(-1, status, WNOHANG)) == 0) {
+		size_t now = atomic_load(done);
+
+		progress_tell(progress, (double)now / (double)all, "%zu of %zu drops, %.0f drops/s", now, all,
+		              (double)now / progress_seconds(progress));
+		nanosleep(&look, NULL);
+	}
+	return done != NULL && progress->terminal ? ended : wait(status);
+}
+
 int campaign_run(const struct campaign *campaign)
 {
+	atomic_size_t *done = campaign_memory(sizeof(*done)); /* NULL: nothing is told */
 	size_t jobs = processes(campaign), started = 0;
+	struct progress progress;
 	int result = 0;
+
+	progress_begin(&progress, TOLD_AFTER_S);
 
 	fflush(NULL); /* or each process writes it again */
 	for (; started < jobs && !result; started++) {
@@ -88,7 +118,7 @@ int campaign_run(const struct campaign *campaign)
 			int status = 0;
 
 			for (size_t i = started; i < campaign->count && !status; i += jobs)
-				status = campaign_run_scene(campaign, i);
+				status = campaign_run_scene(campaign, i, done);
 			_exit(-status);
 		}
 		if (child < 0) {
@@ -99,10 +129,13 @@ int campaign_run(const struct campaign *campaign)
 	for (; started > 0; started--) {
 		int status = 0;
 
-		if (wait(&status) < 0 || !WIFEXITED(status))
+		if (campaign_wait(campaign, done, &progress, &status) < 0 || !WIFEXITED(status))
 			result = DT_E_SYSTEM;
 		else if (WEXITSTATUS(status) != 0)
 			result = -WEXITSTATUS(status);
 	}
+	progress_end(&progress);
+	if (done != NULL)
+		campaign_free(done, sizeof(*done));
 	return result;
 }

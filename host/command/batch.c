@@ -7,12 +7,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "common/base/number.h"
 #include "common/base/text.h"
 #include "host/base/beside.h"
+#include "host/base/progress.h"
 #include "host/batch/batch.h"
 #include "host/command/analyze.h"
 #include "host/command/command.h"
@@ -31,8 +31,7 @@ struct batch_arguments {
 struct told {
 	struct analyze_arguments *analyze;
 	const struct inputs *inputs;
-	double begun_s;
-	bool terminal, shown;
+	struct progress progress;
 };
 
 /* ---- options ---- */
@@ -232,33 +231,15 @@ static int read_names(struct files *files, const char *name)
 
 /* ---- told ---- */
 
-static double now_s(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 /* On a terminal: how far, how fast, until when. */
 static void tell_progress(const struct crew_progress *p, void *context)
 {
 	struct told *told = context;
-	double passed_s = now_s() - told->begun_s, rest;
-	char end[32] = "?";
-	time_t at;
-	struct tm day;
+	double rest = (double)(told->inputs->bytes - p->bytes), new = (double)p->new_bytes;
 
-	if (!told->terminal)
-		return;
-	if (p->new_bytes > 0 && passed_s > 0.5) {
-		rest = (double)(told->inputs->bytes - p->bytes) * passed_s / (double)p->new_bytes;
-		at = time(NULL) + (time_t)fmin(rest, 1e9);
-		strftime(end, sizeof(end), rest < 72000 ? "%H:%M:%S" : "%F %H:%M", localtime_r(&at, &day));
-	}
-	fprintf(stderr, "\r%lu of %zu files, %lu results, %.0f files/s, ends %s \033[K", p->files,
-	        told->inputs->count, p->results, (double)(p->files - p->found) / fmax(passed_s, 1e-3), end);
-	told->shown = true;
+	progress_tell(&told->progress, new / (new + rest), "%lu of %zu files, %lu results, %.0f files/s",
+	              p->files, told->inputs->count, p->results,
+	              (double)(p->files - p->found) / fmax(progress_seconds(&told->progress), 1e-3));
 }
 
 static void tell_refused(const struct inputs *inputs, unsigned long refused)
@@ -277,7 +258,7 @@ static void tell_refused(const struct inputs *inputs, unsigned long refused)
 static void tell_summary(const struct batch *batch, const struct told *told)
 {
 	const struct crew_progress *p = &batch->crew.progress;
-	double passed_s = now_s() - told->begun_s;
+	double passed_s = progress_seconds(&told->progress);
 
 	printf("%lu of %zu files: %lu results, %lu without a result, %lu with a failure, %lu done before, "
 	       "%lu "
@@ -302,8 +283,7 @@ static int analyse_file(const char *file, void *context)
 
 static int batch_files(struct batch_arguments *arguments, const struct files *files, char *settings)
 {
-	struct told told = {
-	        .analyze = &arguments->analyze, .begun_s = now_s(), .terminal = isatty(STDERR_FILENO) == 1};
+	struct told told = {.analyze = &arguments->analyze};
 	struct batch batch = {.folder = arguments->out,
 	                      .settings = settings,
 	                      .shard = arguments->shard,
@@ -319,10 +299,10 @@ static int batch_files(struct batch_arguments *arguments, const struct files *fi
 	int result, code;
 
 	told.inputs = &batch.inputs;
+	progress_begin(&told.progress, 0.0);
 	interrupt_catch();
 	result = batch_work(&batch, files->file, files->count, message);
-	if (told.shown)
-		fputs("\r\033[K", stderr);
+	progress_end(&told.progress);
 	if (result != 0) {
 		command_error("%s", message);
 		code = COMMAND_INPUT;
