@@ -9,8 +9,9 @@
 static const char style[] =
         "tr.out td{color:var(--soft);text-decoration:line-through}tr.out td.text{text-decoration:none}"
         "tr.mean td{font-weight:600}tr.mean.first td{border-top:2px solid var(--soft)}"
-        "td.wrap{white-space:normal;min-width:14em;overflow-wrap:anywhere}td,th{vertical-align:top}"
-        ".facts{table-layout:fixed}.facts th{font-weight:400;width:38%}"
+        "td.wrap{white-space:normal;min-width:14em;overflow-wrap:anywhere}td{vertical-align:top}th{white-"
+        "space:normal;vertical-align:bottom}"
+        ".facts{table-layout:fixed}.facts th{font-weight:400;width:38%;vertical-align:top}"
         ".facts td{text-align:left;white-space:normal}"
         ".hash{font:.8rem/1.4 ui-monospace,'Liberation Mono',monospace;overflow-wrap:anywhere}"
         ".scroll+.scroll{margin-top:14px}.drop{break-inside:avoid;margin:22px 0 0}"
