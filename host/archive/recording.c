@@ -190,7 +190,8 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 
 static const struct {
 	const char *format, *ending;
-} logs[] = {{"candump", ".log"}, {"lcm", ".lcm"}, {"csv", ".csv"}, {"uff58", ".unv"}, {"hdf5", ".h5"}};
+} logs[] = {{"candump", ".log"}, {"lcm", ".lcm"}, {"csv", ".csv"},
+            {"uff58", ".unv"},   {"hdf5", ".h5"}, {"", ".dat"}}; /* .dat: of others */
 
 enum { LOGS = sizeof(logs) / sizeof(logs[0]) };
 
@@ -199,7 +200,7 @@ const char *archive_ending(const char *format)
 	for (unsigned i = 0; i < LOGS; i++)
 		if (strcmp(logs[i].format, format) == 0)
 			return logs[i].ending;
-	return logs[0].ending;
+	return logs[LOGS - 1].ending;
 }
 
 bool archive_is_log(const char *name)

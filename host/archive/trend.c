@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * How a series went: what its drops measured, of the product and of their tower, in their order.
+ * How a series went: what its drops measured, of the product and of their tower, in their order; of channels
+ * that have no column in tables of drops, as recordings of others have, what analyze --repeats tells.
  */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "host/archive/private.h"
 #include "host/archive/table.h"
@@ -13,7 +16,25 @@ struct trends {
 	double angle_deg, height_m;
 	char scene_name[ARCHIVE_TEXT_MAX + 1];
 	bool undecided;
+	unsigned *counted; /* numbers of the drops that count, in order */
+	size_t room;
 };
+
+static int trends_count(struct trends *t, unsigned number)
+{
+	size_t room = t->room > 0 ? 2 * t->room : 64;
+	unsigned *more;
+
+	if (t->repeats->repeats == t->room) {
+		more = realloc(t->counted, room * sizeof(*more));
+		if (more == NULL)
+			return DT_E_MEMORY;
+		t->counted = more;
+		t->room = room;
+	}
+	t->counted[t->repeats->repeats++] = number;
+	return 0;
+}
 
 static int trends_take(void *context, const struct archive_drop *drop)
 {
@@ -21,7 +42,8 @@ static int trends_take(void *context, const struct archive_drop *drop)
 
 	if (!archive_counts(drop, t->undecided))
 		return 0;
-	t->repeats->repeats++;
+	if (trends_count(t, drop->number) != 0)
+		return DT_E_MEMORY;
 	t->angle_deg = drop->series.angle_deg;
 	t->height_m = drop->series.height_m;
 	snprintf(t->scene_name, sizeof(t->scene_name), "%s", drop->series.scene_name);
@@ -86,6 +108,71 @@ static int trends_tower(struct archive *archive, const char *series, struct repe
 	return result;
 }
 
+static bool has_column(const char *subject)
+{
+	for (int i = 0; i < ARCHIVE_VALUE_COUNT; i++)
+		if (strcmp(quantity_columns[i].subject, subject) == 0)
+			return true;
+	return false;
+}
+
+static int by_number(const void *a, const void *b)
+{
+	unsigned one = *(const unsigned *)a, other = *(const unsigned *)b;
+
+	return (one > other) - (one < other);
+}
+
+/* Values of one kind, by channel and drop; a row for each channel without a column. */
+static int trends_channels(const struct trends *t, struct archive *archive, sqlite3_stmt *s,
+                           const struct quantity *quantity)
+{
+	struct repeats *repeats = t->repeats;
+	struct repeats_row *row = NULL;
+	int result;
+
+	while ((result = sql_step(archive, s)) > 0) {
+		const char *subject = sql_text(s, 0);
+		unsigned number = (unsigned)sqlite3_column_int64(s, 1);
+
+		if (has_column(subject) ||
+		    bsearch(&number, t->counted, repeats->repeats, sizeof(number), by_number) == NULL)
+			continue;
+		if (row == NULL || strcmp(row->channel, subject) != 0)
+			row = repeats_row_new(repeats, subject, quantity);
+		if (row == NULL || repeats_value(row, number, sqlite3_column_double(s, 2)) != 0)
+			return DT_E_MEMORY;
+	}
+	return result;
+}
+
+static int trends_others(const struct trends *t, struct archive *archive, const char *series)
+{
+	enum quantity_place place;
+	const struct quantity *quantity;
+	int result = 0;
+
+	qsort(t->counted, t->repeats->repeats, sizeof(*t->counted), by_number);
+	for (size_t i = 0; result == 0 && (quantity = repeats_wanted(i, &place)) != NULL; i++) {
+		char query[400];
+		sqlite3_stmt *s;
+
+		snprintf(query, sizeof(query),
+		         "SELECT t.subject, d.number, t.\"%s\" AS value FROM drops d JOIN series g ON g.id = "
+		         "d.series_id"
+		         " JOIN %s t ON t.result_id = (SELECT max(id) FROM results WHERE drop_id = d.id)"
+		         " WHERE g.name = ? AND value IS NOT NULL AND t.status = 'ok' ORDER BY t.subject, "
+		         "d.number",
+		         quantity->key, quantity_homes[place].table);
+		result = sql_query(archive, &s, query, "s", series);
+		if (result != 0)
+			return result;
+		result = trends_channels(t, archive, s, quantity);
+		sqlite3_finalize(s);
+	}
+	return result;
+}
+
 static int trends_rows(struct repeats *repeats)
 {
 	const struct quantity *q = NULL;
@@ -111,12 +198,12 @@ static int trends_rows(struct repeats *repeats)
 }
 
 /* Rows of fewer values than three say nothing that a mean does not. */
-static void trends_close(struct repeats *repeats)
+static void trends_close(struct repeats *repeats, size_t others)
 {
 	size_t kept = 0;
 
 	for (size_t i = 0; i < repeats->rows; i++) {
-		if (i < ARCHIVE_VALUE_COUNT)
+		if (i < ARCHIVE_VALUE_COUNT || i >= others)
 			repeats->row[i].left_out = repeats->repeats - repeats->row[i].count;
 		if (repeats->row[i].count < 3)
 			repeats_row_free(&repeats->row[i]);
@@ -131,6 +218,7 @@ int archive_trends(struct archive *archive, const char *series, bool undecided, 
 {
 	struct archive_filter filter = archive_filter_none();
 	struct trends t = {.repeats = repeats, .undecided = undecided};
+	size_t others;
 	int result;
 
 	*repeats = (struct repeats){.one = "drop"};
@@ -142,8 +230,12 @@ int archive_trends(struct archive *archive, const char *series, bool undecided, 
 		result = trends_pool(archive, &t);
 	for (size_t i = ARCHIVE_VALUE_COUNT; result == 0 && i < repeats->rows; i++)
 		result = trends_tower(archive, series, &repeats->row[i]);
+	others = repeats->rows;
+	if (result == 0 && repeats->repeats > 0)
+		result = trends_others(&t, archive, series);
+	free(t.counted);
 	if (result == 0)
-		trends_close(repeats);
+		trends_close(repeats, others);
 	else
 		repeats_free(repeats);
 	return result == DT_E_MEMORY ? archive_refuse(archive, result, "%s", error_text(result)) : result;

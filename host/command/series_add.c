@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * `droptower series add`: the drops of logs into a series, each once, and none that fell another way.
+ * `droptower series add`: the drops of logs and the recordings of others into a series, each once, and none
+ * that fell another way.
  */
 #include <cjson/cJSON.h>
 #include <errno.h>
@@ -266,15 +267,51 @@ static int copy_log(const struct adding *adding, const struct log_capture *captu
 	return result;
 }
 
+static bool same_samples(const struct record *a, const struct record *b)
+{
+	bool same = a->channel_count == b->channel_count;
+
+	for (size_t i = 0; i < a->channel_count && same; i++) {
+		const struct channel *x = &a->channels[i], *y = &b->channels[i];
+
+		same = strcmp(x->name, y->name) == 0 && x->count == y->count && x->flags == y->flags &&
+		       !(fabs(x->rate_hz - y->rate_hz) > 0) && !(fabs(x->start_s - y->start_s) > 0) &&
+		       memcmp(x->value_g, y->value_g, x->count * sizeof(*x->value_g)) == 0;
+	}
+	return same;
+}
+
+/* A recording of others may be read by what stands beside it: a profile, the channels of a test. */
+static int check_foreign_copy(const char *name, const struct record *record,
+                              const struct archive_recording *r)
+{
+	char message[READ_MESSAGE_MAX];
+	struct record copied;
+	bool same;
+
+	if (read_record(&copied, r->log, NULL, message) == 0) {
+		same = same_samples(record, &copied);
+		record_free(&copied);
+		if (same)
+			return 0;
+	}
+	command_error(
+	        "%s: is not read by itself alone, and an archive keeps no more of it: 'droptower convert' "
+	        "it to .csv, and add that",
+	        name);
+	return -1;
+}
+
 /* What was copied reads as what was to be. */
-static int check_copy(const struct adding *adding, const char *name, const struct log_capture *capture,
+static int check_copy(const char *name, const struct log_capture *capture, const struct record *original,
                       const struct archive_recording *r)
 {
 	char message[READ_MESSAGE_MAX];
 	struct log_capture copied = {0};
 	struct record record;
 
-	(void)adding;
+	if (!original->is_drop)
+		return check_foreign_copy(name, original, r);
 	if (capture == NULL || capture->alone)
 		return 0;
 	if (read_record(&record, r->log, NULL, message) != 0) {
@@ -300,7 +337,7 @@ static int64_t time_of(const struct adding *adding, const struct log_capture *ca
 }
 
 static void take_in(struct adding *adding, const char *name, const struct log_capture *capture,
-                    const char *format, const char *key)
+                    const struct record *record, const char *key)
 {
 	const struct series_arguments *a = adding->a;
 	bool told = !isnan(a->filter.angle_deg) || !isnan(adding->angle_deg);
@@ -310,12 +347,12 @@ static void take_in(struct adding *adding, const char *name, const struct log_ca
 	struct archive_recording r;
 	int code;
 
-	if (archive_begin(adding->archive, a->word[0], a->operator_name, archive_ending(format), a->simulated,
-	                  &r) != 0) {
+	if (archive_begin(adding->archive, a->word[0], a->operator_name, archive_ending(record->format),
+	                  a->simulated, &r) != 0) {
 		adding->code = archived_failed(adding->archive);
 		return;
 	}
-	if (copy_log(adding, capture, &r) != 0 || check_copy(adding, name, capture, &r) != 0) {
+	if (copy_log(adding, capture, &r) != 0 || check_copy(name, capture, record, &r) != 0) {
 		archive_discard(adding->archive, &r);
 		adding->code = COMMAND_INPUT;
 		return;
@@ -337,17 +374,12 @@ static void add_record(struct adding *adding, const struct log_capture *capture,
 	char name[512], key[LOG_CAPTURE_KEY_CHARS] = "";
 
 	name_drop(adding, capture, name, sizeof(name));
-	if (!drop_has_channel(record)) {
-		command_error("%s: no channel S1X to S2Z, expected a drop of the tower", name);
-		series_add_refuse(adding);
-		return;
-	}
 	if (record->is_drop)
 		log_capture_key(record, key);
 	if (key[0] != '\0' && series_add_is_there(adding, name, key) != 0)
 		return;
 	if (series_add_agrees(adding, name, capture, record))
-		take_in(adding, name, capture, record->format, key);
+		take_in(adding, name, capture, record, key);
 }
 
 static int series_add_drop(void *context, const struct log_capture *capture, struct record *record)

@@ -28,6 +28,14 @@ static const struct {
               {QUANTITY_AT_RINGDOWN, "amplitude_g"},
               {QUANTITY_AT_RESULTANT, "peak_g"}};
 
+const struct quantity *repeats_wanted(size_t i, enum quantity_place *place)
+{
+	if (i >= sizeof(wanted) / sizeof(wanted[0]))
+		return NULL;
+	*place = wanted[i].place;
+	return quantity_find(quantity_homes[*place].object, wanted[i].key);
+}
+
 /* ---- taking in ---- */
 
 struct repeats_row *repeats_row_new(struct repeats *repeats, const char *channel,
@@ -75,14 +83,15 @@ int repeats_value(struct repeats_row *row, size_t number, double value)
 
 int repeats_add(struct repeats *repeats, struct result *result)
 {
+	enum quantity_place place;
+	const struct quantity *quantity;
+
 	repeats->repeats++;
-	for (size_t w = 0; w < sizeof(wanted) / sizeof(wanted[0]); w++) {
-		enum quantity_object which = quantity_homes[wanted[w].place].object;
-		const struct quantity *quantity = quantity_find(which, wanted[w].key);
+	for (size_t w = 0; (quantity = repeats_wanted(w, &place)) != NULL; w++) {
 		const char *subject;
 		void *object;
 
-		for (size_t i = 0; (object = result_at(result, wanted[w].place, i, &subject)) != NULL; i++) {
+		for (size_t i = 0; (object = result_at(result, place, i, &subject)) != NULL; i++) {
 			double value = quantity_number(quantity, object);
 			bool ok = isfinite(value) && quantity_status(quantity, object) == ESTIMATE_OK;
 			struct repeats_row *row = repeats_row_of(repeats, subject, quantity);

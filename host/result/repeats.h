@@ -75,6 +75,9 @@ DT_MUST_USE int repeats_table(const struct repeats *repeats, enum table_format f
 	"beyond by chance, of 51 twelve. A trend is told at 0.27 %, another mean and what stands out\n"    \
 	"(Grubbs) at 1 %. Marked, and in the means all the same: to leave one out needs a cause and a name."
 
+/* What is worth a row, of each channel: the i-th from 0, NULL behind the last. */
+const struct quantity *repeats_wanted(size_t i, enum quantity_place *place);
+
 /* Another repeat. 0 or DT_E_MEMORY. */
 DT_MUST_USE int repeats_add(struct repeats *repeats, struct result *result);
 void repeats_close(struct repeats *repeats);
