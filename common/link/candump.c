@@ -135,10 +135,47 @@ static bool eat_fd_flags(struct text *text, struct frame *frame)
 	return true;
 }
 
+/* Sixteen characters at once. */
+typedef uint8_t letters __attribute__((vector_size(16)));
+typedef uint16_t pairs __attribute__((vector_size(16)));
+typedef uint8_t octet __attribute__((vector_size(8)));
+
+/* Eight bytes from sixteen hex digits; false, and nothing written, if one is none. */
+static bool read_octet(const char *at, uint8_t bytes[8])
+{
+	letters c, low, is_digit, is_letter, valid;
+	octet packed;
+	pairs pair;
+	uint64_t all[2];
+
+	memcpy(&c, at, sizeof(c));
+	low = c | 0x20;
+	is_digit = (letters)((c >= '0') & (c <= '9'));
+	is_letter = (letters)((low >= 'a') & (low <= 'f'));
+	valid = is_digit | is_letter;
+	memcpy(all, &valid, sizeof(all));
+	if ((all[0] & all[1]) != UINT64_MAX)
+		return false;
+	pair = (pairs)((c & 0x0F) + (is_letter & 9));
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ /* the first digit of two is the higher one */
+	pair = pair << 4 | pair >> 8;
+#else
+	pair = pair >> 4 | pair;
+#endif
+	packed = __builtin_convertvector(pair, octet);
+	memcpy(bytes, &packed, sizeof(packed));
+	return true;
+}
+
 static void eat_data(struct text *text, struct frame *frame)
 {
 	unsigned length = 0;
 
+	while (length + 8 <= FRAME_DATA_MAX && text->end - text->at >= 16 &&
+	       read_octet(text->at, frame->data + length)) {
+		length += 8;
+		text->at += 16;
+	}
 	while (length < FRAME_DATA_MAX && text->end - text->at >= 2) {
 		unsigned high = digit_value[(unsigned char)text->at[0]];
 		unsigned low = digit_value[(unsigned char)text->at[1]];

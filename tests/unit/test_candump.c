@@ -330,6 +330,40 @@ static void test_mutations_against_grammar(void **state)
 	regfree(&regex);
 }
 
+/* A frame of 64 bytes with any byte in the place of any digit: a digit counts, all others end the data before
+ * it. */
+static void test_every_byte_in_every_place(void **state)
+{
+	static const char head[] = "(1.000000) can0 123##1";
+	enum { FROM = sizeof(head) - 1 };
+	char line[FROM + 128];
+
+	(void)state;
+	memcpy(line, head, FROM);
+	for (size_t at = 0; at < 128; at++)
+		for (int byte = 0; byte < 256; byte++) {
+			static const char digits[] = "0123456789abcdef";
+			const char *digit =
+			        byte != '\0' ? strchr(digits, byte >= 'A' && byte <= 'F' ? byte + 32 : byte)
+			                     : NULL;
+			struct frame frame;
+			unsigned column = 0;
+
+			memset(line + FROM, '5', 128);
+			line[FROM + at] = (char)byte;
+			if (digit == NULL) {
+				assert_int_not_equal(candump_parse(line, sizeof(line), &frame, &column), 1);
+				continue;
+			}
+			assert_int_equal(candump_parse(line, sizeof(line), &frame, &column), 1);
+			assert_int_equal(frame.length, 64);
+			for (size_t k = 0; k < 64; k++)
+				assert_int_equal(frame.data[k], k != at / 2 ? 0x55
+				                                : at % 2    ? 0x50 | (digit - digits)
+				                                            : (digit - digits) << 4 | 5);
+		}
+}
+
 static void test_noise(void **state)
 {
 	(void)state;
@@ -357,6 +391,7 @@ int main(void)
 	        cmocka_unit_test(test_skipped),
 	        cmocka_unit_test(test_refused_with_column),
 	        cmocka_unit_test(test_fd_lengths),
+	        cmocka_unit_test(test_every_byte_in_every_place),
 	        cmocka_unit_test(test_round_trip),
 	        cmocka_unit_test(test_longest_line_fits),
 	        cmocka_unit_test(test_mutations_against_grammar),
