@@ -546,7 +546,11 @@ static int read_image(const struct source *source)
 
 	if (file < 0)
 		return refuse("damaged", "a whole file");
-	result = is_ours(file) ? record_to_csv(file) : foreign_put(file);
+	if (H5Aexists(file, "sha256") < 0 ||
+	    H5Aexists(file, "format") < 0) /* of ours it would pass for another's */
+		result = refuse("damaged: the attributes of its root cannot be read", "a whole file");
+	else
+		result = is_ours(file) ? record_to_csv(file) : foreign_put(file);
 	H5Fclose(file);
 	return result;
 }
