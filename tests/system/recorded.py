@@ -177,15 +177,6 @@ def patient(url):
             assert time.monotonic() < end, f"{name} was not set"  # not before the self-test has ended
 
 
-def path_without_pictures(folder):
-    """A PATH whose gnuplot draws nothing: the real one takes longer than the drop."""
-    os.makedirs(folder + "/bin", exist_ok=True)
-    with open(folder + "/bin/gnuplot", "w") as f:
-        f.write("#!/bin/sh\necho '<svg></svg>'\n")
-    os.chmod(folder + "/bin/gnuplot", 0o755)
-    return dict(os.environ, PATH=folder + "/bin:" + os.environ["PATH"])
-
-
 def real_drop(watch, url, folder):
     """One of this very tower: `ctl` arms and releases, `run` sets parameters and fetches it. What was heard of them."""
     watch.heard.clear()
