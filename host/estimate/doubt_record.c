@@ -11,6 +11,10 @@
 /* Before a second contact its foot. */
 #define FOOT_S 1e-3
 
+/* Of a width: S1's peaks before S2's, on both axes. Two sensors on one box have up to 0.16 on one, as it
+ * turns. */
+#define LEAD_APART 0.25
+
 /* Both sensors see one shock: what Y reads of X differs by more between them only where something is wrong.
  */
 #define RATIO_APART 1.6
@@ -131,10 +135,20 @@ static bool axis_late(struct estimate_channel *const xy[2])
 	        fabs(x->end_s - y->end_s) > END_APART * width + chance);
 }
 
+/* The plate before the case that shakes it: the sensors are exchanged, or their names are. */
+static bool axis_leads(const struct estimate_channel *s1, const struct estimate_channel *s2)
+{
+	double width = fmin(s1->pulse.duration_s, s2->pulse.duration_s);
+
+	return axis_sure(s1) && axis_sure(s2) && s1->pulse.start_s < s2->pulse.start_s &&
+	       s2->peak.time_s - s1->peak.time_s > LEAD_APART * width;
+}
+
 unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2])
 {
 	struct estimate_channel *const *s1 = channel[0], *const *s2 = channel[1];
-	bool any = axis_exchanged(channel) || axis_dead(s1, s2) || axis_dead(s2, s1) || axis_late(s2);
+	bool any = axis_exchanged(channel) || axis_dead(s1, s2) || axis_dead(s2, s1) || axis_late(s2) ||
+	           (axis_leads(s1[0], s2[0]) && axis_leads(s1[1], s2[1]));
 	/* What shifts zero on both axes of the case is in a supply that the plate's have too. */
 	unsigned shared = s2[0]->peak.how.flags & s2[1]->peak.how.flags & ESTIMATE_FLAG_TAIL;
 
