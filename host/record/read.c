@@ -226,8 +226,11 @@ static bool read_span(struct log_file *log, struct found *found)
 		return false;
 	}
 	read_keep(found, &indexed, span.has_record ? &span.record : NULL);
-	if (found->has_record)
-		found->record.counters.corrupt = indexed.counters.corrupt;
+	if (!found->has_record)
+		return true;
+	found->record.counters.corrupt = indexed.counters.corrupt;
+	if (found->record.time_s == log_capture_time_s(&span.capture)) /* no other is told */
+		found->record.time_s = log_capture_time_s(&indexed);
 	return true;
 }
 
