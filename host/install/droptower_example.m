@@ -14,7 +14,7 @@ function droptower_example(json, csv)
     if iscell(channel), channel = channel{1}; end
     column = cells{strcmp(names, [channel.name '_g'])};
     column = column(~isnan(column));
-    fprintf('%s peak %.3f g, %d samples, from %.3f to %.3f g\n', channel.name, channel.peak.value_g, ...
+    fprintf('%s peak %.3f g, %d samples, from %.5f to %.5f g\n', channel.name, channel.peak.value_g, ...
             numel(column), min(column), max(column));
   end
 end

@@ -14,4 +14,4 @@ print("dropped", result["origin"]["date"], "by", result["origin"]["operator"])
 for channel in result["channels"]:
     column = samples[channel["name"] + "_g"].dropna()
     print(f"{channel['name']} peak {channel['peak']['value_g']:.3f} g, {len(column)} samples,"
-          f" from {column.min():.3f} to {column.max():.3f} g")
+          f" from {column.min():.5f} to {column.max():.5f} g")

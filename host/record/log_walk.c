@@ -384,6 +384,7 @@ void log_walk_drop(struct log_walk *walk, struct record *record)
 	bool wanted = is_wanted(walk);
 
 	log_capture_of_record(record, &capture);
+	record->time_s = log_capture_time_s(&capture);
 	if (walk->begun && walk->begun_drop != record->drop_id)
 		take_run(walk, true);
 	walk->begun = false;
