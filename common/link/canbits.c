@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "common/link/canbits.h"
 
+#include "common/link/transport.h"
+
 enum {
 	RUN = 5, /* equal bits, then a stuff bit */
 	ID_BITS = 11,
@@ -60,17 +62,6 @@ struct canbits canbits_classic(uint32_t id, unsigned length)
 	return (struct canbits){.nominal = coder.bits + CLASSIC_END_BITS};
 }
 
-static unsigned fd_code(unsigned length)
-{
-	static const uint8_t lengths[] = {12, 16, 20, 24, 32, 48, 64};
-	unsigned code = length;
-
-	for (unsigned i = 0; i < sizeof(lengths); i++)
-		if (length == lengths[i])
-			code = 9 + i;
-	return code;
-}
-
 struct canbits canbits_fd(uint32_t id, unsigned length)
 {
 	struct coder coder = canbits_start(id);
@@ -80,7 +71,7 @@ struct canbits canbits_fd(uint32_t id, unsigned length)
 	put_word(&coder, 0x5, 5); /* RRS 0, IDE 0, FDF 1, res 0, BRS 1 */
 	nominal = coder.bits;
 	canbits_put(&coder, 0); /* ESI */
-	put_word(&coder, fd_code(length), DLC_BITS);
+	put_word(&coder, link_code_of_length(length), DLC_BITS);
 	put_worst(&coder, 8 * length - 1);
 	coder.bits++; /* after the last data bit a fixed stuff bit comes anyway */
 	return (struct canbits){

@@ -34,6 +34,22 @@ static bool fd_length_valid(unsigned length)
 	       length == 48 || length == 64;
 }
 
+static const uint8_t length_of_code[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
+
+unsigned link_length_of_code(unsigned code)
+{
+	return length_of_code[code];
+}
+
+unsigned link_code_of_length(unsigned length)
+{
+	unsigned code = 0;
+
+	while (code < 15 && length_of_code[code] < length)
+		code++;
+	return code;
+}
+
 bool link_frame_valid(const struct frame *frame)
 {
 	unsigned flags = frame->flags;

@@ -8,7 +8,6 @@
 
 #define STAMP_DIGITS 4u
 
-static const uint8_t length_of_code[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
 static const char hex_digits[16] = "0123456789ABCDEF";
 
 static const struct {
@@ -27,15 +26,6 @@ static const struct {
 
 #define LETTERS (sizeof(letters) / sizeof(letters[0]))
 
-static unsigned slcan_text_code_of_length(uint8_t length)
-{
-	unsigned code = 0;
-
-	while (code < 15 && length_of_code[code] < length)
-		code++;
-	return code;
-}
-
 size_t slcan_encode(char line[SLCAN_LINE_MAX], const struct frame *frame)
 {
 	unsigned flags = frame->flags & ~(unsigned)FRAME_ESI;
@@ -49,7 +39,7 @@ size_t slcan_encode(char line[SLCAN_LINE_MAX], const struct frame *frame)
 		return 0;
 	while (id_digits-- > 0)
 		*p++ = hex_digits[frame->id >> (4 * id_digits) & 15u];
-	*p++ = hex_digits[slcan_text_code_of_length(frame->length)];
+	*p++ = hex_digits[link_code_of_length(frame->length)];
 	for (unsigned i = 0; i < frame->length && (flags & FRAME_REMOTE) == 0; i++) {
 		*p++ = hex_digits[frame->data[i] >> 4];
 		*p++ = hex_digits[frame->data[i] & 15u];
@@ -103,7 +93,7 @@ static bool parse_line(const char *line, unsigned length, struct frame *frame)
 	if (length < head || !all_hex(line + 1, length - 1))
 		return false;
 	parsed.id = slcan_text_number_of(line + 1, id_digits);
-	parsed.length = length_of_code[slcan_text_number_of(line + 1 + id_digits, 1)];
+	parsed.length = (uint8_t)link_length_of_code(slcan_text_number_of(line + 1 + id_digits, 1));
 	data_digits = (parsed.flags & FRAME_REMOTE) != 0 ? 0 : 2u * parsed.length;
 	if (!link_frame_valid(&parsed) ||
 	    (length != head + data_digits && length != head + data_digits + STAMP_DIGITS))

@@ -49,6 +49,11 @@ __attribute__((format(printf, 2, 3))) void link_complain(struct link_message *me
 /* True for a frame that can stand on a bus (or be an error report): identifier, flags and length agree. */
 bool link_frame_valid(const struct frame *frame);
 
+/* Bytes of data that a data length code of 0 to 15 stands for in CAN FD; the least code that holds so many.
+ */
+unsigned link_length_of_code(unsigned code);
+unsigned link_code_of_length(unsigned length);
+
 /* CLOCK_MONOTONIC for deadlines, CLOCK_REALTIME for time_us. */
 int64_t link_now_us(void);
 int64_t link_clock_us(void);

@@ -66,13 +66,13 @@ static bool take_id(uint32_t id, struct frame *frame)
 /* bytes: how many of data count. */
 static bool take_data(const char *data, size_t room, unsigned dlc, unsigned bytes, struct frame *frame)
 {
-	static const unsigned char lengths[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
-	unsigned told = dlc < sizeof(lengths) ? lengths[dlc] : UINT_MAX;
+	unsigned told;
 
-	if ((frame->flags & FRAME_FD) == 0 && told > 8)
-		told = dlc < sizeof(lengths) ? 8 : UINT_MAX;
-	if (told > FRAME_DATA_MAX)
+	if (dlc > 15)
 		return false;
+	told = link_length_of_code(dlc);
+	if ((frame->flags & FRAME_FD) == 0 && told > 8)
+		told = 8;
 	frame->length = (uint8_t)told;
 	if ((frame->flags & FRAME_REMOTE) != 0)
 		return true;
