@@ -12,6 +12,7 @@
 #include "host/hdf5/foreign.h"
 #include "host/record/drop.h"
 #include "host/record/fields.h"
+#include "host/record/helper.h"
 #include "host/record/digest.h"
 #include "host/record/seal.h"
 #include "host/record/write.h"
@@ -269,21 +270,6 @@ static int write_image(const struct record *record)
 		H5Fclose(file);
 	H5Pclose(plan);
 	H5Pclose(access);
-	return result;
-}
-
-static int csv_to_hdf5(const struct source *source)
-{
-	char message[READ_MESSAGE_MAX];
-	struct record record;
-	int result;
-
-	if (read_csv(&record, source, message) != 0) {
-		fprintf(stderr, "%s\n", message);
-		return -1;
-	}
-	result = write_image(&record);
-	record_free(&record);
 	return result;
 }
 
@@ -557,21 +543,10 @@ static int read_image(const struct source *source)
 
 int main(int argc, char **argv)
 {
-	char message[READ_MESSAGE_MAX];
-	struct source source;
-	int result;
+	int code;
 
-	if (argc != 2 || (strcmp(argv[1], "read") != 0 && strcmp(argv[1], "write") != 0)) {
-		fputs("usage: droptower-hdf5 read|write <IN >OUT\n", stderr);
-		return 2;
-	}
 	H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* one line of our own instead */
-	if (source_load(&source, "/dev/stdin", "a recording", message) != 0) {
-		fprintf(stderr, "%s\n", message);
-		return 3;
-	}
-	result = strcmp(argv[1], "read") == 0 ? read_image(&source) : csv_to_hdf5(&source);
-	source_free(&source);
+	code = helper_serve(argc, argv, "droptower-hdf5", read_image, write_image);
 	H5close();
-	return result == 0 ? 0 : 3;
+	return code;
 }

@@ -19,6 +19,7 @@
 #include "common/base/text.h"
 #include "common/link/temporary.h"
 #include "host/mat/put.h"
+#include "host/record/helper.h"
 #include "host/record/mat.h"
 #include "host/record/tree.h"
 
@@ -360,36 +361,7 @@ static int mat_to_tree(const struct source *source)
 	return result;
 }
 
-static int csv_to_mat(const struct source *source)
-{
-	char message[READ_MESSAGE_MAX];
-	struct record record;
-	int result;
-
-	if (read_csv(&record, source, message) != 0) {
-		fprintf(stderr, "%s\n", message);
-		return -1;
-	}
-	result = put_record(&record);
-	record_free(&record);
-	return result;
-}
-
 int main(int argc, char **argv)
 {
-	char message[READ_MESSAGE_MAX];
-	struct source source;
-	int result;
-
-	if (argc != 2 || (strcmp(argv[1], "read") != 0 && strcmp(argv[1], "write") != 0)) {
-		fputs("usage: droptower-mat read|write <IN >OUT\n", stderr);
-		return 2;
-	}
-	if (source_load(&source, "/dev/stdin", "a recording", message) != 0) {
-		fprintf(stderr, "%s\n", message);
-		return 3;
-	}
-	result = strcmp(argv[1], "read") == 0 ? mat_to_tree(&source) : csv_to_mat(&source);
-	source_free(&source);
-	return result == 0 ? 0 : 3;
+	return helper_serve(argc, argv, "droptower-mat", mat_to_tree, put_record);
 }

@@ -93,3 +93,38 @@ int helper_write(const struct helper *helper, const struct record *record, FILE 
 	process_streams_close(&streams);
 	return error;
 }
+
+static int write_of_csv(const struct source *source, int (*write)(const struct record *record))
+{
+	char message[READ_MESSAGE_MAX];
+	struct record record;
+	int result;
+
+	if (read_csv(&record, source, message) != 0) {
+		fprintf(stderr, "%s\n", message);
+		return -1;
+	}
+	result = write(&record);
+	record_free(&record);
+	return result;
+}
+
+int helper_serve(int argc, char **argv, const char *program, int (*read)(const struct source *source),
+                 int (*write)(const struct record *record))
+{
+	char message[READ_MESSAGE_MAX];
+	struct source source;
+	int result;
+
+	if (argc != 2 || (strcmp(argv[1], "read") != 0 && strcmp(argv[1], "write") != 0)) {
+		fprintf(stderr, "usage: %s read|write <IN >OUT\n", program);
+		return 2;
+	}
+	if (source_load(&source, "/dev/stdin", "a recording", message) != 0) {
+		fprintf(stderr, "%s\n", message);
+		return 3;
+	}
+	result = strcmp(argv[1], "read") == 0 ? read(&source) : write_of_csv(&source, write);
+	source_free(&source);
+	return result == 0 ? 0 : 3;
+}

@@ -11,6 +11,7 @@
 
 #include "common/base/process.h"
 #include "host/record/read.h"
+#include "host/record/source.h"
 
 struct helper {
 	const char *program, *format; /* "droptower-hdf5", "HDF5" */
@@ -25,5 +26,10 @@ DT_MUST_USE int helper_run(const struct helper *helper, const char *verb, const 
 /* Its verb "write": our CSV of the record to what it gives, all of it to out. */
 DT_MUST_USE int helper_write(const struct helper *helper, const struct record *record, FILE *out,
                              const char *file, char message[READ_MESSAGE_MAX]);
+
+/* The main of such a program: `PROGRAM read`, a file of the library to standard output, and `PROGRAM write`,
+ * our CSV to one. Its exit code; read and write have said what is wrong where they give no 0. */
+int helper_serve(int argc, char **argv, const char *program, int (*read)(const struct source *source),
+                 int (*write)(const struct record *record));
 
 #endif
