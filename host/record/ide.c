@@ -99,16 +99,24 @@ static int take_polynomial(struct ide *ide, const struct ebml_element *of)
 	return 0;
 }
 
-static int take_calibrations(struct ide *ide, const struct ebml_element *of)
+/* What is in an element, as far as it is of one of two kinds. */
+static int take_inside(struct ide *ide, const struct ebml_element *of, uint32_t id, uint32_t other,
+                       int (*take)(struct ide *ide, const struct ebml_element *element), const char *cut)
 {
 	struct ebml inside = ebml_inside(of);
 	struct ebml_element element;
 	int more, error = 0;
 
 	while ((more = ebml_next(&inside, &element)) > 0 && !error)
-		if (element.id == ID_UNIVARIATE || element.id == ID_BIVARIATE)
-			error = take_polynomial(ide, &element);
-	return more < 0 ? ide_refuse(ide, "cut or damaged in its calibrations") : error;
+		if (element.id == id || element.id == other)
+			error = take(ide, &element);
+	return more < 0 ? ide_refuse(ide, cut) : error;
+}
+
+static int take_calibrations(struct ide *ide, const struct ebml_element *of)
+{
+	return take_inside(ide, of, ID_UNIVARIATE, ID_BIVARIATE, take_polynomial,
+	                   "cut or damaged in its calibrations");
 }
 
 /* ---- channels ---- */
@@ -239,26 +247,13 @@ static int take_channel(struct ide *ide, const struct ebml_element *of)
 
 static int take_channels(struct ide *ide, const struct ebml_element *of)
 {
-	struct ebml inside = ebml_inside(of);
-	struct ebml_element element;
-	int more, error = 0;
-
-	while ((more = ebml_next(&inside, &element)) > 0 && !error)
-		if (element.id == ID_CHANNEL)
-			error = take_channel(ide, &element);
-	return more < 0 ? ide_refuse(ide, "cut or damaged in its channels") : error;
+	return take_inside(ide, of, ID_CHANNEL, ID_CHANNEL, take_channel, "cut or damaged in its channels");
 }
 
 static int take_properties(struct ide *ide, const struct ebml_element *of)
 {
-	struct ebml inside = ebml_inside(of);
-	struct ebml_element element;
-	int more, error = 0;
-
-	while ((more = ebml_next(&inside, &element)) > 0 && !error)
-		if (element.id == ID_CHANNELS)
-			error = take_channels(ide, &element);
-	return more < 0 ? ide_refuse(ide, "cut or damaged in its properties") : error;
+	return take_inside(ide, of, ID_CHANNELS, ID_CHANNELS, take_channels,
+	                   "cut or damaged in its properties");
 }
 
 /* ---- blocks ---- */
@@ -323,7 +318,8 @@ static int take_block(struct ide *ide, const struct ebml_element *of)
 	struct ebml inside = ebml_inside(of);
 	struct ide_told told = {.has_channel = false};
 	struct ebml_element element;
-	struct ide_channel *channel = NULL;
+	const struct ide_channel *found;
+	struct ide_channel *channel;
 	struct ide_block block = {.first = 0};
 	int more;
 
@@ -332,11 +328,10 @@ static int take_block(struct ide *ide, const struct ebml_element *of)
 			return ide_refuse(ide, "cut or damaged in a block");
 	if (more < 0 || !told.has_channel || !told.has_first)
 		return ide_refuse(ide, "a block without its channel or its time: cut or damaged");
-	for (size_t i = 0; i < ide->channels; i++)
-		if (ide->channel[i].id == told.channel)
-			channel = &ide->channel[i];
-	if (channel == NULL)
+	found = ide_channel(ide, told.channel);
+	if (found == NULL)
 		return 0; /* not described: of the recorder's own */
+	channel = &ide->channel[found - ide->channel];
 	block.first = without_rollover(ide, channel, told.first);
 	block.last = told.has_last ? without_rollover(ide, channel, told.last) : block.first;
 	if (channel->wrong != NULL || told.data.size == 0)
