@@ -280,7 +280,8 @@ static int read_table_row(struct reading *reading, double time_s, const char *ce
 	if (isnan(time_s) && (size_t)(marks_end - cell) == record->channel_count)
 		return 0;
 	for (size_t i = 0; i < record->channel_count; i++, cell = comma + 1) {
-		uint8_t sample = marks_of_table(record->channels[i].name, &marks, marks_end);
+		uint8_t sample =
+		        marks < marks_end ? marks_of_table(record->channels[i].name, &marks, marks_end) : 0;
 		int error = 0;
 
 		comma = memchr(cell, ',', (size_t)(end - cell));

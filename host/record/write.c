@@ -7,22 +7,22 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/number.h"
+#include "common/base/text.h"
 #include "common/link/candump.h"
 #include "common/wire.h"
 #include "common/wire_table.h"
+#include "host/base/whole.h"
 #include "host/record/digest.h"
 #include "host/record/drop.h"
 #include "host/record/fields.h"
 #include "host/record/hdf5.h"
 #include "host/record/lcm_codec.h"
-#include "common/base/number.h"
 #include "host/record/lcm_log.h"
 #include "host/record/mat.h"
 #include "host/record/mme.h"
 #include "host/record/seal.h"
-#include "common/base/text.h"
 #include "host/record/uff58.h"
-#include "host/base/whole.h"
 
 /* ---- frames ---- */
 
@@ -200,9 +200,13 @@ static void put_marks(const struct record *record, const size_t *next, double no
 
 	for (size_t i = 0; i < record->channel_count; i++) {
 		const struct channel *channel = &record->channels[i];
-		const char *word = is_due(channel, next[i], now) ? word_of(channel, next[i]) : "";
-		bool clipped = is_due(channel, next[i], now) && is_clipped(channel, next[i]);
+		const char *word;
+		bool clipped;
 
+		if (!is_due(channel, next[i], now))
+			continue;
+		word = word_of(channel, next[i]);
+		clipped = is_clipped(channel, next[i]);
 		if (word[0] == '\0' && !clipped)
 			continue;
 		fprintf(out, "%s%s%s%s%s", between, channel->name, word[0] ? " " : "", word,
