@@ -172,24 +172,18 @@ const char scenario_actions[] =
 
 bool scenario_parse_action(unsigned count, char **words, uint8_t sequence, struct event *event)
 {
-	if (strcmp(words[0], "fault") == 0 || strcmp(words[0], "repair") == 0)
-		return parse_fault(count, words, event);
+	static const struct {
+		const char *word;
+		bool (*parse)(unsigned count, char **words, struct event *event);
+	} actions[] = {{"fault", parse_fault},       {"repair", parse_fault}, {"reset", parse_reset},
+	               {"hang", parse_hang},         {"gate", parse_gate},    {"dropout", parse_dropout},
+	               {"friction", parse_friction}, {"spike", parse_spike},  {"let_go", parse_let_go}};
+
 	if (strcmp(words[0], "send") == 0)
 		return parse_send(count, words, sequence, event);
-	if (strcmp(words[0], "reset") == 0)
-		return parse_reset(count, words, event);
-	if (strcmp(words[0], "hang") == 0)
-		return parse_hang(count, words, event);
-	if (strcmp(words[0], "gate") == 0)
-		return parse_gate(count, words, event);
-	if (strcmp(words[0], "dropout") == 0)
-		return parse_dropout(count, words, event);
-	if (strcmp(words[0], "friction") == 0)
-		return parse_friction(count, words, event);
-	if (strcmp(words[0], "spike") == 0)
-		return parse_spike(count, words, event);
-	if (strcmp(words[0], "let_go") == 0)
-		return parse_let_go(count, words, event);
+	for (size_t i = 0; i < sizeof(actions) / sizeof(actions[0]); i++)
+		if (strcmp(words[0], actions[i].word) == 0)
+			return actions[i].parse(count, words, event);
 	return parse_bus(count, words, event);
 }
 
