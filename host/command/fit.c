@@ -217,16 +217,17 @@ static int fit_page(const struct fitted *fitted, const char *file)
 {
 	char message[READ_MESSAGE_MAX] = "no memory";
 	struct text text;
-	int error = text_open(&text);
+	int code, error = text_open(&text);
 
 	if (error == 0)
 		error = text_close(&text, fitted_page(fitted, text.out, message, sizeof(message)));
-	if (error == 0)
-		error = whole_write(file, text.bytes, text.size, message, sizeof(message));
-	if (error != 0)
+	if (error != 0) {
 		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	code = command_write(file, text.bytes, text.size);
 	free(text.bytes);
-	return error != 0 ? COMMAND_INPUT : COMMAND_DONE;
+	return code;
 }
 
 static int fit_told(const struct fitting *f)
