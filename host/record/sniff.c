@@ -129,7 +129,7 @@ static int read_head(struct sniff_work *work, struct sniff *sniff, size_t column
 			                     "\"%.*s\": a rate with a comma or point for thousands or for a "
 			                     "decimal sign, expected --columns with name:unit@RATE_HZ",
 			                     (int)(line.length < 60 ? line.length : 60), line.text);
-		if (sniff_tells_scale(&line))
+		if (sniff_tells_scale(&line, sniff->style))
 			return source_refuse(work->message, DT_E_FORMAT, work->source->file, line.number,
 			                     "\"%.*s\" may be in the numbers or not, expected --columns that "
 			                     "says so, e.g. name:g or name:g*FACTOR",

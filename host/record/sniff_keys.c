@@ -55,7 +55,7 @@ static size_t begins_with(struct piece text, const char *word)
 			at += at < text.length && strchr(" _-", text.text[at]) != NULL;
 			continue;
 		}
-		if (at == text.length || tolower((unsigned char)text.text[at]) != *word)
+		if (at == text.length || tolower((unsigned char)text.text[at]) != (unsigned char)*word)
 			return 0;
 		at++;
 	}
@@ -124,11 +124,24 @@ double sniff_rate(const struct source_line *line, struct cells_style style)
 	return value * unit_hertz(unit);
 }
 
-static const char *const scale_words[] = {"scale",       "scale factor", "scaling",      "scaling factor",
-                                          "factor",      "scale_factor", "multiplier",   "conversion factor",
-                                          "faktor",      "skalierung",   "skalenfaktor", "skalierungsfaktor",
-                                          "y multiplier"};
-enum { SCALE_WORDS = sizeof(scale_words) / sizeof(scale_words[0]) };
+/* Those from SCALE_ANYWHERE on may follow other words: "Amplifier gain", but neither "Full scale" nor "Crest
+ * factor". */
+static const char *const scale_words[] = {"scale",
+                                          "factor",
+                                          "faktor",
+                                          "scale factor",
+                                          "scaling",
+                                          "scaling factor",
+                                          "multiplier",
+                                          "skalierung",
+                                          "skalenfaktor",
+                                          "y multiplier",
+                                          "conversion factor",
+                                          "skalierungsfaktor",
+                                          "verstaerkung",
+                                          "gain",
+                                          "verst\xc3\xa4rkung"};
+enum { SCALE_WORDS = sizeof(scale_words) / sizeof(scale_words[0]), SCALE_ANYWHERE = 3 };
 
 bool sniff_is_scale(struct piece key)
 {
@@ -138,21 +151,38 @@ bool sniff_is_scale(struct piece key)
 	return false;
 }
 
-bool sniff_tells_scale(const struct source_line *line)
+/* Each number from at on, as many as there are channels, up to what is none. */
+static bool tells_other_than_one(const struct piece *text, struct cells_style style, size_t at)
 {
-	struct piece text = head_words(line);
-	double value = 1;
-	size_t at;
+	size_t digit;
 
-	for (size_t i = 0; i < SCALE_WORDS; i++) {
-		if (!sniff_begins(text, scale_words[i]))
-			continue;
-		at = strlen(scale_words[i]);
-		while (at < text.length && strchr(" \t:=;,\"", text.text[at]))
+	for (;;) {
+		while (at < text->length && strchr(" \t:=;,\"", text->text[at]))
 			at++;
-		value = at < text.length && isdigit((unsigned char)text.text[at])
-		                ? told_number(&text, (struct cells_style){0}, &at)
-		                : value;
+		digit = at;
+		while (digit < text->length && strchr("+-.", text->text[digit]))
+			digit++;
+		if (digit == text->length || !isdigit((unsigned char)text->text[digit]))
+			return false;
+		if (!(fabs(told_number(text, style, &at) - 1) < 1e-12))
+			return true;
 	}
-	return !(fabs(value - 1) < 1e-12);
+}
+
+bool sniff_tells_scale(const struct source_line *line, struct cells_style style)
+{
+	struct piece text = head_words(line), rest;
+	size_t length;
+
+	for (size_t at = 0; at < text.length && strchr(":=;,\t", text.text[at]) == NULL; at++) {
+		rest = (struct piece){text.text + at, text.length - at};
+		for (size_t i = at == 0 ? 0 : SCALE_ANYWHERE; i < SCALE_WORDS; i++) {
+			length = begins_with(rest, scale_words[i]);
+			if (length > 0 && (length == rest.length || !sniff_is_letter(rest.text[length])) &&
+			    (at == 0 || !sniff_is_letter(rest.text[-1])) &&
+			    tells_other_than_one(&rest, style, length))
+				return true;
+		}
+	}
+	return false;
 }

@@ -64,7 +64,7 @@ DT_MUST_USE int sniff_settle_names(struct sniff *sniff, const struct piece *unit
 double sniff_rate(const struct source_line *line, struct cells_style style);
 
 /* A line like "Scale factor: 2", of a number other than 1. */
-bool sniff_tells_scale(const struct source_line *line);
+bool sniff_tells_scale(const struct source_line *line, struct cells_style style);
 
 /* ---- */
 

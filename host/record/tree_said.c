@@ -94,12 +94,11 @@ static bool says_start(const struct tree_node *node, struct piece key)
 
 static bool says_scale(const struct tree_node *node, struct piece key)
 {
-	static const char *const offsets[] = {"offset", "add_offset", NULL}, *const gains[] = {"gain", NULL};
+	static const char *const offsets[] = {"offset", "add_offset", NULL};
 	double value = tree_numbers(node) == 1 ? tree_number(node, 0) : 0;
 
 	return tree_numbers(node) == 1 &&
-	       ((sniff_is_scale(key) || key_is(key, gains)) ? fabs(value - 1) > 1e-12
-	                                                    : key_is(key, offsets) && fabs(value) > 1e-12);
+	       (sniff_is_scale(key) ? fabs(value - 1) > 1e-12 : key_is(key, offsets) && fabs(value) > 1e-12);
 }
 
 /* "acc_units" and "units_acc" beside "acc". */
