@@ -386,6 +386,9 @@ static const char *contradiction(const struct scene *scene)
 	if (isnan(scene->contact_stiffness_n_m15) != isnan(scene->contact_duration_s))
 		return "a predicted contact is whole, expected duration_s and stiffness_n_m15 both '" CORNER
 		       "' or neither";
+	for (size_t i = 0; i < SCENE_FITTED && isnan(scene->contact_stiffness_n_m15); i++)
+		if (scene->fitted_u[i] > 0.0)
+			return "the contact is '" CORNER "', expected no [fit], which is of another contact";
 	if (scene->mount_plate_mass_kg > 0.0 &&
 	    !(scene->mount_stiffness_n_m > 0.0 && scene->mount_cube_m > 0.0))
 		return "a plate needs mounts, expected stiffness_n_m and cube_m above 0";

@@ -26,7 +26,7 @@ struct scene {
 #include "common/scenes/scene.def"
 #undef SCENE_KEY
 	double predicted_u;            /* relative, of a stiffness_n_m15 that was `corner`; 0: it was not */
-	double fitted_u[SCENE_FITTED]; /* 0: not known */
+	double fitted_u[SCENE_FITTED]; /* 0: not known; of a predicted contact the first alone */
 	double fitted_correlation[SCENE_FITTED][SCENE_FITTED];
 	/* Section [limits] as it stands, "LINE:KEY=VALUE\n" each: what it means is the host's
 	 * (host/result/plan.h). */

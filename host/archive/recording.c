@@ -15,6 +15,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "host/model/corner.h"
+#include "host/model/model.h"
 #include "host/result/plan.h"
 #include "host/archive/proof.h"
 
@@ -92,6 +94,30 @@ static int set_height(struct archive *archive, double height_m, double measured_
 
 	return result != 0 ? result
 	                   : set_number(archive, "duration_height_m", measured_m, "duration_s", text);
+}
+
+/* What a scene leaves to be predicted of its contact, at the series' own angle and height, with the
+ * uncertainty where a fit would have put it: a later version may predict otherwise. */
+static int set_contact(struct archive *archive, struct scene *scene, char **text)
+{
+	char reason[MODEL_MESSAGE_MAX], *with;
+	int result;
+
+	if (!isnan(scene->contact_stiffness_n_m15))
+		return 0;
+	if (corner_fill(scene, reason) != 0)
+		return archive_refuse(archive, DT_E_RANGE, "the scene of the series: %s", reason);
+	result = set_number(archive, "duration_s", scene->contact_duration_s, NULL, text);
+	if (result == 0)
+		result = set_number(archive, "stiffness_n_m15", scene->contact_stiffness_n_m15, NULL, text);
+	if (result != 0)
+		return result;
+	if (asprintf(&with, "\n; stiffness_n_m15 was predicted from the materials\n[fit]\n%s = %.6g\n",
+	             scene_fitted[0], scene->fitted_u[0]) < 0)
+		return archive_refuse(archive, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
+	result = put_line(archive, text, *text + strlen(*text), false, with);
+	free(with);
+	return result;
 }
 
 /* Names that do not depend on where the scene stood, a line each in place of those that were there. */
@@ -177,6 +203,8 @@ int archive_new_series(struct archive *archive, const char *name, const char *ca
 		result = set_chain(archive, scene.chain, &text);
 	if (result == 0)
 		result = scene_of_text(archive, name, text, angle_deg, &scene);
+	if (result == 0)
+		result = set_contact(archive, &scene, &text);
 	if (result == 0)
 		result = archive_change(archive);
 	if (result == 0)

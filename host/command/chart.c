@@ -8,6 +8,7 @@
 
 #include "host/chart/chart.h"
 #include "host/command/command.h"
+#include "host/model/corner.h"
 
 static const struct subject {
 	const char *name;
@@ -73,7 +74,8 @@ static int take_scene(const struct arguments *arguments, struct chart_options *o
 	char message[CHART_MESSAGE_MAX];
 	struct scene scene;
 
-	if (arguments->scene_file && scene_read(&scene, arguments->scene_file, message)) {
+	if (arguments->scene_file &&
+	    (scene_read(&scene, arguments->scene_file, message) != 0 || corner_fill(&scene, message) != 0)) {
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}

@@ -162,9 +162,9 @@ static int find_motion(struct evaluated *e, const struct scene *scene)
 	struct fit_later later;
 	int result;
 
-	e->analysis.has_motion =
-	        ensemble_fitted(scene) && evaluate_fit_drop(e->report.record, scene->drop_angle_deg,
-	                                                    scene->drop_height_m, &drop) == NULL;
+	e->analysis.has_motion = ensemble_fitted(scene) && !corner_predicted(scene) &&
+	                         evaluate_fit_drop(e->report.record, scene->drop_angle_deg,
+	                                           scene->drop_height_m, &drop) == NULL;
 	if (!e->analysis.has_motion)
 		return 0;
 	result = fit_later_drop(scene, &drop, &options, &later, e->refused);

@@ -321,8 +321,6 @@ int command_model(int argc, char **argv)
 		code = evaluate_read_scene(&scene, a.scene_file, a.angle_deg);
 	if (code != COMMAND_DONE)
 		return code;
-	if (scene.predicted_u > 0.0)
-		scene.fitted_u[0] = scene.predicted_u;
 	a.ensemble.scene = &scene;
 	a.ensemble.seed = a.seed != NO_SEED ? a.seed : 1;
 	if (a.design_keys)
@@ -330,6 +328,7 @@ int command_model(int argc, char **argv)
 	else if (a.vary)
 		code = parse_vary(&a.ensemble, a.vary);
 	else if (a.draws > 0 && !ensemble_fitted(&scene))
-		code = command_usage("model", "--monte-carlo needs --vary, or a scene with [fit]");
+		code = command_usage(
+		        "model", "--monte-carlo needs --vary, or a scene with [fit] or of contact 'corner'");
 	return code == COMMAND_DONE ? model_answer(&a) : code;
 }

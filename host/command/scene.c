@@ -15,9 +15,11 @@
 #include "host/base/whole.h"
 #include "host/command/command.h"
 #include "host/model/contact.h"
+#include "host/model/corner.h"
 
 struct arguments {
 	double mass_kg, length_m, width_m, thickness_m, height_m, s2_offset_m, plate_kg, cube_m;
+	double mat_modulus_pa, mat_thickness_m, edge_radius_m; /* all or none */
 };
 
 static const struct option_row rows[] = {
@@ -33,17 +35,26 @@ static const struct option_row rows[] = {
                       "the plate with S1; 0: there is none"),
         OPTION_NUMBER("cube", "M", struct arguments, cube_m, 0, 0.1,
                       "side of one of the four rubber cubes under it"),
+        OPTION_NUMBER("mat-modulus", "PA", struct arguments, mat_modulus_pa, 1e3, 1e12,
+                      "of the rubber it falls on, to predict the contact with the next two"),
+        OPTION_NUMBER("mat-thickness", "M", struct arguments, mat_thickness_m, 1e-4, 1, "of that mat"),
+        OPTION_NUMBER("edge-radius", "M", struct arguments, edge_radius_m, 1e-5, 1,
+                      "of the edge that strikes, 0.25 to 2 mats' thickness"),
 };
+
+enum { ASKED = 8 }; /* the first rows; the others are given or not */
 
 static const struct option_table scene_options = {
         .program = "droptower",
         .command = "scene",
         .head = "usage: droptower scene new FILE.ini [OPTIONS]\n"
                 "\n"
-                "A first scene of a product. What no option gives is asked for on a terminal. Contact, grip "
+                "A first scene of a product. What no option gives is asked for on a terminal, but for mat "
                 "and "
-                "mounts are\n"
-                "filled by rules of the study's boxes, to be improved by 'droptower fit'.\n"
+                "edge.\n"
+                "Contact, grip and mounts are filled by rules of the study's boxes, to be improved by "
+                "'droptower fit';\n"
+                "with mat and edge the contact is 'corner', which predicts it with its uncertainty.\n"
                 "\n",
         OPTION_ROWS(rows),
         .words = true,
@@ -99,6 +110,12 @@ static void scene_fill(const struct arguments *a, const char *file, struct scene
 	speed = sqrt(2.0 * s->drop_gravity_m_s2 * a->height_m);
 	if (contact_law_init(&law, RULE_RESTITUTION) == 0)
 		s->contact_duration_s = contact_duration(&law, a->mass_kg, speed, RULE_STIFFNESS_N_M15);
+	if (a->mat_modulus_pa > 0.0) {
+		s->contact_stiffness_n_m15 = s->contact_duration_s = (double)NAN;
+		s->contact_mat_modulus_pa = a->mat_modulus_pa;
+		s->contact_mat_thickness_m = a->mat_thickness_m;
+		s->contact_corner_radius_m = a->edge_radius_m;
+	}
 	if (!(a->plate_kg > 0.0))
 		return;
 	s->mount_plate_mass_kg = a->plate_kg;
@@ -113,17 +130,22 @@ static int scene_make(const struct arguments *a, const char *file)
 {
 	char message[SCENE_MESSAGE_MAX];
 	struct whole whole;
-	struct scene s = {
+	struct scene predicted, s = {
 #define SCENE_KEY(section, key, min, max, initial, doc) .section##_##key = initial,
 #include "common/scenes/scene.def"
 #undef SCENE_KEY
-	};
+	                        };
 
 	if (access(file, F_OK) == 0) {
 		command_error("%s: there is one already, expected a new file", file);
 		return COMMAND_INPUT;
 	}
 	scene_fill(a, file, &s);
+	predicted = s;
+	if (corner_fill(&predicted, message) != 0) {
+		command_error("%s: %s", file, message);
+		return COMMAND_INPUT;
+	}
 	if (whole_open(&whole, file, message, sizeof(message)) == 0) {
 		scene_write(&s, whole.out);
 		if (whole_close(&whole, 0, message, sizeof(message)) == 0 &&
@@ -136,16 +158,20 @@ static int scene_make(const struct arguments *a, const char *file)
 
 int command_scene(int argc, char **argv)
 {
-	struct arguments a = {NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
-	double *value[] = {&a.mass_kg,  &a.length_m,    &a.width_m,  &a.thickness_m,
-	                   &a.height_m, &a.s2_offset_m, &a.plate_kg, &a.cube_m};
+	struct arguments a = {NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+	double *value[ASKED] = {&a.mass_kg,  &a.length_m,    &a.width_m,  &a.thickness_m,
+	                        &a.height_m, &a.s2_offset_m, &a.plate_kg, &a.cube_m};
 	int code = option_read(&scene_options, &a, argc, argv);
 
 	if (code != OPTIONS_READ)
 		return code;
 	if (argc - optind != 2 || strcmp(argv[optind], "new") != 0)
 		return command_usage("scene", "expected new FILE.ini");
-	for (int i = 0; i < scene_options.count; i++) {
+	if (isnan(a.mat_modulus_pa) != isnan(a.mat_thickness_m) ||
+	    isnan(a.mat_modulus_pa) != isnan(a.edge_radius_m))
+		return command_usage("scene", "expected --mat-modulus, --mat-thickness and --edge-radius "
+		                              "together, or none of them");
+	for (int i = 0; i < ASKED; i++) {
 		if (value[i] == &a.cube_m && !(a.plate_kg > 0.0))
 			continue;
 		code = scene_ask(&rows[i], value[i]);

@@ -400,6 +400,7 @@ static void conclude_scene(const struct solve *s, const struct scene *start, str
 	struct scene *to = &fit->scene;
 
 	*to = *start;
+	to->predicted_u = 0.0;
 	motion_to_scene(s->common, to);
 	if (isfinite(fit->drop[0].derived[MOTION_CONTACT_S])) {
 		to->contact_duration_s = fit->drop[0].derived[MOTION_CONTACT_S];

@@ -8,6 +8,7 @@
 #include "host/fit/fit_private.h"
 #include "host/fit/judge.h"
 #include "host/fit/prepare.h"
+#include "host/model/corner.h"
 
 /* ---- predictions ---- */
 
@@ -118,7 +119,8 @@ int fit_later_drop(const struct scene *scene, const struct fit_drop *drop, const
 	if (!s.motion) {
 		error = DT_E_MEMORY;
 		snprintf(message, FIT_MESSAGE_MAX, "no memory");
-	} else if (!(scene->fitted_u[MOTION_LN_STIFFNESS] > 0.0) || !start_known(scene, &s)) {
+	} else if (!(scene->fitted_u[MOTION_LN_STIFFNESS] > 0.0) || corner_predicted(scene) ||
+	           !start_known(scene, &s)) {
 		error = DT_E_ARGUMENT;
 		snprintf(message, FIT_MESSAGE_MAX, "the scene has no [fit] that is a covariance");
 	} else {

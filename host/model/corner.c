@@ -194,8 +194,17 @@ int corner_fill(struct scene *scene, char *message)
 	        corner.stiffness_n_m15 / body_wedge(UNITS_RAD(scene->drop_angle_deg));
 	scene->contact_duration_s =
 	        contact_duration(&law, scene->contact_mass_kg, speed, corner.stiffness_n_m15);
-	scene->predicted_u = corner.relative_u;
+	scene->predicted_u = scene->fitted_u[0] = corner.relative_u;
+	scene->fitted_correlation[0][0] = 1.0;
 	return 0;
+}
+
+bool corner_predicted(const struct scene *scene)
+{
+	for (int i = 1; i < SCENE_FITTED; i++)
+		if (scene->fitted_u[i] > 0.0)
+			return false;
+	return scene->fitted_u[0] > 0.0;
 }
 
 void corner_follow(struct scene *scene, double *number, double value)

@@ -9,6 +9,8 @@
  *
  * Pure functions, any thread; SI units.
  */
+#include <stdbool.h>
+
 #include "common/error.h"
 #include "common/scenes/scene.h"
 
@@ -34,8 +36,12 @@ struct corner {
 DT_MUST_USE int corner_predict(const struct scene *scene, struct corner *corner, char *message);
 
 /* Puts numbers in place of stiffness_n_m15 and duration_s of a scene that leaves both to it (NAN), and the
- * uncertainty beside them; leaves another scene alone. 0, or as corner_predict. */
+ * uncertainty where that of a fit would stand; leaves another scene alone. 0, or as corner_predict. */
 DT_MUST_USE int corner_fill(struct scene *scene, char *message);
+
+/* Whether all that is known of a scene's uncertainty is that of its stiffness: it was predicted. A fit finds
+ * restitution with it. */
+bool corner_predicted(const struct scene *scene);
 
 /* Sets one number of such a scene, and both after it; to NAN beyond the table. */
 void corner_follow(struct scene *scene, double *number, double value);

@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "host/model/contact.h"
 #include "host/model/corner.h"
 
 static const struct vary_key keys[] = {
@@ -85,9 +86,21 @@ void vary_set(struct scene *scene, const struct vary_key *key, double value)
 	}
 }
 
+/* Of the contact's law, as the scene has it; NAN: there is no such law. */
+static double vary_contact_time(const struct scene *s)
+{
+	double speed = sqrt(2.0 * s->drop_gravity_m_s2 * s->contact_duration_height_m);
+	struct contact_law law;
+
+	return contact_law_init(&law, s->contact_restitution) == 0
+	               ? contact_duration(&law, s->contact_mass_kg, speed, s->contact_stiffness_n_m15)
+	               : (double)NAN;
+}
+
 /* In the order of scene_fitted. */
 void vary_fitted(struct scene *s, const double move[SCENE_FITTED])
 {
+	double before = vary_contact_time(s);
 	double *const relative[SCENE_FITTED] = {
 	        [0] = &s->contact_stiffness_n_m15, [3] = &s->contact_tangential_ratio,
 	        [4] = &s->mount_stiffness_n_m,     [6] = &s->mount_softening_strain,
@@ -98,6 +111,7 @@ void vary_fitted(struct scene *s, const double move[SCENE_FITTED])
 		if (relative[i])
 			*relative[i] *= exp(move[i]);
 	s->contact_restitution = 1.0 / (1.0 + (1.0 / s->contact_restitution - 1.0) * exp(-move[1]));
+	s->contact_duration_s *= vary_contact_time(s) / before;
 	s->product_balance_angle_deg += move[2];
 	s->mount_softening = fmax(s->mount_softening + move[5], 0.0);
 	s->sensor_s1_yaw_deg += move[8];

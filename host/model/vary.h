@@ -38,7 +38,8 @@ DT_MUST_USE int vary_find(const char *name, struct vary_key *key);
 /* Calls each(key, context) for every key of scene.def, under its full name. */
 void vary_each(void (*each)(const struct vary_key *key, void *context), void *context);
 
-/* Moves what a fit found, by so much in the coordinates of [fit]: scene_fitted of scene.h. */
+/* Moves what a fit found, by so much in the coordinates of [fit]: scene_fitted of scene.h. The contact time
+ * follows stiffness and restitution. */
 void vary_fitted(struct scene *scene, const double move[SCENE_FITTED]);
 
 double vary_get(const struct scene *scene, const struct vary_key *key);

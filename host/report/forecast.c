@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "host/model/auto.h"
+#include "host/model/corner.h"
 #include "host/base/put.h"
 
 enum { CELL_MAX = 48, ROW_MAX = CELL_MAX * (ENSEMBLE_OUTPUTS + ENSEMBLE_KEYS_MAX) };
@@ -71,10 +72,11 @@ int forecast_text(const struct forecast *f, FILE *out)
 		text_row(out, outputs[i]->key, ensemble_value(p, outputs[i]),
 		         f->u ? f->u[outputs[i] - ensemble_outputs] : none,
 		         f->next ? ensemble_value(f->next, outputs[i]) : none);
-	if (f->scene->predicted_u > 0.0)
+	if (corner_predicted(f->scene))
 		fprintf(out,
-		        "\nthe contact is predicted: %.3g N/m^1.5 +- %.0f %%, for which the bars stand\n",
-		        p->stiffness_n_m15, 100.0 * f->scene->predicted_u);
+		        "\nthe contact is predicted: %.3g N/m^1.5 at 25 deg +- %.0f %%, for which the bars "
+		        "stand\n",
+		        f->scene->contact_stiffness_n_m15, 100.0 * f->scene->fitted_u[0]);
 	else if (f->u)
 		fputs("\n+-: standard uncertainty by [fit] of the scene; the law's own error is not in it\n",
 		      out);

@@ -2,6 +2,7 @@
 #include <inttypes.h>
 #include <math.h>
 
+#include "host/model/corner.h"
 #include "host/model/ensemble.h"
 #include "host/report/page.h"
 #include "host/result/quantity.h"
@@ -139,14 +140,14 @@ static void model(struct page *page)
 	      "known well enough to compare.",
 	      out);
 	if (fitted)
-		fputs(" Behind the model's value, &plusmn;: the standard uncertainty of what one drop may "
-		      "show, by the "
-		      "fit of the scene, angle and speed about what was set and the sensors' gains; the "
-		      "law's own "
-		      "error is not in it. Agrees: within twice both uncertainties; 2 sigma: beyond; not "
-		      "possible: "
-		      "beyond four times.",
-		      out);
+		fprintf(out,
+		        " Behind the model's value, &plusmn;: the standard uncertainty of what one drop may "
+		        "show, by %s, angle and speed about what was set and the sensors' gains; the law's "
+		        "own error is not in it. Agrees: within twice both uncertainties; 2 sigma: beyond; "
+		        "not possible: beyond four times.",
+		        corner_predicted(page->report->scene)
+		                ? "the contact's stiffness, which is predicted from the materials"
+		                : "the fit of the scene");
 	else if (simpler)
 		fprintf(out, " Next simpler model: how far %s is from the model.",
 		        page->report->below->fidelity);

@@ -14,6 +14,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
+#include "host/model/corner.h"
 #include "tests/unit/archive_trial.h"
 #include "tests/unit/near.h"
 
@@ -372,6 +373,54 @@ static void test_a_series_from_another_height(void **state)
 	archive_close(archive);
 }
 
+static void write_whole_scene(const char *path, const struct scene *scene)
+{
+	FILE *out = fopen(path, "w");
+
+	assert_non_null(out);
+	scene_write(scene, out);
+	assert_int_equal(fclose(out), 0);
+}
+
+/* A contact that was left to be predicted: its numbers at the series' angle and height, and their bar. */
+static void test_a_series_keeps_what_was_predicted(void **state)
+{
+	struct archive *archive = trial_open(ARCHIVE_CREATE);
+	struct scene scene, expected;
+	char path[100];
+
+	(void)state;
+	snprintf(path, sizeof(path), "%s/scene.ini", trial_folder);
+	assert_int_equal(scene_read(&expected, TRIAL_SCENE, trial_message), 0);
+	expected.contact_stiffness_n_m15 = expected.contact_duration_s = (double)NAN;
+	write_whole_scene(path, &expected);
+	assert_int_equal(archive_new_series(archive, "s", "trial", path, 33, 0.7, NULL, 5), 0);
+	expected.drop_angle_deg = 33;
+	expected.drop_height_m = 0.7;
+	assert_int_equal(corner_fill(&expected, trial_message), 0);
+	for (int again = 0; again < 2; again++) {
+		assert_int_equal(archive_scene(archive, "s", &scene), 0);
+		assert_near_part(scene.contact_stiffness_n_m15, expected.contact_stiffness_n_m15, 1e-14);
+		assert_near_part(scene.contact_duration_s, expected.contact_duration_s, 1e-14);
+		assert_near(scene.contact_duration_height_m, 0.894, 0);
+		assert_near_part(scene.fitted_u[0], expected.fitted_u[0], 1e-5);
+		assert_true(scene.fitted_u[0] > 0.5 && corner_predicted(&scene));
+		archive_close(archive);
+		assert_int_equal(archive_rebuild(trial_folder, false, trial_count, &(int){0}, trial_message),
+		                 0);
+		archive = trial_open(ARCHIVE_WRITE);
+	}
+	expected.contact_stiffness_n_m15 = expected.contact_duration_s = (double)NAN;
+	expected.contact_corner_radius_m = 0.001;
+	expected.fitted_u[0] = 0.0;
+	write_whole_scene(path, &expected);
+	assert_int_equal(archive_new_series(archive, "t", "trial", path, 33, 0.7, NULL, 5), DT_E_RANGE);
+	assert_non_null(strstr(archive_message(archive), "corner_radius_m"));
+	assert_int_equal(archive_scene(archive, "t", &scene), DT_E_UNKNOWN);
+	archive_close(archive);
+	assert_int_equal(unlink(path), 0);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -384,6 +433,7 @@ int main(void)
 	        IN_A_TRIAL(test_a_series_staged_but_not_in_its_place),
 	        IN_A_TRIAL(test_a_drop_staged_but_not_in_its_place_is_rebuilt),
 	        IN_A_TRIAL(test_a_series_from_another_height),
+	        IN_A_TRIAL(test_a_series_keeps_what_was_predicted),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -19,6 +19,7 @@
 #include "common/units.h"
 #include "host/model/body.h"
 #include "host/model/corner.h"
+#include "host/model/ensemble.h"
 #include "host/model/model.h"
 #include "host/model/vary.h"
 #include "tests/unit/near.h"
@@ -264,6 +265,45 @@ static void a_changed_scene_is_predicted_again(void **state)
 	assert_true(isnan(moved.contact_stiffness_n_m15) && isnan(moved.contact_duration_s));
 }
 
+/* Peaks are as stiffness^0.4: those of a half-sine exactly, the box's own at the balance angle but for its
+ * weight, which is a hundredth of the force. The logarithm of the stiffness is moved by its bar to each side.
+ */
+static void bars_stand_for_the_predicted_stiffness(void **state)
+{
+	struct ensemble e = {.fidelity = MODEL_SDOF, .options = model_defaults, .seed = 3};
+	struct ensemble_spread spread[ENSEMBLE_OUTPUTS];
+	struct model_prediction p;
+	struct scene scene;
+	double u[ENSEMBLE_OUTPUTS], share;
+	size_t box = 0, failed;
+
+	(void)state;
+	while (strcmp(ensemble_outputs[box].key, "box_peak_g") != 0)
+		box++;
+	assert_int_equal(read_scene("corner", "corner", &scene), 0);
+	assert_false(corner_predicted(&scene));
+	assert_int_equal(corner_fill(&scene, message), 0);
+	assert_true(corner_predicted(&scene));
+	e.scene = &scene;
+	share = 0.4 * predicted(&scene).relative_u;
+	assert_int_equal(model_solve(&scene, MODEL_SDOF, NULL, &p, message), 0);
+	assert_true(ensemble_bars(&e, u));
+	assert_near_part(u[box], p.box.value_g * sinh(share), 1e-6);
+	assert_int_equal(ensemble_monte_carlo(&e, 4000, spread, &failed), 0);
+	assert_near_part(spread[box].low, p.box.value_g * exp(-1.96 * share), 0.05);
+	assert_near_part(spread[box].high, p.box.value_g * exp(1.96 * share), 0.05);
+	e.fidelity = MODEL_PLANAR;
+	assert_int_equal(model_solve(&scene, MODEL_PLANAR, NULL, &p, message), 0);
+	assert_true(ensemble_bars(&e, u));
+	assert_near_part(u[box], p.box.value_g * sinh(share), 0.02);
+
+	scene.fitted_u[1] = 0.01; /* a fit's */
+	assert_false(corner_predicted(&scene));
+	scene.contact_stiffness_n_m15 = scene.contact_duration_s = (double)NAN;
+	assert_int_equal(scene_check(&scene, "here", message), DT_E_RANGE);
+	assert_non_null(strstr(message, "[fit]"));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -275,6 +315,7 @@ int main(void)
 	        cmocka_unit_test(beyond_the_table_the_key_is_named),
 	        cmocka_unit_test(a_scene_may_leave_its_contact_to_it),
 	        cmocka_unit_test(a_changed_scene_is_predicted_again),
+	        cmocka_unit_test(bars_stand_for_the_predicted_stiffness),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
