@@ -55,13 +55,15 @@ struct run {
 	struct ode ode;
 	double released_s; /* corner 0 left the mat first; NAN: not yet */
 	double second_s;   /* the second touch of any corner; NAN: none yet */
-	double touched_s;  /* the last one */
 	int second_corner;
 	struct event event;
-	double contact_end_s; /* whoever has not left the mat by then will not */
-	double window_s;      /* the peaks of a box that leaves are looked for up to here, or so */
-	bool strikes;         /* another touch may come before that */
-	double period_s;      /* of the plate, 0 without one */
+	double contact_end_s;          /* whoever has not left the mat in this time will not */
+	double window_s;               /* the peaks of a box that leaves are looked for up to here, or so; */
+	double begin_by_s;             /* touches are followed that begin by then, */
+	double follow_s[BODY_CORNERS]; /* each while it lasts, up to here; 0: it is not; */
+	double fly_s;                  /* then what flies, up to here */
+	bool strikes;                  /* another touch may come before that */
+	double period_s;               /* of the plate, 0 without one */
 };
 
 static void course_rates(const void *context, const double y[], double rate[])
@@ -127,6 +129,7 @@ static void course_start(struct run *c, const struct course *in)
 	duration = contact_duration(&p->law, p->case_mass_kg, p->speed_m_s, stiffness);
 	c->contact_end_s = CONTACTS_MAX * duration + FLIGHT_SHARE * c->period_s;
 	c->window_s = CONTACTS_USUAL * duration + FLIGHT_SHARE * c->period_s;
+	c->begin_by_s = c->follow_s[0] = c->contact_end_s;
 	c->ode.count = p->turns ? BODY_ONE_CORNER : BODY_UPRIGHT;
 	c->ode.rates = course_rates;
 	c->ode.context = c;
@@ -209,10 +212,34 @@ static struct event first_change(const struct run *c, double *first)
 	return found;
 }
 
+/* Until when the peaks are looked for. */
+static double course_end(const struct run *c)
+{
+	double end = c->fly_s;
+
+	for (int i = 0; i < BODY_CORNERS; i++)
+		if (c->touching >> i & 1u)
+			end = fmax(end, c->follow_s[i]);
+	return end;
+}
+
+/* What begins while another touch is followed is followed likewise: neither is cut. */
+static bool course_follows(const struct run *c)
+{
+	bool follows = c->ode.t <= c->begin_by_s;
+
+	for (int i = 0; i < BODY_CORNERS; i++)
+		follows = follows || ((c->touching >> i & 1u) && c->ode.t < c->follow_s[i]);
+	return follows;
+}
+
 static void course_touch(struct run *c, int corner)
 {
+	bool follows = course_follows(c);
+
+	c->follow_s[corner] = follows ? c->ode.t + c->contact_end_s : 0.0;
+	c->fly_s = follows ? c->fly_s : 0.0;
 	c->touching |= 1u << corner;
-	c->touched_s = c->ode.t;
 	if (isnan(c->second_s)) {
 		c->second_s = c->ode.t;
 		c->second_corner = corner;
@@ -225,6 +252,7 @@ static void course_touch(struct run *c, int corner)
 static void course_leave(struct run *c, int corner)
 {
 	c->touching &= ~(1u << corner);
+	c->fly_s = fmax(c->fly_s, c->ode.t + FLIGHT_SHARE * c->period_s);
 	if (corner == 0 && isnan(c->released_s))
 		c->released_s = c->ode.t;
 	c->body.touch[corner].hold = BODY_STICKS;
@@ -397,22 +425,18 @@ static bool course_peaks_in_flight(const struct course *in)
 }
 
 /* Steps until the window of peaks ends: the release and, if anything may peak then, a share of the plate's
- * period after it. What touches by then is followed likewise; the next touch after that ends it. */
+ * period after it. What touches by then is followed likewise, whichever touch it is; the next one ends it. */
 static int follow(struct run *c, struct watch *watch, struct course_result *r)
 {
 	const struct course *in = c->in;
 	bool flies = course_peaks_in_flight(in);
 	/* such a plate may throw the box down once more */
 	bool heavy = in->body.plate_mass_kg > LIGHT_PLATE * in->body.case_mass_kg;
-	double end = c->contact_end_s, window = (double)NAN, flight = FLIGHT_SHARE * c->period_s;
+	double flight = FLIGHT_SHARE * c->period_s;
 	int error = 0;
 
-	while (!error) {
-		if (c->ode.t >= end && !(c->touching && end == window))
-			break;
-		if (c->ode.t >= end)
-			end += c->contact_end_s;
-		error = course_step(c, end);
+	while (!error && c->ode.t < course_end(c)) {
+		error = course_step(c, course_end(c));
 		if (error)
 			break;
 		watch_step(watch, &c->ode);
@@ -429,13 +453,9 @@ static int follow(struct run *c, struct watch *watch, struct course_result *r)
 		if (course_turn_over(c)) {
 			conclude_contact(c, r);
 			flies = flies || course_may_strike(c, flight);
-			window = end = c->ode.t + (flies ? flight : 0.0);
+			c->begin_by_s = c->fly_s = c->ode.t + (flies ? flight : 0.0);
 			if (in->count_ring)
 				error = ring_down(c, r);
-		} else if (!c->touching && c->touched_s <= window) {
-			end = c->ode.t + flight;
-		} else if (c->touched_s > window && !(c->touching & (c->touching - 1))) {
-			end = c->ode.t;
 		}
 		watch_resume(watch, &c->ode);
 	}

@@ -53,8 +53,8 @@ struct course_result {
 	unsigned evaluations;
 };
 
-/* 0, or DT_E_NUMERIC. Peaks are those up to until_s: 0.6 plate periods after the release, or after that of a
- * touch that began by then. */
+/* 0, or DT_E_NUMERIC. Peaks are those up to until_s: 0.6 plate periods after the release, or after those of
+ * the touches that began by then or while one of those lasted. */
 DT_MUST_USE int course_solve(const struct course *course, struct course_result *result);
 
 struct course_sample {
