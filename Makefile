@@ -13,7 +13,7 @@ JOBS ?= $(shell nproc)
 PACKAGES_RUN = gcc libc6-dev libgsl-dev liblcm-dev liblcm-bin libinih-dev libcjson-dev gnuplot-nox \
 	libsqlite3-dev nettle-dev zlib1g-dev
 PACKAGES_TEST = $(PACKAGES_RUN) libcmocka-dev clang llvm libclang-rt-14-dev can-utils python3-canmatrix \
-	iproute2 util-linux gawk libmicrohttpd-dev libode-dev
+	iproute2 util-linux gawk libmicrohttpd-dev libode-dev valgrind
 
 # ---- flags -----------------------------------------------------------------------------------------
 

@@ -109,6 +109,7 @@ enum {
 	WIRE_YZ_PER_TICK = 10,   /* 10 kHz */
 	WIRE_SAMPLE_BYTES = 54,  /* of one block: 7 X, 10 Y, 10 Z */
 	WIRE_SAMPLE_OFFSET = 10, /* first sample byte in a block */
+	WIRE_TICK_OFFSET = 2,    /* first byte of its tick */
 	WIRE_CRC8_OFFSET = 9,
 	WIRE_COUNTS_PER_G = 32,
 	WIRE_SAMPLE_NOT_TAKEN = -32768,
@@ -137,6 +138,14 @@ void wire_seal_block(struct frame *frame);
 
 /* 0, DT_E_LENGTH, or DT_E_CORRUPT if the CRC-8 does not agree. */
 DT_MUST_USE int wire_check_block(const struct frame *frame);
+
+/* Of a block that is one: its tick alone. */
+static inline uint32_t wire_block_tick_ms(const struct frame *frame)
+{
+	const uint8_t *p = frame->data + WIRE_TICK_OFFSET;
+
+	return p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+}
 
 /* Writes the seal of a packed capture end into its place. */
 void wire_seal_capture_end(struct frame *frame);

@@ -2,9 +2,11 @@
 #include "common/base/number.h"
 
 #include <errno.h>
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { LENGTH_MAX = 63 }; /* twice the digits of a double */
 
@@ -55,9 +57,105 @@ bool number_parse(const char *text, size_t length, char decimal, double *value)
 	return true;
 }
 
+/* ---- the shortest form ---- */
+
+enum { HELD = 19, ENOUGH = 17 }; /* digits that a uint64_t holds; that read back equal whatever the value */
+
+/* d.ddd times 10^exponent, the last of the HELD digits rounded. */
+struct decimal {
+	uint64_t digits;
+	int exponent;
+};
+
+static struct decimal decimal_of(double size)
+{
+	char text[HELD + 8]; /* d.ddd and e-308 */
+	struct decimal decimal;
+
+	snprintf(text, sizeof(text), "%.*e", HELD - 1, size);
+	decimal.digits = (uint64_t)(text[0] - '0');
+	for (unsigned i = 2; i <= HELD; i++)
+		decimal.digits = 10 * decimal.digits + (uint64_t)(text[i] - '0');
+	decimal.exponent = atoi(text + HELD + 2);
+	return decimal;
+}
+
+/* As "%.*g" lays it out, from the digits without the zeros at their end. */
+static void lay_out(char *at, struct decimal decimal, int digits)
+{
+	char digit[HELD];
+	int count = HELD, exponent = decimal.exponent;
+
+	for (int i = HELD; i > 0; decimal.digits /= 10)
+		digit[--i] = (char)('0' + decimal.digits % 10);
+	while (count > 1 && digit[count - 1] == '0')
+		count--;
+	if (exponent < -4 || exponent >= digits) {
+		*at++ = digit[0];
+		if (count > 1)
+			*at++ = '.';
+		memcpy(at, digit + 1, (size_t)count - 1);
+		at += count - 1;
+		snprintf(at, 6, "e%c%02u", exponent < 0 ? '-' : '+', (unsigned)abs(exponent) % 1000);
+		return;
+	}
+	if (exponent < 0)
+		*at++ = '0';
+	for (int i = 0; i <= exponent; i++)
+		*at++ = i < count ? digit[i] : '0';
+	if (count > exponent + 1)
+		*at++ = '.';
+	for (int i = exponent + 1; i < 0; i++)
+		*at++ = '0';
+	for (int i = exponent < 0 ? 0 : exponent + 1; i < count; i++)
+		*at++ = digit[i];
+	*at = '\0';
+}
+
+/* Without asking strtod whether it reads back equal: it does where it lies by less than half a place of the
+ * value's from it. False where that is too near to say, and where places are not even to both sides. */
+static bool shorten(char *text, double value, int least)
+{
+	const double size = fabs(value);
+	struct decimal decimal;
+	uint64_t scale = 100; /* of HELD and ENOUGH digits */
+	double half;
+	int power;
+
+	if (!(size > DBL_MIN / DBL_EPSILON && size < DBL_MAX) || frexp(size, &power) == 0.5)
+		return false;
+	decimal = decimal_of(size);
+	half = (double)decimal.digits * (ldexp(0.5, power - DBL_MANT_DIG) / size);
+	for (int digits = ENOUGH; digits > least; digits--)
+		scale *= 10;
+	for (int digits = least; digits <= ENOUGH; digits++, scale /= 10) {
+		uint64_t below = decimal.digits % scale, above = scale - below;
+		double off = (double)(below < above ? below : above);
+
+		if (below == above)
+			return false; /* which way it is rounded hangs on what is not held */
+		if (digits < ENOUGH && off - 1 > half)
+			continue;
+		if (digits < ENOUGH && off + 1 > half)
+			return false;
+		decimal.digits = below < above ? decimal.digits - below : decimal.digits + above;
+		if (decimal.digits >= 10000000000000000000u) {
+			decimal.digits /= 10;
+			decimal.exponent++;
+		}
+		if (signbit(value))
+			*text++ = '-';
+		lay_out(text, decimal, digits);
+		return true;
+	}
+	return false;
+}
+
 void number_format(char text[NUMBER_CHARS], double value, int least)
 {
-	for (int digits = least; digits <= 17; digits++) {
+	if (shorten(text, value, least))
+		return;
+	for (int digits = least; digits <= ENOUGH; digits++) {
 		snprintf(text, NUMBER_CHARS, "%.*g", digits, value);
 		if (strtod(text, NULL) == value)
 			return;

@@ -63,12 +63,40 @@ static bool is_decimal(int c)
 	return c >= '0' && c <= '9';
 }
 
+/* Eight decimal digits at once: false if one of the characters is none. */
+static bool read_eight(const char *at, uint32_t *value)
+{
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+	uint64_t c, digit;
+
+	memcpy(&c, at, sizeof(c));
+	digit = c ^ 0x3030303030303030u;
+	if ((((digit + 0x7676767676767676u) | digit) & 0x8080808080808080u) != 0)
+		return false;
+	digit = (digit * 10 + (digit >> 8)) & 0x00FF00FF00FF00FFu;
+	digit = (digit * 100 + (digit >> 16)) & 0x0000FFFF0000FFFFu;
+	*value = (uint32_t)(digit * 10000 + (digit >> 32));
+	return true;
+#else
+	(void)at;
+	(void)value;
+	return false;
+#endif
+}
+
 /* At most max decimal digits into *value; how many there were. */
 static int eat_decimals(struct text *text, int max, int64_t *value)
 {
+	uint32_t eight;
 	int digits = 0;
 
-	for (*value = 0; digits < max && is_decimal(peek(text)); digits++)
+	*value = 0;
+	if (max >= 8 && text->end - text->at >= 8 && read_eight(text->at, &eight)) {
+		*value = eight;
+		text->at += 8;
+		digits = 8;
+	}
+	for (; digits < max && is_decimal(peek(text)); digits++)
 		*value = *value * 10 + (*text->at++ - '0');
 	return digits;
 }
@@ -141,7 +169,7 @@ typedef uint16_t pairs __attribute__((vector_size(16)));
 typedef uint8_t octet __attribute__((vector_size(8)));
 
 /* Eight bytes from sixteen hex digits; false, and nothing written, if one is none. */
-static bool read_octet(const char *at, uint8_t bytes[8])
+static inline bool read_octet(const char *at, uint8_t bytes[8])
 {
 	letters c, low, is_digit, is_letter, valid;
 	octet packed;
@@ -221,10 +249,11 @@ static bool eat_tail(struct text *text)
 int candump_parse(const char *line, size_t length, struct frame *frame, unsigned *column)
 {
 	struct text text = {line, line + length};
-	struct frame parsed = {0};
+	struct frame parsed;
 
 	if (peek(&text) != '(')
 		return 0;
+	memset(&parsed, 0, sizeof(parsed));
 	if (!eat_time(&text, &parsed.time_us) || !eat_interface(&text) || !eat_id(&text, &parsed) ||
 	    !eat_content(&text, &parsed) || !link_frame_valid(&parsed) || !eat_tail(&text)) {
 		*column = (unsigned)(text.at - line) + 1u;

@@ -68,7 +68,7 @@ static inline bool is_inside(const struct walk *walk)
 	return fabs(walk->angle) < UNITS_PI / 2 && walk->at.cosine > 0;
 }
 
-static size_t bell_normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
+static size_t bell_normal(const void *model, double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
                           double right[CHOLESKY_MAX], double *squares)
 {
 	const struct scene *scene = model;

@@ -110,7 +110,7 @@ static void driven_add_blocks(const struct scene *scene, const struct respond *r
 	}
 }
 
-static size_t driven_normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
+static size_t driven_normal(const void *model, double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
                             double right[CHOLESKY_MAX], double *squares)
 {
 	const struct scene *scene = model;

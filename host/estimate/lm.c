@@ -26,7 +26,7 @@ struct place {
 	size_t used;
 };
 
-static bool stand(const struct lm_problem *problem, const double *p, struct place *place)
+static bool stand(const struct lm_problem *problem, double *p, struct place *place)
 {
 	memset(place->normal, 0, problem->size * sizeof(place->normal[0]));
 	memset(place->right, 0, sizeof(place->right));

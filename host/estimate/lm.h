@@ -26,9 +26,10 @@ enum {
 struct lm_problem {
 	unsigned size;     /* unknowns, at most CHOLESKY_MAX */
 	const void *model; /* handed to normal */
-	/* J^T J (lower triangle), J^T r with r = data - model, and r^T r at p, into zeroed arrays. Returns
-	 * the samples used; 0 when p is no place for this model, which takes the step back. */
-	size_t (*normal)(const void *model, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
+	/* J^T J (lower triangle), J^T r with r = data - model, and r^T r at p, into zeroed arrays. Unknowns
+	 * the model is linear in may be moved to their best for the others first (variable projection).
+	 * Returns the samples used; 0 when p is no place for this model, which takes the step back. */
+	size_t (*normal)(const void *model, double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
 	                 double right[CHOLESKY_MAX], double *squares);
 	/* A model whose slope jumps where a sample leaves it may have its minimum on the jump, where steps
 	 * only shuttle: a gain below this part of the variance is then the end. 0 for a smooth one. */

@@ -41,7 +41,7 @@ static struct law law_at(double decay, double time, double size)
 }
 
 /* One mode whose frequency hangs on its swing. */
-static size_t bent(const void *context, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
+static size_t bent(const void *context, double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
                    double right[CHOLESKY_MAX], double *squares)
 {
 	const struct modes_problem *problem = context;
@@ -75,7 +75,7 @@ static size_t bent(const void *context, const double *p, double normal[CHOLESKY_
 	return gram_finish(&gram, normal, right, squares);
 }
 
-static size_t spring(const void *context, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
+static size_t spring(const void *context, double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
                      double right[CHOLESKY_MAX], double *squares)
 {
 	const struct modes_problem *problem = context;

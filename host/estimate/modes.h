@@ -12,7 +12,10 @@
  *              A = A0 e^{-a t}: w + k (A / A0)^2, whose integral is h = (1 - e^{-2 a t}) / 2a; or the decay
  *              on a softening spring (spring.h). w is the frequency as the swing vanishes.
  *
- * By lm.h, the functions by recurrence. Times in s from the series' zero, values in g, w and k in rad/s.
+ * By lm.h, the functions by recurrence. Two modes are searched for by their decays and frequencies alone, the
+ * linear unknowns always being the best for these (variable projection): a third of the steps. One mode is
+ * not, since a swing that is free to follow ends on a spike more often. Times in s from the series' zero,
+ * values in g, w and k in rad/s.
  */
 #include "host/estimate/lm.h"
 #include "host/estimate/series.h"
@@ -24,7 +27,7 @@ enum {
 	MODES_OMEGA,
 	MODES_COSINE,
 	MODES_SINE,
-	MODES_LAW, /* k; of a spring Q and B */
+	MODES_LAW, /* k; of a spring Q and D */
 	MODES_EACH = 4,
 };
 

@@ -17,7 +17,7 @@ struct modes_problem {
 bool modes_possible(const struct modes *modes, const double *p);
 
 /* lm_problem's normal, of a modes_problem: any number of modes, hum or none, no law. */
-size_t modes_undisturbed(const void *context, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
+size_t modes_undisturbed(const void *context, double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
                          double right[CHOLESKY_MAX], double *squares);
 
 #endif

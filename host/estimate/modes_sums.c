@@ -267,9 +267,84 @@ static inline double modes_sums_both(PAIR pair)
 	return pair[0] + pair[1];
 }
 
+/* The products of linear unknowns: the offset, then each decay's cosine and sine. */
+static void linear_products(const struct sums *sums, const struct view *view, unsigned used,
+                            double product[CHOLESKY_MAX][CHOLESKY_MAX], double right[CHOLESKY_MAX])
+{
+	const struct residual_sums *r = &sums->residual;
+
+	product[0][0] = used;
+	right[0] = modes_sums_both(r->sum);
+	for (unsigned d = 0; d < view->decays; d++) {
+		double *c = product[1 + 2 * d], *s = product[2 + 2 * d];
+
+		right[1 + 2 * d] = modes_sums_both(r->c[d][0]);
+		right[2 + 2 * d] = modes_sums_both(r->s[d][0]);
+		c[0] = sums->of[d][0].re[0];
+		s[0] = sums->of[d][0].im[0];
+		for (unsigned e = 0; e <= d; e++) {
+			const struct complex_pair with = sums->with[d][e][0];
+
+			c[1 + 2 * e] = (with.re[0] + with.re[1]) / 2;
+			c[2 + 2 * e] = (with.im[0] - with.im[1]) / 2;
+			s[1 + 2 * e] = (with.im[0] + with.im[1]) / 2;
+			s[2 + 2 * e] = (with.re[1] - with.re[0]) / 2;
+		}
+	}
+}
+
+/* Takes c cos + s sin of decay e off the residual's sums with decay d. */
+static void take_swing_off(struct sums *sums, unsigned d, unsigned e, double c, double s)
+{
+	const unsigned high = d > e ? d : e, low = d > e ? e : d;
+
+	for (unsigned late = 0; late < 2; late++) {
+		const struct complex_pair with = sums->with[high][low][late];
+		const double turned = d < e ? -with.im[1] : with.im[1];
+
+		sums->residual.c[d][late][0] -=
+		        (c * (with.re[0] + with.re[1]) + s * (with.im[0] - turned)) / 2;
+		sums->residual.s[d][late][0] -=
+		        (c * (with.im[0] + turned) + s * (with.re[1] - with.re[0])) / 2;
+	}
+}
+
+/* Moves the linear unknowns of p to their best, and the sums of the residual with them. Left as they are
+ * where the series does not determine them. */
+static void project(struct sums *sums, struct view *view, const struct modes_problem *problem, double *p)
+{
+	double product[CHOLESKY_MAX][CHOLESKY_MAX], right[CHOLESKY_MAX], change[CHOLESKY_MAX];
+	const unsigned size = 1 + 2 * view->decays;
+	struct residual_sums *r = &sums->residual;
+	struct cholesky factor;
+
+	linear_products(sums, view, problem->series->used, product, right);
+	if (!cholesky_factor(&factor, size, product))
+		return;
+	cholesky_solve(&factor, right, change);
+	r->sum[0] -= change[0] * problem->series->used;
+	for (unsigned i = 0; i < size; i++)
+		r->squares[0] -= change[i] * right[i];
+	p[MODES_OFFSET] += change[0];
+	for (unsigned d = 0; d < view->decays; d++) {
+		const double c = change[1 + 2 * d], s = change[2 + 2 * d];
+		double *swing = p + swing_place(problem->modes, d);
+
+		swing[0] += c;
+		swing[1] += s;
+		r->sum[0] -= c * sums->of[d][0].re[0] + s * sums->of[d][0].im[0];
+		for (unsigned late = 0; late < 2; late++) {
+			r->c[d][late][0] -= change[0] * sums->of[d][late].re[0];
+			r->s[d][late][0] -= change[0] * sums->of[d][late].im[0];
+		}
+		for (unsigned e = 0; e < view->decays; e++)
+			take_swing_off(sums, e, d, c, s);
+	}
+}
+
 /* All products of derivatives follow from those of the decays, and these are geometric series but for what is
  * missing; only the residual is summed point by point. */
-size_t modes_undisturbed(const void *context, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
+size_t modes_undisturbed(const void *context, double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
                          double right[CHOLESKY_MAX], double *squares)
 {
 	const struct modes_problem *problem = context;
@@ -282,6 +357,8 @@ size_t modes_undisturbed(const void *context, const double *p, double normal[CHO
 		return 0;
 	view = modes_sums_look(problem, p);
 	sum_up(&sums, &view);
+	if (problem->modes->count > 1)
+		project(&sums, &view, problem, p);
 	n = make_columns(column, problem->modes, p);
 	normal[MODES_OFFSET][MODES_OFFSET] = problem->series->used;
 	right[MODES_OFFSET] = modes_sums_both(sums.residual.sum);

@@ -9,7 +9,7 @@
 
 #define F_LIMIT 7.0
 
-/* B of a spring to start from; of one that stiffens as much below zero. */
+/* How much stiffer than at the largest swing a spring is to start from, or less stiff. */
 #define SPRING_B 0.3
 
 enum { OUTLIER_ROUNDS = 3, THIN_MIN = 48 };
@@ -124,7 +124,7 @@ static void try_spring(struct ringdown_job *job, double k)
 	modes.p[MODES_COSINE] *= -1;
 	modes.p[MODES_SINE] *= -1;
 	modes.p[MODES_LAW] = 1 / (swing * swing);
-	modes.p[MODES_LAW + 1] = k < 0 ? SPRING_B : -SPRING_B;
+	modes.p[MODES_LAW + 1] = (k < 0 ? SPRING_B / (1 + SPRING_B) : -SPRING_B / (1 - SPRING_B)) / 2;
 	if (modes_fit(&modes, &job->series))
 		consider(job, &modes);
 }
@@ -140,8 +140,7 @@ static bool ringdown_richer_fit_two(struct modes *modes, const struct ringdown_j
 		modes->p[MODES_DECAY + MODES_EACH * m] = job->single.p[MODES_DECAY];
 		modes->p[MODES_OMEGA + MODES_EACH * m] = (m ? aside : 1) * job->single.p[MODES_OMEGA];
 	}
-	return modes_linear(modes, &job->series) && modes_fit(modes, &job->series) &&
-	       ringdown_decays(modes, 0) && ringdown_decays(modes, 1);
+	return modes_fit(modes, &job->series) && ringdown_decays(modes, 0) && ringdown_decays(modes, 1);
 }
 
 /* Two modes that are surely nearer than the stronger's width, or not surely apart, are one as far as anyone

@@ -218,7 +218,7 @@ size_t shape_count_used(const struct shape_problem *m)
 	return used;
 }
 
-static size_t shape_normal(const void *model, const double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
+static size_t shape_normal(const void *model, double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
                            double right[CHOLESKY_MAX], double *squares)
 {
 	const struct shape_problem *m = model;

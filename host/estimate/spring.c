@@ -5,19 +5,20 @@
 #include <string.h>
 
 #include "common/units.h"
-#include "host/estimate/gram.h"
 #include "host/estimate/limits.h"
 #include "host/estimate/modes.h"
 
 /* Q, of a swing as large as the start's: beyond is no spring any more. */
 #define SOFT_MAX 1e4
+
+/* A small swing is stiffer than one without end by at most this part of that, and softer by less. */
 #define B_MIN -0.9
 #define B_MAX 10.0
 
 /* Of spring_at's steps and those of the first cycles. */
 #define STEPS_PER_CYCLE 64.0
 
-enum { PLACE_Q = MODES_LAW, PLACE_B = MODES_LAW + 1, LANES = 4, QUADS = (SPRING_SIZE + LANES - 1) / LANES };
+enum { PLACE_Q = MODES_LAW, PLACE_D = MODES_LAW + 1, LANES = 4 };
 
 /* Where the processor has registers of four they are used. The numbers are the same, as nothing is fused or
  * reordered. */
@@ -38,24 +39,39 @@ struct state {
 };
 
 struct spring {
-	double loss, q, b, omega0; /* loss: 2 a / w0 */
+	double loss, q, k, omega0; /* loss: 2 a / w0 */
 	struct state at;
 };
 
+static double spring_swing(const double *p)
+{
+	return p[MODES_COSINE] * p[MODES_COSINE] + p[MODES_SINE] * p[MODES_SINE];
+}
+
+/* The part of the stiffness that a swing without end would have lost. */
+static double spring_lost(const double *p)
+{
+	const double swing = p[PLACE_Q] * spring_swing(p);
+
+	return p[PLACE_D] * (1 + swing) / swing;
+}
+
 static struct spring spring_of(const double *p)
 {
-	double omega0 = hypot(p[MODES_OMEGA], p[MODES_DECAY]);
+	double omega0 = hypot(p[MODES_OMEGA], p[MODES_DECAY]), swing = spring_swing(p);
 
 	return (struct spring){2 * p[MODES_DECAY] / omega0,
 	                       p[PLACE_Q],
-	                       p[PLACE_B],
+	                       p[PLACE_D] * (1 / swing + p[PLACE_Q]),
 	                       omega0,
 	                       {p[MODES_COSINE], p[MODES_SINE]}};
 }
 
 static inline double push(const struct spring *s, double x, double v)
 {
-	return -s->loss * v - x * (1 + s->b / (1 + s->q * x * x)) / (1 + s->b);
+	const double y = x * x;
+
+	return -s->loss * v - x * (1 - s->k * y / (1 + s->q * y));
 }
 
 /* By step in 1/w0, either way. */
@@ -89,9 +105,7 @@ double spring_at(const double *p, double time_s)
 
 double spring_softness(const double *p)
 {
-	double swing = p[MODES_COSINE] * p[MODES_COSINE] + p[MODES_SINE] * p[MODES_SINE];
-
-	return (1 + p[PLACE_B] / (1 + p[PLACE_Q] * swing)) / (1 + p[PLACE_B]);
+	return 1 - p[PLACE_D];
 }
 
 /* The angle from one state to the next. */
@@ -100,16 +114,41 @@ static double spring_turned(const struct state *from, const struct state *to)
 	return atan2(from->v * to->x - from->x * to->v, from->x * to->x + from->v * to->v);
 }
 
+/* Whole steps until the last quarter of the last turn: a turn begins as the state comes past where it was at
+ * time 0. Returns the steps, fewer than most. */
+static unsigned spring_turn(struct spring *s, unsigned cycles, double step, unsigned most)
+{
+	const struct state start = s->at;
+	unsigned steps = 0, turns = 0;
+	bool late = false; /* in the second half of a turn */
+
+	while (steps < most) {
+		double along, aside;
+
+		spring_step(s, step);
+		steps++;
+		along = start.x * s->at.x + start.v * s->at.v;
+		aside = start.v * s->at.x - start.x * s->at.v;
+		turns += late && aside >= 0;
+		late = aside < 0;
+		if (turns + 1 >= cycles && late && along > 0)
+			break;
+	}
+	return steps;
+}
+
 double spring_mean_hz(const double *p, unsigned cycles)
 {
-	const double turns = 2 * UNITS_PI * cycles, longest = 2 * UNITS_PI / STEPS_PER_CYCLE;
+	const double longest = 2 * UNITS_PI / STEPS_PER_CYCLE;
 	/* No spring takes longer. */
 	const unsigned most = (unsigned)(B_MAX * STEPS_PER_CYCLE) * cycles;
 	struct spring s = spring_of(p);
-	double left = turns, time = 0;
+	const struct state start = s.at;
+	const unsigned whole = spring_turn(&s, cycles, longest, most);
+	double time = whole * longest, left = -spring_turned(&start, &s.at);
 
 	/* What is left is a step too far or too short, each time a smaller one. */
-	for (unsigned i = 0; i < most && fabs(left) > LIMIT_ROUNDING; i++) {
+	for (unsigned i = whole; i < most && fabs(left) > LIMIT_ROUNDING; i++) {
 		const struct state before = s.at;
 		double step = fmin(longest, left);
 
@@ -122,10 +161,9 @@ double spring_mean_hz(const double *p, unsigned cycles)
 
 static bool spring_possible(const double *p)
 {
-	double swing = p[MODES_COSINE] * p[MODES_COSINE] + p[MODES_SINE] * p[MODES_SINE];
-
-	return p[MODES_OMEGA] > 0 && fabs(p[MODES_DECAY]) < p[MODES_OMEGA] && p[PLACE_Q] >= 0 &&
-	       p[PLACE_Q] * swing < SOFT_MAX && p[PLACE_B] > B_MIN && p[PLACE_B] < B_MAX;
+	return p[MODES_OMEGA] > 0 && fabs(p[MODES_DECAY]) < p[MODES_OMEGA] && p[PLACE_Q] > 0 &&
+	       p[PLACE_Q] * spring_swing(p) < SOFT_MAX && spring_lost(p) > B_MIN / (1 + B_MIN) &&
+	       spring_lost(p) < B_MAX / (1 + B_MAX);
 }
 
 /* The spring at p and, for each unknown but the offset, at p a little changed by difference. */
@@ -150,7 +188,7 @@ static void start_all(struct spring *s, double *difference, const double *p, con
 
 /* Four solutions. */
 struct quad {
-	QUAD loss, q, b, share, step; /* share: 1 / (1 + b); step in 1/w0 */
+	QUAD loss, q, k, step; /* step in 1/w0 */
 	QUAD x, v;
 };
 
@@ -159,8 +197,7 @@ static void quad_set(struct quad *quad, const struct spring *s, double step_s)
 	for (unsigned i = 0; i < LANES; i++) {
 		quad->loss[i] = s[i].loss;
 		quad->q[i] = s[i].q;
-		quad->b[i] = s[i].b;
-		quad->share[i] = 1 / (1 + s[i].b);
+		quad->k[i] = s[i].k;
 		quad->step[i] = s[i].omega0 * step_s;
 		quad->x[i] = s[i].at.x;
 		quad->v[i] = s[i].at.v;
@@ -169,7 +206,9 @@ static void quad_set(struct quad *quad, const struct spring *s, double step_s)
 
 INSIDE push_quad(const struct quad *s, const QUAD *x, const QUAD *v, QUAD *a)
 {
-	*a = -s->loss * *v - *x * (1 + s->b / (1 + s->q * *x * *x)) * s->share;
+	const QUAD y = *x * *x;
+
+	*a = -s->loss * *v - *x * (1 - s->k * y / (1 + s->q * y));
 }
 
 /* As spring_step. */
@@ -193,48 +232,83 @@ INSIDE quad_step(struct quad *s, QUAD *a1)
 }
 
 /* The next block's mean of each solution: of the accelerations before its steps. */
-WIDE static void spring_block_means(struct quad quad[QUADS], unsigned block, double mean[QUADS * LANES])
+INSIDE quad_block_mean(struct quad *quad, unsigned block, QUAD *mean)
 {
-	for (unsigned i = 0; i < QUADS; i++) {
-		struct quad here = quad[i];
-		QUAD sum = {0}, a;
+	struct quad here = *quad;
+	QUAD sum = {0}, a;
 
-		for (unsigned j = 0; j < block; j++) {
-			quad_step(&here, &a);
-			sum += a;
-		}
-		quad[i] = here;
-		sum /= block;
-		memcpy(mean + LANES * i, &sum, sizeof(sum));
+	for (unsigned j = 0; j < block; j++) {
+		quad_step(&here, &a);
+		sum += a;
 	}
+	*quad = here;
+	*mean = sum / block;
+}
+
+/* Derivatives and, last, the residual: a row of the normal equations, and the sums of its products. */
+_Static_assert(SPRING_SIZE + 1 == 2 * LANES, "a row fills two registers");
+
+struct spring_sums {
+	QUAD of[2 * LANES][2]; /* of a column with the first four and the last four */
+	size_t taken;
+};
+
+INSIDE spring_add(struct spring_sums *sums, const QUAD *low, const QUAD *high)
+{
+	for (unsigned i = 0; i < LANES; i++) {
+		sums->of[i][0] += (*low)[i] * *low;
+		sums->of[LANES + i][0] += (*high)[i] * *low;
+		sums->of[LANES + i][1] += (*high)[i] * *high;
+	}
+	sums->taken++;
+}
+
+WIDE static void spring_sum(struct spring_sums *sums, struct quad quad[2], const QUAD difference[2],
+                            const struct series *series, double offset_g)
+{
+	struct spring_sums all = {.taken = 0};
+
+	for (unsigned k = 0; k < series->count; k++) {
+		QUAD low, high;
+		double at;
+
+		quad_block_mean(&quad[0], series->block, &low);
+		quad_block_mean(&quad[1], series->block, &high);
+		if (!series->good[k])
+			continue;
+		at = low[MODES_OFFSET];
+		low = (low - at) / difference[0];
+		high = (high - at) / difference[1];
+		low[MODES_OFFSET] = 1;
+		high[LANES - 1] = series->value_g[k] - offset_g - at;
+		spring_add(&all, &low, &high);
+	}
+	*sums = all;
 }
 
 size_t spring_normal(const struct series *series, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
                      double right[CHOLESKY_MAX], double *squares)
 {
-	struct spring s[QUADS * LANES];
-	struct quad quad[QUADS];
-	double difference[SPRING_SIZE];
-	struct gram gram;
+	struct spring s[2 * LANES];
+	struct spring_sums sums;
+	struct quad quad[2];
+	double difference[2 * LANES];
+	QUAD by[2];
 
 	if (!spring_possible(p))
 		return 0;
 	start_all(s, difference, p, series);
-	for (unsigned i = SPRING_SIZE; i < QUADS * LANES; i++)
-		s[i] = s[0]; /* one too few */
-	for (unsigned i = 0; i < QUADS; i++)
+	s[SPRING_SIZE] = s[0]; /* one too few */
+	difference[SPRING_SIZE] = 1;
+	for (unsigned i = 0; i < 2; i++)
 		quad_set(&quad[i], &s[LANES * i], series->step_s / series->block);
-	gram_start(&gram, SPRING_SIZE);
-	for (unsigned k = 0; k < series->count; k++) {
-		double mean[QUADS * LANES], row[SPRING_SIZE + 1];
-
-		spring_block_means(quad, series->block, mean);
-		for (unsigned i = 0; i < SPRING_SIZE; i++)
-			row[i] = (mean[i] - mean[MODES_OFFSET]) / difference[i];
-		row[MODES_OFFSET] = 1;
-		row[SPRING_SIZE] = series->value_g[k] - p[MODES_OFFSET] - mean[MODES_OFFSET];
-		if (series->good[k])
-			gram_add(&gram, row);
+	memcpy(by, difference, sizeof(by));
+	spring_sum(&sums, quad, by, series, p[MODES_OFFSET]);
+	for (unsigned i = 0; i < SPRING_SIZE; i++) {
+		for (unsigned j = 0; j <= i; j++)
+			normal[i][j] = sums.of[i][j / LANES][j % LANES];
+		right[i] = sums.of[SPRING_SIZE][i / LANES][i % LANES];
 	}
-	return gram_finish(&gram, normal, right, squares);
+	*squares = sums.of[SPRING_SIZE][1][LANES - 1];
+	return sums.taken;
 }

@@ -5,12 +5,14 @@
  * The free decay of a mass on a mount that softens with its swing, as a filled rubber does, and comes back
  * to its small-swing stiffness as the swing vanishes:
  *
- *     x'' = -2 a x' - w0^2 x (1 + B / (1 + Q x^2)) / (1 + B),   w0^2 = w^2 + a^2
+ *     x'' = -2 a x' - w0^2 x (1 - D (1 + Q x0^2) / x0^2 * x^2 / (1 + Q x^2)),   w0^2 = w^2 + a^2
  *
- * read as the acceleration x'' + b. Unlike a frequency that is a function of the envelope it has the
- * harmonics too. Integrated by Runge-Kutta, one step per sample; the derivatives are differences of eight
- * solutions that run side by side. Unknowns at the places of modes.h: b, a, w (damped, of a small swing),
- * w0^2 x and w0 x' at time 0 in g, Q in 1/g^2 of the former, B. A negative B stiffens.
+ * read as the acceleration x'' + b. D is what the swing of time 0, x0, has taken of the stiffness, and Q says
+ * over which swings it goes: of all ways to write this law the one whose unknowns hang on each other least,
+ * so that a fit needs half the steps. A negative D stiffens. Unlike a frequency that is a function of the
+ * envelope it has the harmonics too. Integrated by Runge-Kutta, one step per sample; the derivatives are
+ * differences of eight solutions that run side by side. Unknowns at the places of modes.h: b, a, w (damped,
+ * of a small swing), w0^2 x and w0 x' at time 0 in g, Q in 1/g^2 of the former, D.
  */
 #include "host/estimate/cholesky.h"
 #include "host/estimate/series.h"

@@ -240,8 +240,8 @@ int drop_close(struct record *record)
 	}
 	if (record->counters.blocks > held)
 		record->counters.blocks = held; /* of a file that ends before the last of them */
-	record->crc_agrees =
-	        record->crc_known && record->gap_count == 0 && samples_crc32(record) == record->crc32;
+	record->crc_agrees = record->crc_known && record->gap_count == 0 &&
+	                     (record->crc_agrees || samples_crc32(record) == record->crc32);
 	drop_set_axes(record);
 	drop_capture_end(record, &end);
 	record->seal_agrees = record->seal_known && wire_check_capture_end(&end) == 0;

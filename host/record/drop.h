@@ -41,7 +41,8 @@ uint8_t drop_mark(const struct channel *channel, double value_g);
 void drop_capture_end(const struct record *record, struct frame *frame);
 
 /* Lists the gaps, compares the samples with record->crc32 if crc_known and the capture end with its seal,
- * puts range and clipped marks right, and finishes the record. On DT_E_MEMORY the record is freed. */
+ * puts range and clipped marks right, and finishes the record. crc_agrees is set before only by whoever has
+ * compared the bytes that the samples are of. On DT_E_MEMORY the record is freed. */
 DT_MUST_USE int drop_close(struct record *record);
 
 /* Whether the channels are those of a drop of its ticks, whole blocks of them, with its range or, as

@@ -170,16 +170,17 @@ static bool follow_live(struct join *join, unsigned s, uint32_t tick_ms)
 
 static void feed_block(struct join *join, unsigned s, const struct frame *frame, bool resent)
 {
-	struct wire_block block;
+	uint32_t tick_ms;
 	bool reordered;
 
-	if (wire_check_block(frame) || wire_unpack_block(frame, &block)) {
+	if (wire_check_block(frame)) {
 		join->corrupt++;
 		return;
 	}
-	reordered = !resent && follow_live(join, s, block.tick_ms);
-	put_in_ring(join, s, block.tick_ms, frame, resent, reordered);
-	put_in_window(join, s, block.tick_ms, frame, resent, reordered);
+	tick_ms = wire_block_tick_ms(frame);
+	reordered = !resent && follow_live(join, s, tick_ms);
+	put_in_ring(join, s, tick_ms, frame, resent, reordered);
+	put_in_window(join, s, tick_ms, frame, resent, reordered);
 }
 
 /* Makes the window of ticks first..first+ticks-1 from the ring. */
@@ -470,6 +471,7 @@ int join_take(struct join *join, struct record *record)
 		fill_from_end(join, &drop);
 		told_fill(&join->told, &join->end, &drop);
 	}
+	drop.crc_agrees = join->crc_agrees;
 	error = drop_close(&drop);
 	if (error)
 		return error;

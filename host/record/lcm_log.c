@@ -90,9 +90,14 @@ static bool event_at(struct log_file *log, uint64_t *at, uint64_t end, struct lc
 bool lcm_log_is(struct log_file *log)
 {
 	size_t held;
-	const uint8_t *head = bytes_at(log, 0, LOOK_BYTES, &held);
+	const uint8_t *head = bytes_at(log, 0, LOOK_BYTES, &held), *end;
 
-	return memmem(head, held < LOOK_BYTES ? held : LOOK_BYTES, sync_word, SYNC_BYTES) != NULL;
+	if (held == 0)
+		return false;
+	/* Text has none of its bytes, and a single one is looked for many times faster. */
+	end = head + (held < LOOK_BYTES ? held : LOOK_BYTES);
+	head = memchr(head, sync_word[0], (size_t)(end - head));
+	return head != NULL && memmem(head, (size_t)(end - head), sync_word, SYNC_BYTES) != NULL;
 }
 
 /* To the next byte that a sync word may begin with. */
