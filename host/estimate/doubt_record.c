@@ -144,6 +144,17 @@ static bool axis_leads(const struct estimate_channel *s1, const struct estimate_
 	       s2->peak.time_s - s1->peak.time_s > LEAD_APART * width;
 }
 
+/* A sensor is loose on all of its axes. */
+static void loose_flag(struct estimate_channel *const xy[2])
+{
+	unsigned rough = (xy[0]->peak.how.flags | xy[1]->peak.how.flags) & ESTIMATE_FLAG_ROUGH;
+
+	for (unsigned i = 0; i < 2; i++) {
+		xy[i]->peak.how.flags |= rough;
+		xy[i]->pulse.flags |= rough;
+	}
+}
+
 unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2])
 {
 	struct estimate_channel *const *s1 = channel[0], *const *s2 = channel[1];
@@ -152,6 +163,8 @@ unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_chann
 	/* What shifts zero on both axes of the case is in a supply that the plate's have too. */
 	unsigned shared = s2[0]->peak.how.flags & s2[1]->peak.how.flags & ESTIMATE_FLAG_TAIL;
 
+	loose_flag(s1);
+	loose_flag(s2);
 	for (unsigned i = 0; i < 4; i++) {
 		if (any)
 			axis_flag(channel[i / 2][i % 2]);

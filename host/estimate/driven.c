@@ -467,10 +467,11 @@ void driven_find(const struct driven_axis *axis, struct driven *driven, struct d
 		input_from_samples(s2, peak, &curve->input);
 		has_sampled = solve_both(axis, &scene, &sampled);
 	}
-	if (has_sampled && !(has_smooth && !better(&sampled, &smooth)))
+	if (has_sampled && !(has_smooth && !better(&sampled, &smooth))) {
 		driven_express(axis, &sampled, peak->result.time_s, peak->result.sigma_time_s,
 		               sampled.input_spread_s * s2->noise_g, driven);
-	else if (has_smooth)
+		driven->doubt_s = peak->doubt_s;
+	} else if (has_smooth)
 		driven_express(axis, &smooth, bell.centre_s, bell.sigma_centre_s, 0, driven);
 	if (isnan(driven->peak_g))
 		return;

@@ -31,6 +31,7 @@ struct driven_axis {
 
 struct driven {
 	double lag_s, sigma_s;
+	double doubt_s; /* what of sigma_s is doubt of S2's crest: both axes have it alike */
 	/* S1's by the fitted response and its time, with the fit's uncertainty, and S2's noise where its
 	 * samples are the input: no doubt of the model; NAN unless ok and not refused. */
 	double peak_g, sigma_peak_g, peak_s, sigma_peak_s;

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "common/units.h"
 #include "host/estimate/crest.h"
 #include "host/estimate/limits.h"
 
@@ -18,8 +19,18 @@
 /* A top that stands aside of the middle at half its height by this part of what it is wide there is flatter
  * on one side than a polynomial tells: saw-tooths of 0.25 to 0.75 have 0.25 and are 0.02 of a width off; an
  * impact has 0.1. */
-#define ASIDE 0.18
-#define ASIDE_TIME 0.01
+#define ASIDE 0.1
+#define ASIDE_WHOLE 0.18
+#define ASIDE_TIME 0.02
+
+/* A top this wide at nine tenths of its height, in parts of what it is wide at half, is flat: a half-sine has
+ * 0.43, a trapezoid more than 0.6. Its highest instant is anywhere on it. */
+#define FLAT_LEVEL 0.9
+#define FLAT 0.6
+#define FLAT_TIME 0.1
+
+/* A crest this much sharper than a half-sine as wide may be a hump. */
+#define SHARP 1.5
 
 /* A half-sine is two thirds of its base wide at half height. */
 #define BASE_PER_HALF_WIDTH 1.5
@@ -168,20 +179,44 @@ static bool peak_parabola(const struct trace *trace, const struct peak *peak, do
 	return fabs(*shift) <= 1;
 }
 
+/* How sharp the top of a half-sine as wide is, per s^2. */
+static double half_sine_bend(const struct peak *peak)
+{
+	return fabs(peak->result.value_g) * pow(UNITS_PI / peak->width_s, 2);
+}
+
 static bool take_parabola(const struct trace *trace, struct peak *peak)
 {
 	struct estimate_peak *result = &peak->result;
-	double shift, rise, bend, late;
+	double shift, rise, bend, bent, late;
 
 	if (!peak_parabola(trace, peak, &shift, &rise, &bend))
 		return false;
-	late = hypot(trace->noise_g / (sqrt(2.0) * bend), shift / 2);
 	result->how.method = "parabola";
 	result->value_g = trace->value_g[peak->at] + rise;
+	bent = fmin(fabs(bend), SHARP * half_sine_bend(peak) / (trace->rate_hz * trace->rate_hz));
+	late = hypot(trace->noise_g / (sqrt(2.0) * bent), shift / 2);
 	result->time_s = trace_time(trace, peak->at) + shift / trace->rate_hz;
 	result->sigma_g = hypot(trace->noise_g, fmax(fabs(rise), fabs(bend) / 8));
 	result->sigma_time_s = (late < SHIFT_MIN ? SHIFT_MIN : late) / trace->rate_hz;
 	return true;
+}
+
+/* How ill the time is told of a crest that no polynomial follows: far from the middle of the pulse, on a flat
+ * top, or on a hump that noise or a ripple may have lifted. */
+static double crest_doubt(const struct trace *trace, const struct peak *peak, const struct crest *crest)
+{
+	double half_s = peak->start.half_width_s, level = FLAT_LEVEL * fabs(trace->value_g[peak->at]);
+	double aside = fabs(crest->time_s - peak->start.peak_s) / half_s - ASIDE;
+	double doubt_s = ASIDE_TIME * peak->width_s * fmin(fmax(aside / (ASIDE_WHOLE - ASIDE), 0), 1);
+	double noise = pow(crest->sigma_time_s, 2) - pow(crest->model_s, 2), from, until, d[3], sharper;
+
+	if (trace_edge(trace, peak->at, -1, peak->sign, level, &from) &&
+	    trace_edge(trace, peak->at, 1, peak->sign, level, &until) && until - from > FLAT * half_s)
+		doubt_s = fmax(doubt_s, FLAT_TIME * (until - from));
+	local_at(&crest->axis[0], crest->time_s, d);
+	sharper = fabs(d[2]) / (SHARP * half_sine_bend(peak));
+	return sharper > 1 ? hypot(doubt_s, sqrt(fmax(noise, 0)) * sharper) : doubt_s;
 }
 
 static bool take_crest(const struct trace *trace, struct peak *peak)
@@ -201,9 +236,9 @@ static bool take_crest(const struct trace *trace, struct peak *peak)
 	result->value_g = peak->sign * crest.value_g;
 	result->sigma_g = crest.sigma_g;
 	result->time_s = crest.time_s;
-	result->sigma_time_s = crest.sigma_time_s;
-	if (fabs(crest.time_s - peak->start.peak_s) > ASIDE * peak->start.half_width_s)
-		result->sigma_time_s = hypot(result->sigma_time_s, ASIDE_TIME * peak->width_s);
+	peak->doubt_s = crest_doubt(trace, peak, &crest);
+	result->sigma_time_s = hypot(crest.sigma_time_s, peak->doubt_s);
+	peak->doubt_s = hypot(peak->doubt_s, crest.model_s);
 	peak->model = PEAK_MODEL_LOCAL;
 	peak->local = crest.axis[0];
 	peak->noise_g = crest_noise(&peak->local, trace);
@@ -249,6 +284,7 @@ void peak_take_shape(struct peak *peak)
 	result->sigma_g = peak->shape.sigma_peak_g;
 	result->time_s = peak->shape.peak_s;
 	result->sigma_time_s = peak->shape.sigma_peak_s;
+	peak->doubt_s = 0;
 	peak->model = PEAK_MODEL_SHAPE;
 }
 

@@ -66,7 +66,8 @@ struct peak {
 	struct shape shape;     /* the family's fit asked for last; its family is AUTO when there was none */
 	struct shape half_sine; /* that fit, likewise */
 	double noise_g;         /* of local */
-	double scale;           /* model to axis: 1 but for a weak axis */
+	double doubt_s; /* what of sigma_time_s is the polynomials', which have it alike on both axes */
+	double scale;   /* model to axis: 1 but for a weak axis */
 };
 
 /* Everything but result is meaningful unless the status is short or no_peak. */

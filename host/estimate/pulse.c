@@ -4,11 +4,14 @@
 #include <math.h>
 
 #include "common/units.h"
+#include "host/estimate/crest.h"
 #include "host/estimate/guide.h"
 #include "host/estimate/limits.h"
 
 /* Samples. */
 enum { AGAIN_WITHIN = 4 };
+
+enum { SLOW_NEWTON = 4 };
 
 struct edge {
 	double time_s;
@@ -62,6 +65,41 @@ static double crossed_again(const struct trace *trace, const struct peak *peak, 
 	return (double)(step < 0 ? at - last : last - at) / trace->rate_hz;
 }
 
+/* An edge that rises by less than this many sigma of noise from sample to sample is slow: two samples tell
+ * its slope no more, and noise crosses the level before the pulse does. */
+#define SLOW_SIGMAS 6.0
+
+/* Of the time from the level to twice it: half the window of a parabola on a slow edge. */
+#define SLOW_HALF 0.7
+
+/* A slow edge by a parabola through the samples around edge, where there are enough for one that meets the
+ * level within its window. */
+static void find_slow_edge(const struct trace *trace, const struct peak *peak, int step, double level_g,
+                           struct edge *edge)
+{
+	struct local_span all = {-INFINITY, INFINITY};
+	struct local local;
+	double inside, half, d[3], noise, time = edge->time_s;
+
+	if (!trace_edge(trace, peak->at, step, peak->sign, 2 * level_g, &inside))
+		return;
+	half = SLOW_HALF * fabs(edge->time_s - inside);
+	if (!local_fit(&local, trace, edge->time_s, half, &all, 2))
+		return;
+	for (unsigned i = 0; i < SLOW_NEWTON; i++) {
+		local_at(&local, time, d);
+		if (!(step * peak->sign * d[1] < 0))
+			return;
+		time += (peak->sign * level_g - d[0]) / d[1];
+		if (!(fabs(time - edge->time_s) < half))
+			return;
+	}
+	noise = crest_noise(&local, trace);
+	edge->time_s = time;
+	edge->slope_g_s = fabs(d[1]);
+	edge->sigma_s = noise * local_spread(&local, time, 0) / edge->slope_g_s;
+}
+
 /* Where the pulse meets level_g on one side, by the parabola through the two samples as bent as both their
  * neighbourhoods say; and how well that is known: noise, the bend that they do not agree on, and the hole
  * when they are no neighbours. */
@@ -95,6 +133,8 @@ static bool find_edge(const struct trace *trace, const struct peak *peak, int st
 	edge->sigma_s = hypot(noise, fmax(fabs(bend0 - bent), fabs(bend1 - bent)) / 16) / edge->slope_g_s;
 	edge->sigma_s = hypot(hypot(edge->sigma_s, missing),
 	                      crossed_again(trace, peak, step < 0 ? before : after, step, level_g));
+	if (after - before == 1 && fabs(rise) < SLOW_SIGMAS * trace->noise_g)
+		find_slow_edge(trace, peak, step, level_g, edge);
 	return true;
 }
 

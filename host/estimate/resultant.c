@@ -176,9 +176,11 @@ static bool resultant_summit(const struct resultant_axes *axes, double *time_s, 
 }
 
 /* Noise through the models, as in crest.h, and what the axes' own uncertainties hold beyond it, the models'
- * error. Variances of half the square's value and of its slope. */
+ * error, which two axes of one shape have alike. Variances of half the square's value and of its slope. */
 static void resultant_spread(const struct resultant_axes *axes, double time_s, double variance[2])
 {
+	double model[2] = {0, 0};
+
 	variance[0] = variance[1] = 0;
 	for (unsigned i = 0; i < 2; i++) {
 		const struct estimate_peak *own = &axes->peak[i]->result;
@@ -189,10 +191,12 @@ static void resultant_spread(const struct resultant_axes *axes, double time_s, d
 		variance[0] += d[0] * d[0] * noise[0];
 		variance[1] += d[0] * d[0] * noise[1] + d[1] * d[1] * noise[0];
 		beyond = own->sigma_g * own->sigma_g - top_noise[0];
-		variance[0] += beyond > 0 ? d[0] * d[0] * beyond : 0;
+		model[0] += fabs(d[0]) * sqrt(fmax(beyond, 0));
 		beyond = pow(own->sigma_time_s * top[2], 2) - top_noise[1];
-		variance[1] += beyond > 0 ? d[0] * d[0] * beyond : 0;
+		model[1] += fabs(d[0]) * sqrt(fmax(beyond, 0));
 	}
+	variance[0] += model[0] * model[0];
+	variance[1] += model[1] * model[1];
 }
 
 /* Models of different swings or pulses say nothing together; a polynomial does not reach that far, a curve
