@@ -25,6 +25,9 @@ void html_text_part(FILE *out, const char *text, size_t length)
 		case '\'':
 			fputs("&#39;", out);
 			break;
+		case HTML_OWN:
+		case HTML_OWN_END:
+			break;
 		default:
 			fputc(text[i], out);
 		}
@@ -34,6 +37,13 @@ void html_text_part(FILE *out, const char *text, size_t length)
 void html_text(FILE *out, const char *text)
 {
 	html_text_part(out, text, strlen(text));
+}
+
+void html_own(FILE *out, const char *text)
+{
+	fputc(HTML_OWN, out);
+	html_text(out, text);
+	fputc(HTML_OWN_END, out);
 }
 
 enum { SIGMA_DIGITS = -3 }; /* of a value with significant digits */

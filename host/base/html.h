@@ -7,9 +7,15 @@
 #include <stddef.h>
 #include <stdio.h>
 
-/* A text of the user's, escaped: harmless between tags and within a quoted attribute. */
+/* A text, escaped: harmless between tags and within a quoted attribute. */
 void html_text(FILE *out, const char *text);
 void html_text_part(FILE *out, const char *text, size_t length);
+
+/* The same of the user's words, between marks, so that no translation takes them for the page's. A page in
+ * memory has the marks, a finished one has not (host/report/language.h). */
+#define HTML_OWN '\1'
+#define HTML_OWN_END '\2'
+void html_own(FILE *out, const char *text);
 
 /* A dash when it is not known; negative decimals: so many significant digits, three of the uncertainty. */
 void html_number(FILE *out, int decimals, double value);

@@ -154,7 +154,7 @@ static void put_words(const struct table *t, const struct table_column *c, const
 	if (t->format == TABLE_CSV)
 		csv_words(t->out, words);
 	else if (t->format == TABLE_HTML)
-		html_text(t->out, words);
+		(c->own ? html_own : html_text)(t->out, words);
 	else
 		fprintf(t->out, "%*.*s", c->width, c->digits > 0 && is_words(c) ? c->digits : -1, words);
 }

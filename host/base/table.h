@@ -45,6 +45,7 @@ struct table_column {
 	const char *unit;  /* behind the title; NULL: none */
 	const char *gap;   /* in text, before the column; NULL: a blank */
 	int width;         /* in text; negative: to the left */
+	bool own;          /* words of the user's, in no language of ours */
 	int digits;   /* behind the point; negative: significant ones. Of words: most characters, 0: all */
 	double scale; /* of numbers in text and HTML; 0: 1 */
 };

@@ -90,6 +90,7 @@ static const struct option_row rows[] = {
                     "one JSON object per drop on standard output"),
         OPTION_TEXT("html", "PAGE", struct analyze_arguments, evaluate.html,
                     "write a page (one FILE of one drop, or --drop N)"),
+        COMMAND_LANGUAGE_ROW(struct analyze_arguments, evaluate.language),
         OPTION_FLAG("strict", struct analyze_arguments, evaluate.strict,
                     "a flagged record or channel is a failure (exit 3)"),
 };

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/command/command.h"
+#include "host/report/language.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -109,6 +110,22 @@ static int within_scene(const struct option_table *table, const char *name, cons
 int command_angle(const struct option_table *table, const char *name, const char *text, void *field)
 {
 	return within_scene(table, name, "angle_deg", text, field);
+}
+
+int command_language(const struct option_table *table, const char *name, const char *text, void *field)
+{
+	const struct language *language = language_find(text);
+
+	if (language == NULL)
+		return option_wrong(table, "--%s is '%s', expected en or de", name, text);
+	*(const struct language **)field = language;
+	return OPTIONS_READ;
+}
+
+void command_untranslated(void *context, const char *text)
+{
+	(void)context;
+	command_error("no translation: '%s'", text);
 }
 
 int command_height(const struct option_table *table, const char *name, const char *text, void *field)

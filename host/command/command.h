@@ -67,7 +67,15 @@ int command_tower_failed(int result, const char *message);
 /* Interrupted before anything was released: says so and returns COMMAND_REFUSED. */
 int command_stopped(void);
 
-/* --angle and --height, within what a scene may have. */
-option_take command_angle, command_height;
+/* --angle and --height, within what a scene may have; --language, a struct language *. */
+option_take command_angle, command_height, command_language;
+
+#define COMMAND_LANGUAGE_ROW(in, at)                          \
+	OPTION_TAKEN(                                         \
+	        "language", "CODE", in, at, command_language, \
+	        "of page and PDF: en, or de for German with a decimal comma; JSON and CSV stay English")
+
+/* A text of a page that has no entry in its language (struct translation): says so. */
+void command_untranslated(void *context, const char *text);
 
 #endif

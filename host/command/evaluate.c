@@ -35,14 +35,17 @@ static int write_json_file(const struct report *report, const char *file, char *
 
 static int evaluate_write_out(const struct report *report, const struct evaluate_options *options)
 {
+	const struct translation translation = {options->language, command_untranslated, NULL};
+	struct report page = *report;
 	char message[512];
 
+	page.translation = &translation;
 	if ((options->json ? report_json(report, stdout) : report_text(report, stdout)) != 0 &&
 	    command_output_failed(strerror(errno)) != COMMAND_DONE)
 		return COMMAND_INPUT;
 	if ((options->json_file != NULL &&
 	     write_json_file(report, options->json_file, message, sizeof(message)) != 0) ||
-	    (options->html != NULL && report_html(report, options->html, message, sizeof(message)) != 0)) {
+	    (options->html != NULL && report_html(&page, options->html, message, sizeof(message)) != 0)) {
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}

@@ -22,18 +22,19 @@ struct evaluate_options {
 	double iepe_time_constant_s; /* 0 = not undone, NAN = the scene's */
 	unsigned cfc;                /* channel frequency class; 0 = none */
 	enum estimate_family family;
-	double tolerance;             /* of estimate_options */
-	struct events_options events; /* how shocks are found */
-	bool show_events;             /* shocks and free falls in the table too */
-	struct band_options band;     /* its curve NULL: none */
-	const char *limits;           /* a preset's name, in place of the scene's limits; NULL: those */
-	bool json;                    /* JSON to stdout instead of the table */
-	const char *html;             /* page to write; NULL: none */
-	const char *json_file;        /* JSON beside it; NULL: none */
-	bool strict;                  /* a flag is a failure */
-	bool simulated;               /* the page says so */
-	bool unattended;              /* JSON says so */
-	struct repeats *repeats;      /* what is found goes there, and nothing is printed; NULL: printed */
+	double tolerance;                /* of estimate_options */
+	struct events_options events;    /* how shocks are found */
+	bool show_events;                /* shocks and free falls in the table too */
+	struct band_options band;        /* its curve NULL: none */
+	const char *limits;              /* a preset's name, in place of the scene's limits; NULL: those */
+	bool json;                       /* JSON to stdout instead of the table */
+	const char *html;                /* page to write; NULL: none */
+	const struct language *language; /* of the page; NULL: English */
+	const char *json_file;           /* JSON beside it; NULL: none */
+	bool strict;                     /* a flag is a failure */
+	bool simulated;                  /* the page says so */
+	bool unattended;                 /* JSON says so */
+	struct repeats *repeats;         /* what is found goes there, and nothing is printed; NULL: printed */
 };
 
 /* The row of --limits; at: a const char * of the struct in, for evaluate_options' limits. The word list is

@@ -17,6 +17,7 @@
 
 struct arguments {
 	const char *archive, *html, *pdf, *csv, *laboratory;
+	const struct language *language;
 	bool undecided, partial, strict;
 };
 
@@ -31,6 +32,7 @@ static const struct option_row rows[] = {
                 "laboratory", "FILE", struct arguments, laboratory,
                 "a report under ISO/IEC 17025, 7.8: laboratory, customer, item, sensors from this .ini file; "
                 "what it lacks makes the report a draft"),
+        COMMAND_LANGUAGE_ROW(struct arguments, language),
         OPTION_FLAG("strict", struct arguments, strict,
                     "with --laboratory: no report with a sensor whose calibration was overdue (exit 3)"),
         OPTION_TEXT("archive", "DIR", struct arguments, archive,
@@ -168,6 +170,7 @@ static int report_write_page(const struct series_report *request, const struct a
 
 static int report_write_all(struct archive *archive, const char *series, const struct arguments *a)
 {
+	const struct translation translation = {a->language, command_untranslated, NULL};
 	char message[SETTINGS_MESSAGE_MAX];
 	struct laboratory laboratory;
 	struct series_report request = {.archive = archive,
@@ -175,6 +178,7 @@ static int report_write_all(struct archive *archive, const char *series, const s
 	                                .undecided = a->undecided,
 	                                .laboratory = a->laboratory != NULL ? &laboratory : NULL,
 	                                .strict = a->strict,
+	                                .translation = &translation,
 	                                .version = DT_VERSION,
 	                                .partial = a->partial,
 	                                .lacking = report_tell};

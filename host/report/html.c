@@ -27,9 +27,9 @@ static void put_origin(const struct record *r, FILE *out)
 	if (r->time_s == 0)
 		return;
 	fields_format(r, fields_find("date"), date);
-	fprintf(out, "<time>%s</time>", date);
+	fprintf(out, "<time>%c%s%c</time>", HTML_OWN, date, HTML_OWN_END);
 	fputs(r->operator_name[0] != '\0' ? ", " : "", out);
-	html_text(out, r->operator_name);
+	html_own(out, r->operator_name);
 	fputs(". ", out);
 }
 
@@ -53,9 +53,9 @@ static void html_head(struct page *page)
 	fputs(r->is_drop ? ". " : "", out);
 	put_origin(r, out);
 	fputs("<span class=\"soft file\">", out);
-	html_text(out, r->file);
-	fprintf(out, " (%s%s)</span></p>\n<div class=\"verdict %s\">%s %s</div>\n", r->format,
-	        record_lacks_seal(r) ? ", not sealed" : "", good ? "good" : "bad",
+	html_own(out, r->file);
+	fprintf(out, " (%c%s%c%s)</span></p>\n<div class=\"verdict %s\">%s %s</div>\n", HTML_OWN, r->format,
+	        HTML_OWN_END, record_lacks_seal(r) ? ", not sealed" : "", good ? "good" : "bad",
 	        good ? "&#10003;" : "&#9888;", verdict);
 	if (report->simulated || r->simulated != 0)
 		fputs("<p><b>Simulated tower: no product fell.</b></p>\n", out);
@@ -142,7 +142,7 @@ static void notes(struct page *page, const struct report_note *note, size_t coun
 
 		if (first)
 			fprintf(page->out, "<li><b>%s</b>: ", estimate_flag_name(note[i].flag));
-		html_text(page->out, note[i].of);
+		page_note_subject(page->out, note[i].of);
 		if (last)
 			fprintf(page->out, ": %s.</li>", report_note_words(note[i].flag));
 		else
@@ -214,9 +214,7 @@ static void html_verdict(struct page *page)
 	fputs("</div>\n", page->out);
 	if (verdict_table(v, TABLE_HTML, page->out) != 0)
 		page->error = DT_E_MEMORY;
-	fprintf(page->out, "<p class=\"note\">%s %s. Uncertainty of %s.%s%s</p>\n",
-	        v->by[0] != '\0' ? "Limits by" : "Limits of the scene.", v->by, v->rests_on,
-	        v->verified ? "" : " ", v->verified ? "" : VERDICT_UNVERIFIED ".");
+	page_limits_by(page->out, v);
 	fprintf(page->out, "<p class=\"note\">Decision rule: %s.</p>\n", v->rule);
 }
 
@@ -234,7 +232,11 @@ static void html_write_page(struct page *page)
 
 int report_html(const struct report *report, const char *file, char *message, size_t size)
 {
-	struct page page = {.report = report, .zero = report_zero(report), .message = message, .size = size};
+	struct page page = {.report = report,
+	                    .zero = report_zero(report),
+	                    .translation = report->translation,
+	                    .message = message,
+	                    .size = size};
 	struct text text;
 	int result = text_open(&text);
 

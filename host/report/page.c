@@ -33,9 +33,29 @@ void page_end_compared(FILE *out, const struct report_row *row, bool simpler)
 void page_channel_name(FILE *out, const char *name)
 {
 	if (strlen(name) == 3 && name[0] == 'S')
-		fprintf(out, "%.2s %c", name, name[2]);
+		fprintf(out, "%c%.2s %c%c", HTML_OWN, name, name[2], HTML_OWN_END);
 	else
-		html_text(out, name);
+		html_own(out, name);
+}
+
+void page_note_subject(FILE *out, const char *of)
+{
+	static const char *const whats[] = {" peak", " velocity change", " contact", " resultant", " lag"};
+	size_t length = strlen(of);
+
+	for (size_t i = 0; i < sizeof(whats) / sizeof(whats[0]); i++) {
+		size_t what = strlen(whats[i]);
+
+		if (length > what && strcmp(of + length - what, whats[i]) == 0 &&
+		    strncmp(of, "driven", 6) != 0) {
+			fputc(HTML_OWN, out);
+			html_text_part(out, of, length - what);
+			fputc(HTML_OWN_END, out);
+			html_text(out, of + length - what);
+			return;
+		}
+	}
+	html_text(out, of);
 }
 
 /* Nothing is fetched and nothing runs, whatever a text may try. */
@@ -46,9 +66,9 @@ void page_begin(FILE *out, const char *title, const char *more)
 	      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
 	      "style-src 'unsafe-inline'\"><title>",
 	      out);
-	html_text(out, title);
+	html_own(out, title);
 	fprintf(out, "</title>\n<style>%s%s</style></head>\n<body><main>\n<h1>", page_style, more);
-	html_text(out, title);
+	html_own(out, title);
 	fputs("</h1>\n", out);
 }
 
@@ -57,11 +77,22 @@ void page_end(FILE *out, const char *version)
 	fputs("<p>droptower", out);
 	if (version) {
 		fputc(' ', out);
-		html_text(out, version);
+		html_own(out, version);
 	}
 	fprintf(out,
-	        ", wire %08" PRIX32 ", GSL %s, pictures by gnuplot.</p></footer>\n</main></body></html>\n",
-	        wire_hash(), gsl_version);
+	        ", wire %08" PRIX32
+	        ", GSL %c%s%c, pictures by gnuplot.</p></footer>\n</main></body></html>\n",
+	        wire_hash(), HTML_OWN, gsl_version, HTML_OWN_END);
+}
+
+void page_limits_by(FILE *out, const struct verdict *v)
+{
+	fputs(v->by[0] != '\0' ? "<p class=\"note\">Limits by " : "<p class=\"note\">Limits of the scene",
+	      out);
+	if (v->by[0] != '\0')
+		html_own(out, v->by);
+	fprintf(out, ". Uncertainty of %s.%s</p>\n", v->rests_on,
+	        v->verified ? "" : " " VERDICT_UNVERIFIED ".");
 }
 
 void page_begin_card(FILE *out, const char *label)

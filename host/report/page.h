@@ -8,16 +8,18 @@
 #include "host/base/html.h"
 #include "common/base/text.h"
 #include "host/report/facts.h"
+#include "host/report/language.h"
 
 /* page_open, write to out, page_close in any case. What is written stays in memory until all pictures can be
  * drawn. */
 struct page {
-	FILE *out;                   /* of the body */
-	FILE *whole;                 /* where all of it goes in the end */
-	struct text body, scripts;   /* page_draw's, one behind the other */
-	size_t *picture_at;          /* places in the body where they come in */
-	const struct report *report; /* of a drop; NULL: of a series */
-	struct report_zero zero;     /* of the report */
+	FILE *out;                             /* of the body */
+	FILE *whole;                           /* where all of it goes in the end */
+	struct text body, scripts;             /* page_draw's, one behind the other */
+	size_t *picture_at;                    /* places in the body where they come in */
+	const struct report *report;           /* of a drop; NULL: of a series */
+	const struct translation *translation; /* NULL: English */
+	struct report_zero zero;               /* of the report */
 	size_t pictures;
 	int error; /* DT_E_* of what failed first, its line in message */
 	char *message;
@@ -33,11 +35,17 @@ void page_end_compared(FILE *out, const struct report_row *row, bool simpler);
 /* "S1X" as "S1 X"; other names as they are. */
 void page_channel_name(FILE *out, const char *name);
 
+/* Of what a note or remark is, as "acc 1 peak": the channel's name is the user's. */
+void page_note_subject(FILE *out, const char *of);
+
 /* Colours, type, tables and pictures of every page. */
 extern const char page_style[];
 
 /* From the doctype to the title as heading; more: style beside page_style. */
 void page_begin(FILE *out, const char *title, const char *more);
+
+/* Where limits come from, and what the uncertainties hold. */
+void page_limits_by(FILE *out, const struct verdict *verdict);
 
 /* What wrote it, and the end; version NULL: not said. A footer is open. */
 void page_end(FILE *out, const char *version);

@@ -97,21 +97,34 @@ static bool page_put_svg(FILE *out, const char **svgs, bool first)
 }
 
 /* The body with its pictures in their places. */
-static int page_put(const struct page *page, const char *svgs)
+static int page_put(const struct page *page, const char *svgs, FILE *out)
 {
 	size_t from = 0;
 
 	for (size_t i = 0; i < page->pictures; i++) {
-		fwrite(page->body.bytes + from, 1, page->picture_at[i] - from, page->whole);
+		fwrite(page->body.bytes + from, 1, page->picture_at[i] - from, out);
 		from = page->picture_at[i];
-		if (!page_put_svg(page->whole, &svgs, i == 0)) {
+		if (!page_put_svg(out, &svgs, i == 0)) {
 			snprintf(page->message, page->size, "gnuplot made %zu pictures, expected %zu", i,
 			         page->pictures);
 			return DT_E_SYSTEM;
 		}
 	}
-	fwrite(page->body.bytes + from, 1, page->body.size - from, page->whole);
+	fwrite(page->body.bytes + from, 1, page->body.size - from, out);
 	return 0;
+}
+
+static int page_translate(const struct page *page, const char *svgs)
+{
+	struct text english;
+	int result = text_open(&english);
+
+	if (result == 0)
+		result = text_close(&english, page_put(page, svgs, english.out));
+	if (result == 0)
+		result = language_write(page->translation, english.bytes, english.size, page->whole);
+	free(english.bytes);
+	return result;
 }
 
 int page_close(struct page *page)
@@ -124,7 +137,7 @@ int page_close(struct page *page)
 		page->error = picture_draw(page->scripts.bytes, page->scripts.size, &svgs, page->message,
 		                           page->size);
 	if (!page->error)
-		page->error = page_put(page, svgs);
+		page->error = page_translate(page, svgs);
 	free(svgs);
 	free(page->body.bytes);
 	free(page->scripts.bytes);

@@ -194,11 +194,11 @@ static void uncertainties(struct page *page)
 		const struct sensor_used *s = &report->sensors->used[i];
 
 		fputs(i > 0 ? "; " : "", out);
-		html_text(out, s->name);
+		html_own(out, s->name);
 		fputs(", serial number ", out);
-		html_text(out, s->serial);
+		html_own(out, s->serial);
 		fputs(", certificate ", out);
-		html_text(out, s->certificate);
+		html_own(out, s->certificate);
 		fprintf(out, " of %s, due %s%s", s->date, s->due,
 		        s->overdue ? ": <b style=\"color:var(--bad)\">OVERDUE</b>" : "");
 	}

@@ -11,6 +11,7 @@
 #include "host/estimate/estimate.h"
 #include "host/model/model.h"
 #include "host/record/record.h"
+#include "host/report/language.h"
 #include "host/result/verdict.h"
 #include "host/shock/band.h"
 #include "host/shock/events.h"
@@ -27,13 +28,14 @@ struct report {
 	const struct free_falls *falls;            /* as events */
 	const struct band *band;                   /* NULL: no band was given */
 	const struct verdict *verdict;             /* NULL: no limits were given */
-	const struct sensors *sensors; /* NULL: none has a file, the uncertainties are noise only */
-	const struct budget *budget;   /* NULL: as sensors */
-	bool show_events;              /* in the table too */
-	bool simulated;                /* no product fell: the page says so */
-	bool unattended;               /* nobody was asked before it fell */
-	bool tolerance_asked;          /* what is less certain than it gets a note */
-	const char *version;           /* of the program, for the page's foot; NULL: not said */
+	const struct sensors *sensors;         /* NULL: none has a file, the uncertainties are noise only */
+	const struct budget *budget;           /* NULL: as sensors */
+	bool show_events;                      /* in the table too */
+	bool simulated;                        /* no product fell: the page says so */
+	bool unattended;                       /* nobody was asked before it fell */
+	bool tolerance_asked;                  /* what is less certain than it gets a note */
+	const char *version;                   /* of the program, for the page's foot; NULL: not said */
+	const struct translation *translation; /* of the page; NULL: English */
 };
 
 /* The result table. 0 or DT_E_SYSTEM. */

@@ -80,6 +80,7 @@ static int read_log(struct series_page *page, struct series_drop *drop, const ch
 	if (result == DT_E_CORRUPT) {
 		drop->a.state = "altered"; /* or missing: it counts nowhere */
 		snprintf(drop->no_log, sizeof(drop->no_log), "%.300s", archive_message(archive));
+		drop->quoted = true;
 		return 0;
 	}
 	if (result)
@@ -87,6 +88,7 @@ static int read_log(struct series_page *page, struct series_drop *drop, const ch
 	if (log.fault[0]) {
 		drop->a.state = "altered";
 		snprintf(drop->no_log, sizeof(drop->no_log), "%.300s", log.fault);
+		drop->quoted = true;
 	} else if (read_record(&drop->record, log.file, NULL, message) != 0) {
 		snprintf(drop->no_log, sizeof(drop->no_log), "%.100s: the raw log cannot be read", log.raw);
 		record_init(&drop->record);
@@ -360,7 +362,7 @@ int series_report_html(const struct series_report *request, FILE *out, char *mes
 	if (!page)
 		return DT_E_MEMORY;
 	page->request = request;
-	page->page = (struct page){.message = message, .size = size};
+	page->page = (struct page){.translation = request->translation, .message = message, .size = size};
 	result = series_gather(page);
 	if (result == 0)
 		result = series_make_page(page, out);

@@ -14,6 +14,7 @@
 
 #include "host/archive/archive.h"
 #include "host/report/laboratory.h"
+#include "host/report/language.h"
 
 /* How the last comment of the page begins: what it rests on, a line each, for `droptower verify`:
  * "series NAME", "log PLACE SHA-256" for each drop, "chain ENTRY HEAD", "data TABLE", and an empty seal
@@ -31,8 +32,9 @@ struct series_report {
 	/* Called with one line for each recorded drop of which that is so, and why; NULL: nobody is told. */
 	void (*lacking)(void *context, const char *text);
 	void *context;
-	const struct laboratory *laboratory; /* NULL: no report under ISO/IEC 17025, 7.8 */
-	bool strict;                         /* no report with a sensor whose calibration was overdue */
+	const struct laboratory *laboratory;   /* NULL: no report under ISO/IEC 17025, 7.8 */
+	const struct translation *translation; /* NULL: English */
+	bool strict;                           /* no report with a sensor whose calibration was overdue */
 };
 
 /* Writes the page to out, gnuplot is run for its pictures. 0, or DT_E_* with one line in message, and what

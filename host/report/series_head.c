@@ -31,6 +31,7 @@ static void write_style(struct series_page *page, FILE *out)
 {
 	fputs(style, out);
 	fputs("@page{size:A4;margin:19mm 14mm 17mm;@top-left{content:\"Drop series ", out);
+	fputc(HTML_OWN, out);
 	for (const char *s = page->series.name; *s;
 	     s++) /* within a CSS string nothing but a name's letters */
 		fputc(strchr("._-", *s) || (*s >= '0' && *s <= '9') || (*s >= 'A' && *s <= 'Z') ||
@@ -38,6 +39,7 @@ static void write_style(struct series_page *page, FILE *out)
 		              ? *s
 		              : '?',
 		      out);
+	fputc(HTML_OWN_END, out);
 	fputs("\"}@bottom-right{content:\"page \" counter(page) \" of \" counter(pages)}"
 	      "@top-left{font:8pt sans-serif;color:#56606b}@bottom-right{font:8pt sans-serif;color:#56606b}}",
 	      out);
@@ -191,10 +193,10 @@ void series_head(struct series_page *page)
 	page_begin(out, scene->title[0] ? scene->title : scene->name, more.bytes);
 	free(more.bytes);
 	fputs("<p>Drop series <b>", out);
-	html_text(out, page->series.name);
+	html_own(out, page->series.name);
 	fprintf(out, "</b>: dropped from %g m at %g&deg;. <span class=\"soft\">Campaign ",
 	        scene->drop_height_m, scene->drop_angle_deg);
-	html_text(out, page->series.campaign);
+	html_own(out, page->series.campaign);
 	fprintf(out, "</span></p>\n<div class=\"verdict %s\">%s %s</div>\n", good ? "good" : "bad",
 	        good ? "&#10003;" : "&#9888;", line);
 	simulated(page);
@@ -221,7 +223,7 @@ static void subject_product(const struct series_page *page)
 
 	fputs("<div><table class=\"facts\">", out);
 	begin_fact(out, "geometry");
-	html_text(out, s->name);
+	html_own(out, s->name);
 	end_fact(out);
 	begin_fact(out, "outside");
 	fprintf(out, "%g &times; %g &times; %g mm", s->product_length_m * 1e3, s->product_width_m * 1e3,
@@ -343,7 +345,7 @@ static void fact_operators(const struct series_page *page)
 		if (before < i || !name[0])
 			continue;
 		fputs(named++ ? ", " : "", out);
-		html_text(out, name);
+		html_own(out, name);
 	}
 	fputs(named ? "" : "&ndash;", out);
 	end_fact(out);

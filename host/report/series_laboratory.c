@@ -114,11 +114,11 @@ void series_sensors(struct series_page *page)
 {
 #define COLUMN(KIND, member, ...) TABLE_COLUMN(KIND, struct series_sensor, member, .width = -1, __VA_ARGS__)
 	static const struct table_column columns[] = {
-	        COLUMN(CHARS, name, .title = "sensor"),
-	        COLUMN(CHARS, serial, .title = "serial number"),
-	        COLUMN(CHARS, model, .title = "model"),
-	        COLUMN(CHARS, certificate, .title = "certificate"),
-	        COLUMN(CHARS, laboratory, .title = "calibrated by"),
+	        COLUMN(CHARS, name, .own = true, .title = "sensor"),
+	        COLUMN(CHARS, serial, .own = true, .title = "serial number"),
+	        COLUMN(CHARS, model, .own = true, .title = "model"),
+	        COLUMN(CHARS, certificate, .own = true, .title = "certificate"),
+	        COLUMN(CHARS, laboratory, .own = true, .title = "calibrated by"),
 	        COLUMN(CHARS, date, .title = "on"),
 	        COLUMN(CHARS, due, .title = "due"),
 	        COLUMN(YES, overdue, .title = "overdue"),
@@ -152,8 +152,9 @@ void series_sensors(struct series_page *page)
 	for (size_t i = 0; i < page->sensors; i++) {
 		fputs(i == 0 ? "<p class=\"note\">Files, by their SHA-256: <span class=\"hash\">" : "; ",
 		      table.out);
-		html_text(table.out, page->sensor[i].serial);
-		fprintf(table.out, " %s", page->sensor[i].file_sha256);
+		html_own(table.out, page->sensor[i].serial);
+		fputc(' ', table.out);
+		html_own(table.out, page->sensor[i].file_sha256);
 	}
 	fputs("</span></p>\n", table.out);
 }
@@ -170,10 +171,10 @@ static void laboratory_row(const struct series_page *page, enum laboratory_field
 		return;
 	fprintf(out, "<tr><th>%s</th><td>", row->label);
 	if (text[0])
-		html_text(out, text);
+		html_own(out, text);
 	else
 		fputs("<b style=\"color:var(--bad)\">missing</b>", out);
-	fprintf(out, "</td><td class=\"soft\">%s</td></tr>\n", row->clause);
+	fprintf(out, "</td><td class=\"soft\">%c%s%c</td></tr>\n", HTML_OWN, row->clause, HTML_OWN_END);
 }
 
 static void sensor_row(const struct series_page *page, const char *name)
@@ -202,9 +203,9 @@ static void statements(const struct series_page *page, bool final)
 	if (!final)
 		return;
 	fputs("<p>Authorised: ", out);
-	html_text(out, l->text[LABORATORY_laboratory_signatory]);
+	html_own(out, l->text[LABORATORY_laboratory_signatory]);
 	fputs(", ", out);
-	html_text(out, l->text[LABORATORY_report_issued]);
+	html_own(out, l->text[LABORATORY_report_issued]);
 	fputs(" &emsp; ______________________________</p>\n", out);
 }
 
@@ -221,7 +222,7 @@ void series_laboratory(struct series_page *page)
 	fputs("<h2>Test report", out);
 	if (l->text[LABORATORY_report_number][0]) {
 		fputs(" ", out);
-		html_text(out, l->text[LABORATORY_report_number]);
+		html_own(out, l->text[LABORATORY_report_number]);
 	}
 	fputs("</h2>\n", out);
 	if (missing > 0)

@@ -106,11 +106,7 @@ void series_limits(struct series_page *page)
 	        counted, of[DECIDE_PASS], of[DECIDE_CONDITIONAL_PASS], of[DECIDE_CONDITIONAL_FAIL],
 	        of[DECIDE_FAIL], of[DECIDE_UNDECIDED] + counted - judged);
 	limit_table(page, worst);
-	fprintf(out,
-	        "<p class=\"note\">%s%s. Uncertainty of %s.%s%s</p>\n<p class=\"note\">Decision rule: %s; r "
-	        "= "
-	        "%g, risk of a pass up to %.2g %%.</p>\n",
-	        worst->by[0] ? "Limits by " : "Limits of the scene", worst->by, worst->rests_on,
-	        worst->verified ? "" : " ", worst->verified ? "" : VERDICT_UNVERIFIED ".", worst->rule,
-	        worst->guard, 100.0 * worst->risk);
+	page_limits_by(out, worst);
+	fprintf(out, "<p class=\"note\">Decision rule: %s; r = %g, risk of a pass up to %.2g %%.</p>\n",
+	        worst->rule, worst->guard, 100.0 * worst->risk);
 }

@@ -71,7 +71,7 @@ static void drop_heading(FILE *out, const struct series_drop *drop)
 	fputs("</span></h3>\n", out);
 	if (drop->a.note[0]) {
 		fputs("<p>Note: ", out);
-		html_text(out, drop->a.note);
+		html_own(out, drop->a.note);
 		fputs("</p>\n", out);
 	}
 }
@@ -81,8 +81,10 @@ static void drop_pictures(struct series_page *page, const struct series_drop *dr
 	FILE *out = page->page.out;
 
 	if (!series_is_drawn(drop)) {
-		fprintf(out, "<p class=\"soft\">No trace: %s.</p>\n",
-		        drop->no_log[0] ? drop->no_log : "it has no result to lay its time by");
+		fputs("<p class=\"soft\">No trace: ", out);
+		(drop->quoted ? html_own : html_text)(
+		        out, drop->no_log[0] ? drop->no_log : "it has no result to lay its time by");
+		fputs(".</p>\n", out);
 		return;
 	}
 	fputs("<div class=\"grid\">", out);
@@ -99,7 +101,10 @@ static void excluded_reason(FILE *out, const struct series_drop *drop)
 	fprintf(out, "<p><b>%c%s</b>", decision[0] - 'a' + 'A', decision + 1);
 	if (!strcmp(decision, "rejected")) {
 		fputs(": ", out);
-		html_text(out, drop->a.reason[0] ? drop->a.reason : "no reason was noted");
+		if (drop->a.reason[0])
+			html_own(out, drop->a.reason);
+		else
+			fputs("no reason was noted", out);
 	} else if (archive_is_faulty(&drop->a)) {
 		fputs(": what is kept of it is not what was recorded, or is not there", out);
 	} else if (!strcmp(decision, "undecided")) {

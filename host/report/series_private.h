@@ -17,6 +17,7 @@ struct series_drop {
 	bool counts;              /* goes into the means */
 	bool has_result;          /* analysis is filled */
 	char no_log[320];         /* why there is no trace to draw; "": there is one */
+	bool quoted;              /* no_log is what verify says, in its words */
 	struct record record;     /* from the log; without it, what the result knows of it, without samples */
 	struct analysis analysis; /* from the result: what pictures and remarks need */
 	struct estimate_options options; /* of the result: the high-pass that was undone */

@@ -152,7 +152,7 @@ static void series_records_tell(FILE *out, struct remarks *remarks, size_t first
 		if (r->flag != flag || r->kind != kind)
 			continue;
 		fputs(told++ ? "; " : "", out);
-		html_text(out, r->of);
+		page_note_subject(out, r->of);
 		fputs(r->of[0] ? " of " : "", out);
 		if (r->count == counted)
 			fputs("all drops", out);
@@ -201,13 +201,18 @@ static void record_row(FILE *out, const struct series_drop *drop)
 	fprintf(out, "<tr><td>%u</td><td class=\"text\">", drop->a.number);
 	series_time(out, drop->a.time);
 	fputs("</td><td class=\"text\">", out);
-	html_text(out, drop->a.operator_name);
+	html_own(out, drop->a.operator_name);
 	fputs("</td><td>", out);
 	html_number(out, 3, r->frame_speed_m_s > 0.0 ? r->frame_speed_m_s : (double)NAN);
 	fputs("</td><td class=\"text wrap\">", out);
-	html_text(out, drop->no_log[0] ? drop->no_log : verdict[0] ? verdict : "no result");
+	(drop->quoted ? html_own : html_text)(out, drop->no_log[0] ? drop->no_log
+	                                           : verdict[0]    ? verdict
+	                                                           : "no result");
 	fputs("</td><td class=\"text\">", out);
-	html_text(out, drop->a.version ? drop->a.version : "no result");
+	if (drop->a.version)
+		html_own(out, drop->a.version);
+	else
+		fputs("no result", out);
 	fputs("</td></tr>\n", out);
 }
 
@@ -230,9 +235,12 @@ static void logs(const struct series_page *page)
 		const struct series_drop *d = page->drop[i];
 
 		fprintf(out, "<tr><td>%u</td><td class=\"text wrap hash\">", d->a.number);
-		html_text(out, d->a.raw);
+		html_own(out, d->a.raw);
 		fputs("<br>", out);
-		html_text(out, d->a.sha256[0] ? d->a.sha256 : "none: never finished");
+		if (d->a.sha256[0])
+			html_own(out, d->a.sha256);
+		else
+			fputs("none: never finished", out);
 		fprintf(out, "</td><td>%" PRId64 "</td></tr>\n", d->a.bytes);
 	}
 	fputs("</tbody></table></div>\n", out);
@@ -240,8 +248,8 @@ static void logs(const struct series_page *page)
 		fprintf(out,
 		        "<p class=\"note\">Chain of the archive: entry %" PRId64
 		        ", which stands for all before "
-		        "it, head <span class=\"hash\">%s</span></p>\n",
-		        page->seal.entry, page->seal.head);
+		        "it, head <span class=\"hash\">%c%s%c</span></p>\n",
+		        page->seal.entry, HTML_OWN, page->seal.head, HTML_OWN_END);
 	else
 		fputs("<p class=\"note\">Not sealed: recorded before the archive had a chain.</p>\n", out);
 }
@@ -313,9 +321,9 @@ static int history_row(void *context, const struct archive_event *event)
 	fputs("</td><td class=\"text\">", h->out);
 	html_text(h->out, event->what);
 	fputs("</td><td class=\"text\">", h->out);
-	html_text(h->out, event->operator_name);
+	html_own(h->out, event->operator_name);
 	fputs("</td><td class=\"text wrap\">", h->out);
-	html_text(h->out, event->text);
+	html_own(h->out, event->text);
 	fputs("</td></tr>\n", h->out);
 	return 0;
 }
