@@ -33,6 +33,19 @@ static void put_number(FILE *out, const char *key, double value)
 	put_text(out, key, text);
 }
 
+/* When it fell, in UTC, as "2026-11-28 03:22:26". */
+static void put_date(FILE *out, const struct record *record)
+{
+	char date[FIELDS_TEXT_MAX] = "";
+
+	if (fields_known(record, fields_find("date"))) {
+		fields_format(record, fields_find("date"), date);
+		date[10] = ' ';
+		date[19] = '\0';
+	}
+	put_text(out, "Timestamp", date);
+}
+
 static int put_test(const struct record *record, FILE *out, const char *title)
 {
 	const struct fields_entry *entry;
@@ -41,7 +54,7 @@ static int put_test(const struct record *record, FILE *out, const char *title)
 	put_text(out, "Data format edition number", "1.6");
 	put_text(out, "Laboratory name", "");
 	put_text(out, "Title", title);
-	put_text(out, "Timestamp", "");
+	put_date(out, record);
 	put_number(out, "Number of test objects", 1);
 	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++) {
 		if (!fields_known(record, entry))
