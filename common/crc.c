@@ -18,14 +18,68 @@
 #define SIXTY_FOUR(f, b) SIXTEEN(f, b), SIXTEEN(f, (b) + 16u), SIXTEEN(f, (b) + 32u), SIXTEEN(f, (b) + 48u)
 #define ALL(f) SIXTY_FOUR(f, 0u), SIXTY_FOUR(f, 64u), SIXTY_FOUR(f, 128u), SIXTY_FOUR(f, 192u)
 
-static const uint8_t table8[256] = {ALL(CRC8_BYTE)};
+/* Where there is room for tables, eight bytes at once: the remainder of b x^(8 + 8 n) is a sum over the bits
+ * of b as well, of what a byte's table makes of the sums before. */
+#if UINTPTR_MAX > 0xFFFFFFFFu
+#define CRC8_AT_ONCE 8
+#define LATER(to, from)                                                                     \
+	to##0 = CRC8_BYTE(from##0), to##1 = CRC8_BYTE(from##1), to##2 = CRC8_BYTE(from##2), \
+	to##3 = CRC8_BYTE(from##3), to##4 = CRC8_BYTE(from##4), to##5 = CRC8_BYTE(from##5), \
+	to##6 = CRC8_BYTE(from##6), to##7 = CRC8_BYTE(from##7)
+#define BY(z, b)                                                                                            \
+	(uint8_t)(BIT(b, 0, z##0) ^ BIT(b, 1, z##1) ^ BIT(b, 2, z##2) ^ BIT(b, 3, z##3) ^ BIT(b, 4, z##4) ^ \
+	          BIT(b, 5, z##5) ^ BIT(b, 6, z##6) ^ BIT(b, 7, z##7))
+
+/* a: of b x^8, bit by bit; then of b x^16 and so on. */
+enum {
+	a0 = CRC8_BYTE(1u),
+	a1 = CRC8_BYTE(2u),
+	a2 = CRC8_BYTE(4u),
+	a3 = CRC8_BYTE(8u),
+	a4 = CRC8_BYTE(16u),
+	a5 = CRC8_BYTE(32u),
+	a6 = CRC8_BYTE(64u),
+	a7 = CRC8_BYTE(128u),
+	LATER(b, a),
+	LATER(c, b),
+	LATER(d, c),
+	LATER(e, d),
+	LATER(f, e),
+	LATER(g, f),
+	LATER(h, g)
+};
+#define BY_B(n) BY(b, n)
+#define BY_C(n) BY(c, n)
+#define BY_D(n) BY(d, n)
+#define BY_E(n) BY(e, n)
+#define BY_F(n) BY(f, n)
+#define BY_G(n) BY(g, n)
+#define BY_H(n) BY(h, n)
+#else
+#define CRC8_AT_ONCE 1
+#endif
+
+static const uint8_t table8[CRC8_AT_ONCE][256] = {
+        {ALL(CRC8_BYTE)},
+#if CRC8_AT_ONCE == 8
+        {ALL(BY_B)},      {ALL(BY_C)}, {ALL(BY_D)}, {ALL(BY_E)}, {ALL(BY_F)}, {ALL(BY_G)}, {ALL(BY_H)},
+#endif
+};
 static const uint32_t table32[256] = {ALL(CRC32_BYTE)};
 
 uint8_t crc8(uint8_t crc, const uint8_t *bytes, size_t count)
 {
+	size_t i = 0;
+
 	crc ^= 0xFFu;
-	for (size_t i = 0; i < count; i++)
-		crc = table8[crc ^ bytes[i]];
+#if CRC8_AT_ONCE == 8
+	for (; i + 8 <= count; i += 8)
+		crc = table8[7][crc ^ bytes[i]] ^ table8[6][bytes[i + 1]] ^ table8[5][bytes[i + 2]] ^
+		      table8[4][bytes[i + 3]] ^ table8[3][bytes[i + 4]] ^ table8[2][bytes[i + 5]] ^
+		      table8[1][bytes[i + 6]] ^ table8[0][bytes[i + 7]];
+#endif
+	for (; i < count; i++)
+		crc = table8[0][crc ^ bytes[i]];
 	return crc ^ 0xFFu;
 }
 

@@ -102,22 +102,21 @@ static void mean_values(const struct modes *modes, double value[MEAN_VALUES])
 	value[MEAN_DAMPING] = p[MODES_DECAY] / (2 * UNITS_PI * value[MEAN_NATURAL]);
 }
 
-/* The vanishing swing is extrapolated; a mean of cycles that are there is far more certain. */
-static void mean_sigmas(const struct ringdown_job *job, double sigma[MEAN_VALUES])
+/* Of value. The vanishing swing is extrapolated; a mean of cycles that are there is far more certain. */
+static void mean_sigmas(const struct ringdown_job *job, const double value[MEAN_VALUES],
+                        double sigma[MEAN_VALUES])
 {
 	double row[MEAN_VALUES][CHOLESKY_MAX] = {{0}}, point = ringdown_sigma_point(job, &job->modes);
 
-	for (unsigned i = 0; i < modes_size(&job->modes); i++) {
-		struct modes above = job->modes, below = job->modes;
-		double high[MEAN_VALUES], low[MEAN_VALUES];
+	for (unsigned i = MODES_DECAY; i < modes_size(&job->modes); i++) {
+		struct modes above = job->modes;
+		double high[MEAN_VALUES];
 		double step = LIMIT_SMALL * fmax(fabs(job->modes.p[i]), LIMIT_LEAST);
 
 		above.p[i] += step;
-		below.p[i] -= step;
 		mean_values(&above, high);
-		mean_values(&below, low);
 		for (unsigned v = 0; v < MEAN_VALUES; v++)
-			row[v][i] = (high[v] - low[v]) / (2 * step);
+			row[v][i] = (high[v] - value[v]) / step;
 	}
 	for (unsigned v = 0; v < MEAN_VALUES; v++)
 		sigma[v] = point * sqrt(cholesky_variance(&job->modes.fit.factor, row[v]));
@@ -130,7 +129,7 @@ static void express_mean(const struct ringdown_job *job, struct estimate_ringdow
 	double value[MEAN_VALUES], sigma[MEAN_VALUES];
 
 	mean_values(&job->modes, value);
-	mean_sigmas(job, sigma);
+	mean_sigmas(job, value, sigma);
 	result->small_swing_hz = result->frequency_hz;
 	result->frequency_hz = value[MEAN_HZ];
 	result->sigma_hz = sigma[MEAN_HZ];

@@ -31,17 +31,38 @@ static bool is_of_tower(const struct frame *frame)
 	       (frame->id == WIRE_ID_HEARTBEAT_TOWER && frame->length == WIRE_LENGTH_heartbeat);
 }
 
+static bool is_blank(char c)
+{
+	return c == ' ' || c == '\t';
+}
+
 /* Behind the time; the line has been parsed. */
-static void take_bus(const struct log_line *line, char name[LOG_BUS_MAX])
+static const char *bus_in(const struct log_line *line)
 {
 	const char *end = line->text + line->length, *at = memchr(line->text, ')', line->length);
+
+	while (++at < end && is_blank(*at))
+		continue;
+	return at;
+}
+
+static void take_bus(const struct log_line *line, char name[LOG_BUS_MAX])
+{
+	const char *end = line->text + line->length;
 	size_t length = 0;
 
-	while (++at < end && (*at == ' ' || *at == '\t'))
-		continue;
-	for (; at < end && *at != ' ' && *at != '\t' && length < LOG_BUS_MAX - 1; at++)
+	for (const char *at = bus_in(line); at < end && !is_blank(*at) && length < LOG_BUS_MAX - 1; at++)
 		name[length++] = *at;
 	name[length] = '\0';
+}
+
+static bool is_same_bus(const struct log_line *line, const char *name)
+{
+	const char *at = bus_in(line);
+	const size_t length = strlen(name);
+
+	return (size_t)(line->text + line->length - at) > length && memcmp(at, name, length) == 0 &&
+	       is_blank(at[length]);
 }
 
 /* Two towers, each on a bus of its own, would be taken for one that sends everything twice. */
@@ -49,6 +70,10 @@ static void check_bus(struct log_walk *walk, const struct log_line *line)
 {
 	struct log_bus now = {.time_us = walk->time_us};
 
+	if (is_same_bus(line, walk->bus.name)) {
+		walk->bus.time_us = walk->time_us;
+		return;
+	}
 	take_bus(line, now.name);
 	if (strcmp(now.name, walk->bus.name) != 0) {
 		bool returns = strcmp(now.name, walk->bus_before.name) == 0 &&

@@ -77,18 +77,21 @@ static void record_finish_channel(struct record *record, struct channel *channel
 	const unsigned readers =
 	        RECORD_FLAG_UNEVEN | RECORD_FLAG_NO_LINE_END | RECORD_FLAG_SAME_NAMES | RECORD_FLAG_ASSUMED;
 	unsigned flags = channel->flags & readers; /* only the reader knows */
+	unsigned marks = 0, full = 0;
 	uint64_t lost = 0;
 
-	for (size_t k = 0; k < channel->count; k++) {
-		if (channel->sample[k] & SAMPLE_LOST)
-			lost++;
-		if (channel->sample[k] & SAMPLE_BAD)
-			flags |= RECORD_FLAG_BAD;
-		if (channel->sample[k] & SAMPLE_CLIPPED)
-			flags |= RECORD_FLAG_CLIPPED;
-		if (record->is_drop && fabs(channel->value_g[k]) >= full_scale_g)
-			flags |= RECORD_FLAG_FULL_SCALE;
-	}
+	for (size_t k = 0; k < channel->count; k++)
+		marks |= channel->sample[k];
+	for (size_t k = 0; k < channel->count && marks & SAMPLE_LOST; k++)
+		lost += (channel->sample[k] & SAMPLE_LOST) != 0;
+	for (size_t k = 0; k < channel->count && record->is_drop; k++)
+		full |= fabs(channel->value_g[k]) >= full_scale_g;
+	if (marks & SAMPLE_BAD)
+		flags |= RECORD_FLAG_BAD;
+	if (marks & SAMPLE_CLIPPED)
+		flags |= RECORD_FLAG_CLIPPED;
+	if (full)
+		flags |= RECORD_FLAG_FULL_SCALE;
 	if (lost)
 		flags |= RECORD_FLAG_LOST;
 	channel->flags = flags;
