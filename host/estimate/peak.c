@@ -247,7 +247,6 @@ static bool take_crest(const struct trace *trace, struct peak *peak)
 	return true;
 }
 
-/* Without any model: it says so in its uncertainty. */
 /* A value without any model: it says so in its uncertainty. */
 static void peak_take_samples(const struct trace *trace, struct peak *peak)
 {

@@ -8,10 +8,17 @@
 #include "host/estimate/guide.h"
 #include "host/estimate/limits.h"
 
-/* Samples. */
-enum { AGAIN_WITHIN = 4 };
+/* An edge that rises by less than this many sigma of noise from sample to sample is slow: two samples tell
+ * its slope no more, and noise crosses the level before the pulse does. */
+#define SLOW_SIGMAS 6.0
 
-enum { SLOW_NEWTON = 4 };
+/* Of the time from the level to twice it: half the window of a parabola on a slow edge. */
+#define SLOW_HALF 0.7
+
+enum {
+	AGAIN_WITHIN = 4, /* samples */
+	SLOW_NEWTON = 4,  /* steps to where the parabola meets the level */
+};
 
 struct edge {
 	double time_s;
@@ -64,13 +71,6 @@ static double crossed_again(const struct trace *trace, const struct peak *peak, 
 	}
 	return (double)(step < 0 ? at - last : last - at) / trace->rate_hz;
 }
-
-/* An edge that rises by less than this many sigma of noise from sample to sample is slow: two samples tell
- * its slope no more, and noise crosses the level before the pulse does. */
-#define SLOW_SIGMAS 6.0
-
-/* Of the time from the level to twice it: half the window of a parabola on a slow edge. */
-#define SLOW_HALF 0.7
 
 /* A slow edge by a parabola through the samples around edge, where there are enough for one that meets the
  * level within its window. */
