@@ -178,41 +178,9 @@ static bool eat_fd_flags(struct text *text, struct frame *frame)
 	return true;
 }
 
-/* Sixteen characters at once. */
-typedef uint8_t letters __attribute__((vector_size(16)));
-typedef uint16_t pairs __attribute__((vector_size(16)));
-typedef uint8_t octet __attribute__((vector_size(8)));
-
-/* Eight bytes from sixteen hex digits; false, and nothing written, if one is none. */
-static inline bool read_octet(const char *at, uint8_t bytes[8])
-{
-	letters c, low, is_digit, is_letter, valid;
-	octet packed;
-	pairs pair;
-	uint64_t all[2];
-
-	memcpy(&c, at, sizeof(c));
-	low = c | 0x20;
-	is_digit = (letters)((c >= '0') & (c <= '9'));
-	is_letter = (letters)((low >= 'a') & (low <= 'f'));
-	valid = is_digit | is_letter;
-	memcpy(all, &valid, sizeof(all));
-	if ((all[0] & all[1]) != UINT64_MAX)
-		return false;
-	pair = (pairs)((c & 0x0F) + (is_letter & 9));
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ /* the first digit of two is the higher one */
-	pair = pair << 4 | pair >> 8;
-#else
-	pair = pair >> 4 | pair;
-#endif
-	packed = __builtin_convertvector(pair, octet);
-	memcpy(bytes, &packed, sizeof(packed));
-	return true;
-}
-
-/* As read_octet, twice as much at once. */
-typedef uint8_t many_letters __attribute__((vector_size(32)));
-typedef uint16_t many_pairs __attribute__((vector_size(32)));
+/* Thirty-two characters at once. */
+typedef uint8_t letters __attribute__((vector_size(32)));
+typedef uint16_t pairs __attribute__((vector_size(32)));
 typedef uint8_t octets __attribute__((vector_size(16)));
 
 /* Where the processor has registers of that width they are used. */
@@ -228,19 +196,19 @@ WIDE static unsigned read_many(const char *at, size_t digits, uint8_t bytes[FRAM
 	unsigned length = 0;
 
 	for (; length + 16 <= FRAME_DATA_MAX && digits >= 32; length += 16, at += 32, digits -= 32) {
-		many_letters c, is_letter, valid;
-		many_pairs pair;
+		letters c, is_letter, valid;
+		pairs pair;
 		octets packed;
 		uint64_t all[4];
 
 		memcpy(&c, at, sizeof(c));
-		is_letter = (many_letters)(((c | 0x20) >= 'a') & ((c | 0x20) <= 'f'));
-		valid = (many_letters)((c >= '0') & (c <= '9')) | is_letter;
+		is_letter = (letters)(((c | 0x20) >= 'a') & ((c | 0x20) <= 'f'));
+		valid = (letters)((c >= '0') & (c <= '9')) | is_letter;
 		memcpy(all, &valid, sizeof(all));
 		if ((all[0] & all[1] & all[2] & all[3]) != UINT64_MAX)
 			break;
-		pair = (many_pairs)((c & 0x0F) + (is_letter & 9));
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+		pair = (pairs)((c & 0x0F) + (is_letter & 9));
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ /* the first digit of two is the higher one */
 		pair = pair << 4 | pair >> 8;
 #else
 		pair = pair >> 4 | pair;
@@ -251,13 +219,28 @@ WIDE static unsigned read_many(const char *at, size_t digits, uint8_t bytes[FRAM
 	return length;
 }
 
+/* A frame's last or only eight bytes, as if as many zeros followed; false, and nothing written, if a digit is
+ * none. */
+static bool read_octet(const char *at, uint8_t bytes[8])
+{
+	char padded[32];
+	uint8_t all[FRAME_DATA_MAX];
+
+	memset(padded, '0', sizeof(padded));
+	memcpy(padded, at, 16);
+	if (read_many(padded, sizeof(padded), all) == 0)
+		return false;
+	memcpy(bytes, all, 8);
+	return true;
+}
+
 static void eat_data(struct text *text, struct frame *frame)
 {
 	unsigned length = read_many(text->at, (size_t)(text->end - text->at), frame->data);
 
 	text->at += 2 * length;
-	while (length + 8 <= FRAME_DATA_MAX && text->end - text->at >= 16 &&
-	       read_octet(text->at, frame->data + length)) {
+	if (length + 8 <= FRAME_DATA_MAX && text->end - text->at >= 16 &&
+	    read_octet(text->at, frame->data + length)) {
 		length += 8;
 		text->at += 16;
 	}

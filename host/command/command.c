@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/command/command.h"
-#include "host/report/language.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -15,6 +14,7 @@
 #include "common/error.h"
 #include "common/scenes/scene.h"
 #include "host/base/whole.h"
+#include "host/report/language.h"
 
 void command_error(const char *format, ...)
 {

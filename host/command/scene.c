@@ -49,12 +49,10 @@ static const struct option_table scene_options = {
         .command = "scene",
         .head = "usage: droptower scene new FILE.ini [OPTIONS]\n"
                 "\n"
-                "A first scene of a product. What no option gives is asked for on a terminal, but for mat "
-                "and "
-                "edge.\n"
-                "Contact, grip and mounts are filled by rules of the study's boxes, to be improved by "
-                "'droptower fit';\n"
-                "with mat and edge the contact is 'corner', which predicts it with its uncertainty.\n"
+                "A first scene of a product. What no option gives is asked for on a terminal, mat and\n"
+                "edge excepted. Contact, grip and mounts are filled by rules of the study's boxes, to be\n"
+                "improved by 'droptower fit'; with mat and edge the contact is 'corner', which predicts it\n"
+                "with its uncertainty.\n"
                 "\n",
         OPTION_ROWS(rows),
         .words = true,
