@@ -43,6 +43,8 @@ static void estimate_sensors_drive(const struct desk *desk, unsigned i, const st
 	driven_find(&axis, driven, curve);
 	if (peak_driven(&axis, driven, curve, desk->options, &work->peak))
 		s1->axes.curve[i] = curve;
+	else if (driven->status == ESTIMATE_NOT_CONVERGED || driven->flags & ESTIMATE_FLAG_MODEL)
+		peak_narrow(&work->trace, desk->options, &work->peak);
 	if (isnan(driven->free_s))
 		return;
 	work->span.from_s = driven->free_s;

@@ -32,6 +32,9 @@
 /* A crest this much sharper than a half-sine as wide may be a hump. */
 #define SHARP 1.5
 
+/* A plate's top is bent by what the case does under it: of the width, so much is one smooth curve. */
+#define BENT 0.55
+
 /* A half-sine is two thirds of its base wide at half height. */
 #define BASE_PER_HALF_WIDTH 1.5
 
@@ -219,7 +222,7 @@ static double crest_doubt(const struct trace *trace, const struct peak *peak, co
 	return sharper > 1 ? hypot(doubt_s, sqrt(fmax(noise, 0)) * sharper) : doubt_s;
 }
 
-static bool take_crest(const struct trace *trace, struct peak *peak)
+static bool take_crest(const struct trace *trace, double width_s, struct peak *peak)
 {
 	const struct trace *axes[1] = {trace};
 	struct estimate_peak *result = &peak->result;
@@ -229,7 +232,7 @@ static bool take_crest(const struct trace *trace, struct peak *peak)
 	peak_tried(&result->how, "poly4/poly6");
 	if (peak_parabola(trace, peak, &shift, &rise, &bend))
 		near += shift / trace->rate_hz;
-	if (!crest_fit(&crest, axes, 1, near, peak->width_s, &peak->span))
+	if (!crest_fit(&crest, axes, 1, near, width_s, &peak->span))
 		return false;
 	result->how.method = "poly4/poly6";
 	result->how.chi_square = crest.chi_square;
@@ -378,7 +381,7 @@ void peak_climb(const struct trace *trace, const struct estimate_options *option
 		}
 		how->flags |= ESTIMATE_FLAG_MODEL;
 	}
-	if (!take_crest(trace, peak))
+	if (!take_crest(trace, peak->width_s, peak))
 		climb_samples(trace, verdict, peak);
 	else if (verdict == SHAPE_DOUBTFUL)
 		take_doubtful(peak);
@@ -435,6 +438,13 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 	if (peak->result.how.status == ESTIMATE_OK && may_be_spike(trace, peak))
 		peak->result.how.status = ESTIMATE_AMBIGUOUS;
 	peak_flag_tolerance(peak, options);
+}
+
+void peak_narrow(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
+{
+	if (peak->model == PEAK_MODEL_LOCAL && peak->result.how.status == ESTIMATE_OK &&
+	    !(peak->result.how.flags & ESTIMATE_FLAG_WEAK) && take_crest(trace, BENT * peak->width_s, peak))
+		peak_flag_tolerance(peak, options);
 }
 
 bool peak_at(const struct peak *peak, double time_s, double derivative[3], double variance[2])

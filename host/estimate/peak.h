@@ -82,6 +82,11 @@ bool peak_is_weak(const struct trace *trace, const struct peak *peak);
 bool peak_weak(const struct trace *trace, const struct estimate_options *options,
                const struct trace *strong_trace, const struct peak *strong, struct peak *peak);
 
+/* The peak of a plate that no oscillator explains, by polynomials as narrow as what the case's contact leaves
+ * under its top. Those as wide as its swing fit within the noise and are up to five of their sigma off in
+ * time. A peak that is not of polynomials, ok and an axis of its own stays. */
+void peak_narrow(const struct trace *trace, const struct estimate_options *options, struct peak *peak);
+
 /* The time of peak, which peak_weak gave strong's shape, once strong's has changed. */
 void peak_weak_time(const struct estimate_options *options, const struct peak *strong, struct peak *peak);
 
