@@ -7,9 +7,8 @@
 
 enum {
 	EQUAL_EXTREMES = 3,
-	WALL_STEPS = 8,          /* that level samples of a round top do not fall at once */
-	EQUAL_APART = 3,         /* noise may keep samples between them below the limit */
-	COARSENESS_WINDOW = 256, /* samples the step of the numbers is looked for in */
+	WALL_STEPS = 8,  /* that level samples of a round top do not fall at once */
+	EQUAL_APART = 3, /* noise may keep samples between them below the limit */
 };
 
 /* Where samples tremble by so many steps of their numbers, two or three do not come out equal by chance. */
@@ -19,12 +18,11 @@ enum {
 /* Of a step: numbers that are no nearer to whole ones have none. */
 #define STEP_WHOLE 1e-3
 
-/* The step of the numbers that samples come in: the least rise; 0 where none rises. */
-static double clip_step(const struct trace *trace)
+double clip_step(const struct trace *trace)
 {
 	double least = INFINITY;
 
-	for (size_t k = 1; k < trace->count && k < COARSENESS_WINDOW; k++) {
+	for (size_t k = 1; k < trace->count && k < CLIP_WINDOW; k++) {
 		double rise = fabs(trace->value_g[k] - trace->value_g[k - 1]);
 
 		if (trace_good(trace, k) && trace_good(trace, k - 1) && rise > 0)
@@ -39,7 +37,7 @@ static bool trembles(const struct trace *trace, double steps)
 	double least = clip_step(trace);
 	size_t n = 0, wide = 0;
 
-	for (size_t k = 1; k < trace->count && k < COARSENESS_WINDOW; k++) {
+	for (size_t k = 1; k < trace->count && k < CLIP_WINDOW; k++) {
 		if (!trace_good(trace, k) || !trace_good(trace, k - 1))
 			continue;
 		n++;

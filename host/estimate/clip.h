@@ -13,6 +13,11 @@
  */
 #include "host/estimate/trace.h"
 
+enum { CLIP_WINDOW = 256 }; /* samples the step of the numbers is looked for in, from the first on */
+
+/* The step of the numbers that samples come in, in g: the least rise; 0 where none rises. */
+double clip_step(const struct trace *trace);
+
 void clip_mark(struct trace *trace);
 void clip_judge_twins(struct trace *trace, double noise_g);
 

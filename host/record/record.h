@@ -38,7 +38,8 @@ enum {
 	RECORD_FLAG_OVERRUN = 1u << 10,    /* "overrun" */
 	RECORD_FLAG_ZERO_SHIFT = 1u << 11, /* "zero_shift": offset after the drop not the one before */
 	RECORD_FLAG_CABLE = 1u << 12,      /* "cable": a sensor's bias was lost */
-	RECORD_FLAG_STUCK = 1u << 13,      /* "stuck": a channel gave one value for 20 ms */
+	RECORD_FLAG_STUCK =
+	        1u << 13, /* "stuck": a channel gave one value for 20 ms, or held one on a flank */
 	/* found by the analysis, and cured where it says so */
 	RECORD_FLAG_SPIKE = 1u << 14,  /* "spike": outliers of one or two samples, left out */
 	RECORD_FLAG_ZEROED = 1u << 15, /* "zeroed": a run of exact zeros in a signal that is not; left out */

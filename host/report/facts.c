@@ -212,7 +212,7 @@ const char *report_flag_words(unsigned flag)
 	case RECORD_FLAG_CABLE:
 		return "a sensor lost its supply during the drop: check its cable";
 	case RECORD_FLAG_STUCK:
-		return "a channel gave one value for 20 ms: check sensor and converter";
+		return "a channel held one value where its signal moves: check sensor and converter";
 	case RECORD_FLAG_ALTERED:
 		return "the capture end or the parameters are not what the tower sealed: trust no number of "
 		       "this drop";

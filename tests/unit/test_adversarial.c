@@ -29,7 +29,7 @@
 #define G_M_S2 9.80665
 #define FINE_S 2e-6
 
-enum { S1X, S1Y, S2X, S2Y, S2Z, CHANNELS, FINE = 110000, DROPS = 4 };
+enum { S1X, S1Y, S2X, S2Y, S2Z, CHANNELS, FINE = 110000, DROPS = 4, HELD_SAMPLES = 6 };
 
 enum form { HALF_SINE, HAVERSINE, HERTZ, GAMMA, TRAPEZOID, HUMPS, RING, BELL, FINAL, INITIAL, EXPONENTIALS };
 enum plate { PLAIN, HARDLY_DAMPED, MUCH_DAMPED, FAST, RIGID, TWO_MODES, SOFT };
@@ -72,6 +72,8 @@ enum spoil {
 	LATE,
 	DULL,
 	HELD,
+	FROZEN,
+	TWICE,
 	RECTIFIED,
 	SLEW,
 	DEAD,
@@ -143,6 +145,8 @@ static const struct class classes[] = {
         {"Y late", HALF_SINE, PLAIN, LATE, false},
         {"X behind 250 Hz", HALF_SINE, PLAIN, DULL, true},
         {"samples held", HALF_SINE, PLAIN, HELD, true},
+        {"one value held, rising", HALF_SINE, PLAIN, FROZEN, false},
+        {"each sample twice", HERTZ, PLAIN, TWICE, false},
         {"one polarity lost", HALF_SINE, PLAIN, RECTIFIED, false},
         {"slew rate", HALF_SINE, PLAIN, SLEW, true},
         {"Y dead", HALF_SINE, PLAIN, DEAD, false},
@@ -399,6 +403,8 @@ static void fill(struct drop *d, int c, struct synth_random *random)
 {
 	struct channel *channel = &d->channel[c];
 	double code = d->class->spoil == COARSE ? 0.5 : CODE_G, before = 0;
+	size_t rise = (size_t)((d->onset_s + (0.2 + 0.2 * d->at) * d->base_s - channel->start_s) *
+	                       channel->rate_hz);
 	size_t top = (size_t)((d->onset_s + d->base_s / 2 - channel->start_s) * channel->rate_hz);
 
 	for (size_t k = 0; k < channel->count; k++) {
@@ -412,6 +418,11 @@ static void fill(struct drop *d, int c, struct synth_random *random)
 
 		channel->value_g[k] = code * round(value / code);
 	}
+	if (c == S2X && d->class->spoil == FROZEN)
+		for (size_t k = rise + 1; k < rise + HELD_SAMPLES; k++)
+			channel->value_g[k] = channel->value_g[rise];
+	for (size_t k = 1; c == S2X && d->class->spoil == TWICE && k < channel->count; k += 2)
+		channel->value_g[k] = channel->value_g[k - 1];
 	for (int i = 0; d->class->spoil == SPIKES && i < 3; i++)
 		channel->value_g[(size_t)(synth_uniform(random) * (double)(channel->count - 1))] += 300;
 	if (d->class->spoil == LOST)

@@ -375,13 +375,75 @@ static void dropouts(void **state)
 	synth_free(&channel);
 }
 
+/* One value held on the way up is left out but for its first sample, one on the way down too; a whole pulse
+ * holds none. Codes of 1/32 g; a run that chance could make is none. */
+static void held(void **state)
+{
+	struct synth_random random = {25};
+	struct channel channel = synth_channel("a", 7000, 0, 700);
+	size_t clean_marked = 0, found = 0, held_runs = 0;
+
+	(void)state;
+	for (int run = 0; run < 4000; run++) {
+		size_t from = 145 + (size_t)(9 * synth_uniform(&random)),
+		       n = run % 2 ? 5 + (size_t)run % 4 : 0;
+		double sigma = 0.3 * pow(10, synth_uniform(&random));
+		struct trace trace;
+
+		fill(&channel, (enum synth_shape)(run / 2 % SYNTH_SHAPES), false, 3e-3, 485, sigma, &random);
+		for (size_t k = from + 1; k < from + n; k++)
+			channel.value_g[k] = channel.value_g[from];
+		assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+		if (n == 0) {
+			clean_marked += dropout_mark(&trace, sigma);
+		} else if (channel.value_g[from - 1] < channel.value_g[from] &&
+		           channel.value_g[from + n] > channel.value_g[from]) {
+			held_runs++;
+			found += dropout_mark(&trace, sigma);
+			assert_int_equal(trace.flags, RECORD_FLAG_BAD | RECORD_FLAG_STUCK);
+			for (size_t k = 0; k < 700; k++)
+				assert_int_equal(trace.sample[k], k > from && k < from + n ? SAMPLE_BAD : 0);
+		}
+		trace_close(&trace);
+	}
+	print_message("held: %zu of %zu found\n", found, held_runs);
+	assert_true(held_runs > 500);
+	assert_int_equal(found, held_runs);
+	assert_int_equal(clean_marked, 0);
+	synth_free(&channel);
+}
+
+/* Samples that are repeated all along are flagged and stay; those of coarse numbers are not. */
+static void repeated(void **state)
+{
+	struct synth_random random = {26};
+	struct channel channel = synth_channel("a", 7000, 0, 700);
+
+	(void)state;
+	for (int run = 0; run < 200; run++) {
+		double code = run % 2 ? 1.0 / 32 : 1;
+		struct trace trace;
+
+		fill(&channel, SYNTH_HERTZ, false, 3e-3, 485, 0.6, &random);
+		for (size_t k = 0; k < 700; k++)
+			channel.value_g[k] = code * round(channel.value_g[k - (run % 2 ? k % 2 : 0)] / code);
+		assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+		assert_false(dropout_mark(&trace, 0.6));
+		assert_int_equal(trace.flags & ~(unsigned)RECORD_FLAG_CLIPPED,
+		                 run % 2 ? RECORD_FLAG_STUCK : 0);
+		trace_close(&trace);
+	}
+	synth_free(&channel);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(clean),        cmocka_unit_test(vibrations),   cmocka_unit_test(found),
 	        cmocka_unit_test(found_near),   cmocka_unit_test(on_the_pulse), cmocka_unit_test(recordings),
 	        cmocka_unit_test(says_nothing), cmocka_unit_test(dropouts),     cmocka_unit_test(among_holes),
-	        cmocka_unit_test(at_the_ends),  cmocka_unit_test(cut_off),
+	        cmocka_unit_test(at_the_ends),  cmocka_unit_test(cut_off),      cmocka_unit_test(held),
+	        cmocka_unit_test(repeated),
 	};
 
 	for (int shape = 0; shape < SYNTH_SHAPES; shape++)

@@ -69,7 +69,7 @@ export const FLAGS = {
 	overrun: "the controller missed samples; they are marked and left out",
 	zero_shift: "the offset after the drop is not the one before: the sensor may have been overloaded",
 	cable: "a sensor lost its supply during the drop: check its cable",
-	stuck: "one value for 20 ms: check sensor and converter",
+	stuck: "one value held where the signal moves: check sensor and converter",
 	spike: "single outliers were left out: look for a loose contact",
 	zeroed: "runs of exact zeros were left out: data were lost on the way",
 	offset: "zero was far off before the pulse; it was taken off",
