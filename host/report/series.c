@@ -97,13 +97,67 @@ static int read_log(struct series_page *page, struct series_drop *drop, const ch
 	return 0;
 }
 
+/* The files that the result was made with, by their digests. */
+struct applied {
+	size_t count;
+	char sha256[SENSORS_MAX][DIGEST_CHARS];
+};
+
+static int note_applied(void *context, const struct sensor_used *used)
+{
+	struct applied *applied = context;
+
+	if (applied->count < SENSORS_MAX)
+		snprintf(applied->sha256[applied->count], DIGEST_CHARS, "%s", used->file_sha256);
+	applied->count++;
+	return 0;
+}
+
+static bool still_there(const struct sensors *sensors, const struct applied *applied)
+{
+	size_t same = 0;
+
+	for (size_t i = 0; i < sensors->count; i++)
+		for (size_t k = 0; k < applied->count && k < SENSORS_MAX; k++)
+			same += !strcmp(sensors->used[i].file_sha256, applied->sha256[k]);
+	return same == applied->count && sensors->count == applied->count;
+}
+
+/* The readings as the sensors' files put them right for the result, if the scene's are those. */
+static int correct_readings(struct series_page *page, struct series_drop *drop, const char *name)
+{
+	char message[SETTINGS_MESSAGE_MAX];
+	struct applied applied = {0};
+	struct sensors sensors;
+	struct record corrected;
+	int result =
+	        archive_each_sensor(page->request->archive, name, drop->a.version, note_applied, &applied);
+
+	if (result != 0 || applied.count == 0 || drop->record.channel_count == 0)
+		return result;
+	result = sensors_read(&sensors, page->scene.chain, (double)drop->record.time_s / 86400.0, message);
+	if (result == 0 && still_there(&sensors, &applied))
+		result = sensors_correct(&sensors, &drop->record, &corrected, message);
+	else if (result == 0)
+		result = DT_E_UNKNOWN;
+	if (result == DT_E_MEMORY)
+		return result;
+	if (result != 0) {
+		drop->as_read = true;
+		return 0;
+	}
+	record_free(&drop->record);
+	drop->record = corrected;
+	return 0;
+}
+
 /* What was decided when it was analysed, with the sensors' files of then. */
 static int read_verdict(struct series_page *page, struct series_drop *drop, const char *name)
 {
 	char *json;
 	int result;
 
-	if (!page->scene.limits[0] || !series_is_drawn(drop))
+	if (!page->scene.limits[0] || !series_is_whole(drop))
 		return 0;
 	result = archive_json(page->request->archive, name, drop->a.version, &json);
 	if (result)
@@ -141,6 +195,8 @@ static int read_drop(struct series_page *page, struct series_drop *drop)
 		return result == DT_E_FORMAT ? 0 : result;
 	drop->has_result = true;
 	result = read_verdict(page, drop, name);
+	if (result == 0)
+		result = correct_readings(page, drop, name);
 	if (result)
 		return result;
 	drop->report = (struct report){.record = &drop->record, .analysis = &drop->analysis};
@@ -214,7 +270,7 @@ static bool tell_lacking(const struct series_page *page, const struct series_dro
 	const struct series_report *request = page->request;
 	char text[420], name[ARCHIVE_NAME_MAX + 16];
 
-	if (series_is_drawn(drop) || !drop->a.sha256[0] || (!drop->no_log[0] && !drop->counts))
+	if (series_is_whole(drop) || !drop->a.sha256[0] || (!drop->no_log[0] && !drop->counts))
 		return false;
 	snprintf(name, sizeof(name), "%.60s/%u", page->series.name, drop->a.number);
 	if (drop->no_log[0] && !strncmp(drop->no_log, name, strlen(name)))
@@ -305,9 +361,14 @@ static void series_release(struct series_page *page)
 	free(page);
 }
 
-bool series_is_drawn(const struct series_drop *drop)
+bool series_is_whole(const struct series_drop *drop)
 {
 	return drop->has_result && !drop->no_log[0];
+}
+
+bool series_is_drawn(const struct series_drop *drop)
+{
+	return series_is_whole(drop) && !drop->as_read;
 }
 
 size_t series_counted(const struct series_page *page)

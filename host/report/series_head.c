@@ -77,7 +77,7 @@ static size_t unfinished(const struct series_page *page)
 static bool all_whole(const struct series_page *page)
 {
 	for (size_t i = 0; i < page->count; i++)
-		if (page->drop[i]->counts && !series_is_drawn(page->drop[i]))
+		if (page->drop[i]->counts && !series_is_whole(page->drop[i]))
 			return false;
 	return true;
 }

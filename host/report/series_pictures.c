@@ -80,6 +80,12 @@ static void drop_pictures(struct series_page *page, const struct series_drop *dr
 {
 	FILE *out = page->page.out;
 
+	if (drop->as_read) {
+		fputs("<p class=\"soft\">No trace: the scene's sensor files are not those of its "
+		      "result.</p>\n",
+		      out);
+		return;
+	}
 	if (!series_is_drawn(drop)) {
 		fputs("<p class=\"soft\">No trace: ", out);
 		(drop->quoted ? html_own : html_text)(

@@ -17,6 +17,7 @@ struct series_drop {
 	bool counts;              /* goes into the means */
 	bool has_result;          /* analysis is filled */
 	char no_log[320];         /* why there is no trace to draw; "": there is one */
+	bool as_read;             /* record is not what the result is of: its sensors' files were others */
 	bool quoted;              /* no_log is what verify says, in its words */
 	struct record record;     /* from the log; without it, what the result knows of it, without samples */
 	struct analysis analysis; /* from the result: what pictures and remarks need */
@@ -65,6 +66,9 @@ struct series_page {
  * with the model; and both sensors of one drop. The same axes for all drops. */
 bool series_traces_over(FILE *out, const struct series_page *page, size_t sensor, char axis);
 bool series_traces_drop(FILE *out, const struct series_page *page, const struct series_drop *drop, char axis);
+
+/* Whether its log and its result are there. */
+bool series_is_whole(const struct series_drop *drop);
 
 /* Whether there is a trace to draw of it. */
 bool series_is_drawn(const struct series_drop *drop);
