@@ -9,16 +9,30 @@ static unsigned char *slot(const struct ring *ring, uint32_t index)
 	return ring->storage + (size_t)(index & (ring->count - 1u)) * ring->entry_size;
 }
 
-int ring_put(struct ring *ring, const void *entry)
+void *ring_room(struct ring *ring)
 {
 	uint32_t head = atomic_load_explicit(&ring->head, memory_order_relaxed);
 	uint32_t tail = atomic_load_explicit(&ring->tail, memory_order_acquire);
 
 	DT_ASSERT(head - tail <= ring->count);
-	if (head - tail == ring->count)
-		return DT_E_FULL;
-	memcpy(slot(ring, head), entry, ring->entry_size);
+	return head - tail == ring->count ? NULL : slot(ring, head);
+}
+
+void ring_written(struct ring *ring)
+{
+	uint32_t head = atomic_load_explicit(&ring->head, memory_order_relaxed);
+
 	atomic_store_explicit(&ring->head, head + 1u, memory_order_release);
+}
+
+int ring_put(struct ring *ring, const void *entry)
+{
+	void *room = ring_room(ring);
+
+	if (room == NULL)
+		return DT_E_FULL;
+	memcpy(room, entry, ring->entry_size);
+	ring_written(ring);
 	return 0;
 }
 

@@ -32,6 +32,11 @@ struct ring {
 /* Producer: copies one entry in. DT_E_FULL leaves the ring as it was. */
 DT_MUST_USE int ring_put(struct ring *ring, const void *entry);
 
+/* The same without the copy: where the next entry is to be written, NULL when the ring is full, and that it
+ * is. */
+void *ring_room(struct ring *ring);
+void ring_written(struct ring *ring);
+
 /* Consumer: copies the oldest entry out and drops it. DT_E_EMPTY leaves *entry as it was. */
 DT_MUST_USE int ring_get(struct ring *ring, void *entry);
 

@@ -4,6 +4,7 @@
 #include <stdatomic.h>
 
 #include "common/memory.h"
+#include "firmware/port.h"
 
 void acquire_init(struct acquire *acquire, const struct parameters *parameters, volatile uint32_t *counters)
 {
@@ -44,7 +45,7 @@ void acquire_x(struct acquire *acquire, const int16_t code[WIRE_SENSORS], bool r
 	if (k >= WIRE_X_PER_TICK)
 		return;
 	for (unsigned s = 0; s < WIRE_SENSORS; s++)
-		page->sensor[s].x[k] = taken(code[s], ready);
+		page->tick.sensor[s].x[k] = taken(code[s], ready);
 }
 
 void acquire_yz(struct acquire *acquire, const int16_t y[WIRE_SENSORS], const int16_t z[WIRE_SENSORS],
@@ -56,8 +57,8 @@ void acquire_yz(struct acquire *acquire, const int16_t y[WIRE_SENSORS], const in
 	if (k >= WIRE_YZ_PER_TICK)
 		return;
 	for (unsigned s = 0; s < WIRE_SENSORS; s++) {
-		page->sensor[s].y[k] = taken(y[s], ready);
-		page->sensor[s].z[k] = taken(z[s], ready);
+		page->tick.sensor[s].y[k] = taken(y[s], ready);
+		page->tick.sensor[s].z[k] = taken(z[s], ready);
 	}
 }
 
@@ -79,96 +80,39 @@ static void judge_clocks(struct acquire *acquire, const struct acquire_page *pag
 	acquire->clock_yz = 0;
 }
 
-/* A sample that is not simply good. */
-static void mark(struct acquire *acquire, unsigned sensor, uint8_t clip_bit, int32_t range, int32_t size)
-{
-	struct acquire_tick *tick = &acquire->tick;
-
-	if (size > WIRE_SAMPLE_FULL_SCALE) {
-		tick->marks |= WIRE_MARK_OVERRUN;
-		acquire->counters[WIRE_COUNTER_samples_overrun]++;
-		return;
-	}
-	if (size > range) {
-		tick->status[sensor] |= clip_bit;
-		tick->marks |= WIRE_MARK_CLIPPED;
-		acquire->counters[WIRE_COUNTER_samples_clipped]++;
-	}
-	if (size == WIRE_SAMPLE_FULL_SCALE) {
-		tick->marks |= WIRE_MARK_FULL_SCALE;
-		acquire->counters[WIRE_COUNTER_samples_full_scale]++;
-	}
-}
-
-/* One channel, sample by sample. */
-static void judge_clipping(struct acquire *acquire, unsigned sensor, uint8_t clip_bit, const int16_t *code,
-                           unsigned places, int32_t good)
-{
-	int32_t range = (int32_t)acquire->parameters->value[WIRE_PARAMETER_range_counts];
-
-#pragma GCC unroll 10
-	for (unsigned k = 0; k < places; k++)
-		if ((uint32_t)(code[k] + good) > 2u * (uint32_t)good) /* |code| > good */
-			mark(acquire, sensor, clip_bit, range, code[k] < 0 ? -code[k] : code[k]);
-}
-
-enum { SMALL = 8192 };
-
-/* True when every |code| is below SMALL: then the upper three bits of each are equal. Two at a time and on
- * the way, since control has few instructions to spare; nearly all ticks are such. */
-static bool copy_small(struct acquire_samples *to, const struct acquire_samples *from)
-{
-	const unsigned char *source = (const unsigned char *)from;
-	unsigned char *target = (unsigned char *)to;
-	uint32_t differ, last = (uint16_t)from->z[WIRE_YZ_PER_TICK - 1];
-
-	to->z[WIRE_YZ_PER_TICK - 1] = (int16_t)last;
-	differ = last ^ last << 1;
-#pragma GCC unroll 13
-	for (unsigned i = 0; i + 4 <= sizeof(*from); i += 4) {
-		uint32_t two;
-
-		__builtin_memcpy(&two, source + i, sizeof(two));
-		__builtin_memcpy(target + i, &two, sizeof(two));
-		differ |= two ^ two << 1;
-	}
-	return (differ & 0xC000C000u) == 0;
-}
-
-/* What did not come has its place. */
 static void fill(int16_t *code, unsigned count, unsigned places)
 {
 	for (unsigned k = count; k < places; k++)
 		code[k] = WIRE_SAMPLE_NOT_TAKEN;
 }
 
-_Static_assert(sizeof(struct acquire_samples) == (WIRE_X_PER_TICK + 2 * WIRE_YZ_PER_TICK) * sizeof(int16_t),
-               "the three channels follow each other");
-
-static void judge_sensor(struct acquire *acquire, unsigned sensor, const struct acquire_page *page)
+/* What did not come has its place. */
+static void fill_page(struct acquire_page *page)
 {
-	struct acquire_samples *samples = &acquire->tick.sensor[sensor];
-	int32_t range = (int32_t)acquire->parameters->value[WIRE_PARAMETER_range_counts];
-	int32_t good = range < WIRE_SAMPLE_FULL_SCALE ? range : WIRE_SAMPLE_FULL_SCALE - 1;
-	bool small = copy_small(samples, &page->sensor[sensor]);
+	for (unsigned s = 0; s < WIRE_SENSORS; s++) {
+		struct acquire_samples *samples = &page->tick.sensor[s];
 
-	if (small && good >= SMALL && page->x_count >= WIRE_X_PER_TICK && page->yz_count >= WIRE_YZ_PER_TICK)
-		return;
-	fill(samples->x, page->x_count, WIRE_X_PER_TICK);
-	fill(samples->y, page->yz_count, WIRE_YZ_PER_TICK);
-	fill(samples->z, page->yz_count, WIRE_YZ_PER_TICK);
-	judge_clipping(acquire, sensor, WIRE_STATUS_CLIP_X, samples->x, WIRE_X_PER_TICK, good);
-	judge_clipping(acquire, sensor, WIRE_STATUS_CLIP_Y, samples->y, WIRE_YZ_PER_TICK, good);
-	judge_clipping(acquire, sensor, WIRE_STATUS_CLIP_Z, samples->z, WIRE_YZ_PER_TICK, good);
+		fill(samples->x, page->x_count, WIRE_X_PER_TICK);
+		fill(samples->y, page->yz_count, WIRE_YZ_PER_TICK);
+		fill(samples->z, page->yz_count, WIRE_YZ_PER_TICK);
+	}
 }
 
-static void finish_page(struct acquire *acquire, const struct acquire_page *page)
+static void finish_page(struct acquire *acquire, struct acquire_page *page)
 {
-	struct acquire_tick *tick = &acquire->tick;
+	const struct acquire_head *head = &acquire->head;
+	struct acquire_tick *tick = &page->tick;
 
 	judge_clocks(acquire, page);
-	for (unsigned s = 0; s < WIRE_SENSORS; s++)
-		judge_sensor(acquire, s, page);
+	tick->tick_ms = head->tick_ms;
+	tick->drop_id = head->drop_id;
+	tick->io = head->io;
+	tick->marks = head->marks;
+	if ((~head->io & (WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2)) != 0)
+		tick->marks |= WIRE_MARK_CABLE;
+	tick->status[0] = tick->status[1] = head->state;
+	if (page->x_count < WIRE_X_PER_TICK || page->yz_count < WIRE_YZ_PER_TICK)
+		fill_page(page);
 	if (ring_put(&acquire->queue, tick) != 0)
 		acquire->counters[WIRE_COUNTER_samples_overrun] += ACQUIRE_SAMPLES_PER_TICK;
 }
@@ -190,15 +134,7 @@ uint32_t acquire_close(struct acquire *acquire)
 
 void acquire_open(struct acquire *acquire, const struct acquire_head *head)
 {
-	struct acquire_tick *tick = &acquire->tick;
-
-	tick->tick_ms = head->tick_ms;
-	tick->drop_id = head->drop_id;
-	tick->io = head->io;
-	tick->marks = head->marks;
-	if ((~head->io & (WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2)) != 0)
-		tick->marks |= WIRE_MARK_CABLE;
-	tick->status[0] = tick->status[1] = head->state;
+	acquire->head = *head;
 	acquire->open = true;
 }
 
@@ -220,9 +156,81 @@ int16_t acquire_clock_ppm(struct acquire *acquire)
 	return (int16_t)(ppm < ACQUIRE_NO_PPM ? ppm : ACQUIRE_NO_PPM - 1);
 }
 
+/* A sample that is not simply good. */
+static void mark(struct acquire *acquire, struct acquire_tick *tick, unsigned sensor, uint8_t clip_bit,
+                 int32_t size)
+{
+	if (size > WIRE_SAMPLE_FULL_SCALE) {
+		tick->marks |= WIRE_MARK_OVERRUN;
+		port_lock();
+		acquire->counters[WIRE_COUNTER_samples_overrun]++;
+		port_unlock();
+		return;
+	}
+	if (size > (int32_t)acquire->parameters->value[WIRE_PARAMETER_range_counts]) {
+		tick->status[sensor] |= clip_bit;
+		tick->marks |= WIRE_MARK_CLIPPED;
+		acquire->counters[WIRE_COUNTER_samples_clipped]++;
+	}
+	if (size == WIRE_SAMPLE_FULL_SCALE) {
+		tick->marks |= WIRE_MARK_FULL_SCALE;
+		acquire->counters[WIRE_COUNTER_samples_full_scale]++;
+	}
+}
+
+/* One channel, sample by sample. */
+static void judge_channel(struct acquire *acquire, struct acquire_tick *tick, unsigned sensor,
+                          uint8_t clip_bit, const int16_t *code, unsigned places, uint32_t good)
+{
+#pragma GCC unroll 10
+	for (unsigned k = 0; k < places; k++)
+		if ((uint32_t)code[k] + good > 2u * good) /* |code| > good */
+			mark(acquire, tick, sensor, clip_bit, code[k] < 0 ? -code[k] : code[k]);
+}
+
+_Static_assert(sizeof(struct acquire_samples) == (WIRE_X_PER_TICK + 2 * WIRE_YZ_PER_TICK) * sizeof(int16_t),
+               "the three channels follow each other");
+
+enum { SMALL = 8192 };
+
+/* Every |code| is below SMALL: then the upper three bits of each are equal. Two at a time: nearly all ticks
+ * are such. */
+static bool all_small(const struct acquire_samples *samples)
+{
+	const unsigned char *bytes = (const unsigned char *)samples;
+	uint32_t differ = (uint16_t)samples->z[WIRE_YZ_PER_TICK - 1];
+
+	differ ^= differ << 1;
+#pragma GCC unroll 13
+	for (unsigned i = 0; i + 4 <= sizeof(*samples); i += 4) {
+		uint32_t two;
+
+		__builtin_memcpy(&two, bytes + i, sizeof(two));
+		differ |= two ^ two << 1;
+	}
+	return (differ & 0xC000C000u) == 0;
+}
+
+static void judge(struct acquire *acquire, struct acquire_tick *tick, unsigned sensor)
+{
+	const struct acquire_samples *samples = &tick->sensor[sensor];
+	uint32_t range = acquire->parameters->value[WIRE_PARAMETER_range_counts];
+	uint32_t good = range < WIRE_SAMPLE_FULL_SCALE ? range : WIRE_SAMPLE_FULL_SCALE - 1;
+
+	if (good >= SMALL && all_small(samples))
+		return;
+	judge_channel(acquire, tick, sensor, WIRE_STATUS_CLIP_X, samples->x, WIRE_X_PER_TICK, good);
+	judge_channel(acquire, tick, sensor, WIRE_STATUS_CLIP_Y, samples->y, WIRE_YZ_PER_TICK, good);
+	judge_channel(acquire, tick, sensor, WIRE_STATUS_CLIP_Z, samples->z, WIRE_YZ_PER_TICK, good);
+}
+
 int acquire_take(struct acquire *acquire, struct acquire_tick *tick)
 {
-	return ring_get(&acquire->queue, tick);
+	int result = ring_get(&acquire->queue, tick);
+
+	for (unsigned s = 0; s < WIRE_SENSORS && result == 0; s++)
+		judge(acquire, tick, s);
+	return result;
 }
 
 const int16_t *acquire_channel(const struct acquire_tick *tick, unsigned channel, unsigned *count)

@@ -8,7 +8,8 @@
  * Context: acquire_turn, acquire_x and acquire_yz are the sample interrupts'; acquire_close and acquire_open
  * the control interrupt's, which they interrupt: the samples of a millisecond gather on one page while
  * control has the page before. acquire_init runs before interrupts, acquire_take and acquire_pack in main.
- * Counts are 1/32 g. Clipping is judged against the parameter range_counts.
+ * Counts are 1/32 g. Clipping is judged in main, against the parameter range_counts: a command that comes
+ * with the millisecond does not wait for that.
  */
 #include <stdbool.h>
 #include <stdint.h>
@@ -51,13 +52,13 @@ struct acquire_head {
 
 /* The samples of a millisecond as they come. */
 struct acquire_page {
-	struct acquire_samples sensor[WIRE_SENSORS];
+	struct acquire_tick tick;   /* its head is known when it ends */
 	uint16_t x_count, yz_count; /* instants that came; those beyond a tick's have no place */
 };
 
 struct acquire {
 	const struct parameters *parameters;
-	volatile uint32_t *counters; /* control's */
+	volatile uint32_t *counters; /* overrun: control's, and main's under port_lock; clipping: main's */
 	/* sample interrupts */
 	struct acquire_page page[2];
 	uint8_t filling;         /* which of them; the other is control's while it waits there */
@@ -65,7 +66,7 @@ struct acquire {
 	_Atomic bool waiting;    /* set by the turn, taken back by control */
 	/* control */
 	uint32_t turns_seen;
-	struct acquire_tick tick; /* its head is known, its samples are not */
+	struct acquire_head head; /* of the tick whose samples come */
 	bool open;
 	uint8_t clock_ticks;
 	uint16_t clock_x, clock_yz;
@@ -97,7 +98,7 @@ void acquire_yz(struct acquire *acquire, const int16_t y[WIRE_SENSORS], const in
  * bits of the wire; ACQUIRE_NO_PPM for less than a second, and for more than some days. */
 int16_t acquire_clock_ppm(struct acquire *acquire);
 
-/* Main: the oldest finished tick, or DT_E_EMPTY. */
+/* Main: the oldest finished tick, its samples judged, or DT_E_EMPTY. */
 DT_MUST_USE int acquire_take(struct acquire *acquire, struct acquire_tick *tick);
 
 /* Main: the samples of one channel, *count of them. */

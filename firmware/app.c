@@ -66,9 +66,9 @@ void app_init(enum port_reset cause)
 }
 
 /* Control, or main between port_lock and port_unlock. */
-static struct sequence_view view_now(void)
+static struct sequence_view view_now(uint16_t pins)
 {
-	return health_look(&app.health, &app.input, &app.acquire,
+	return health_look(&app.health, &app.input, pins, &app.acquire,
 	                   hosts_here(&app.hosts, app.sequence.session));
 }
 
@@ -77,23 +77,26 @@ static struct sequence_view view_now(void)
 void app_on_tick(void)
 {
 	uint32_t begun = acquire_close(&app.acquire);
+	uint16_t pins;
 	struct sequence_view view;
 
 	if (begun == 0)
 		return;
+	pins = port_io();
 	app.tick_ms += begun;
 	app.tick_us = port_time_us();
-	input_read(&app.input, port_io() & (uint16_t)~WIRE_IO_OUTPUTS);
+	input_read(&app.input, pins & (uint16_t)~WIRE_IO_OUTPUTS);
 	hosts_tick(&app.hosts, app.tick_ms);
-	view = view_now();
+	view = view_now(pins);
 	sequence_tick(&app.sequence, &view, app.tick_ms);
-	acquire_open(&app.acquire, &(struct acquire_head){
-	                                   .tick_ms = app.tick_ms,
-	                                   .drop_id = app.sequence.drop_id,
-	                                   .io = input_io(&app.input),
-	                                   .marks = sequence_tick_marks(&app.sequence),
-	                                   .state = app.sequence.state,
-	                           });
+	acquire_open(&app.acquire,
+	             &(struct acquire_head){
+	                     .tick_ms = app.tick_ms,
+	                     .drop_id = app.sequence.drop_id,
+	                     .io = input_io(&app.input, port_io()), /* the tick may have switched some */
+	                     .marks = sequence_tick_marks(&app.sequence),
+	                     .state = app.sequence.state,
+	             });
 }
 
 void app_on_gate(unsigned gate, uint32_t time_us)
@@ -171,7 +174,7 @@ static void send_status(void)
 	struct frame frame;
 
 	port_lock();
-	view = view_now();
+	view = view_now(port_io());
 	port_unlock();
 	status.io = view.io;
 	status.checks = sequence_checks(&now, view.checks);
@@ -304,23 +307,7 @@ static void note_trigger(void)
 		        measure_us((int32_t)(port_time_us() - began_us - app.capture.trigger_us % 1000u));
 }
 
-/* The ticks that the interrupt has finished: into the ring, and out. */
-static void take_ticks(void)
-{
-	enum capture_phase before = app.capture.phase;
-	struct acquire_tick tick;
-
-	for (unsigned i = 0; i < TICKS_PER_POLL && acquire_take(&app.acquire, &tick) == 0; i++) {
-		health_samples(&app.health, &tick);
-		capture_put(&app.capture, &tick);
-		stream_tick(&app.stream, &tick);
-	}
-	if (before == CAPTURE_ROLLING && app.capture.phase != CAPTURE_ROLLING)
-		note_trigger();
-	if (capture_work(&app.capture))
-		finish_capture();
-}
-
+/* Between whatever takes long, since a RELEASE may be among them. */
 static void receive(void)
 {
 	struct frame frame;
@@ -328,6 +315,28 @@ static void receive(void)
 	for (unsigned i = 0; i < FRAMES_PER_POLL && port_can_receive(&frame) == 1; i++)
 		if (command_handle(&commands, &frame))
 			send_capture();
+}
+
+/* The ticks that the interrupt has finished: into the ring, and out. */
+static void take_ticks(void)
+{
+	enum capture_phase before = app.capture.phase;
+	struct acquire_tick tick;
+
+	for (unsigned i = 0; i < TICKS_PER_POLL && acquire_take(&app.acquire, &tick) == 0; i++) {
+		receive();
+		health_samples(&app.health, &tick);
+		receive();
+		capture_put(&app.capture, &tick);
+		for (unsigned sensor = 0; sensor < WIRE_SENSORS; sensor++) {
+			receive();
+			stream_block(&app.stream, &tick, sensor);
+		}
+	}
+	if (before == CAPTURE_ROLLING && app.capture.phase != CAPTURE_ROLLING)
+		note_trigger();
+	if (capture_work(&app.capture))
+		finish_capture();
 }
 
 /* A bus-off disarms; in motion the drop goes on without the bus. */
@@ -400,8 +409,9 @@ void app_poll(void)
 	uint32_t tick_ms;
 
 	stream_flush(&app.stream);
-	receive(); /* first, so that a RELEASE does not wait for two blocks to be packed */
+	receive();
 	take_ticks();
+	receive();
 	now = take_glance();
 	watch_bus(&now);
 	watch_fault(&now);

@@ -68,7 +68,7 @@ static void operate(const struct command_scope *scope, const struct wire_command
 	int result;
 
 	port_lock();
-	view = health_look(scope->health, scope->input, scope->acquire,
+	view = health_look(scope->health, scope->input, 0, scope->acquire, /* no command asks for outputs */
 	                   hosts_here(scope->hosts, sequence->session));
 	was_armed = sequence->state == WIRE_STATE_ARMED;
 	result = sequence_command(scope->sequence, &view, &order);

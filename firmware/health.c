@@ -125,6 +125,7 @@ static uint32_t input_checks(uint16_t io)
 	};
 	uint32_t checks = 0;
 
+#pragma GCC unroll 8
 	for (unsigned i = 0; i < sizeof(needed) / sizeof(needed[0]); i++)
 		if ((io & needed[i].input) == 0)
 			checks |= needed[i].check;
@@ -149,11 +150,11 @@ uint32_t health_checks(const struct health *health, const struct health_view *vi
 	return checks;
 }
 
-struct sequence_view health_look(const struct health *health, const struct input *input,
+struct sequence_view health_look(const struct health *health, const struct input *input, uint16_t pins,
                                  const struct acquire *acquire, bool host_good)
 {
 	struct health_view view = {
-	        .io = input_io(input),
+	        .io = input_io(input, pins),
 	        .bias_high = port_bias_high(),
 	        .host_good = host_good,
 	        .clocks_good = acquire->clocks_good,

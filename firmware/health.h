@@ -61,8 +61,8 @@ void health_samples(struct health *health, struct acquire_tick *tick);
 /* WIRE_CHECK_* bits that are not green, those of the sequence apart. */
 uint32_t health_checks(const struct health *health, const struct health_view *view);
 
-/* Everything that is seen now, for the sequence; host_good as in the view. */
-struct sequence_view health_look(const struct health *health, const struct input *input,
+/* Everything that is seen now, for the sequence; pins as port_io, host_good as in the view. */
+struct sequence_view health_look(const struct health *health, const struct input *input, uint16_t pins,
                                  const struct acquire *acquire, bool host_good);
 
 #endif

@@ -3,7 +3,6 @@
 
 #include "common/memory.h"
 #include "common/wire.h"
-#include "firmware/port.h"
 
 void input_init(struct input *input)
 {
@@ -23,7 +22,7 @@ void input_read(struct input *input, uint16_t pins)
 	input->known |= (uint16_t)(all | ~any);
 }
 
-uint16_t input_io(const struct input *input)
+uint16_t input_io(const struct input *input, uint16_t pins)
 {
-	return (uint16_t)((port_io() & WIRE_IO_OUTPUTS) | input->agreed);
+	return (uint16_t)((pins & WIRE_IO_OUTPUTS) | input->agreed);
 }

@@ -25,7 +25,7 @@ void input_init(struct input *input);
 /* Each millisecond: the pins as they stand. */
 void input_read(struct input *input, uint16_t pins);
 
-/* Outputs as they are, inputs as they are agreed on. */
-uint16_t input_io(const struct input *input);
+/* The outputs of `pins`, and the inputs as they are agreed on. */
+uint16_t input_io(const struct input *input, uint16_t pins);
 
 #endif

@@ -134,7 +134,7 @@ static void enter(struct sequence *sequence, uint8_t state)
 	sequence->state = state;
 	sequence->entered_ms = sequence->tick_ms;
 	if (state != ARMED)
-		sequence->session = sequence->arm_key = sequence->nonce = 0;
+		sequence->session = sequence->arm_key = sequence->nonce = sequence->release_key = 0;
 	if (state != FALLING && state != SEPARATED) {
 		port_off_cancel(MAGNET);
 		port_off_cancel(RELIEVE);
@@ -286,6 +286,8 @@ static int arm(struct sequence *sequence, uint32_t checks, const struct sequence
 	sequence->session = session;
 	sequence->arm_key = command->argument;
 	sequence->parameters_crc32 = order->parameters_crc32;
+	sequence->release_key =
+	        wire_answer(order->nonce, sequence_next_drop(sequence), order->parameters_crc32);
 	sequence->times = (struct fall_times){.dropout_us = order->dropout_us};
 	return step(sequence, SEQUENCE_ARM);
 }
@@ -293,14 +295,13 @@ static int arm(struct sequence *sequence, uint32_t checks, const struct sequence
 static int refuse_release(const struct sequence *sequence, uint32_t checks,
                           const struct wire_command *command)
 {
-	uint32_t key = wire_answer(sequence->nonce, sequence_next_drop(sequence), sequence->parameters_crc32);
 	uint32_t warned_ms = sequence->tick_ms - sequence->entered_ms;
 
 	if (sequence->state != ARMED)
 		return DT_E_STATE;
 	if (command->host != (uint16_t)sequence->session)
 		return DT_E_SESSION;
-	if (command->argument != key)
+	if (command->argument != sequence->release_key)
 		return DT_E_TOKEN;
 	if (warned_ms < sequence->parameters->value[WIRE_PARAMETER_warning_ms])
 		return DT_E_EARLY;
@@ -489,6 +490,7 @@ static void tick_interlocks(struct sequence *sequence, uint32_t checks)
 {
 	bool in_motion = sequence->state != ARMED;
 
+#pragma GCC unroll 8
 	for (unsigned i = 0; i < sizeof(interlocks) / sizeof(interlocks[0]); i++)
 		if ((checks & interlocks[i].check) && (interlocks[i].in_motion || !in_motion)) {
 			sequence_fault(sequence, interlocks[i].fault);

@@ -88,6 +88,7 @@ struct sequence {
 	uint16_t frame_speed_mm_s;
 	uint32_t session, arm_key; /* who has armed, with what; 0 unless armed */
 	uint32_t nonce;            /* of the challenge that waits for its answer, 0: none */
+	uint32_t release_key;      /* what RELEASE has to answer it with while armed */
 	uint32_t challenged_ms;    /* when READY gave one */
 	uint32_t parameters_crc32; /* of the set that the last ARM confirmed */
 	uint32_t tick_ms;          /* now */

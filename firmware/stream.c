@@ -90,15 +90,13 @@ void stream_flush(struct stream *stream)
 	}
 }
 
-void stream_tick(struct stream *stream, const struct acquire_tick *tick)
+void stream_block(struct stream *stream, const struct acquire_tick *tick, unsigned sensor)
 {
 	struct frame frame;
 
 	if (stream->classic)
 		return;
-	acquire_pack(tick, 0, WIRE_ID_BLOCK_S1, &frame);
-	stream_send(stream, &frame);
-	acquire_pack(tick, 1, WIRE_ID_BLOCK_S2, &frame);
+	acquire_pack(tick, sensor, sensor == 0 ? WIRE_ID_BLOCK_S1 : WIRE_ID_BLOCK_S2, &frame);
 	stream_send(stream, &frame);
 }
 

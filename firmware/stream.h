@@ -51,8 +51,8 @@ void stream_set_classic(struct stream *stream, bool classic);
 
 void stream_send(struct stream *stream, const struct frame *frame);
 
-/* Both blocks of a tick, live; nothing on classic CAN. */
-void stream_tick(struct stream *stream, const struct acquire_tick *tick);
+/* The block of a tick of sensor 0 (S1) or 1 (S2), live; nothing on classic CAN. */
+void stream_block(struct stream *stream, const struct acquire_tick *tick, unsigned sensor);
 
 /* Offers the controller what waits. */
 void stream_flush(struct stream *stream);

@@ -317,7 +317,7 @@ static void a_look_has_the_inputs_that_are_known(void **state)
 	struct acquire acquire = {.clocks_good = true};
 
 	(void)state;
-	assert_int_equal(health_look(&health, &input, &acquire, true).known, 0x7FE3);
+	assert_int_equal(health_look(&health, &input, 0, &acquire, true).known, 0x7FE3);
 }
 
 int main(void)

@@ -62,11 +62,10 @@ static void the_word_is_outputs_and_agreed_inputs(void **state)
 	struct input input = {.agreed = WIRE_IO_DOOR_CLOSED};
 
 	(void)state;
-	fake.inputs = WIRE_IO_ESTOP_CLEAR;
-	fake.outputs = WIRE_IO_OUTPUTS;
-	assert_int_equal(input_io(&input), WIRE_IO_OUTPUTS | WIRE_IO_DOOR_CLOSED);
-	fake.outputs = WIRE_IO_LATCH_OPEN;
-	assert_int_equal(input_io(&input), WIRE_IO_LATCH_OPEN | WIRE_IO_DOOR_CLOSED);
+	assert_int_equal(input_io(&input, WIRE_IO_OUTPUTS | WIRE_IO_ESTOP_CLEAR),
+	                 WIRE_IO_OUTPUTS | WIRE_IO_DOOR_CLOSED);
+	assert_int_equal(input_io(&input, WIRE_IO_LATCH_OPEN | WIRE_IO_ESTOP_CLEAR),
+	                 WIRE_IO_LATCH_OPEN | WIRE_IO_DOOR_CLOSED);
 }
 
 int main(void)

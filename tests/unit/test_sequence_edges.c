@@ -56,6 +56,8 @@ static void be_in(uint8_t state)
 	                                                                            : WIRE_FAULT_NONE;
 	sequence.session = state == STATE(ARMED) ? SESSION : 0;
 	sequence.nonce = state == STATE(ARMED) ? NONCE : 0;
+	sequence.release_key =
+	        state == STATE(ARMED) ? wire_answer(NONCE, sequence_next_drop(&sequence), SET) : 0;
 	sequence.parameters_crc32 = SET;
 	sequence.acknowledged = sequence.settled = true;
 	sequence.tick_ms = sequence.released_ms = now_ms;

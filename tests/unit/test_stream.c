@@ -45,6 +45,12 @@ static void put(uint32_t tick_ms)
 	capture_put(&capture, &tick);
 }
 
+static void stream_both(const struct acquire_tick *tick)
+{
+	stream_block(&stream, tick, 0);
+	stream_block(&stream, tick, 1);
+}
+
 static struct frame numbered(uint32_t number)
 {
 	return (struct frame){.id = WIRE_ID_STATUS, .length = 8, .data = {(uint8_t)number}};
@@ -55,7 +61,7 @@ static void sends_at_once_when_it_can(void **state)
 	struct acquire_tick tick = make(5);
 
 	(void)state;
-	stream_tick(&stream, &tick);
+	stream_both(&tick);
 	assert_int_equal(fake.sent_count, 2);
 	assert_int_equal(fake.sent[0].id, 0x181);
 	assert_int_equal(fake.sent[1].id, 0x281);
@@ -109,7 +115,7 @@ static void blocks_leave_room_for_the_rest(void **state)
 	for (uint32_t t = 0; t < STREAM_QUEUE; t++) {
 		struct acquire_tick tick = make(t);
 
-		stream_tick(&stream, &tick);
+		stream_both(&tick);
 	}
 	assert_int_equal(counters[WIRE_COUNTER_frames_deferred], STREAM_QUEUE - STREAM_RESERVED);
 	for (uint32_t i = 0; i < STREAM_RESERVED; i++) {
@@ -137,7 +143,7 @@ static void resent_block_is_the_live_one(void **state)
 
 	(void)state;
 	capture_put(&capture, &tick);
-	stream_tick(&stream, &tick);
+	stream_both(&tick);
 	memcpy(live, fake.sent, sizeof(live));
 	fake.sent_count = 0;
 	request(2, 100, 1);
@@ -217,7 +223,7 @@ static void classic_sends_segments_and_nothing_live(void **state)
 	for (unsigned i = 0; i < 24; i++)
 		end.data[i] = (uint8_t)(0x40 + i);
 	stream_set_classic(&stream, true);
-	stream_tick(&stream, &tick);
+	stream_both(&tick);
 	assert_int_equal(fake.sent_count, 0);
 	stream_send(&stream, &(struct frame){.id = 0x682, .length = 8});
 	assert_int_equal(fake.sent_count, 1);
@@ -235,7 +241,7 @@ static void classic_sends_segments_and_nothing_live(void **state)
 	}
 	assert_int_equal(counters[WIRE_COUNTER_frames_sent], 5);
 	stream_set_classic(&stream, false);
-	stream_tick(&stream, &tick);
+	stream_both(&tick);
 	assert_int_equal(fake.sent_count, 7);
 	assert_int_equal(fake.sent[6].flags, FRAME_FD | FRAME_BRS);
 }
@@ -286,10 +292,10 @@ static void change_of_bus_drops_what_does_not_fit(void **state)
 
 	(void)state;
 	fake.can_full = true;
-	stream_tick(&stream, &tick);
+	stream_both(&tick);
 	stream_flush(&stream); /* one block waits outside of the queue */
 	stream_send(&stream, &status);
-	stream_tick(&stream, &tick);
+	stream_both(&tick);
 	status = numbered(2);
 	stream_send(&stream, &status);
 	stream_set_classic(&stream, true);

@@ -155,17 +155,17 @@ int can_send(const struct frame *frame)
 	return 0;
 }
 
+/* What the frame does not have is left as it was. */
 static void get_element(uint32_t element, struct frame *frame)
 {
 	uint32_t r0 = RD(element), r1 = RD(element + 4);
 	bool fd = r1 & FDCAN_ELEMENT_FDF;
 	unsigned length = lengths[r1 >> 16 & 15u];
 
-	*frame = (struct frame){
-	        .id = r0 & FDCAN_ELEMENT_XTD ? r0 & 0x1FFFFFFFu : r0 >> 18 & 0x7FFu,
-	        .length = (uint8_t)(!fd && length > 8 ? 8 : length),
-	};
-	frame->flags |= r0 & FDCAN_ELEMENT_XTD ? FRAME_EXTENDED : 0;
+	frame->time_us = 0;
+	frame->id = r0 & FDCAN_ELEMENT_XTD ? r0 & 0x1FFFFFFFu : r0 >> 18 & 0x7FFu;
+	frame->length = (uint8_t)(!fd && length > 8 ? 8 : length);
+	frame->flags = r0 & FDCAN_ELEMENT_XTD ? FRAME_EXTENDED : 0;
 	if (fd)
 		frame->flags |= (uint8_t)(FRAME_FD | (r1 & FDCAN_ELEMENT_BRS ? FRAME_BRS : 0) |
 		                          (r0 & FDCAN_ELEMENT_ESI ? FRAME_ESI : 0));
@@ -174,10 +174,11 @@ static void get_element(uint32_t element, struct frame *frame)
 		return;
 	}
 	for (unsigned i = 0; i < frame->length; i += 4) {
-		uint32_t word = RD(element + 8 + i);
+		uint32_t word = RD(element + 8 + i); /* little endian, as in put_element */
 
-		for (unsigned k = 0; k < 4 && i + k < frame->length; k++)
-			frame->data[i + k] = (uint8_t)(word >> (8 * k));
+		if (frame->length - i < 4) /* what follows the data is nothing */
+			word &= (1u << 8 * (frame->length - i)) - 1u;
+		__builtin_memcpy(frame->data + i, &word, sizeof(word));
 	}
 }
 
@@ -197,14 +198,18 @@ void can_interrupt(void)
 	for (unsigned i = 0; i < 2 * FIFO_ELEMENTS; i++) {
 		uint32_t status = RD(FDCAN_RXF0S);
 		uint32_t get = status >> 8 & 3u;
-		struct frame frame;
+		struct frame *frame;
 
 		if ((status & 15u) == 0)
 			return;
-		get_element(FDCAN_RAM_RX0 + get * FDCAN_ELEMENT_BYTES, &frame);
-		WR(FDCAN_RXF0A, get);
-		if (ring_put(&can.received, &frame) != 0)
+		frame = ring_room(&can.received);
+		if (frame != NULL) {
+			get_element(FDCAN_RAM_RX0 + get * FDCAN_ELEMENT_BYTES, frame);
+			ring_written(&can.received);
+		} else {
 			can.lost++;
+		}
+		WR(FDCAN_RXF0A, get);
 	}
 }
 
