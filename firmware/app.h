@@ -28,7 +28,7 @@
 
 struct app {
 	struct parameters parameters;
-	volatile uint32_t counters[WIRE_COUNTERS]; /* each is written in one context only */
+	volatile uint32_t counters[WIRE_COUNTERS]; /* each is written in one context, or under port_lock */
 	volatile uint32_t tick_ms;                 /* now; written by control ... */
 	uint32_t tick_us;                          /* ... and when it began */
 	uint32_t wire_hash;                        /* our own: takes too long to be worked out each time */

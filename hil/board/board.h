@@ -18,6 +18,7 @@
 enum {
 	BOARD_CLOCKS_PER_US = 168,
 	BOARD_CLOCKS_PER_MS = 168000,
+	BOARD_EXIT_OTHERWISE = 1,
 	BOARD_EXIT_USAGE = 2,
 	BOARD_EXIT_LINK = 4,
 	BOARD_EXIT_FAIL = 70,
@@ -50,8 +51,9 @@ enum board_reset { BOARD_POWER_ON, BOARD_COMMAND, BOARD_WATCHDOG, BOARD_BROWN_OU
 struct board_options {
 	const char *bus, *image;
 	const char *counts;  /* write the instruction counts there; NULL: nowhere */
-	const char *record;  /* write the answers of the bench there; NULL: nowhere */
-	const char *preempt; /* such answers, instead of a bench: interrupt it everywhere (preempt.c) */
+	const char *record;  /* write the requests and the answers of the bench there; NULL: nowhere */
+	const char *preempt; /* such a record instead of a bench: interrupt it everywhere (preempt.c) */
+	const char *compare; /* such a record instead of a bench: end at a request that is another one */
 	const char *shared;  /* with it: memory that main and control share without a lock */
 	const char *only;    /* with it: main, control, CAN or gate; NULL: all */
 	unsigned every, share, shares;

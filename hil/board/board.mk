@@ -20,10 +20,10 @@ MISTAKES ?=
 mistakes: $(BUILD)/droptower-bench board ## build the board's image with mistakes (MISTAKES= some) and see that a drop, or preemption, finds each
 	@hil/board/mistakes $(BUILD) '$(STM32G474_CC) $(STM32G474_CFLAGS)' $(MISTAKES)
 
-EVERY ?= 30
+MUTANTS ?= 100
 DRIVERS ?=
-mutate-board: $(BUILD)/droptower-bench board ## make each EVERY=th small mistake in the board's drivers, see a scenario on the board notice it (DRIVERS= some)
-	@hil/board/mutate $(BUILD) '$(STM32G474_CC) $(STM32G474_CFLAGS)' $(EVERY) $(DRIVERS)
+mutate-board: $(BUILD)/droptower-bench board ## make MUTANTS= small mistakes in the board's drivers, or all, see a scenario on the board notice each (DRIVERS= some, SEED=)
+	@hil/board/mutate $(BUILD) '$(STM32G474_CC) $(STM32G474_CFLAGS)' $(MUTANTS) $(DRIVERS)
 
 preempt: $(BUILD)/droptower-bench board ## interrupt the board's image after every instruction of its longest polls and of control
 	@hil/board/preempt $(BUILD)

@@ -26,7 +26,8 @@ static const char usage[] =
         "  --kept N           what the firmware before the reset kept over it, 0 to 255\n"
         "  --image FILE       the ELF file; firmware-stm32g474/firmware.elf beside this program without it\n"
         "  --clocks N         an instruction takes 0, 0.5, 1, 1.5 or 2 clocks; 1 without it\n"
-        "  --record FILE      write what the other end answers to FILE\n"
+        "  --record FILE      write what is said to the other end, and its answers, to FILE\n"
+        "  --compare FILE     no other end: the answers in FILE; end where something else is said (exit 1)\n"
         "  --preempt FILE     no other end: the answers in FILE; interrupt what the image does after every\n"
         "                     instruction, and say what breaks (exit 1)\n"
         "  --shared FILE      with it: memory that main and interrupts share without a lock: address bytes "
@@ -83,13 +84,21 @@ static unsigned half_clocks(const char *text)
 static void read_options(int argc, char **argv, struct board_options *options)
 {
 	static const struct option known[] = {
-	        {"bus", required_argument, NULL, 'b'},    {"reset-cause", required_argument, NULL, 'r'},
-	        {"kept", required_argument, NULL, 'k'},   {"image", required_argument, NULL, 'i'},
-	        {"clocks", required_argument, NULL, 'c'}, {"counts", required_argument, NULL, 'n'},
-	        {"record", required_argument, NULL, 'R'}, {"preempt", required_argument, NULL, 'p'},
-	        {"shared", required_argument, NULL, 's'}, {"every", required_argument, NULL, 'e'},
-	        {"share", required_argument, NULL, 'S'},  {"only", required_argument, NULL, 'o'},
-	        {"help", no_argument, NULL, 'h'},         {NULL, 0, NULL, 0},
+	        {"bus", required_argument, NULL, 'b'},
+	        {"reset-cause", required_argument, NULL, 'r'},
+	        {"kept", required_argument, NULL, 'k'},
+	        {"image", required_argument, NULL, 'i'},
+	        {"clocks", required_argument, NULL, 'c'},
+	        {"counts", required_argument, NULL, 'n'},
+	        {"record", required_argument, NULL, 'R'},
+	        {"preempt", required_argument, NULL, 'p'},
+	        {"compare", required_argument, NULL, 'C'},
+	        {"shared", required_argument, NULL, 's'},
+	        {"every", required_argument, NULL, 'e'},
+	        {"share", required_argument, NULL, 'S'},
+	        {"only", required_argument, NULL, 'o'},
+	        {"help", no_argument, NULL, 'h'},
+	        {NULL, 0, NULL, 0},
 	};
 	int letter;
 
@@ -116,6 +125,9 @@ static void read_options(int argc, char **argv, struct board_options *options)
 		case 'R':
 			options->record = optarg;
 			break;
+		case 'C':
+			options->compare = optarg;
+			break;
 		case 'p':
 			options->preempt = optarg;
 			break;
@@ -139,8 +151,9 @@ static void read_options(int argc, char **argv, struct board_options *options)
 		default:
 			refuse("wrong option", "");
 		}
-	if ((options->bus == NULL) == (options->preempt == NULL) || optind != argc)
-		refuse("--bus PREFIX or --preempt FILE is needed, and nothing behind the options", "");
+	if ((options->bus != NULL) + (options->preempt != NULL) + (options->compare != NULL) != 1 ||
+	    optind != argc)
+		refuse("one of --bus, --preempt and --compare is needed, and nothing behind the options", "");
 }
 
 /* firmware-stm32g474/firmware.elf next to this program. */

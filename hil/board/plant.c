@@ -16,7 +16,8 @@ enum {
 	LEAD_CLOCKS = 172 * 7, /* from the start of the timers to the first tick, by the port's own README */
 	LATCH_OPEN = 1 << 0,
 	DAMPERS_RELIEVE = 1 << 2,
-	ROOM = 8, /* frames in a request that leaves room for those of the instants ahead */
+	RECORD_HEAD = 2, /* bytes: the reset's cause, what was kept over it */
+	ROOM = 8,        /* frames in a request that leaves room for those of the instants ahead */
 };
 
 static struct {
@@ -30,7 +31,7 @@ static struct {
 	bool more;               /* the next answer comes without a request */
 	size_t come, taken;      /* bytes of input[] */
 	uint8_t input[SENSORBUS_MESSAGE_MAX];
-	const uint8_t *recorded; /* answers, in place of the bench's */
+	const uint8_t *recorded; /* requests and answers, these in place of the bench's */
 	size_t recorded_bytes, recorded_taken;
 	uint16_t inputs_off;
 	size_t bytes;
@@ -73,23 +74,32 @@ static void plant_load(const char *path)
 	fclose(file);
 	plant.recorded = bytes;
 	plant.recorded_bytes = count;
+	board.options.cause = bytes[0];
+	board.options.kept = count > 1 ? bytes[1] : 0;
+}
+
+static void plant_open_record(const struct board_options *options)
+{
+	uint8_t head[RECORD_HEAD] = {(uint8_t)options->cause, (uint8_t)options->kept};
+
+	plant.record_fd = open(options->record, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+	if (plant.record_fd < 0 || write(plant.record_fd, head, sizeof(head)) != sizeof(head)) {
+		fprintf(stderr, "droptower-firmware-board: %s: %s\n", options->record, strerror(errno));
+		exit(BOARD_EXIT_LINK);
+	}
 }
 
 void plant_open(const struct board_options *options)
 {
 	plant.record_fd = -1;
-	if (options->preempt != NULL) {
-		plant_load(options->preempt);
+	if (options->preempt != NULL || options->compare != NULL) {
+		plant_load(options->preempt != NULL ? options->preempt : options->compare);
 		return;
 	}
 	plant.request_fd = plant_open_one(options->bus, "request", O_WRONLY);
 	plant.answer_fd = plant_open_one(options->bus, "answer", O_RDONLY);
 	if (options->record != NULL)
-		plant.record_fd = open(options->record, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-	if (options->record != NULL && plant.record_fd < 0) {
-		fprintf(stderr, "droptower-firmware-board: %s: %s\n", options->record, strerror(errno));
-		exit(BOARD_EXIT_LINK);
-	}
+		plant_open_record(options);
 }
 
 void plant_reset(void)
@@ -100,7 +110,7 @@ void plant_reset(void)
 	plant.more = false;
 	plant.behind = 0;
 	plant.come = plant.taken = 0;
-	plant.recorded_taken = 0;
+	plant.recorded_taken = RECORD_HEAD;
 	plant.inputs_off = 0;
 	plant.frames = 0;
 	plant.bytes = SENSORBUS_REQUEST_BYTES;
@@ -114,7 +124,7 @@ void plant_edge(unsigned output, uint32_t time_us)
 
 bool plant_send(const struct frame *frame)
 {
-	if (plant.recorded != NULL) {
+	if (board.options.preempt != NULL) {
 		preempt_sent(frame);
 		return true;
 	}
@@ -148,6 +158,12 @@ int64_t plant_next(void)
 }
 
 /* ---- one exchange ---- */
+
+static void plant_record(const uint8_t *bytes, size_t count)
+{
+	if (plant.record_fd >= 0 && write(plant.record_fd, bytes, count) != (ssize_t)count)
+		board_fail("what the bench and the firmware say cannot be recorded");
+}
 
 static void plant_write(const uint8_t *bytes, size_t count)
 {
@@ -184,8 +200,7 @@ static void plant_read(uint8_t *bytes, size_t count)
 	if (board.over)
 		return;
 	memcpy(bytes, plant.input + plant.taken, count);
-	if (plant.record_fd >= 0 && write(plant.record_fd, bytes, count) != (ssize_t)count)
-		board_fail("what the bench says cannot be recorded");
+	plant_record(bytes, count);
 	plant.taken += count;
 }
 
@@ -207,6 +222,23 @@ static bool ahead_is_welcome(int64_t of_ms)
 	       timer_next_edge() > next_tick && plant.frames < ROOM;
 }
 
+/* The request is the one that was recorded, where that is asked for. */
+static void plant_compare(void)
+{
+	uint16_t count;
+	uint8_t request[sizeof(plant.request)];
+
+	plant_read((uint8_t *)&count, sizeof(count));
+	if (!board.over)
+		plant_read(request, count);
+	if (!board.over && board.options.compare != NULL &&
+	    (count != plant.bytes || memcmp(request, plant.request, count) != 0)) {
+		printf("otherwise than recorded in tick %lld\n",
+		       (long long)(plant.next / BOARD_CLOCKS_PER_MS));
+		exit(BOARD_EXIT_OTHERWISE);
+	}
+}
+
 static void plant_ask(uint8_t group, int64_t of_ms)
 {
 	struct sensorbus_request request = {
@@ -223,7 +255,15 @@ static void plant_ask(uint8_t group, int64_t of_ms)
 
 	memcpy(request.edge_us, plant.edge_us, sizeof(request.edge_us));
 	(void)sensorbus_put_request(plant.request, &request);
-	plant_write(plant.request, plant.bytes);
+	if (plant.recorded != NULL) {
+		plant_compare();
+	} else {
+		uint16_t count = (uint16_t)plant.bytes;
+
+		plant_record((const uint8_t *)&count, sizeof(count));
+		plant_record(plant.request, plant.bytes);
+		plant_write(plant.request, plant.bytes);
+	}
 	plant.edges = 0;
 	plant.first = false;
 	plant.frames = plant.behind = 0;
@@ -281,7 +321,7 @@ void plant_event(void)
 
 	if (plant.more)
 		plant.behind++;
-	else if (plant.recorded == NULL)
+	else
 		plant_ask(group, of_ms);
 	if (!board.over)
 		plant_take(group);
