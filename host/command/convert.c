@@ -30,11 +30,38 @@ static int write_dbc(const char *file)
 	return code;
 }
 
+/* A log into blocks, all of it as it is. */
+static int convert_log(struct log_file *log, const char *in, const char *out)
+{
+	char message[READ_MESSAGE_MAX], damage[BLOCKS_MESSAGE_MAX];
+
+	if (write_blocks(log, out, message) != 0) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	if (log_file_damage(log, 0, log->size, damage) == 0)
+		return COMMAND_DONE;
+	command_error("%s: %s: what stood in it is not in %s", in, damage, out);
+	return COMMAND_INPUT;
+}
+
 static int convert(const char *in, const char *out, const char *columns, unsigned number)
 {
 	char message[READ_MESSAGE_MAX];
 	struct record record;
-	int result = read_nth(&record, in, columns, number, message);
+	struct log_file log;
+	int result;
+
+	if (number == 0 && columns == NULL && write_packs(out) &&
+	    log_file_open(&log, in, "a recording", message) == 0) {
+		bool is_log = write_blocks_is(&log, out);
+		int code = is_log ? convert_log(&log, in, out) : COMMAND_DONE;
+
+		log_file_close(&log);
+		if (is_log)
+			return code;
+	}
+	result = read_nth(&record, in, columns, number, message);
 
 	if (result == 0) {
 		result = write_record(&record, out, message);
@@ -132,9 +159,11 @@ static const struct option_table known_options = {
                 "log,\n"
                 ".csv, .unv or .uff universal file (dataset 58), .h5 or .hdf5 HDF5, .pcapng frames for "
                 "Wireshark,\n"
-                ".mat MATLAB version 5, .mme a test of ISO 13499 with its folder Channel. IN is recognised "
-                "by its "
-                "content.\n"
+                ".mat MATLAB version 5, .mme a test of ISO 13499 with its folder Channel. .log.zst and "
+                ".lcm.zst are\n"
+                "a log in blocks with an index: all of IN, however many drops, read at any place; 'zstd -d' "
+                "undoes it.\n"
+                "IN is recognised by its content.\n"
                 "Foreign recordings become CSV, universal files, HDF5, MAT or ISO 13499.\n"
                 "\n",
         OPTION_ROWS(rows),

@@ -8,6 +8,7 @@
 #include <time.h>
 
 #include "common/base/number.h"
+#include "common/link/candump.h"
 #include "common/link/link.h"
 #include "common/wire.h"
 #include "common/wire_table.h"
@@ -15,6 +16,8 @@
 #include "host/session/publish.h"
 #include "host/session/session.h"
 #include "host/record/lcm_log.h"
+#include "host/record/log_walk.h"
+#include "host/record/read.h"
 
 static const double CENTURY_S = 3.15e9;
 
@@ -36,6 +39,8 @@ struct replay {
 	const char *file, *to;
 	struct pace pace;
 	bool as_host;
+	unsigned drop;        /* 0: all that is there */
+	uint64_t from, until; /* of the log; 0 and its size */
 	uint64_t sent, skipped;
 	uint64_t withheld;                  /* what only a host may send */
 	uint64_t states_sent, states_heard; /* over LCM we hear ourselves */
@@ -147,41 +152,38 @@ static int replay_send_frame(struct replay *replay, struct frame *frame, struct 
 	return COMMAND_DONE;
 }
 
-static int replay_frames(struct replay *replay, struct link *from, struct link *to,
+static int replay_frames(struct replay *replay, struct log_file *log, struct link *to,
                          struct publisher *publisher)
 {
 	bool copies = strncmp(replay->to, "log:", 4) == 0;
 	int code = to != NULL && is_live(replay) ? listen_on_link(replay, to, LISTEN_MS) : COMMAND_DONE;
-	struct frame frame;
-	int result = 1;
+	struct log_line line = {.next = replay->from > log->begin ? replay->from : log->begin};
 
-	while (code == COMMAND_DONE && !interrupt_came() && (result = link_receive(from, &frame, 0)) == 1) {
-		if ((frame.flags & FRAME_ERROR) != 0)
-			replay->skipped++; /* a report of the bus, not a frame anybody sent */
+	while (code == COMMAND_DONE && !interrupt_came() && log_file_next_line(log, replay->until, &line)) {
+		struct frame frame;
+		unsigned column;
+		int result = candump_parse(line.text, line.length, &frame, &column);
+
+		if (result == 0)
+			continue;
+		if (result < 0 || (frame.flags & FRAME_ERROR) != 0)
+			replay->skipped++; /* no frame, or a report of the bus and not a frame anybody sent */
 		else if (is_hosts(&frame) && !copies && !replay->as_host)
 			replay->withheld++;
 		else
 			code = replay_send_frame(replay, &frame, to, publisher);
 	}
-	replay->skipped += link_counters(from)->malformed;
-	if (code == COMMAND_DONE && result != DT_E_CLOSED && result != 1)
-		return command_link_failed(replay->file, result);
 	return code;
 }
 
-static int replay_candump(struct replay *replay)
+static int replay_candump(struct replay *replay, struct log_file *log)
 {
 	char message[512];
 	bool to_lcm = publisher_wants(replay->to);
 	struct publisher *publisher = NULL;
-	struct link *from, *to = NULL;
+	struct link *to = NULL;
 	int code;
 
-	from = link_open_log(replay->file, LINK_READ, message, sizeof(message));
-	if (from == NULL) {
-		command_error("%s", message);
-		return COMMAND_INPUT;
-	}
 	if (to_lcm)
 		publisher = publisher_open(replay->to, message);
 	else
@@ -191,12 +193,11 @@ static int replay_candump(struct replay *replay)
 		command_error("%s", message);
 		code = COMMAND_LINK;
 	} else {
-		code = replay_frames(replay, from, to, publisher);
+		code = replay_frames(replay, log, to, publisher);
 	}
 	publisher_close(publisher);
 	if (link_close(to) != 0 && code == COMMAND_DONE)
 		code = command_link_failed(replay->to, DT_E_SYSTEM);
-	(void)link_close(from);
 	return code;
 }
 
@@ -246,7 +247,7 @@ static int send_event(struct replay *replay, const struct lcm_log_event *event, 
 
 static int replay_events(struct replay *replay, struct log_file *log, struct publisher *publisher)
 {
-	struct lcm_log_walk walk = {0};
+	struct lcm_log_walk walk = {.at = replay->from, .end = replay->until};
 	struct lcm_log_event event;
 	int code = COMMAND_DONE;
 
@@ -288,17 +289,55 @@ static int replay_lcm(struct replay *replay, struct log_file *log)
 	return code;
 }
 
+/* ---- one drop of many ---- */
+
+static int replay_find(void *context, const struct log_capture *capture, struct record *record)
+{
+	struct replay *replay = context;
+
+	(void)record; /* none is asked for */
+	if (capture->number == replay->drop) {
+		replay->from = capture->from;
+		replay->until = capture->to;
+	}
+	return 0;
+}
+
+static int find_drop(struct replay *replay)
+{
+	struct log_visitor visitor = {.context = replay, .capture = replay_find};
+	char message[READ_MESSAGE_MAX];
+
+	if (replay->drop == 0)
+		return COMMAND_DONE;
+	replay->until = 0;
+	if (read_list(replay->file, &visitor, message) != 0)
+		command_error("%s", message);
+	else if (replay->until == 0)
+		command_error("%s: no drop %u: 'droptower analyze --list' shows them", replay->file,
+		              replay->drop);
+	else
+		return COMMAND_DONE;
+	return COMMAND_INPUT;
+}
+
 static int replay_file(struct replay *replay)
 {
-	char message[READ_MESSAGE_MAX];
+	char message[READ_MESSAGE_MAX], damage[BLOCKS_MESSAGE_MAX];
 	struct log_file log;
-	int code;
+	int code = find_drop(replay);
 
+	if (code != COMMAND_DONE)
+		return code;
 	if (log_file_open(&log, replay->file, "a recording", message) != 0) {
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}
-	code = lcm_log_is(&log) ? replay_lcm(replay, &log) : replay_candump(replay);
+	code = lcm_log_is(&log) ? replay_lcm(replay, &log) : replay_candump(replay, &log);
+	if (code == COMMAND_DONE && log_file_damage(&log, replay->from, replay->until, damage) > 0) {
+		command_error("%s: %s: what stood in it was not sent", replay->file, damage);
+		code = COMMAND_INPUT;
+	}
 	if (code == COMMAND_DONE && log_file_error(&log, message) != 0) {
 		command_error("%s", message);
 		code = COMMAND_INPUT;
@@ -323,6 +362,8 @@ static int take_speed(const struct option_table *table, const char *name, const 
 }
 
 static const struct option_row rows[] = {
+        OPTION_UNSIGNED("drop", "N", struct replay, drop, 1, 1e9,
+                        "the N-th drop of a log of several alone ('droptower analyze --list' shows them)"),
         OPTION_TAKEN("speed", "X", struct replay, pace.speed, take_speed,
                      "X times as fast (default 1), or max: as fast as FILE can be read"),
         OPTION_TEXT("to", "URL", struct replay, to,
@@ -335,7 +376,7 @@ static const struct option_row rows[] = {
 static const struct option_table known_options = {
         .program = "droptower",
         .command = "replay",
-        .head = "usage: droptower replay FILE [--speed X|max] [--to URL] [--as-host]\n"
+        .head = "usage: droptower replay FILE [--drop N] [--speed X|max] [--to URL] [--as-host]\n"
                 "\n"
                 "Sends a logged drop again, in its own time. candump text goes to a CAN link (unix:PATH, "
                 "can:IF,\n"
@@ -350,7 +391,7 @@ static const struct option_table known_options = {
 
 int command_replay(int argc, char **argv)
 {
-	struct replay replay = {.to = "log:-", .pace = {.speed = 1.0}};
+	struct replay replay = {.to = "log:-", .pace = {.speed = 1.0}, .until = UINT64_MAX};
 	int code = option_read(&known_options, &replay, argc, argv);
 
 	if (code != OPTIONS_READ)

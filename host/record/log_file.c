@@ -45,6 +45,22 @@ static void log_file_skip_mark(struct log_file *log)
 		log->begin = 3;
 }
 
+/* A log in blocks is gone on with as the log that it is of. */
+static int open_blocks(struct log_file *log, char *message)
+{
+	size_t held;
+	const char *head = log_file_get(log, 0, BLOCKS_HEAD_BYTES, &held);
+
+	if (!blocks_is(head, held))
+		return 0;
+	log->blocks = blocks_open(log->descriptor, log->size);
+	if (log->blocks == NULL)
+		return log_file_refuse(log, DT_E_SYSTEM, strerror(errno), message);
+	log->size = blocks_size(log->blocks);
+	log->held = 0;
+	return 0;
+}
+
 /* Compressed, or a CAN log of others. */
 static bool log_file_is_packed(struct log_file *log)
 {
@@ -80,6 +96,8 @@ int log_file_open(struct log_file *log, const char *file, const char *expected,
 		error = open_regular(&opened, message);
 	else
 		error = open_whole(&opened, message);
+	if (!error && opened.whole.bytes == NULL)
+		error = open_blocks(&opened, message);
 	if (!error && opened.whole.bytes == NULL && log_file_is_packed(&opened))
 		error = open_whole(&opened, message);
 	if (!error && opened.whole.bytes == NULL)
@@ -94,6 +112,8 @@ int log_file_open(struct log_file *log, const char *file, const char *expected,
 void log_file_close(struct log_file *log)
 {
 	source_free(&log->whole);
+	blocks_close(log->blocks);
+	log->blocks = NULL;
 	free(log->window);
 	log->window = NULL;
 	if (log->descriptor >= 0)
@@ -133,7 +153,9 @@ static void log_file_fill(struct log_file *log)
 			return;
 		if (want > log->size - place)
 			want = (size_t)(log->size - place);
-		count = pread(log->descriptor, log->window + log->held, want, (off_t)place);
+		count = log->blocks != NULL
+		                ? blocks_read(log->blocks, place, log->window + log->held, want)
+		                : pread(log->descriptor, log->window + log->held, want, (off_t)place);
 		if (count > 0)
 			log->held += (size_t)count;
 		else if (count == 0)
@@ -177,6 +199,12 @@ const char *log_file_get(struct log_file *log, uint64_t offset, size_t want, siz
 	}
 	*held = log->held - (size_t)(offset - log->at);
 	return log->window + (offset - log->at);
+}
+
+unsigned log_file_damage(const struct log_file *log, uint64_t from, uint64_t to,
+                         char message[BLOCKS_MESSAGE_MAX])
+{
+	return log->blocks != NULL ? blocks_damage(log->blocks, from, to, message) : 0;
 }
 
 int log_file_error(const struct log_file *log, char message[READ_MESSAGE_MAX])

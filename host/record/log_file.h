@@ -3,17 +3,20 @@
 #define DT_HOST_RECORD_LOG_FILE_H
 /*
  * A log of any size through a window of constant memory: bytes by their place in the file. What is no regular
- * file (a pipe) cannot be gone back in and is held whole, as a source.
+ * file (a pipe) cannot be gone back in and is held whole, as a source. A log in blocks is read as the log
+ * that it is of.
  *
  * log_file_open, log_file_get, log_file_close. What is returned points into the window, until the next call.
  */
+#include "host/record/blocks.h"
 #include "host/record/source.h"
 
 struct log_file {
-	const char *file;     /* as given */
-	const char *expected; /* of it, for its refusal */
-	uint64_t begin, size; /* where what it says begins, and ends when it was opened */
-	struct source whole;  /* of what is no regular file; else bytes is NULL */
+	const char *file;      /* as given */
+	const char *expected;  /* of it, for its refusal */
+	uint64_t begin, size;  /* where what it says begins, and ends when it was opened */
+	struct source whole;   /* of what is no regular file; else bytes is NULL */
+	struct blocks *blocks; /* or NULL; begin, size and places are of what stands in them */
 	int descriptor;
 	char *window;
 	uint64_t at; /* place of its first byte */
@@ -35,6 +38,10 @@ const char *log_file_get(struct log_file *log, uint64_t offset, size_t want, siz
 
 /* 0, or what reading said, told in message. */
 DT_MUST_USE int log_file_error(const struct log_file *log, char message[READ_MESSAGE_MAX]);
+
+/* How many damaged blocks were met within these bytes; message says which, without the file. */
+unsigned log_file_damage(const struct log_file *log, uint64_t from, uint64_t to,
+                         char message[BLOCKS_MESSAGE_MAX]);
 
 /* Where a line is. */
 struct log_line {

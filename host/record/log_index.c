@@ -35,15 +35,24 @@ static void hash_part(struct log_file *log, uint64_t at, struct sha256_ctx *hash
 	sha256_update(hash, held < ENDS_BYTES ? held : ENDS_BYTES, (const uint8_t *)bytes);
 }
 
-/* The two lines that an index of this log begins with, by this program; false when it cannot have one. */
-static bool describe(struct log_file *log, char lines[LINE_MAX_BYTES])
+/* The file's own size: an index beside a log in blocks is of its contents. */
+static bool is_as_opened(const struct log_file *log, const struct stat *status)
+{
+	return log->blocks != NULL || (uint64_t)status->st_size == log->size;
+}
+
+/* The two lines that an index of this log begins with, by this program; false when it cannot have one.
+ * Inside: of one in the log's own file, which has no time of change. */
+static bool describe(struct log_file *log, bool inside, char lines[LINE_MAX_BYTES])
 {
 	char ends[DIGEST_CHARS];
 	struct sha256_ctx hash;
-	struct stat status;
+	struct stat status = {0};
 
-	if (log->descriptor < 0 || log->size < LOG_INDEX_LEAST || fstat(log->descriptor, &status) != 0 ||
-	    (uint64_t)status.st_size != log->size)
+	if (log->size < LOG_INDEX_LEAST)
+		return false;
+	if (!inside &&
+	    (log->descriptor < 0 || fstat(log->descriptor, &status) != 0 || !is_as_opened(log, &status)))
 		return false;
 	sha256_init(&hash);
 	hash_part(log, 0, &hash);
@@ -85,18 +94,33 @@ static bool log_index_is_whole(FILE *index)
 	return false;
 }
 
-static bool is_of(FILE *index, struct log_file *log)
+static bool is_of(FILE *index, struct log_file *log, bool inside)
 {
 	char wanted[LINE_MAX_BYTES], found[LINE_MAX_BYTES];
 	size_t length;
 
-	if (!describe(log, wanted))
+	if (!describe(log, inside, wanted))
 		return false;
 	length = strlen(wanted);
 	return fread(found, 1, length, index) == length && memcmp(found, wanted, length) == 0;
 }
 
-FILE *log_index_open(struct log_file *log)
+/* That of a log in blocks, which is in it. */
+static FILE *open_inside(struct log_file *log)
+{
+	size_t size = 0;
+	char *text = log->blocks != NULL ? blocks_index(log->blocks, &size) : NULL;
+	FILE *index = text != NULL && size > 0 ? fmemopen(NULL, size + 1, "w+") : NULL;
+
+	if (index != NULL) {
+		fwrite(text, 1, size, index);
+		rewind(index);
+	}
+	free(text);
+	return index;
+}
+
+static FILE *open_beside(struct log_file *log)
 {
 	char *name = index_name(log);
 	struct stat status;
@@ -105,15 +129,27 @@ FILE *log_index_open(struct log_file *log)
 	if (name != NULL && stat(name, &status) == 0 && S_ISREG(status.st_mode))
 		index = fopen(name, "re");
 	free(name);
+	return index;
+}
+
+static FILE *believed(FILE *index, struct log_file *log, bool inside)
+{
 	if (index == NULL)
 		return NULL;
-	if (is_of(index, log)) {
+	if (is_of(index, log, inside)) {
 		rewind(index);
 		if (log_index_is_whole(index))
 			return index;
 	}
 	fclose(index);
 	return NULL;
+}
+
+FILE *log_index_open(struct log_file *log)
+{
+	FILE *index = believed(open_inside(log), log, true);
+
+	return index != NULL ? index : believed(open_beside(log), log, false);
 }
 
 static bool read_parameters(char *text, struct log_capture_parameters *parameters)
@@ -201,6 +237,7 @@ struct making {
 	struct log_visitor *to;
 	struct whole whole;
 	bool open;
+	FILE *out; /* of whole, or text in memory */
 	struct sha256_ctx hash;
 	uint64_t lines;
 };
@@ -216,7 +253,7 @@ __attribute__((format(printf, 2, 3))) static void log_index_put(struct making *m
 	va_start(list, format);
 	vsnprintf(text, sizeof(text), format, list);
 	va_end(list);
-	fputs(text, making->whole.out); /* whole_close says whether all was written */
+	fputs(text, making->out); /* whoever closes it says whether all was written */
 	sha256_update(&making->hash, strlen(text), (const uint8_t *)text);
 	for (const char *p = text; *p != '\0'; p++)
 		making->lines += *p == '\n';
@@ -284,20 +321,29 @@ static void log_index_begin(struct making *making, const char *name, const char 
 	sha256_init(&making->hash);
 	if (name != NULL && may_write(name))
 		making->open = whole_open(&making->whole, name, message, sizeof(message)) == 0;
+	making->out = making->whole.out;
 	log_index_put(making, "%s", lines);
+}
+
+static void put_end(struct making *making)
+{
+	struct sha256_ctx hash = making->hash;
+	char digest[DIGEST_CHARS];
+
+	digest_text(&hash, digest);
+	fprintf(making->out, "end %" PRIu64 " %s\n", making->lines, digest);
 }
 
 /* Kept if the log was walked to its end and is still the one that was opened. */
 static void log_index_end(struct making *making, struct log_file *log, int result, const char *lines)
 {
-	char now[LINE_MAX_BYTES], message[READ_MESSAGE_MAX], digest[DIGEST_CHARS];
-	struct sha256_ctx hash = making->hash;
+	char now[LINE_MAX_BYTES], message[READ_MESSAGE_MAX];
 
 	if (!making->open)
 		return;
-	digest_text(&hash, digest);
-	fprintf(making->whole.out, "end %" PRIu64 " %s\n", making->lines, digest);
-	if (result == 0 && (!describe(log, now) || strcmp(now, lines) != 0 || ferror(making->whole.out)))
+	put_end(making);
+	if (result == 0 &&
+	    (!describe(log, false, now) || strcmp(now, lines) != 0 || ferror(making->whole.out)))
 		result = DT_E_STATE;
 	if (whole_close(&making->whole, result, message, sizeof(message)) != 0)
 		making->open = false; /* there is none then, as in a folder that cannot be written */
@@ -314,7 +360,7 @@ int log_index_walk(struct log_file *log, struct log_visitor *visitor, struct log
 	char lines[LINE_MAX_BYTES], *name;
 	int result;
 
-	if (!describe(log, lines))
+	if (!describe(log, false, lines))
 		return log_walk(log, 0, log->size, visitor, contents, message);
 	name = index_name(log);
 	log_index_begin(&making, name, lines);
@@ -322,4 +368,39 @@ int log_index_walk(struct log_file *log, struct log_visitor *visitor, struct log
 	log_index_end(&making, log, result == 0 && contents->captures == 0 ? DT_E_EMPTY : result, lines);
 	free(name);
 	return result;
+}
+
+/* ---- inside a log in blocks ---- */
+
+static int pass_by(void *context, const struct log_capture *capture, struct record *record)
+{
+	(void)context;
+	(void)capture;
+	(void)record; /* none is asked for */
+	return 0;
+}
+
+int log_index_text(struct log_file *log, struct text *text, char message[READ_MESSAGE_MAX])
+{
+	struct log_visitor nothing = {.capture = pass_by};
+	struct making making = {.to = &nothing, .open = true};
+	struct log_visitor put_first = {
+	        .context = &making, .capture = put_capture, .event = log_index_put_event};
+	struct log_contents contents;
+	char lines[LINE_MAX_BYTES];
+	int result;
+
+	*text = (struct text){0};
+	if (!describe(log, true, lines))
+		return log_file_error(log, message);
+	if (text_open(text) != 0)
+		return source_no_memory(message, log->file);
+	making.out = text->out;
+	sha256_init(&making.hash);
+	log_index_put(&making, "%s", lines);
+	result = log_walk(log, 0, log->size, &put_first, &contents, message);
+	put_end(&making);
+	if (text_close(text, result) != 0)
+		return result ? result : source_no_memory(message, log->file);
+	return 0;
 }

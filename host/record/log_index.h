@@ -11,11 +11,12 @@
  */
 #include <stdio.h>
 
+#include "common/base/text.h"
 #include "host/record/log_walk.h"
 
 enum { LOG_INDEX_LEAST = 1 << 20 };
 
-/* The index of a log if there is one to believe, else NULL. Closed with fclose. */
+/* The index of a log if there is one to believe, in it or beside it, else NULL. Closed with fclose. */
 FILE *log_index_open(struct log_file *log);
 
 /* Calls the visitor for all that it holds, without records. 0, what the visitor returned, or DT_E_FORMAT. */
@@ -24,5 +25,8 @@ DT_MUST_USE int log_index_visit(FILE *index, const struct log_file *log, const s
 /* log_walk of all of the log, which leaves an index where one belongs. */
 DT_MUST_USE int log_index_walk(struct log_file *log, struct log_visitor *visitor,
                                struct log_contents *contents, char message[READ_MESSAGE_MAX]);
+
+/* What blocks.h is to take with the log: 0 with text->bytes to be freed, NULL for a log that needs none. */
+DT_MUST_USE int log_index_text(struct log_file *log, struct text *text, char message[READ_MESSAGE_MAX]);
 
 #endif

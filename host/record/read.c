@@ -10,6 +10,7 @@
 #include "host/record/log_index.h"
 #include "host/record/seal.h"
 #include "host/record/table_data.h"
+#include "host/record/unpack.h"
 #include "host/record/uff58.h"
 
 /* ---- what is no log ---- */
@@ -72,6 +73,8 @@ static int read_one_record(struct record *record, struct log_file *log, const ch
 	log->whole = (struct source){0};
 	if (source.bytes == NULL)
 		error = source_load(&source, log->file, log->expected, message);
+	if (!error && log->blocks != NULL)
+		error = unpack(&source, message);
 	if (!error)
 		error = read_dispatch(record, &source, columns, message);
 	if (!error)
@@ -116,8 +119,12 @@ static int refuse_empty(struct log_file *log, const struct log_contents *content
 
 static void name_record(struct log_file *log, const struct log_capture *capture, struct record *record)
 {
+	char damage[BLOCKS_MESSAGE_MAX];
+
 	strcpy(record->file, log->file);
 	strcpy(record->format, log_format(log));
+	if (log_file_damage(log, capture->from, capture->to, damage) > 0)
+		snprintf(record->read_as, sizeof(record->read_as), "log in blocks; %s", damage);
 	record->log_number = capture->alone ? 0 : capture->number;
 }
 
@@ -228,7 +235,9 @@ static bool read_span(struct log_file *log, struct found *found)
 	read_keep(found, &indexed, span.has_record ? &span.record : NULL);
 	if (!found->has_record)
 		return true;
-	found->record.counters.corrupt = indexed.counters.corrupt;
+	/* of a log in blocks the index may be older than the damage */
+	if (log->blocks == NULL || found->record.counters.corrupt < indexed.counters.corrupt)
+		found->record.counters.corrupt = indexed.counters.corrupt;
 	if (found->record.time_s == log_capture_time_s(&span.capture)) /* no other is told */
 		found->record.time_s = log_capture_time_s(&indexed);
 	return true;

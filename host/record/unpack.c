@@ -14,8 +14,11 @@ static const struct {
 	size_t length;
 	const char *program;
 } packers[] = {
-        {"\x1f\x8b", 2, "gzip"},    {"\x28\xb5\x2f\xfd", 4, "zstd"},
-        {"\xfd\x37zXZ\0", 6, "xz"}, {"\x04\x22\x4d\x18", 4, "lz4"},
+        {"\x1f\x8b", 2, "gzip"},
+        {"\x28\xb5\x2f\xfd", 4, "zstd"},
+        {"\x5d\x2a\x4d\x18", 4, "zstd"}, /* blocks.h */
+        {"\xfd\x37zXZ\0", 6, "xz"},
+        {"\x04\x22\x4d\x18", 4, "lz4"},
         {"BZh", 3, "bzip2"},
 };
 

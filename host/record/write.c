@@ -13,12 +13,14 @@
 #include "common/wire.h"
 #include "common/wire_table.h"
 #include "host/base/whole.h"
+#include "host/record/blocks.h"
 #include "host/record/digest.h"
 #include "host/record/drop.h"
 #include "host/record/fields.h"
 #include "host/record/hdf5.h"
 #include "host/record/lcm_codec.h"
 #include "host/record/lcm_log.h"
+#include "host/record/log_index.h"
 #include "host/record/mat.h"
 #include "host/record/mme.h"
 #include "host/record/seal.h"
@@ -469,14 +471,92 @@ static const struct format {
         {".mme", false, .files = write_mme},
 };
 
+static const char packed_ending[] = ".zst";
+
+bool write_packs(const char *file)
+{
+	size_t length = strlen(file), ending = strlen(packed_ending);
+
+	return length > ending && strcmp(file + length - ending, packed_ending) == 0;
+}
+
+/* By the ending, or the one before that of blocks: only what is written in one go can be packed. */
 static const struct format *format_of(const char *file)
 {
-	const char *ending = strrchr(file, '.');
+	size_t length = strlen(file) - (write_packs(file) ? strlen(packed_ending) : 0);
 
-	for (size_t i = 0; ending && i < sizeof(formats) / sizeof(formats[0]); i++)
-		if (strcmp(ending, formats[i].ending) == 0)
+	for (size_t i = 0; i < sizeof(formats) / sizeof(formats[0]); i++) {
+		size_t ending = strlen(formats[i].ending);
+
+		if (length >= ending && memcmp(file + length - ending, formats[i].ending, ending) == 0 &&
+		    (!write_packs(file) || formats[i].write != NULL))
 			return &formats[i];
+	}
 	return NULL;
+}
+
+/* In blocks (blocks.h). */
+static int write_packed(const struct record *record, const struct format *format, FILE *out)
+{
+	struct blocks_writer *writer;
+	struct text text;
+	int error = text_open(&text);
+
+	if (!error)
+		error = text_close(&text, format->write(record, text.out));
+	if (error)
+		return error;
+	error = blocks_begin(&writer, out);
+	if (!error)
+		error = blocks_end(writer, blocks_put(writer, text.bytes, text.size), NULL, 0);
+	free(text.bytes);
+	return error;
+}
+
+/* ---- a log as it is ---- */
+
+bool write_blocks_is(struct log_file *log, const char *file)
+{
+	const struct format *format = write_packs(file) ? format_of(file) : NULL;
+
+	return format != NULL && log_is(log) &&
+	       format->write == (strcmp(log_format(log), "lcm") == 0 ? write_lcm : write_candump);
+}
+
+static int put_log(struct log_file *log, struct blocks_writer *writer)
+{
+	int error = 0;
+	size_t held;
+
+	for (uint64_t at = 0; at < log->size && !error; at += held) {
+		const char *bytes = log_file_get(log, at, 1, &held);
+
+		if (held == 0)
+			break;
+		error = blocks_put(writer, bytes, held);
+	}
+	return error;
+}
+
+int write_blocks(struct log_file *log, const char *file, char message[READ_MESSAGE_MAX])
+{
+	struct blocks_writer *writer;
+	struct whole whole;
+	struct text index;
+	int error = log_index_text(log, &index, message);
+
+	if (error)
+		return error;
+	error = whole_open(&whole, file, message, READ_MESSAGE_MAX);
+	if (!error) {
+		error = blocks_begin(&writer, whole.out);
+		if (!error)
+			error = blocks_end(writer, put_log(log, writer), index.bytes, index.size);
+		error = whole_close(&whole, log->failed != 0 ? DT_E_SYSTEM : error, message,
+		                    READ_MESSAGE_MAX);
+	}
+	free(index.bytes);
+	return log->failed != 0 ? log_file_error(log, message) : error;
 }
 
 int write_record(const struct record *record, const char *file, char message[READ_MESSAGE_MAX])
@@ -488,7 +568,7 @@ int write_record(const struct record *record, const char *file, char message[REA
 	if (!format)
 		return source_refuse(message, DT_E_ARGUMENT, file, 0,
 		                     "unknown ending, expected .csv, .lcm, .log, .candump, .pcapng, .unv, "
-		                     ".uff, .h5, .hdf5, .mat or .mme");
+		                     ".uff, .h5, .hdf5, .mat or .mme; .zst behind one of the first seven");
 	if (format->drops_only && !record->is_drop)
 		return source_refuse(message, DT_E_ARGUMENT, file, 0,
 		                     "not a drop of a tower: expected .csv, .unv, .h5, .mat or .mme");
@@ -504,5 +584,7 @@ int write_record(const struct record *record, const char *file, char message[REA
 		return error;
 	if (format->by_helper != NULL)
 		return write_whole(record, format->by_helper, &whole, message);
-	return whole_close(&whole, format->write(record, whole.out), message, READ_MESSAGE_MAX);
+	error = write_packs(file) ? write_packed(record, format, whole.out)
+	                          : format->write(record, whole.out);
+	return whole_close(&whole, error, message, READ_MESSAGE_MAX);
 }

@@ -13,12 +13,20 @@
 #include <stdio.h>
 
 #include "common/frame.h"
+#include "host/record/log_file.h"
 #include "host/record/read.h"
 #include "common/base/text.h"
 
 /* Writes file in the format its name ends in: .csv, .lcm, .log or .candump, .unv or .uff,
- * .h5 or .hdf5, .pcapng, .mat, .mme. 0 or DT_E_* with one line in message. */
+ * .h5 or .hdf5, .pcapng, .mat, .mme, or in blocks (blocks.h) with .zst behind. 0 or DT_E_* with one line in
+ * message. */
 DT_MUST_USE int write_record(const struct record *record, const char *file, char message[READ_MESSAGE_MAX]);
+
+/* All that is in a log, byte for byte, in blocks with an index (blocks.h): where the file's name ends in that
+ * of the log's format and .zst, as write_blocks_is says. */
+bool write_packs(const char *file); /* whether its name ends in .zst */
+bool write_blocks_is(struct log_file *log, const char *file);
+DT_MUST_USE int write_blocks(struct log_file *log, const char *file, char message[READ_MESSAGE_MAX]);
 
 /* What the last columns of our CSV are called. */
 #define CSV_TABLE "marks,droptower_csv_2"
