@@ -306,6 +306,24 @@ static double highpass_of(struct record *corrected, double told_s, bool asked)
 	return of_files_s;
 }
 
+int evaluate_put_right(struct record *record, const char *chain)
+{
+	char message[SETTINGS_MESSAGE_MAX];
+	struct sensors sensors;
+	struct record corrected;
+
+	if (chain == NULL || chain[0] == '\0')
+		return COMMAND_DONE;
+	if (sensors_read(&sensors, chain, day_of(record), message) != 0 ||
+	    sensors_correct(&sensors, record, &corrected, message) != 0) {
+		command_error("%s", message);
+		return COMMAND_INPUT;
+	}
+	record_free(record);
+	*record = corrected;
+	return COMMAND_DONE;
+}
+
 const char *evaluate_chain(const struct evaluate_options *options)
 {
 	if (options->chain != NULL)

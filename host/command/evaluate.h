@@ -73,11 +73,15 @@ DT_MUST_USE int evaluate_open(struct evaluated *e, const struct record *record,
                               const struct evaluate_options *options);
 void evaluate_close(struct evaluated *e);
 
-/* All that was found, for the table of quantities. */
 /* What a record that was just made does not know of itself: when, by whom, of what, measured by which
  * sensors. */
 int evaluate_sign(struct record *record, const struct evaluate_options *options, const char *operator_name);
 
+/* The record as the files of chain put its readings right; NULL or "": as it is. 0 or a COMMAND_* code,
+ * errors printed. */
+int evaluate_put_right(struct record *record, const char *chain);
+
+/* All that was found, for the table of quantities. */
 struct result evaluate_said(struct evaluated *e);
 
 /* Prints and writes what was asked for. Returns a COMMAND_* exit code; errors were printed. */

@@ -80,8 +80,14 @@ struct fitting {
 static int fit_add(struct fitting *f, struct record *record, const char *name, double angle_deg,
                    double height_m)
 {
-	const char *missing = evaluate_fit_drop(record, angle_deg, height_m, &f->drop[f->count]);
+	const char *missing;
+	int code = evaluate_put_right(record, f->scene.chain);
 
+	if (code != COMMAND_DONE) {
+		record_free(record);
+		return code;
+	}
+	missing = evaluate_fit_drop(record, angle_deg, height_m, &f->drop[f->count]);
 	if (missing != NULL) {
 		command_error("%s: no channel %s, expected a drop of the tower with S1X, S1Y, S2X and S2Y",
 		              name, missing);

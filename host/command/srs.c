@@ -6,6 +6,7 @@
 
 #include "common/base/number.h"
 #include "host/command/command.h"
+#include "host/command/evaluate.h"
 #include "host/command/files.h"
 #include "host/command/stretch.h"
 #include "host/record/read.h"
@@ -16,7 +17,7 @@
 enum { FREQUENCIES_MOST = 1000 };
 
 struct arguments {
-	const char *columns, *limit_file, *csv, *svg;
+	const char *columns, *chain, *limit_file, *csv, *svg;
 	double frequency_hz[FREQUENCIES_MOST]; /* asked for one by one */
 	unsigned drop;                         /* of a log of several; 0: the only one */
 	struct stretch stretch;
@@ -82,6 +83,8 @@ static int take_frequencies(const struct option_table *table, const char *name, 
 static const struct option_row rows[] = {
         OPTION_TEXT("columns", "SPEC", struct arguments, columns,
                     "for foreign text, e.g. \"time:ms,fixture:g,board:-g,-\""),
+        OPTION_TEXT("chain", "FILE,...", struct arguments, chain,
+                    "the sensors' files: what their certificates say is applied"),
         OPTION_UNSIGNED("drop", "N", struct arguments, drop, 1, 1e9,
                         "the N-th drop of a log of several, counted from 1"),
         STRETCH_ROWS(struct arguments, stretch),
@@ -274,8 +277,10 @@ static int srs_file(const char *file, const struct arguments *arguments)
 
 	if (code != COMMAND_DONE)
 		return code;
-	code = stretch_each(&record, &arguments->stretch, &arguments->events, spectrum_of,
-	                    (struct arguments *)(uintptr_t)arguments);
+	code = evaluate_put_right(&record, arguments->chain);
+	if (code == COMMAND_DONE)
+		code = stretch_each(&record, &arguments->stretch, &arguments->events, spectrum_of,
+		                    (struct arguments *)(uintptr_t)arguments);
 	record_free(&record);
 	return code;
 }
