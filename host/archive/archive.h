@@ -142,6 +142,37 @@ DT_MUST_USE int archive_decide(struct archive *archive, const char *drop, enum a
 DT_MUST_USE int archive_note(struct archive *archive, const char *drop, const char *operator_name,
                              const char *text);
 
+/* ---- photos ---- */
+
+/* Of a drop: so many bytes each, so many before it and after it. */
+enum { ARCHIVE_PHOTO_BYTES = 8 * 1024 * 1024, ARCHIVE_PHOTOS_MAX = 8, ARCHIVE_PHOTO_FILE_MAX = 128 };
+
+/* Keeps a photo of SERIES/NUMBER beside the drop's log, JPEG or PNG by its content, without what is no
+ * picture (host/base/image.h). SERIES alone is its next drop: such a photo, before it, waits for the drop
+ * and is of it once that is recorded, but for one that is added from a log of earlier (archive_finish with a
+ * time). DT_E_STATE: the drop was never completely recorded, or has not fallen and the photo is after it.
+ * DT_E_FORMAT: no whole picture. DT_E_RANGE: too large. DT_E_FULL: it has its photos. */
+DT_MUST_USE int archive_photo(struct archive *archive, const char *drop, bool after,
+                              const char *operator_name, const void *bytes, size_t size);
+
+/* Takes away those that wait for the next drop of a series. */
+DT_MUST_USE int archive_discard_photos(struct archive *archive, const char *series);
+
+struct archive_photo {
+	bool after, waits;
+	const char *file, *type, *sha256; /* in the folder; "image/jpeg" */
+	int64_t bytes;
+};
+
+/* The photos of a drop, or those that wait for the next one; names as for archive_photo. */
+DT_MUST_USE int archive_each_photo(struct archive *archive, const char *drop,
+                                   int (*each)(void *context, const struct archive_photo *photo),
+                                   void *context);
+
+/* What it is, to be freed. DT_E_CORRUPT: it is not what was recorded. */
+DT_MUST_USE int archive_photo_bytes(struct archive *archive, const struct archive_photo *photo, char **bytes,
+                                    size_t *size);
+
 /* ---- looking ---- */
 
 /* What a result says in numbers: the columns of quantity.def. NAN where there is none. */

@@ -216,8 +216,7 @@ int archive_each_series(struct archive *archive, const struct archive_filter *fi
 
 /* ---- drops ---- */
 
-/* A recorder holds a lock on its log as long as it lives. */
-static bool is_being_recorded(const struct archive *archive, const char *raw)
+bool archive_is_recording(const struct archive *archive, const char *raw)
 {
 	char path[ARCHIVE_PATH_MAX];
 	bool held;
@@ -291,7 +290,7 @@ static int drop_of(struct archive *archive, sqlite3_stmt *s, sqlite3_stmt **budg
 			drop->state = archive->mark[i].missing ? "missing" : "altered";
 			drop->fault = archive->mark[i].fault;
 		}
-	if (strcmp(drop->state, "recording") == 0 && !is_being_recorded(archive, drop->raw))
+	if (strcmp(drop->state, "recording") == 0 && !archive_is_recording(archive, drop->raw))
 		drop->state = "interrupted";
 	return quantities_budget(archive, budgets, sqlite3_column_int64(s, RESULT), drop->budget);
 }

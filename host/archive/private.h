@@ -100,6 +100,9 @@ struct archive_place {
 	char raw[ARCHIVE_NAME_MAX + 64];
 	bool recorded;
 };
+/* A recorder holds a lock on its log as long as it lives. */
+bool archive_is_recording(const struct archive *archive, const char *raw);
+
 /* "SERIES/NUMBER" to its row. */
 DT_MUST_USE int archive_locate(struct archive *archive, const char *drop, struct archive_place *place);
 
@@ -117,6 +120,14 @@ DT_MUST_USE int archive_each_numbers(struct archive *archive, const struct archi
 DT_MUST_USE int series_insert(struct archive *archive, const char *name, const char *campaign,
                               const char *text, const struct scene *scene, int64_t planned,
                               const char *created, int64_t *row);
+
+/* A change of SERIES/NUMBER by somebody: change_look at its files, which are read from end to end, and at
+ * what is to be written; change_start of a transaction; the change, with what was wrong by proof_log;
+ * change_end, which writes the sidecar again if result is 0 and ends the transaction. */
+DT_MUST_USE int change_look(struct archive *archive, const char *drop, const char *operator_name,
+                            const char *text, char fault[ARCHIVE_MESSAGE_MAX]);
+DT_MUST_USE int change_start(struct archive *archive, const char *drop, struct archive_place *place);
+DT_MUST_USE int change_end(struct archive *archive, const struct archive_place *place, int result);
 
 /* Something that was decided, noted or found of a drop, into the index alone. */
 DT_MUST_USE int event_insert(struct archive *archive, int64_t drop, const char *what,

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/archive/indexed.h"
+#include "host/archive/photo.h"
 
 #include <errno.h>
 #include <stdarg.h>
@@ -49,7 +50,7 @@ void proof_fault(struct proof *proof, enum proof_part part, bool missing, const 
 	proof->told++;
 	if (proof->fault[0] == '\0')
 		memcpy(proof->fault, text, sizeof(text));
-	proof->log_or_sidecar |= part != PROOF_RESULT;
+	proof->log_or_sidecar |= part != PROOF_RESULT && part != PROOF_PHOTO;
 	proof->index |= part == PROOF_INDEX;
 	proof->missing |= missing;
 	proof->altered |= !missing;
@@ -310,6 +311,22 @@ static int hold_result(struct proof *proof, const char *text)
 	return 0;
 }
 
+/* The file that an event of a photo names. */
+static void hold_photo(struct proof *proof, const char *event)
+{
+	static const char mark[] = "\tphoto\t";
+	const char *what = strstr(event, mark),
+	           *text = what != NULL ? strchr(what + sizeof(mark) - 1, '\t') : NULL;
+	struct photo photo;
+
+	if (text == NULL || memchr(event, '\t', strlen(event)) != what)
+		return;
+	if (photo_parse(text + 1, &photo))
+		proof_of_file(proof, PROOF_PHOTO, photo.file, photo.bytes, photo.hash, -1);
+	else
+		proof_fault(proof, PROOF_SIDECAR, false, "%s: damaged: event = %.100s", proof->file, event);
+}
+
 /* What no line names: the order of results, the number of the entry. */
 static void hold_entry(struct proof *proof, const struct chain_entry *entry)
 {
@@ -336,6 +353,9 @@ static int proof_hold_text(struct proof *proof, const struct chain_entry *entry,
 		at = sidecar.line;
 		while (result == 0 && *(line = sidecar_next(&sidecar, "result", &at)) != '\0')
 			result = hold_result(proof, line);
+		at = sidecar.line;
+		while (result == 0 && *(line = sidecar_next(&sidecar, "event", &at)) != '\0')
+			hold_photo(proof, line);
 		if (result == 0 && proof->told == told)
 			hold_entry(proof, entry);
 	}

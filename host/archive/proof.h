@@ -20,7 +20,7 @@ struct proof {
 	char hash[DIGEST_CHARS]; /* of the log, says the index */
 	int64_t bytes, entry;    /* the same */
 	int copy;                /* gets the bytes of the log; -1: nobody does */
-	bool log_or_sidecar;     /* is wrong, rather than a result */
+	bool log_or_sidecar;     /* is wrong, rather than a result or a photo */
 	bool missing, altered, sealed;
 	bool begun;   /* it is not recorded, says the index */
 	bool index;   /* its row is wrong, which a change would write into its sidecar */
@@ -55,7 +55,7 @@ DT_MUST_USE int proof_look(struct archive *archive, const char *drop, char fault
 DT_MUST_USE int proof_log(struct archive *archive, int64_t drop, const char *fault);
 
 /* One line on the file at hand. */
-enum proof_part { PROOF_LOG, PROOF_SIDECAR, PROOF_RESULT, PROOF_INDEX, PROOF_CHAIN };
+enum proof_part { PROOF_LOG, PROOF_SIDECAR, PROOF_RESULT, PROOF_PHOTO, PROOF_INDEX, PROOF_CHAIN };
 __attribute__((format(printf, 4, 5))) void proof_fault(struct proof *proof, enum proof_part part,
                                                        bool missing, const char *format, ...);
 

@@ -18,6 +18,7 @@
 #include "host/model/corner.h"
 #include "host/model/model.h"
 #include "host/result/plan.h"
+#include "host/archive/photo.h"
 #include "host/archive/proof.h"
 
 enum { SCENE_MAX_BYTES = 65536, NUMBER_MAX = 1000000 };
@@ -395,6 +396,7 @@ int archive_resume(struct archive *archive, const char *drop, struct archive_rec
 	                      place.recorded ? "recorded" : "being recorded");
 }
 
+/* when NULL: it fell just now, so that the photos that wait are of it. */
 static int recording_acknowledge(struct archive *archive, const struct archive_recording *r, const char *when,
                                  const char *note, const char *hash, int64_t bytes)
 {
@@ -403,6 +405,8 @@ static int recording_acknowledge(struct archive *archive, const struct archive_r
 	                     " time = COALESCE(?, time) WHERE id = ?",
 	                     "isssi", bytes, hash, note, when, r->drop);
 
+	if (result == 0 && when == NULL)
+		result = photo_bind(archive, r);
 	return result != 0 ? result : sidecar_write_drop(archive, r->drop);
 }
 
@@ -430,8 +434,8 @@ int archive_finish(struct archive *archive, struct archive_recording *recording,
 /* ---- decisions and notes ---- */
 
 /* What is asked for comes before the drop's files, which are read from end to end. */
-static int look_first(struct archive *archive, const char *drop, const char *operator_name, const char *text,
-                      char fault[ARCHIVE_MESSAGE_MAX])
+int change_look(struct archive *archive, const char *drop, const char *operator_name, const char *text,
+                char fault[ARCHIVE_MESSAGE_MAX])
 {
 	int result = archive_check_text(archive, "text", text);
 
@@ -440,7 +444,7 @@ static int look_first(struct archive *archive, const char *drop, const char *ope
 	return result == 0 ? proof_look(archive, drop, fault) : result;
 }
 
-static int start_change(struct archive *archive, const char *drop, struct archive_place *place)
+int change_start(struct archive *archive, const char *drop, struct archive_place *place)
 {
 	int result = archive_change(archive);
 
@@ -450,7 +454,7 @@ static int start_change(struct archive *archive, const char *drop, struct archiv
 	return result == 0 ? 0 : archive_end(archive, result);
 }
 
-static int end_change(struct archive *archive, const struct archive_place *place, int result)
+int change_end(struct archive *archive, const struct archive_place *place, int result)
 {
 	if (result == 0)
 		result = sidecar_write_drop(archive, place->drop);
@@ -467,12 +471,12 @@ int archive_decide(struct archive *archive, const char *drop, enum archive_decis
 
 	if (decision != ARCHIVE_ACCEPTED && strspn(text, " ") == strlen(text))
 		return archive_refuse(archive, DT_E_ARGUMENT, "%s: expected a reason", drop);
-	result = look_first(archive, drop, operator_name, text, fault);
+	result = change_look(archive, drop, operator_name, text, fault);
 	if (result != 0)
 		return result;
 	if (fault[0] != '\0' && decision == ARCHIVE_ACCEPTED)
 		return archive_refuse(archive, DT_E_CORRUPT, "%s cannot be accepted: %.500s", drop, fault);
-	result = start_change(archive, drop, &place);
+	result = change_start(archive, drop, &place);
 	if (result != 0)
 		return result;
 	if (!place.recorded)
@@ -485,17 +489,17 @@ int archive_decide(struct archive *archive, const char *drop, enum archive_decis
 		                 names[decision], text, place.drop);
 	if (result == 0)
 		result = event_insert(archive, place.drop, names[decision], operator_name, text);
-	return end_change(archive, &place, result);
+	return change_end(archive, &place, result);
 }
 
 int archive_note(struct archive *archive, const char *drop, const char *operator_name, const char *text)
 {
 	char fault[ARCHIVE_MESSAGE_MAX];
 	struct archive_place place;
-	int result = look_first(archive, drop, operator_name, text, fault);
+	int result = change_look(archive, drop, operator_name, text, fault);
 
 	if (result == 0)
-		result = start_change(archive, drop, &place);
+		result = change_start(archive, drop, &place);
 	if (result != 0)
 		return result;
 	result = proof_log(archive, place.drop, fault);
@@ -503,5 +507,5 @@ int archive_note(struct archive *archive, const char *drop, const char *operator
 		result = sql_run(archive, "UPDATE drops SET note = ? WHERE id = ?", "si", text, place.drop);
 	if (result == 0)
 		result = event_insert(archive, place.drop, "note", operator_name, text);
-	return end_change(archive, &place, result);
+	return change_end(archive, &place, result);
 }

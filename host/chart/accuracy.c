@@ -37,14 +37,16 @@ static int accuracy_write_csv(const struct chart_options *options, const struct 
 
 	if (status)
 		return status;
-	fprintf(text.out, "# %s, SI units; seed %lu; %s\n", quantity_text(p->quantity)->title, options->seed,
-	        options->about);
-	fputs("method,of,family_told,noise_g,drops,values,gross,bias,rmse,bound,ratio,cost_us\n", text.out);
+	fputs("quantity_si,seed,about,method,of,family_told,noise_g,drops,values,gross,bias,rmse,bound,ratio,"
+	      "cost_us\n",
+	      text.out);
 	for (size_t m = 0; m < p->methods; m++)
 		for (size_t i = 0; i < NOISES && p->method[m].quantity == p->quantity; i++) {
 			const struct tally *t = &p->compare->cells[i].tally[m];
 
-			fprintf(text.out, "\"%s\",%s,%d,%g,%u,%u,%u,%.9g,%.9g,%.9g,%.6g,%.4g\n",
+			fprintf(text.out,
+			        "\"%s\",%lu,\"%s\",\"%s\",%s,%d,%g,%u,%u,%u,%.9g,%.9g,%.9g,%.6g,%.4g\n",
+			        quantity_text(p->quantity)->title, options->seed, options->about,
 			        p->method[m].name, p->method[m].ours ? "droptower" : "others",
 			        p->method[m].told, p->compare->cells[i].scene.noise_g, p->compare->drops,
 			        t->values, compare_gross(p->compare, t), tally_bias(t), tally_rms(t),

@@ -63,12 +63,13 @@ bool plot_fails(const struct plot_panel *panel, size_t row, size_t column)
 /* ---- the table ------------------------------------------------------------------------------------------
  */
 
-static void table_of_map(FILE *out, const struct plot_panel *p)
+static void table_of_map(FILE *out, const struct plot *plot, const struct plot_panel *p)
 {
 	for (size_t r = 0; r < p->rows; r++)
 		for (size_t c = 0; c < p->columns; c++)
-			fprintf(out, "\"%s\",map,%s,%.6g,%s,%.6g,%.6g,%d\n", p->title, p->x.name,
-			        plot_centre(&p->x, c, p->columns), p->y.name, plot_centre(&p->y, r, p->rows),
+			fprintf(out, "\"%s\",\"%s\",map,%s,%.6g,%s,%.6g,\"%s\",%.6g,%d\n", plot->title,
+			        p->title, p->x.name, plot_centre(&p->x, c, p->columns), p->y.name,
+			        plot_centre(&p->y, r, p->rows), plot->value ? plot->value : "",
 			        plot_cell(p, r, c), plot_fails(p, r, c));
 }
 
@@ -81,12 +82,12 @@ static bool in_region(const struct plot_panel *p, double x, double y)
 	return false;
 }
 
-static void table_of_series(FILE *out, const struct plot_panel *p)
+static void table_of_series(FILE *out, const struct plot *plot, const struct plot_panel *p)
 {
 	for (size_t s = 0; s < PLOT_SERIES && p->series[s].name; s++)
 		for (size_t i = 0; i < p->series[s].count; i++)
-			fprintf(out, "\"%s\",\"%s\",%s,%.6g,%s,%.6g,,%d\n", p->title, p->series[s].name,
-			        p->x.name, p->series[s].x[i], p->y.name, p->series[s].y[i],
+			fprintf(out, "\"%s\",\"%s\",\"%s\",%s,%.6g,%s,%.6g,,,%d\n", plot->title, p->title,
+			        p->series[s].name, p->x.name, p->series[s].x[i], p->y.name, p->series[s].y[i],
 			        p->series[s].judged && in_region(p, p->series[s].x[i], p->series[s].y[i]));
 }
 
@@ -97,13 +98,11 @@ static int write_table(const struct plot *plot, const char *folder, const char *
 
 	if (status)
 		return status;
-	fprintf(text.out, "# %s%s%s\n", plot->title, plot->value ? "; value: " : "",
-	        plot->value ? plot->value : "");
-	fputs("panel,series,x_is,x,y_is,y,value,fails\n", text.out);
+	fputs("title,panel,series,x_is,x,y_is,y,value_is,value,fails\n", text.out);
 	for (size_t i = 0; i < plot->panels; i++) {
 		if (plot->panel[i].cell)
-			table_of_map(text.out, &plot->panel[i]);
-		table_of_series(text.out, &plot->panel[i]);
+			table_of_map(text.out, plot, &plot->panel[i]);
+		table_of_series(text.out, plot, &plot->panel[i]);
 	}
 	status = file_write(&text, folder, kind, plot->name, "csv", message);
 	file_drop(&text);

@@ -147,10 +147,9 @@ static int stability_write_csv(const struct chart_options *options, const struct
 
 	if (status)
 		return status;
-	fprintf(text.out, "# %s, SI units; seed %lu; fails: ratio above %g, or gross in more than %g %%\n",
-	        quantity_text(map->quantity)->title, options->seed, quantity_text(map->quantity)->fails,
-	        100 * GROSS_MOST);
-	fputs("method,of,family_told,sweep,value,unit,drops,values,gross,doubted,bias,rmse,bound,ratio,"
+	fputs("quantity_si,seed,fails_above_ratio,fails_above_gross_percent,method,of,family_told,sweep,"
+	      "value,"
+	      "unit,drops,values,gross,doubted,bias,rmse,bound,ratio,"
 	      "fails\n",
 	      text.out);
 	for (size_t m = 0; m < map->methods; m++) {
@@ -162,7 +161,11 @@ static int stability_write_csv(const struct chart_options *options, const struct
 				char value[32];
 
 				fprintf(text.out,
-				        "\"%s\",%s,%d,%s,%s,\"%s\",%u,%u,%u,%u,%.9g,%.9g,%.9g,%.6g,%d\n",
+				        "\"%s\",%lu,%g,%g,\"%s\",%s,%d,%s,%s,\"%s\",%u,%u,%u,%u,%.9g,%.9g,%."
+				        "9g,"
+				        "%.6g,%d\n",
+				        quantity_text(map->quantity)->title, options->seed,
+				        quantity_text(map->quantity)->fails, 100 * GROSS_MOST,
 				        map->method[m].name, map->method[m].ours ? "droptower" : "others",
 				        map->method[m].told, sweeps[s].name, value_text(&sweeps[s], i, value),
 				        sweeps[s].unit, map->compare->drops, t->values,

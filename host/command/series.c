@@ -93,6 +93,10 @@ static const struct option_table known_options = {
                 "  reject DROP...          keeps it and counts it nowhere; --reason TEXT\n"
                 "  reopen DROP...          takes the decision back; --reason TEXT\n"
                 "  note DROP TEXT          the operator's note\n"
+                "  photo DROP WHEN FILE    a JPEG or PNG of what fell, WHEN is before or after; without what "
+                "it "
+                "tells of\n"
+                "                          place and camera; for DROP a SERIES is its next drop, before it\n"
                 "  result DROP             the analysis in full, as JSON; --version V for an older one\n"
                 "  tables [CAMPAIGN]       means, SDs and ratios by scene and angle\n"
                 "  reanalyse SERIES...     by this version; the results of others stay\n"
@@ -130,6 +134,7 @@ static const struct verb {
         {"reject", ARCHIVE_WRITE, 1, 1 << 20, series_verb_reject, "DROP..."},
         {"reopen", ARCHIVE_WRITE, 1, 1 << 20, series_verb_reopen, "DROP..."},
         {"note", ARCHIVE_WRITE, 2, 2, series_verb_note, "DROP TEXT"},
+        {"photo", ARCHIVE_WRITE, 3, 3, series_verb_photo, "DROP before|after FILE"},
         {"result", ARCHIVE_READ, 1, 1, series_verb_result, "DROP"},
         {"tables", ARCHIVE_READ, 0, 1, series_verb_tables, "at most a CAMPAIGN"},
         {"reanalyse", ARCHIVE_WRITE, 1, 1 << 20, series_verb_reanalyse, "SERIES..."},
@@ -172,7 +177,7 @@ static int check_heeded(const char *verb, const struct series_arguments *a)
 	        {"reason", a->reason != NULL, "accept reject reopen"},
 	        {"note", a->note != NULL, "add"},
 	        {"simulated", a->simulated, "add"},
-	        {"operator", a->operator_name != NULL, "add accept reject reopen note"},
+	        {"operator", a->operator_name != NULL, "add accept reject reopen note photo"},
 	        {"json", a->json, "list drops show tables result"},
 	        {"csv", a->csv != NULL, "list drops show tables"},
 	};

@@ -3,6 +3,7 @@
  * The verbs of `droptower series` that change an archive: series, decisions, notes, results. Logs are added
  * by series_add.c.
  */
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,6 +11,7 @@
 
 #include "host/command/archived.h"
 #include "host/base/beside.h"
+#include "host/base/durable.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
 #include "host/command/series_private.h"
@@ -165,6 +167,25 @@ int series_verb_note(struct archive *archive, struct series_arguments *a)
 	if (archive_note(archive, a->word[0], a->operator_name, a->word[1]) != 0)
 		return archived_failed(archive);
 	return COMMAND_DONE;
+}
+
+int series_verb_photo(struct archive *archive, struct series_arguments *a)
+{
+	bool after = strcmp(a->word[1], "after") == 0;
+	char *bytes;
+	size_t size;
+	int result;
+
+	if (!after && strcmp(a->word[1], "before") != 0)
+		return command_usage("series", "photo: '%s', expected before or after", a->word[1]);
+	bytes = durable_read(a->word[2], &size);
+	if (bytes == NULL) {
+		command_error("%s: %s", a->word[2], strerror(errno));
+		return COMMAND_INPUT;
+	}
+	result = archive_photo(archive, a->word[0], after, a->operator_name, bytes, size);
+	free(bytes);
+	return result != 0 ? archived_failed(archive) : COMMAND_DONE;
 }
 
 /* ---- analysed again ---- */

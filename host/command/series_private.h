@@ -33,6 +33,7 @@ int series_verb_accept(struct archive *archive, struct series_arguments *argumen
 int series_verb_reject(struct archive *archive, struct series_arguments *arguments);
 int series_verb_reopen(struct archive *archive, struct series_arguments *arguments);
 int series_verb_note(struct archive *archive, struct series_arguments *arguments);
+int series_verb_photo(struct archive *archive, struct series_arguments *arguments);
 int series_verb_reanalyse(struct archive *archive, struct series_arguments *arguments);
 
 /* Makes the index again, then analyses what came without a result. */

@@ -32,6 +32,7 @@ struct http {
 	struct guard_rates asked;  /* requests with the token, of each console */
 	struct guard_rate held;    /* of the console that holds the arm, whatever others ask for */
 	struct guard_rate wrong;   /* without the token */
+	unsigned photos;           /* on their way in */
 	pthread_mutex_t jobs_lock; /* of closing and jobs */
 	bool closing;
 	unsigned jobs;               /* given away and not yet done */

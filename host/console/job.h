@@ -47,7 +47,9 @@ struct job {
 
 	/* the request */
 	const cJSON *body; /* object; NULL: none */
-	const char *path;  /* what follows the route, "box-30/2" */
+	const void *photo; /* body that is no JSON; NULL: none */
+	size_t photo_size;
+	const char *path; /* what follows the route, "box-30/2" */
 	const char *(*query)(const struct job *job, const char *name); /* NULL: not given */
 	void *luggage;                                                 /* of a job that is handed on */
 

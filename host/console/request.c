@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 
 #include "common/plain.h"
+#include "host/archive/archive.h"
 #include "host/console/http_private.h"
 #include "host/console/metrics.h"
 #include "host/console/route.h"
@@ -17,7 +18,8 @@
 
 enum {
 	BODY_MAX = 16 * 1024,
-	SWALLOW_MAX = 1024 * 1024, /* of a body that is too large, so that its sender hears why */
+	SWALLOW_MAX = 1024 * 1024, /* behind a body that is too large, so that its sender hears why */
+	PHOTOS_MAX = 4,            /* on their way in at once, each in memory until it is whole */
 	TEXT_MAX = 128,
 	TARGET_MAX = 4096,  /* of a request, in bytes */
 	ARGUMENTS_MAX = 64, /* in it */
@@ -32,7 +34,9 @@ struct request {
 	char console[HOLD_CONSOLE_MAX + 1];
 	cJSON *tree;
 	size_t announced; /* of its body, so far */
-	bool asked;       /* the job was given away */
+	char *photo;      /* body of a photo: grows with what comes */
+	size_t photo_room;
+	bool asked; /* the job was given away */
 	char body[BODY_MAX + 1];
 };
 
@@ -224,10 +228,28 @@ static enum MHD_Result send_metrics(struct request *request)
 	return request_answer(request);
 }
 
+/* What a body may have, by its route. */
+static size_t body_max(const struct route *route)
+{
+	return route->photo ? ARCHIVE_PHOTO_BYTES : BODY_MAX;
+}
+
+static enum MHD_Result refuse_length(struct MHD_Connection *connection, const struct route *route)
+{
+	return request_refuse(connection, 413,
+	                      route->photo ? "expected a photo of at most 8 MiB" : "expected at most 16 KiB",
+	                      NULL, NULL);
+}
+
 static bool parse_body(struct request *request)
 {
 	bool post = strcmp(request->route->method, "POST") == 0;
 
+	if (request->route->photo) {
+		request->job.photo = request->photo;
+		request->job.photo_size = request->announced;
+		return true;
+	}
 	if (post) {
 		request->body[request->announced] = '\0';
 		request->tree = plain_is_utf8(request->body, request->announced) &&
@@ -269,10 +291,12 @@ static enum MHD_Result request_begin(struct request *request)
 {
 	struct http *http = request->http;
 
-	if (request->announced > BODY_MAX && !request->route->always)
-		return request_refuse(request->connection, 413, "expected at most 16 KiB", NULL, NULL);
-	if (request->announced > BODY_MAX)
+	if (request->announced > body_max(request->route) && !request->route->always)
+		return refuse_length(request->connection, request->route);
+	if (request->announced > body_max(request->route))
 		request->announced = 0;
+	if (request->route->photo && request->announced > request->photo_room)
+		return request_refuse(request->connection, 503, error_text(DT_E_MEMORY), NULL, NULL);
 	if (!parse_body(request))
 		return request_refuse(request->connection, 400,
 		                      "expected a JSON object in UTF-8, without NUL", NULL, NULL);
@@ -288,6 +312,24 @@ static enum MHD_Result request_begin(struct request *request)
 		return request_answer(request);
 	}
 	return give_away(request);
+}
+
+/* Memory comes with the bytes, and not with what a header promises; without it the photo stays as it was. */
+static void take_photo(struct request *request, const char *bytes, size_t size)
+{
+	size_t room = request->photo_room != 0 ? request->photo_room : BODY_MAX;
+	char *more;
+
+	while (room < request->announced + size && room < ARCHIVE_PHOTO_BYTES)
+		room *= 2;
+	more = room > request->photo_room ? realloc(request->photo, room) : request->photo;
+	if (more != NULL) {
+		request->photo = more;
+		request->photo_room = room;
+		if (request->announced + size <= room)
+			memcpy(more + request->announced, bytes, size);
+	}
+	request->announced += size;
 }
 
 static void take_body(struct request *request, const char *bytes, size_t size)
@@ -425,9 +467,14 @@ static enum MHD_Result open_request(struct http *http, struct MHD_Connection *co
 	if (route->always && (longer_than(connection, BODY_MAX) ||
 	                      header(connection, MHD_HTTP_HEADER_TRANSFER_ENCODING) != NULL))
 		return abort_at_once(http, connection, route);
-	if (longer_than(connection, SWALLOW_MAX))
-		return request_refuse(connection, 413, "expected at most 16 KiB", NULL, NULL);
+	if (longer_than(connection, body_max(route) + SWALLOW_MAX))
+		return refuse_length(connection, route);
+	if (route->photo && http->photos == PHOTOS_MAX)
+		return request_refuse(connection, 503, "other photos are on their way in",
+		                      MHD_HTTP_HEADER_RETRY_AFTER, "2");
 	*context = new_request(http, connection, route, rest, console);
+	if (*context != NULL)
+		http->photos += route->photo;
 	return *context != NULL ? MHD_YES : MHD_NO;
 }
 
@@ -498,9 +545,12 @@ enum MHD_Result http_request(void *user, struct MHD_Connection *connection, cons
 		return request_answer(request);
 	if (*upload_size == 0)
 		return request_begin(request);
-	take_body(request, upload, *upload_size);
+	if (request->route->photo)
+		take_photo(request, upload, *upload_size);
+	else
+		take_body(request, upload, *upload_size);
 	*upload_size = 0;
-	return request->announced <= SWALLOW_MAX ? MHD_YES : MHD_NO;
+	return request->announced <= body_max(request->route) + SWALLOW_MAX ? MHD_YES : MHD_NO;
 }
 
 void http_completed(void *user, struct MHD_Connection *connection, void **context,
@@ -513,7 +563,9 @@ void http_completed(void *user, struct MHD_Connection *connection, void **contex
 	(void)code;
 	if (request == NULL || *context == &target_refused)
 		return;
+	request->http->photos -= request->route->photo;
 	cJSON_Delete(request->tree);
+	free(request->photo);
 	free(request->job.answer);
 	free(request);
 	*context = NULL;

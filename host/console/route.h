@@ -27,6 +27,7 @@ struct route {
 	enum route_kind kind;
 	enum route_tail tail;
 	bool needs_hold; /* of the arm */
+	bool photo;      /* its body is a photo, and not JSON */
 	bool always;     /* never refused for what it says or how often it comes */
 	void (*run)(struct job *job);
 };

@@ -47,5 +47,9 @@ void work_report(struct job *job);
 void work_new_series(struct job *job);
 void work_decide(struct job *job);
 void work_note(struct job *job);
+void work_photo(struct job *job);
+void work_photos(struct job *job);
+void work_photo_bytes(struct job *job);
+void work_photos_discard(struct job *job);
 
 #endif

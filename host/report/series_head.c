@@ -17,6 +17,8 @@ static const char style[] =
         ".scroll+.scroll{margin-top:14px}.drop{break-inside:avoid;margin:22px 0 0}"
         ".drop h3{font-size:1rem;margin:0 0 4px;font-weight:600}"
         ".drop h3 span{font-weight:400;color:var(--soft)}"
+        ".photos{display:flex;flex-wrap:wrap;gap:8px 16px;margin:8px 0 0}.photos img{display:block;max-width:"
+        "100%;max-height:420px}"
         ".drop.out{border-left:5px solid var(--bad);padding-left:12px}"
         "@media print{.screen{display:none}body{font-size:9.5pt;line-height:1.4}h1{font-size:15pt}"
         "h2{font-size:11.5pt;margin:18px 0 4px}.verdict{margin:6px 0 2px}"
@@ -25,7 +27,8 @@ static const char style[] =
         "table{font-size:8pt;break-inside:avoid}th,td{padding:2px 5px}tr{break-inside:avoid}"
         "tr.mean{break-before:avoid}thead{display:table-header-group}.hash{font-size:7pt}"
         ".scroll{overflow:visible}.scroll svg{min-width:0}.grid{gap:6px 14px}"
-        ".drop{margin-top:10px}.drop h3{font-size:9.5pt}.keep{break-inside:avoid}}";
+        ".drop{margin-top:10px}.drop h3{font-size:9.5pt}.keep{break-inside:avoid}"
+        ".photos img{max-width:86mm;max-height:64mm}}";
 
 static void write_style(struct series_page *page, FILE *out)
 {

@@ -214,6 +214,7 @@ void series_laboratory(struct series_page *page)
 	const struct laboratory *l = page->request->laboratory;
 	bool overdue = series_is_overdue(page);
 	unsigned missing;
+	size_t photos;
 	FILE *out = page->page.out;
 
 	if (l == NULL)
@@ -242,6 +243,12 @@ void series_laboratory(struct series_page *page)
 	fputs("<table class=\"facts\">", out);
 	for (int i = 0; i < LABORATORY_FIELDS; i++)
 		laboratory_row(page, (enum laboratory_field)i);
+	photos = series_photos_count(page);
+	if (photos > 0)
+		fprintf(out,
+		        "<tr><th>photos of the item</th><td>%zu, with their drops</td>"
+		        "<td class=\"soft\">%c7.8.2.1 g%c</td></tr>\n",
+		        photos, HTML_OWN, HTML_OWN_END);
 	sensor_row(page, "S1");
 	sensor_row(page, "S2");
 	fputs("</table>\n", out);

@@ -140,6 +140,7 @@ static void drops(struct series_page *page, bool counting, const char *heading)
 			excluded_reason(out, d);
 		if (d->a.sha256[0])
 			drop_pictures(page, d);
+		series_photos(page, d);
 		fputs(first ? "</section></div>\n" : "</section>\n", out);
 		first = false;
 	}

@@ -99,6 +99,13 @@ void series_excluded(struct series_page *page);
 void series_model(struct series_page *page);
 void series_records(struct series_page *page);
 
+/* Bytes in base64. 0 or DT_E_MEMORY. */
+DT_MUST_USE int series_base64(FILE *out, const void *bytes, size_t size);
+
+/* Photos of a drop, and how many there are in all of a series. */
+void series_photos(struct series_page *page, const struct series_drop *drop);
+size_t series_photos_count(struct series_page *page);
+
 /* Adds a sensor of a drop; context: of the drop, with its page. */
 struct series_drop_of_page {
 	struct series_page *page;

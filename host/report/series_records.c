@@ -254,18 +254,23 @@ static void logs(const struct series_page *page)
 		fputs("<p class=\"note\">Not sealed: recorded before the archive had a chain.</p>\n", out);
 }
 
-/* The table of drops in base64: no letter of it means anything to HTML or PDF. */
-static int put_data(const struct series_page *page)
+/* No letter of it means anything to HTML or PDF. */
+int series_base64(FILE *out, const void *bytes, size_t size)
 {
-	size_t size = page->request->data_size;
 	char *text = malloc(BASE64_ENCODE_RAW_LENGTH(size) + 1);
 
 	if (!text)
 		return DT_E_MEMORY;
-	base64_encode_raw(text, size, (const uint8_t *)page->request->data);
-	fwrite(text, 1, BASE64_ENCODE_RAW_LENGTH(size), page->page.out);
+	base64_encode_raw(text, size, bytes);
+	fwrite(text, 1, BASE64_ENCODE_RAW_LENGTH(size), out);
 	free(text);
 	return 0;
+}
+
+/* The table of drops. */
+static int put_data(const struct series_page *page)
+{
+	return series_base64(page->page.out, page->request->data, page->request->data_size);
 }
 
 static void series_data(struct series_page *page)

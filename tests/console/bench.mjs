@@ -3,8 +3,10 @@
 // A series of five in gloves: what decides each drop is in view with the buttons, presses are counted, one drop is
 // rejected and one has flags. Then a foot switch, a bar-code scanner, and a display across the hall.
 import assert from "node:assert/strict";
+import { createHash } from "node:crypto";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
+import { crc32, deflateSync } from "node:zlib";
 import { Desk, browse } from "./desk.mjs";
 import { look } from "./looks.mjs";
 import { build, droptower, makeFolder, serve, stop, stopAll } from "./programs.mjs";
@@ -120,13 +122,68 @@ async function expanded() {
 	assert.equal(await desk.page.locator(".peaks tbody .sigma").count(), await desk.page.locator(".peaks tbody .sigma", { hasText: "U" }).count());
 }
 
+/* A photo as a phone has it: 1200 x 3000 points, and where it was taken. */
+function photo() {
+	const part = (name, data) => {
+		const [body, size, sum] = [Buffer.concat([Buffer.from(name), data]), Buffer.alloc(4), Buffer.alloc(4)];
+		size.writeUInt32BE(data.length);
+		sum.writeUInt32BE(crc32(body));
+		return Buffer.concat([size, body, sum]);
+	};
+	const [head, rows] = [Buffer.alloc(13), Buffer.alloc(3000 * 3601)];
+	head.writeUInt32BE(1200, 0);
+	head.writeUInt32BE(3000, 4);
+	head.set([8, 2], 8);
+	for (let i = 0; i < rows.length; i++)
+		rows[i] = i % 3601 === 0 ? 0 : (i >> 8) & 0xFF;
+	return Buffer.concat([Buffer.from("\x89PNG\r\n\x1a\n", "latin1"), part("IHDR", head), part("tEXt", Buffer.from("Comment\0WHERE-IT-WAS")),
+		part("IDAT", deflateSync(rows)), part("IEND", Buffer.alloc(0))]);
+}
+
+let phone; // another console, which only watches
+
+async function photoBefore() {
+	phone = await Desk.open(browser, { width: 390, height: 844 });
+	await phone.page.goto(address);
+	await phone.until({ connected: "yes", hold: "other" });
+	await phone.page.locator("#photo-before").setInputFiles({ name: "IMG_1.png", mimeType: "image/png", buffer: photo() });
+	await phone.page.locator("#photos-next canvas").waitFor();
+	await look(phone, "19-phone");
+	await phone.page.locator("#photo-before").setInputFiles({ name: "x.txt", mimeType: "text/plain", buffer: Buffer.from("no picture") });
+	await phone.untilText("#message", /no picture/);
+	await phone.click("#message-close");
+}
+
+/* The files are JPEGs of at most 2048 points a side without the comment; both are of the drop, here and there. */
+async function photoAfter() {
+	await phone.page.locator("#photos-drop canvas").waitFor();
+	await phone.page.locator("#photo-after").setInputFiles({ name: "IMG_2.png", mimeType: "image/png", buffer: photo() });
+	for (const { page } of [phone, desk])
+		await page.waitForFunction(() => document.querySelectorAll("#photos-drop canvas").length === 2);
+	const size = await phone.page.locator("#photos-drop canvas").first().evaluate(({ width, height }) => [width, height]);
+	assert.deepEqual(size, [819, 2048]);
+	await look(phone, "19-phone-after");
+	const events = (await drops())[0].events.filter(({ what }) => what === "photo");
+	assert.deepEqual(events.map(({ text }) => text.split(" ")[0]), ["before", "after"]);
+	for (const { text } of events) {
+		const bytes = readFileSync(join(archive, text.split(" ")[1]));
+		assert.equal(createHash("sha256").update(bytes).digest("hex"), text.split(" ")[3]);
+		assert.deepEqual([...bytes.subarray(0, 3)], [0xFF, 0xD8, 0xFF]);
+		assert.equal(bytes.indexOf("WHERE"), -1);
+	}
+	assert.deepEqual(phone.errors, []);
+	await phone.page.context().close();
+}
+
 async function plain() {
 	await look(desk, "20-ready");
+	await photoBefore();
 	await drop(1, async () => {
 		assert.match(await desk.text("#verdict"), /NO FLAGS/);
 		assert.equal(await desk.data("tone"), "good");
 		await expanded();
 		await inView(false);
+		await photoAfter();
 		await desk.click("#accept");
 	}, "accepted");
 }

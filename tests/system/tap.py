@@ -3,6 +3,8 @@
 
 A test is a function named test_*; it passes unless it raises. `skip(why)` marks it skipped.
 """
+import csv
+import importlib.util
 import json
 import os
 import re
@@ -56,6 +58,21 @@ def equal(got, wanted, what=""):
 def within(value, low, high, what=""):
     if value is None or not low <= value <= high:
         raise AssertionError(f"{what}: {value} is not within {low} to {high}")
+
+
+def plain_csv(file):
+    """Its rows by name, read as pandas.read_csv does without options: a line of names, as many cells in each row, no comment."""
+    with open(file, newline="", encoding="utf-8") as f:
+        names, *rows = csv.reader(f)
+    equal(len(set(names)), len(names), f"{file}: {names}")
+    assert all(names) and not names[0].startswith("#"), f"{file}: {names}"
+    for row in rows:
+        equal(len(row), len(names), f"{file}: {row}")
+    if importlib.util.find_spec("pandas"):
+        import pandas
+        read = pandas.read_csv(file)
+        equal((list(read.columns), len(read)), (names, len(rows)), f"{file}: by pandas")
+    return [dict(zip(names, row)) for row in rows]
 
 
 def csv_text(file):

@@ -58,7 +58,7 @@ export function request(method, path, options = {}) {
 		Authorization: `Bearer ${sessionStorage.getItem(TOKEN) ?? ""}`,
 		"X-Console": consoleId,
 	};
-	if (options.body !== undefined) headers["Content-Type"] = "application/json";
+	if (typeof options.body === "string") headers["Content-Type"] = "application/json";
 	return fetch(path, { cache: "no-store", ...options, method, headers });
 }
 
@@ -109,6 +109,11 @@ export const getJson = async (path, query) => (await get(path, query)).json();
 
 export async function post(path, body = {}) {
 	return (await answered("POST", path, { body: JSON.stringify(body) })).json();
+}
+
+/* A file's bytes, as they are. */
+export async function postBytes(path, query, bytes) {
+	return inTurn("file", () => answered("POST", `${path}?${new URLSearchParams(query)}`, { body: bytes }));
 }
 
 /* A link cannot send the token, so the file goes through the page. */

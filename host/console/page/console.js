@@ -11,6 +11,7 @@ import { give, holding, retake, take } from "./hold.js";
 import * as keys from "./keys.js";
 import { Live } from "./live.js";
 import { hideResult, showResult, shownResult } from "./result.js";
+import * as photos from "./photos.js";
 import * as series from "./series.js";
 import * as serial from "./serial.js";
 import * as setup from "./setup.js";
@@ -69,6 +70,12 @@ function tabKeys(event) {
 	byId(`tab-${to}`).focus();
 }
 
+function renderSteps() {
+	const step = steps.render(model);
+	photos.render(step, model.state.series?.name ?? "", byId("result").hidden ? "" : shownResult().name);
+	return step;
+}
+
 /* ---- the drop that is shown ---- */
 
 async function openDrop(name) {
@@ -89,7 +96,7 @@ async function openDrop(name) {
 		await traces.showTraces(name, result);
 		if (result) showResult(name, result, await rows);
 		setData(root, "result", name);
-		steps.render(model);
+		renderSteps();
 	});
 }
 
@@ -124,8 +131,9 @@ async function reload() {
 	} else if (asked && !model.known) setTimeout(reload, AGAIN_MS);
 	if (!byId("history").hidden) history.load();
 	findPending();
+	photos.reload();
 	if (!model.state || !model.connected) return;
-	steps.render(model);
+	renderSteps();
 	if (model.pending && model.state.hold.mine)
 		serial.bind(model.pending, drops.find(isOpen)).catch((error) => message(error.message));
 	/* Nobody is asked about a drop without seeing it; one that has just come is on its way already. */
@@ -176,7 +184,7 @@ function onState(state) {
 	findPending();
 	if (before && state.tower.state !== before.tower.state)
 		tones.tone({ ARMED: "armed", FALLING: "released" }[state.tower.state] ?? "");
-	const step = steps.render(model);
+	const step = renderSteps();
 	if (step === "release" && seen.step !== "release" && follows()) openTab("live");
 	if (step === "setup" && seen.step !== "setup") setup.fill().catch((error) => message(error.message));
 	seen.step = step;
@@ -227,6 +235,7 @@ function listen() {
 	simulation.listen();
 	setup.listen(() => openSetup(false));
 	decide.listen(() => model.pending, openDrop);
+	photos.listen((name) => post("/api/photos/discard", { series: name }));
 	for (const tab of TABS) byId(`tab-${tab}`).addEventListener("click", () => openTab(tab));
 	byId("tab-live").parentElement.addEventListener("keydown", tabKeys);
 	for (const view of ["drop", "history"]) byId(`view-${view}`).addEventListener("click", () => openView(view));

@@ -28,26 +28,26 @@ function keep(key, make) {
 	return cache.get(key);
 }
 
-const path = (drop) => drop.split("/").map(encodeURIComponent).join("/");
+export const pathOf = (drop) => drop.split("/").map(encodeURIComponent).join("/");
 
 export const traceOf = (drop) =>
-	keep(`trace ${drop}`, async () => decode(await (await get(`/api/trace/${path(drop)}`)).arrayBuffer()));
+	keep(`trace ${drop}`, async () => decode(await (await get(`/api/trace/${pathOf(drop)}`)).arrayBuffer()));
 
 /* null when the scene has no model for it. */
 export const modelOf = (drop) =>
 	keep(`model ${drop}`, async () => {
 		try {
-			return decode(await (await get(`/api/model/${path(drop)}`)).arrayBuffer());
+			return decode(await (await get(`/api/model/${pathOf(drop)}`)).arrayBuffer());
 		} catch (error) {
 			if (error.status === 404) return null;
 			throw error;
 		}
 	});
 
-export const resultOf = async (drop) => (await get(`/api/drop/${path(drop)}`)).json();
+export const resultOf = async (drop) => (await get(`/api/drop/${pathOf(drop)}`)).json();
 
 /* What the archive says of its series' drops. */
 export const rowsOf = async (drop) => (await getJson("/api/drops", { series: drop.split("/")[0] })).drops;
 
 export const spectrumOf = (drop, kind) =>
-	keep(`spectrum ${kind} ${drop}`, async () => (await get(`/api/spectrum/${path(drop)}`, { kind })).json());
+	keep(`spectrum ${kind} ${drop}`, async () => (await get(`/api/spectrum/${pathOf(drop)}`, { kind })).json());
