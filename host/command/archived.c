@@ -3,11 +3,13 @@
 
 #include <droptower_version.h>
 #include <errno.h>
+#include <limits.h>
 #include <pwd.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "host/command/command.h"
@@ -107,6 +109,77 @@ int archived_read(struct archive *archive, const char *drop, struct record *reco
 	}
 	archive_close_log(&log);
 	return result;
+}
+
+/* ---- a log that stands in an archive ---- */
+
+struct origin {
+	struct record *record;
+	char serials[FIELDS_TEXT_MAX];
+};
+
+static int take_origin(void *context, const struct archive_drop *drop)
+{
+	struct record *record = ((struct origin *)context)->record;
+	struct tm utc = {0};
+
+	if (strptime(drop->time, "%Y-%m-%dT%H:%M:%SZ", &utc) != NULL)
+		record->time_s = timegm(&utc);
+	fields_take_words(record->operator_name, drop->operator_name);
+	fields_take_words(record->scene, drop->series.scene_name);
+	record->simulated = drop->simulated;
+	return 0;
+}
+
+static int take_serial(void *context, const struct sensor_used *used)
+{
+	struct origin *origin = context;
+	size_t at = strlen(origin->serials);
+
+	snprintf(origin->serials + at, sizeof(origin->serials) - at, "%s%s %s", at > 0 ? ";" : "", used->name,
+	         used->serial);
+	return 0;
+}
+
+/* The folder of the archive that a file would be a log of; false: of none. */
+static bool folder_of_log(const char *file, char folder[PATH_MAX])
+{
+	char path[PATH_MAX], index[PATH_MAX + 16], *slash;
+
+	if (realpath(file, path) == NULL)
+		return false;
+	for (int up = 0; up < 4; up++) { /* raw/YEAR/SERIES/LOG */
+		slash = strrchr(path, '/');
+		if (slash == NULL || (up == 3 && strcmp(slash, "/raw") != 0))
+			return false;
+		*slash = '\0';
+	}
+	snprintf(folder, PATH_MAX, "%s", path);
+	snprintf(index, sizeof(index), "%s/index.sqlite", folder);
+	return access(index, R_OK) == 0;
+}
+
+void archived_origin(const char *file, struct record *record)
+{
+	char message[ARCHIVE_MESSAGE_MAX], folder[PATH_MAX], drop[ARCHIVE_NAME_MAX + 16];
+	struct archive_filter filter = archive_filter_none();
+	struct origin origin = {.record = record};
+	struct archive *archive;
+
+	if (record->operator_name[0] != '\0' || !folder_of_log(file, folder) ||
+	    (archive = archive_open(folder, ARCHIVE_READ, message)) == NULL)
+		return;
+	if (archive_find(archive, file, drop) == 1) {
+		char *slash = strchr(drop, '/');
+		bool known = archive_each_sensor(archive, drop, NULL, take_serial, &origin) == 0;
+
+		filter.number = (unsigned)strtoul(slash + 1, NULL, 10);
+		*slash = '\0';
+		filter.series = drop;
+		if (archive_each_drop(archive, &filter, take_origin, &origin) == 0 && known)
+			fields_take_words(record->sensors, origin.serials);
+	}
+	archive_close(archive);
 }
 
 /* The result does not depend on where the archive stands. */

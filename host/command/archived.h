@@ -29,6 +29,10 @@ int archived_scene_file(struct archive *archive, const char *series, char file[A
 DT_MUST_USE int archived_read(struct archive *archive, const char *drop, struct record *record,
                               char fault[ARCHIVE_MESSAGE_MAX], char message[ARCHIVE_MESSAGE_MAX]);
 
+/* What an archive knows of the drop whose log this file is, where it is one of an archive: date, operator,
+ * scene, serial numbers, whether it was simulated. Nothing is told when it is none. */
+void archived_origin(const char *file, struct record *record);
+
 /* As archived_analyse, with what is wrong in message, and 0 or DT_E_*. */
 DT_MUST_USE int archived_result(struct archive *archive, const char *series, unsigned number,
                                 const char *chain, char fault[ARCHIVE_MESSAGE_MAX],

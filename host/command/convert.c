@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/command/archived.h"
 #include "host/command/command.h"
 #include "host/record/log_capture.h"
 #include "host/record/dbc.h"
@@ -64,6 +65,7 @@ static int convert(const char *in, const char *out, const char *columns, unsigne
 	result = read_nth(&record, in, columns, number, message);
 
 	if (result == 0) {
+		archived_origin(in, &record);
 		result = write_record(&record, out, message);
 		record_free(&record);
 	}

@@ -328,7 +328,8 @@ async function wall() {
 /* Paper has what was found, and no controls; in grey the sensors are told apart by their lines. */
 async function printed() {
 	await desk.page.emulateMedia({ media: "print" });
-	assert.equal(await desk.page.locator("button:visible").count(), 0);
+	assert.equal(await desk.page.locator("button:not(.link):visible").count(), 0);
+	assert.match(await desk.text(`#series-table tr[data-drop="${SERIES}/1"] [data-label="time"]`), /\d\d:\d\d/);
 	assert.ok(await desk.page.locator("#verdict").isVisible() && await desk.page.locator("#series-table").isVisible());
 	await desk.picture("24-print", { fullPage: true });
 	await desk.page.emulateMedia({ media: "screen" });
