@@ -53,7 +53,7 @@ static void find_footer(struct sniff_work *work, struct sniff *sniff)
 		if (sniff_is_idle(&line))
 			continue;
 		sniff_split(sniff->style, &line, &work->cells);
-		if (sniff_is_row(&work->cells) || !has_letter(&line) ||
+		if (sniff_is_row(work, &work->cells) || !has_letter(&line) ||
 		    (sniff->footer_lines == 0 && bytes[work->source->size - 1] != '\n' &&
 		     sniff_kind(&work->cells, 0) == CELL_NUMBER))
 			return;
@@ -67,7 +67,7 @@ struct head {
 	struct piece names_line;
 };
 
-/* A line that tells units: the first cell a unit, and no cell a word that stands for something else. */
+/* A line that tells units: half of the cells or more a unit, and none a text. "Clock" is a name. */
 static bool tells_units(const struct cells *cells)
 {
 	size_t known = 0;
@@ -75,7 +75,8 @@ static bool tells_units(const struct cells *cells)
 	for (size_t i = 0; i < cells->count && i < CELLS_MAX; i++) {
 		struct piece cell = cells->cell[i];
 
-		known += cell.length > 0 && unit_find(cell.text, cell.length) != NULL;
+		known += cell.length > 0 && unit_find(cell.text, cell.length) != NULL &&
+		         !piece_has(cell, "clock");
 		if (cell.length > 12)
 			return false;
 	}
@@ -144,7 +145,8 @@ static int read_head(struct sniff_work *work, struct sniff *sniff, size_t column
 			sniff->rate_line = line.number;
 		}
 		sniff_split(sniff->style, &line, &work->cells);
-		if (!sniff_is_idle(&line) && work->cells.count == columns && sniff_is_row(&work->cells)) {
+		if (!sniff_is_idle(&line) && work->cells.count == columns &&
+		    sniff_is_row(work, &work->cells)) {
 			sniff->first = at;
 			sniff->header_lines = (size_t)line.number - 1;
 			return 0;
@@ -168,7 +170,7 @@ static void find_increasing(struct sniff_work *work, const struct sniff *sniff, 
 		times->can[i] = true;
 	for (size_t k = 0; k < work->lines; k++) {
 		sniff_split(sniff->style, &work->line[k], &work->cells);
-		if (work->cells.count != sniff->columns.count || !sniff_is_row(&work->cells))
+		if (work->cells.count != sniff->columns.count || !sniff_is_row(work, &work->cells))
 			continue;
 		for (size_t i = 0; i < sniff->columns.count; i++) {
 			int64_t ns;
@@ -207,6 +209,13 @@ static int sniff_all(struct sniff_work *work, struct sniff *sniff, struct head *
 	find_increasing(work, sniff, &times);
 	error = sniff_settle_names(sniff, head->units.count > 0 ? head->units.cell : NULL, &times,
 	                           sniff->told_rate_hz > 0, work->source->file, work->message);
+	for (size_t i = 0; !error && i < sniff->columns.count; i++)
+		if (work->words[i] && sniff->columns.column[i].kind == COLUMN_CHANNEL)
+			error = source_refuse(
+			        work->message, DT_E_FORMAT, work->source->file, 0,
+			        "column %zu, \"%s\", has a unit of acceleration and holds words, "
+			        "expected numbers",
+			        i + 1, sniff->columns.column[i].name);
 	if (!error && !sniff->columns.has_time)
 		sniff->columns.rate_hz = sniff->told_rate_hz;
 	return error;

@@ -39,9 +39,36 @@ static bool is_mass_name(struct piece name)
 	       piece_has(name, "masse");
 }
 
+/* The unit of a label like "t/ms" or "a/(m/s2)", a quantity over its unit (ISO 80000-1), and its stem; NULL
+ * for another, so that "mV/g" and "counts/s" are none. */
+static const struct unit *quotient(struct piece name, struct piece *stem)
+{
+	size_t at = 0;
+	const struct unit *unit;
+
+	while (at < name.length && name.text[at] != '/')
+		at++;
+	if (at == 0 || at + 1 >= name.length)
+		return NULL;
+	*stem = (struct piece){name.text, at};
+	unit = unit_in_bracket(name.text + at + 1, name.length - at - 1);
+	if (unit == NULL)
+		unit = unit_find(name.text + at + 1, name.length - at - 1);
+	if (unit == NULL)
+		return NULL;
+	return (unit->kind == UNIT_TIME && sniff_is_time(*stem)) ||
+	                       (unit->kind == UNIT_ACCELERATION && sniff_is_acceleration(*stem))
+	               ? unit
+	               : NULL;
+}
+
 /* A name without the unit in brackets, or the word that is one, behind it. */
 struct piece sniff_stem(struct piece name)
 {
+	struct piece stem;
+
+	if (quotient(name, &stem) != NULL)
+		return stem;
 	for (size_t at = name.length; at-- > 1;)
 		if (name.text[at] == '(' || name.text[at] == '[') {
 			const struct unit *unit = unit_in_bracket(name.text + at, name.length - at);
@@ -90,10 +117,13 @@ static bool unit_alone(struct piece name)
 static const struct unit *sniff_unit(struct piece name, struct piece told, bool *two)
 {
 	const struct unit *by_name = NULL, *by_told = NULL;
+	struct piece stem;
 
 	if (name.length > 0 && !unit_alone(name)) {
-		by_name = unit_of_name(name.text, name.length,
-		                       sniff_is_time(name) ? UNIT_TIME : UNIT_ACCELERATION);
+		by_name = quotient(name, &stem);
+		if (by_name == NULL)
+			by_name = unit_of_name(name.text, name.length,
+			                       sniff_is_time(name) ? UNIT_TIME : UNIT_ACCELERATION);
 		if (by_name == NULL)
 			by_name = unit_of_name(name.text, name.length, UNIT_TIME);
 		by_name = by_name != NULL ? trusted(by_name, name, told) : NULL;

@@ -22,13 +22,16 @@ struct sniff_work {
 	size_t lines;
 	struct cells cells, other;
 	size_t counts[CELLS_MAX + 1];
+	bool words[CELLS_MAX]; /* columns of words: a status, a name */
 	char *message;
 };
 
 enum cell_kind { CELL_EMPTY, CELL_NUMBER, CELL_NO_NUMBER, CELL_CLOCK, CELL_DATE, CELL_TEXT };
 
 enum cell_kind sniff_kind(const struct cells *cells, size_t i);
-bool sniff_is_row(const struct cells *cells);
+
+/* Numbers, but where the table has words. */
+bool sniff_is_row(const struct sniff_work *work, const struct cells *cells);
 
 /* A line of blanks, or a remark. */
 bool sniff_is_idle(const struct source_line *line);

@@ -38,13 +38,15 @@ enum cell_kind sniff_kind(const struct cells *cells, size_t i)
 	return cell.length >= 8 && clock_is_date(cell) ? CELL_DATE : CELL_TEXT;
 }
 
-bool sniff_is_row(const struct cells *cells)
+bool sniff_is_row(const struct sniff_work *work, const struct cells *cells)
 {
 	size_t numbers = 0;
 
 	for (size_t i = 0; i < cells->count; i++) {
 		enum cell_kind kind = i < CELLS_MAX ? sniff_kind(cells, i) : CELL_TEXT;
 
+		if (i < CELLS_MAX && work->words[i])
+			continue;
 		if (kind == CELL_TEXT)
 			return false;
 		numbers += kind == CELL_NUMBER || kind == CELL_NO_NUMBER;
@@ -89,7 +91,7 @@ static void count_rows(struct sniff_work *work, struct sniff_candidate *candidat
 	memset(work->counts, 0, sizeof(work->counts));
 	for (size_t k = 0; k < work->lines; k++) {
 		sniff_split(candidate->style, &work->line[k], &work->cells);
-		if (work->cells.count < CELLS_MAX && sniff_is_row(&work->cells))
+		if (work->cells.count < CELLS_MAX && sniff_is_row(work, &work->cells))
 			work->counts[work->cells.count]++;
 	}
 	candidate->rows = 0;
@@ -130,7 +132,7 @@ static size_t header_fields(struct sniff_work *work, const struct sniff_candidat
 
 	while (source_next_line(work->source, &line) && line.number < SNIFF_HEADER_LINES_MOST) {
 		sniff_split(candidate->style, &line, &work->cells);
-		if (work->cells.count == candidate->columns && sniff_is_row(&work->cells))
+		if (work->cells.count == candidate->columns && sniff_is_row(work, &work->cells))
 			break;
 		if (line.length > 0)
 			fields = work->cells.count;
@@ -183,6 +185,59 @@ static int refuse_no_table(struct sniff_work *work)
 	        "should be rows of numbers; for other text expected --columns \"time:ms,name:g,-\"");
 }
 
+/* Columns that hold words, or nothing, in nearly all of the sampled lines; how many others there are. */
+static size_t find_words(struct sniff_work *work, struct cells_style style)
+{
+	size_t words[CELLS_MAX] = {0}, none[CELLS_MAX] = {0}, columns = 0, lines, numbers = 0;
+
+	memset(work->words, 0, sizeof(work->words));
+	memset(work->counts, 0, sizeof(work->counts));
+	for (size_t k = 0; k < work->lines; k++) {
+		sniff_split(style, &work->line[k], &work->cells);
+		if (work->cells.count < CELLS_MAX &&
+		    ++work->counts[work->cells.count] > work->counts[columns])
+			columns = work->cells.count;
+	}
+	lines = work->counts[columns];
+	for (size_t k = 0; k < work->lines; k++) {
+		sniff_split(style, &work->line[k], &work->cells);
+		for (size_t i = 0; work->cells.count == columns && i < columns; i++) {
+			words[i] += sniff_kind(&work->cells, i) == CELL_TEXT &&
+			            cells_oddity(&work->cells, i) == CELLS_PLAIN;
+			none[i] += work->cells.cell[i].length == 0;
+		}
+	}
+	for (size_t i = 0; i < columns; i++) {
+		work->words[i] = words[i] > 0 && (double)(words[i] + none[i]) > ROWS_PART * (double)lines;
+		numbers += !work->words[i];
+	}
+	return numbers;
+}
+
+/* A table with columns of words, where there is none without: of the readings the one with most numbers. */
+static int find_style_with_words(struct sniff_work *work, struct sniff_candidate *best)
+{
+	size_t most = 0;
+
+	for (size_t k = 0; k < 2 * SNIFF_SEPARATORS; k++) {
+		struct sniff_candidate now = {.style = {separators[k / 2], k % 2 ? ',' : '.'}};
+		size_t numbers = find_words(work, now.style);
+
+		count_rows(work, &now);
+		if (numbers == 0 || now.rows < 2 || (double)now.rows < ROWS_PART * (double)work->lines ||
+		    numbers < most || (numbers == most && same_cells(work, best, &now)))
+			continue;
+		if (numbers == most)
+			return refuse_styles(work, best, &now);
+		*best = now;
+		most = numbers;
+	}
+	if (most == 0)
+		return refuse_no_table(work);
+	find_words(work, best->style);
+	return 0;
+}
+
 int sniff_find_style(struct sniff_work *work, struct sniff_candidate *best)
 {
 	struct sniff_candidate candidate[2 * SNIFF_SEPARATORS];
@@ -202,7 +257,7 @@ int sniff_find_style(struct sniff_work *work, struct sniff_candidate *best)
 			candidate[count++] = now;
 	}
 	if (count == 0)
-		return refuse_no_table(work);
+		return find_style_with_words(work, best);
 	*best = candidate[0];
 	named = header_fields(work, best) == best->columns && best->columns > 1;
 	for (size_t i = 1; i < count; i++) {
