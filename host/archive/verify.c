@@ -7,23 +7,34 @@
 #include <string.h>
 
 #include "host/archive/indexed.h"
+#include "host/base/progress.h"
 
 int proof_of_all(struct proof *proof, const char *series, unsigned number)
 {
+	struct progress progress;
+	int64_t done = 0;
 	sqlite3_stmt *s;
-	int result = sql_query(proof->archive, &s,
-	                       "SELECT d.id FROM drops d JOIN series s ON s.id = d.series_id"
-	                       " WHERE (?1 IS NULL OR s.name = ?1)"
-	                       " AND (?2 = 0 OR d.number = ?2) ORDER BY d.raw",
-	                       "si", series, (int64_t)number);
+	int result =
+	        sql_query(proof->archive, &s,
+	                  "SELECT d.id, COUNT(*) OVER () FROM drops d JOIN series s ON s.id = d.series_id"
+	                  " WHERE (?1 IS NULL OR s.name = ?1)"
+	                  " AND (?2 = 0 OR d.number = ?2) ORDER BY d.raw",
+	                  "si", series, (int64_t)number);
 
 	if (result != 0)
 		return result;
+	progress_begin(&progress, 2.0);
 	while ((result = sql_step(proof->archive, s)) > 0) {
+		int64_t all = sqlite3_column_int64(s, 1);
+
+		progress_tell(&progress, (double)done / (double)all,
+		              "%lld of %lld drops held against their files", (long long)done, (long long)all);
 		result = proof_of_drop(proof, sqlite3_column_int64(s, 0));
 		if (result != 0)
 			break;
+		done++;
 	}
+	progress_end(&progress);
 	sqlite3_finalize(s);
 	return result;
 }

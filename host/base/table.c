@@ -218,13 +218,14 @@ static void table_put_head(const struct table *t, const struct table_column *c, 
 
 static void put_line(const struct table *t, const void *object)
 {
-	const char *tag = object != NULL ? "td" : "th", *gap = "";
+	const char *gap = "";
 
 	if (t->format == TABLE_HTML)
 		fprintf(t->out, "<tr%s>", object != NULL && t->row_class != NULL ? t->row_class : "");
 	for (size_t i = 0; i < 2 * t->count; i++) {
 		const struct table_column *c = &t->columns[i / 2];
 		bool sigma = i % 2 != 0;
+		const char *tag = object != NULL || c->title == NULL || c->title[0] == '\0' ? "td" : "th";
 
 		if (!has(t, c, sigma))
 			continue;
@@ -253,7 +254,7 @@ void table_begin(struct table *table, const struct table_column *columns, size_t
 	if (table->format == TABLE_JSON)
 		fputc('[', table->out);
 	if (table->format == TABLE_HTML)
-		fputs("<div class=\"scroll\"><table><thead>", table->out);
+		fputs("<div class=\"scroll\" tabindex=\"0\"><table><thead>", table->out);
 	if (table->format == TABLE_CSV || table->format == TABLE_HTML)
 		put_line(table, NULL);
 	if (table->format == TABLE_HTML)

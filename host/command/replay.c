@@ -12,6 +12,7 @@
 #include "common/link/link.h"
 #include "common/wire.h"
 #include "common/wire_table.h"
+#include "host/base/progress.h"
 #include "host/command/command.h"
 #include "host/session/publish.h"
 #include "host/session/session.h"
@@ -20,6 +21,7 @@
 #include "host/record/read.h"
 
 static const double CENTURY_S = 3.15e9;
+static const double TOLD_AFTER_S = 2.0;
 
 /* The plan: log time `origin_us` is now; speed 0 is as fast as possible. */
 struct pace {
@@ -152,18 +154,32 @@ static int replay_send_frame(struct replay *replay, struct frame *frame, struct 
 	return COMMAND_DONE;
 }
 
+/* at: place in the log. */
+static void tell_progress(const struct replay *replay, const struct log_file *log, uint64_t at,
+                          struct progress *progress)
+{
+	uint64_t from = replay->from > log->begin ? replay->from : log->begin,
+	         until = replay->until < log->size ? replay->until : log->size;
+
+	progress_tell(progress, until > from ? (double)(at - from) / (double)(until - from) : (double)NAN,
+	              "%" PRIu64 " sent", (uint64_t)replay->sent);
+}
+
 static int replay_frames(struct replay *replay, struct log_file *log, struct link *to,
                          struct publisher *publisher)
 {
 	bool copies = strncmp(replay->to, "log:", 4) == 0;
 	int code = to != NULL && is_live(replay) ? listen_on_link(replay, to, LISTEN_MS) : COMMAND_DONE;
 	struct log_line line = {.next = replay->from > log->begin ? replay->from : log->begin};
+	struct progress progress;
 
+	progress_begin(&progress, TOLD_AFTER_S);
 	while (code == COMMAND_DONE && !interrupt_came() && log_file_next_line(log, replay->until, &line)) {
 		struct frame frame;
 		unsigned column;
 		int result = candump_parse(line.text, line.length, &frame, &column);
 
+		tell_progress(replay, log, line.at, &progress);
 		if (result == 0)
 			continue;
 		if (result < 0 || (frame.flags & FRAME_ERROR) != 0)
@@ -173,6 +189,7 @@ static int replay_frames(struct replay *replay, struct log_file *log, struct lin
 		else
 			code = replay_send_frame(replay, &frame, to, publisher);
 	}
+	progress_end(&progress);
 	return code;
 }
 
@@ -249,6 +266,7 @@ static int replay_events(struct replay *replay, struct log_file *log, struct pub
 {
 	struct lcm_log_walk walk = {.at = replay->from, .end = replay->until};
 	struct lcm_log_event event;
+	struct progress progress;
 	int code = COMMAND_DONE;
 
 	if (replay->as_host) {
@@ -256,7 +274,9 @@ static int replay_events(struct replay *replay, struct log_file *log, struct pub
 		               ? listen_on_lcm(replay, publisher, LISTEN_MS)
 		               : command_link_failed(replay->to, DT_E_LINK);
 	}
+	progress_begin(&progress, TOLD_AFTER_S);
 	while (code == COMMAND_DONE && !interrupt_came() && lcm_log_next(log, &walk, &event)) {
+		tell_progress(replay, log, walk.at, &progress);
 		if (event.cut)
 			continue;       /* counted as skipped */
 		if (event.data == NULL) /* beyond what LCM sends */
@@ -266,6 +286,7 @@ static int replay_events(struct replay *replay, struct log_file *log, struct pub
 		else
 			code = send_event(replay, &event, publisher);
 	}
+	progress_end(&progress);
 	replay->skipped += walk.skipped;
 	return code;
 }

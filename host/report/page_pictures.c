@@ -41,7 +41,7 @@ static void wide_picture(struct page *page,
 
 	if (!page_begin_script(page, &script))
 		return;
-	fputs("<figure class=\"scroll\">", page->out);
+	fputs("<figure class=\"scroll\" tabindex=\"0\">", page->out);
 	page_draw(page, &script, traces(script.out, page->report, &page->zero), name);
 	fputs("</figure>\n", page->out);
 }

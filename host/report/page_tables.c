@@ -40,7 +40,8 @@ static void results(struct page *page)
 	const struct analysis *a = page->report->analysis;
 	FILE *out = page->out;
 
-	fputs("<h2>Results</h2>\n<div class=\"scroll\"><table><tr><th>channel</th><th>rate, Hz</th><th>peak, "
+	fputs("<h2>Results</h2>\n<div class=\"scroll\" tabindex=\"0\"><table><tr><th>channel</th><th>rate, "
+	      "Hz</th><th>peak, "
 	      "g</th><th>at, ms</th><th>width at 10 %, ms</th><th>velocity change, m/s</th><th>noise, g</th>"
 	      "<th class=\"text\">status</th></tr>\n",
 	      out);
@@ -89,7 +90,7 @@ static void joint(struct page *page)
 
 	if (!a->has_lag && !a->has_plate && !a->has_rebound && !a->has_motion)
 		return;
-	fputs("<h2>S1 against S2</h2>\n<div class=\"scroll\"><table "
+	fputs("<h2>S1 against S2</h2>\n<div class=\"scroll\" tabindex=\"0\"><table "
 	      "class=\"small\"><tr><th>quantity</th><th>value</th>"
 	      "<th class=\"text\">status</th></tr>\n",
 	      out);
@@ -125,7 +126,7 @@ static void model(struct page *page)
 	html_text(out, page->report->prediction->fidelity);
 	fputs(", ", out);
 	html_text(out, page->report->prediction->reason);
-	fputs(".</p>\n<div class=\"scroll\"><table "
+	fputs(".</p>\n<div class=\"scroll\" tabindex=\"0\"><table "
 	      "class=\"small\"><tr><th>quantity</th><th>model</th><th>measured</th>"
 	      "<th>difference</th>",
 	      out);

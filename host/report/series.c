@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/progress.h"
 #include "host/record/read.h"
 #include "host/report/series_private.h"
 
@@ -311,6 +312,7 @@ static int series_gather(struct series_page *page)
 {
 	struct archive *archive = page->request->archive;
 	struct archive_filter filter = archive_filter_none();
+	struct progress progress;
 	int result = archive_scene(archive, page->request->series, &page->scene);
 
 	filter.series = page->request->series;
@@ -322,8 +324,13 @@ static int series_gather(struct series_page *page)
 		result = archive_seal(archive, &page->seal);
 	if (result == 0)
 		result = solve_model(page);
-	for (size_t i = 0; i < page->count && result == 0; i++)
+	progress_begin(&progress, 2.0);
+	for (size_t i = 0; i < page->count && result == 0; i++) {
+		progress_tell(&progress, (double)i / (double)page->count, "%zu of %zu drops read", i,
+		              page->count);
 		result = read_drop(page, page->drop[i]);
+	}
+	progress_end(&progress);
 	if (result == 0)
 		result = series_check_sensors(page);
 	archive_cell_close(&page->cell);

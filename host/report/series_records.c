@@ -220,7 +220,7 @@ static void logs(const struct series_page *page)
 {
 	FILE *out = page->page.out;
 
-	fputs("<h2>Records</h2>\n<div class=\"scroll\"><table><thead><tr><th>drop</th><th "
+	fputs("<h2>Records</h2>\n<div class=\"scroll\" tabindex=\"0\"><table><thead><tr><th>drop</th><th "
 	      "class=\"text\">time "
 	      "(UTC)</th><th class=\"text\">operator</th><th>frame, m/s</th><th "
 	      "class=\"text\">record</th><th "
@@ -228,7 +228,8 @@ static void logs(const struct series_page *page)
 	      out);
 	for (size_t i = 0; i < page->count; i++)
 		record_row(out, page->drop[i]);
-	fputs("</tbody></table></div>\n<div class=\"scroll\"><table><thead><tr><th>drop</th><th "
+	fputs("</tbody></table></div>\n<div class=\"scroll\" "
+	      "tabindex=\"0\"><table><thead><tr><th>drop</th><th "
 	      "class=\"text\">raw log and its SHA-256</th><th>bytes</th></tr></thead><tbody>\n",
 	      out);
 	for (size_t i = 0; i < page->count; i++) {
@@ -316,7 +317,7 @@ static int history_row(void *context, const struct archive_event *event)
 
 	if (h->rows++ == 0)
 		fputs("<h2>Decisions and notes</h2>\n<div "
-		      "class=\"scroll\"><table><thead><tr><th>drop</th><th "
+		      "class=\"scroll\" tabindex=\"0\"><table><thead><tr><th>drop</th><th "
 		      "class=\"text\">time (UTC)</th><th class=\"text\">what</th><th "
 		      "class=\"text\">who</th><th "
 		      "class=\"text\">why</th></tr></thead><tbody>\n",

@@ -248,7 +248,7 @@ static void model_rows(const struct series_page *page)
 
 	fill_means(&means, page);
 	count = report_compare(&means.report, rows);
-	fputs("<div class=\"scroll\"><table "
+	fputs("<div class=\"scroll\" tabindex=\"0\"><table "
 	      "class=\"small\"><thead><tr><th>quantity</th><th>model</th><th>mean of "
 	      "drops</th><th>SD</th><th>difference</th>",
 	      out);

@@ -122,7 +122,7 @@ static void test_html_escapes(void **state)
 {
 	(void)state;
 	is(TABLE_HTML, 0, TABLE_VALUES,
-	   "<div class=\"scroll\"><table><thead><tr><th class=\"text\">drop</th><th>speed, "
+	   "<div class=\"scroll\" tabindex=\"0\"><table><thead><tr><th class=\"text\">drop</th><th>speed, "
 	   "mm/s</th><th>n</th></tr>"
 	   "</thead><tbody>\n"
 	   "<tr><td class=\"text\">a, &quot;b&quot; &lt;c&gt;</td><td>12.5 &plusmn; "
