@@ -33,6 +33,7 @@ enum {
 	BOARD_SRAM_BYTES = 96 * 1024,
 	BOARD_CCM = 0x10000000,
 	BOARD_CCM_BYTES = 32 * 1024,
+	BOARD_STACK_BYTES = 4096, /* at its bottom */
 };
 
 /* Numbers of exceptions: 16 and on are the interrupts. */
@@ -91,12 +92,30 @@ bool registers_clocked(uint32_t address);
 uint32_t registers_read(uint32_t address);
 void registers_write(uint32_t address, uint32_t value);
 
-/* core.c: processor, exceptions, idle. */
+/* exception.c: who waits, who may, who interrupts whom. */
+void exception_open(void);
+void exception_reset(void);
+void exception_line(unsigned exception, bool high);
+void exception_pend(unsigned exception);
+void exception_enable(uint64_t exceptions); /* a bit each */
+unsigned exception_next(void);              /* that is to be taken now, 0: none */
+void exception_take(void);                  /* that one, if any */
+void exception_leave(void);                 /* the handler that runs returns */
+unsigned exception_depth(void);             /* of what runs; 0: main */
+uint32_t *exception_instructions(void);     /* that it has run */
+uint32_t exception_stack(void);             /* bytes of it that were needed */
+bool exception_masks_all(void);
+bool exception_masks_control(void);
+
+/* core.c: processor, idle. */
 void core_open(void);
 void core_run(void);
 bool core_waits(void); /* main has nothing to do until something comes */
-void core_line(unsigned exception, bool high);
 uint32_t core_pc(void);
+uint32_t core_get(int name); /* a register, by libunicorn's name */
+void core_set(int name, uint32_t value);
+void core_entered(unsigned exception, unsigned depth);
+void core_left(unsigned exception, unsigned depth, uint32_t instructions);
 void core_report(const char *path);
 
 /* What preempt.c does with it. Depth 0 is main, an interrupt's 1 and more. */
@@ -113,8 +132,6 @@ void core_boot(const struct core_watch *watch);
 void core_pass(void);           /* to the next event, interrupt, end of a poll or pause */
 void core_pause(void);          /* out of watch.instruction: before this instruction */
 void core_hold(unsigned depth); /* what runs at this depth stands still; CORE_HOLDS_NONE */
-bool core_masks_all(void);
-bool core_masks_control(void);
 uint32_t core_register(unsigned number);
 
 #define CORE_HOLDS_NONE UINT32_MAX
@@ -125,6 +142,7 @@ void preempt_where(void); /* on stderr; nothing where nobody preempts */
 void preempt_keep(void *at, size_t bytes);
 void preempt_sent(const struct frame *frame);
 void core_state(void);
+void exception_state(void);
 void registers_state(void);
 void system_state(void);
 void timer_state(void);

@@ -70,7 +70,7 @@ unsigned can_waiting(void)
 
 static void raise_line(void)
 {
-	core_line(BOARD_FDCAN, *at(IR) & *at(IE) && *at(ILE) & 1);
+	exception_line(BOARD_FDCAN, *at(IR) & *at(IE) && *at(ILE) & 1);
 }
 
 /* ---- to the bus ---- */

@@ -6,17 +6,10 @@
 #include "hil/board/chip.h"
 
 enum {
-	ENTRY_CLOCKS = 12,
-	TAIL_CLOCKS = 6,
-	FRAME_BYTES = 32,
-	DEPTH_MAX = 8,
-	LOWEST = 256, /* below every priority */
 	UNICORN_EXCEPTION_EXIT = 8,
 	POLL = 0, /* tallies: an exception's, or main's */
 };
 
-#define RETURN_THREAD 0xFFFFFFF9u
-#define RETURN_HANDLER 0xFFFFFFF1u
 #define RETURN_MASK 0xFFFFFFE0u
 
 struct tally {
@@ -27,15 +20,8 @@ struct tally {
 static struct {
 	uc_engine *uc;
 	int64_t limit; /* a block that begins then or later waits */
-	uint64_t lines, pending, enabled;
-	unsigned depth; /* 0: main */
-	struct level {
-		unsigned exception, priority;
-		uint32_t instructions; /* its own, what interrupted it not counted */
-	} level[DEPTH_MAX];
 	bool returning, failed;
 	unsigned halves; /* of a clock that are left over */
-	uint32_t lowest_stack;
 	/* the main loop */
 	uint32_t idle; /* the address behind its call of app_poll; 0: not yet known */
 	bool at_idle, pass_idle, waiting, interrupted;
@@ -52,7 +38,7 @@ static uint8_t block_instructions[BOARD_FLASH_BYTES / 2], block_halfwords[BOARD_
 static const struct core_watch *watch; /* NULL: nobody watches */
 static uc_context *saved;
 
-static uint32_t get(int name)
+uint32_t core_get(int name)
 {
 	uint32_t value = 0;
 
@@ -60,116 +46,14 @@ static uint32_t get(int name)
 	return value;
 }
 
-static void set(int name, uint32_t value)
+void core_set(int name, uint32_t value)
 {
 	uc_reg_write(core.uc, name, &value);
 }
 
 uint32_t core_pc(void)
 {
-	return core.uc != NULL ? get(UC_ARM_REG_PC) : 0;
-}
-
-/* ---- exceptions: who waits, who may ---- */
-
-static unsigned priority_of(unsigned exception)
-{
-	if (exception == BOARD_PENDSV)
-		return *registers_at(SCB_SHPR3) >> 16 & 0xF0;
-	return *registers_at(NVIC_IPR + (exception - 16) / 4 * 4) >> (8 * (exception % 4)) & 0xF0;
-}
-
-void core_line(unsigned exception, bool high)
-{
-	uint64_t bit = 1ull << exception;
-
-	if (high && !(core.lines & bit))
-		core.pending |= bit;
-	core.lines = high ? core.lines | bit : core.lines & ~bit;
-}
-
-static void core_pend(unsigned exception)
-{
-	core.pending |= 1ull << exception;
-}
-
-/* The exception that is to be taken now, 0: none. Of equal ones the lowest number. */
-static unsigned next_exception(void)
-{
-	uint64_t ready = core.pending & core.enabled;
-	unsigned best = 0, best_priority = core.depth ? core.level[core.depth].priority : LOWEST, base;
-
-	for (; ready != 0; ready &= ready - 1) {
-		unsigned exception = (unsigned)__builtin_ctzll(ready), priority = priority_of(exception);
-
-		if (priority < best_priority) {
-			best = exception;
-			best_priority = priority;
-		}
-	}
-	if (best == 0 || get(UC_ARM_REG_PRIMASK) & 1)
-		return 0;
-	base = get(UC_ARM_REG_BASEPRI) & 0xF0;
-	return base != 0 && best_priority >= base ? 0 : best;
-}
-
-static uint32_t *stack_at(uint32_t address)
-{
-	if (address - BOARD_CCM >= 4096)
-		board_fail("the stack is at 0x%08X", address);
-	return (uint32_t *)(void *)(board.ccm + (address - BOARD_CCM));
-}
-
-static const int stacked[] = {UC_ARM_REG_R0,  UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3,
-                              UC_ARM_REG_R12, UC_ARM_REG_LR, UC_ARM_REG_PC};
-
-static void push_frame(void)
-{
-	uint32_t sp = get(UC_ARM_REG_SP), place = (sp - FRAME_BYTES) & ~7u, *frame = stack_at(place);
-
-	for (unsigned i = 0; i < 7; i++)
-		frame[i] = get(stacked[i]);
-	frame[7] = get(UC_ARM_REG_XPSR) | 1u << 24;
-	if (sp & 4)
-		frame[7] |= 1u << 9;
-	else
-		frame[7] &= ~(1u << 9);
-	set(UC_ARM_REG_SP, place);
-	if (place < core.lowest_stack)
-		core.lowest_stack = place;
-}
-
-static void pop_frame(void)
-{
-	uint32_t sp = get(UC_ARM_REG_SP), frame[8];
-
-	memcpy(frame, stack_at(sp), sizeof(frame));
-	set(UC_ARM_REG_SP, sp + FRAME_BYTES + (frame[7] >> 9 & 1) * 4);
-	for (unsigned i = 0; i < 6; i++)
-		set(stacked[i], frame[i]);
-	set(UC_ARM_REG_XPSR, frame[7] & ~(1u << 9));
-	set(UC_ARM_REG_PC, frame[6] | 1);
-}
-
-/* The handler's first instruction is next; its frame is on the stack. */
-static void enter_handler(unsigned exception)
-{
-	uint32_t vector;
-
-	memcpy(&vector, board.flash + (*registers_at(SCB_VTOR) - BOARD_FLASH) + 4 * exception, 4);
-	if (!(vector & 1) || core.depth + 1 == DEPTH_MAX)
-		board_fail("exception %u has the vector 0x%08X, %u deep", exception, vector, core.depth);
-	core.pending &= ~(1ull << exception);
-	set(UC_ARM_REG_LR, core.depth ? RETURN_HANDLER : RETURN_THREAD);
-	set(UC_ARM_REG_XPSR, (get(UC_ARM_REG_XPSR) & 0xF80F0000) | 1u << 24 | exception);
-	set(UC_ARM_REG_PC, vector);
-	core.level[++core.depth] = (struct level){exception, priority_of(exception), 0};
-	core.interrupted = true;
-	if (watch != NULL)
-		watch->entered(exception, core.depth);
-	if (exception != BOARD_TIM1 && exception != BOARD_TIM3 && exception != BOARD_TIM4)
-		board.woken =
-		        true; /* main gets what control, gates and CAN bring, from the samples nothing */
+	return core.uc != NULL ? core_get(UC_ARM_REG_PC) : 0;
 }
 
 static void add_tally(unsigned which, uint32_t instructions)
@@ -182,39 +66,21 @@ static void add_tally(unsigned which, uint32_t instructions)
 	tally->calls++;
 }
 
-static void leave_handler(void)
+void core_entered(unsigned exception, unsigned depth)
 {
-	const struct level *level = &core.level[core.depth];
-	uint32_t pc = get(UC_ARM_REG_PC) | 1, expected = core.depth > 1 ? RETURN_HANDLER : RETURN_THREAD;
-	unsigned next;
-
-	if (core.depth == 0 || pc != expected)
-		board_fail("a return with 0x%08X, %u deep", pc, core.depth);
-	add_tally(level->exception, level->instructions);
-	if (core.lines >> level->exception & 1)
-		core.pending |= 1ull << level->exception;
-	core.depth--;
+	core.interrupted = true;
 	if (watch != NULL)
-		watch->left(level->exception, core.depth + 1);
-	next = next_exception();
-	if (next != 0) {
-		board.now += board.options.half_clocks > 0 ? TAIL_CLOCKS : 0;
-		enter_handler(next);
-		return;
-	}
-	board.now += board.options.half_clocks > 0 ? ENTRY_CLOCKS : 0;
-	pop_frame();
+		watch->entered(exception, depth);
+	if (exception != BOARD_TIM1 && exception != BOARD_TIM3 && exception != BOARD_TIM4)
+		board.woken =
+		        true; /* main gets what control, gates and CAN bring, from the samples nothing */
 }
 
-static void take_exceptions(void)
+void core_left(unsigned exception, unsigned depth, uint32_t instructions)
 {
-	unsigned next = next_exception();
-
-	if (next == 0)
-		return;
-	board.now += board.options.half_clocks > 0 ? ENTRY_CLOCKS : 0;
-	push_frame();
-	enter_handler(next);
+	add_tally(exception, instructions);
+	if (watch != NULL)
+		watch->left(exception, depth);
 }
 
 /* ---- what the processor tells ---- */
@@ -248,7 +114,7 @@ static void spend(unsigned instructions)
 
 	board.now += halves / 2;
 	core.halves = halves % 2;
-	core.level[core.depth].instructions += instructions;
+	*exception_instructions() += instructions;
 }
 
 /* libunicorn's own idea of where it stopped is the instruction before where that one lies across two pages.
@@ -266,22 +132,22 @@ static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *unu
 	(void)uc, (void)unused;
 	if (address - BOARD_FLASH >= BOARD_FLASH_BYTES) /* a return, which the processor reports next */
 		return;
-	if (core.depth == 0 && address == board.app_poll && core.idle == 0) {
-		core.idle = get(UC_ARM_REG_LR) & ~1u;
-		core.level[0].instructions = 0; /* of the start */
+	if (exception_depth() == 0 && address == board.app_poll && core.idle == 0) {
+		core.idle = core_get(UC_ARM_REG_LR) & ~1u;
+		*exception_instructions() = 0; /* of the start */
 	}
-	if (core.depth == 0 && address == core.idle && !core.pass_idle) {
+	if (exception_depth() == 0 && address == core.idle && !core.pass_idle) {
 		core.at_idle = true;
 		stop_before(address);
 		return;
 	}
-	if (board.now >= core.limit || (core.pending & core.enabled && next_exception() != 0)) {
+	if (board.now >= core.limit || exception_next() != 0) {
 		stop_before(address);
 		return;
 	}
 	core.pass_idle = false;
 	if (watch != NULL)
-		watch->block(core.depth, address);
+		watch->block(exception_depth(), address);
 	else
 		spend(instructions_in(address, size));
 }
@@ -289,7 +155,7 @@ static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *unu
 static void on_access(uc_engine *uc, int type, uint64_t address, int size, int64_t value, void *unused)
 {
 	(void)uc, (void)value, (void)unused;
-	watch->access(core.depth, (uint32_t)address, (unsigned)size, type == UC_MEM_WRITE);
+	watch->access(exception_depth(), (uint32_t)address, (unsigned)size, type == UC_MEM_WRITE);
 }
 
 /* Only where somebody watches: it takes twice the time. */
@@ -298,7 +164,7 @@ static void on_instruction(uc_engine *uc, uint64_t address, uint32_t size, void 
 	(void)uc, (void)size, (void)unused;
 	if (core.paused || core.stopped != 0 || address - BOARD_FLASH >= BOARD_FLASH_BYTES)
 		return;
-	watch->instruction(core.depth, (uint32_t)address);
+	watch->instruction(exception_depth(), (uint32_t)address);
 	if (core.paused)
 		stop_before((uint32_t)address);
 	else
@@ -308,8 +174,8 @@ static void on_instruction(uc_engine *uc, uint64_t address, uint32_t size, void 
 static void on_interrupt(uc_engine *uc, uint32_t number, void *unused)
 {
 	(void)unused;
-	if (number == UNICORN_EXCEPTION_EXIT && core.depth > 0 &&
-	    (get(UC_ARM_REG_PC) & RETURN_MASK) == RETURN_MASK)
+	if (number == UNICORN_EXCEPTION_EXIT && exception_depth() > 0 &&
+	    (core_get(UC_ARM_REG_PC) & RETURN_MASK) == RETURN_MASK)
 		core.returning = true;
 	else
 		board_fail("exception %u of the processor", number);
@@ -343,9 +209,9 @@ static void write_core(uint32_t address, uint32_t value)
 	registers_check_write(address, value);
 	board.wrote = true;
 	if (address == NVIC_ISER)
-		core.enabled |= (uint64_t)value << 16;
+		exception_enable((uint64_t)value << 16);
 	if (address == SCB_ICSR) {
-		core_pend(BOARD_PENDSV);
+		exception_pend(BOARD_PENDSV);
 		return;
 	}
 	if (address == SCB_AIRCR && value == 0x05FA0004) {
@@ -400,12 +266,14 @@ void core_open(void)
 	board.flash = memset(flash, 0xFF, sizeof(flash));
 	board.sram = sram;
 	board.ccm = ccm;
+	exception_open();
 	must(uc_open(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS, &core.uc), "emulator");
 	must(uc_ctl_set_cpu_model(core.uc, UC_CPU_ARM_CORTEX_M4), "processor");
 	must(uc_mem_map_ptr(core.uc, BOARD_FLASH, sizeof(flash), UC_PROT_READ | UC_PROT_EXEC, flash),
 	     "flash");
 	must(uc_mem_map_ptr(core.uc, BOARD_SRAM, sizeof(sram), UC_PROT_READ | UC_PROT_WRITE, sram), "SRAM");
-	must(uc_mem_map_ptr(core.uc, BOARD_CCM, 4096, UC_PROT_READ | UC_PROT_WRITE, ccm), "stack");
+	must(uc_mem_map_ptr(core.uc, BOARD_CCM, BOARD_STACK_BYTES, UC_PROT_READ | UC_PROT_WRITE, ccm),
+	     "stack");
 	map_registers(0x40000000, 0x31000);
 	map_registers(0x48000000, 0x2000);
 	map_registers(0x50000000, 0x1000);
@@ -413,7 +281,6 @@ void core_open(void)
 	map_registers(0xE000E000u, 0x1000);
 	hook(UC_HOOK_BLOCK, (void *)(uintptr_t)on_block);
 	hook(UC_HOOK_INTR, (void *)(uintptr_t)on_interrupt);
-	core.lowest_stack = BOARD_CCM + 4096;
 }
 
 static void core_reset(void)
@@ -427,15 +294,11 @@ static void core_reset(void)
 
 	memcpy(vector, board.flash, sizeof(vector));
 	for (unsigned i = 0; i < sizeof(others) / sizeof(others[0]); i++)
-		set(others[i], 0);
-	set(UC_ARM_REG_XPSR, 1u << 24);
-	set(UC_ARM_REG_LR, 0xFFFFFFFFu);
-	set(UC_ARM_REG_SP, vector[0]);
-	set(UC_ARM_REG_PC, vector[1]);
-	core.lines = core.pending = 0;
-	core.enabled = 1u << BOARD_PENDSV;
-	core.depth = 0;
-	core.level[0] = (struct level){0};
+		core_set(others[i], 0);
+	core_set(UC_ARM_REG_XPSR, 1u << 24);
+	core_set(UC_ARM_REG_LR, 0xFFFFFFFFu);
+	core_set(UC_ARM_REG_SP, vector[0]);
+	core_set(UC_ARM_REG_PC, vector[1]);
 	core.at_idle = core.pass_idle = core.waiting = false;
 	core.idle = 0;
 }
@@ -459,21 +322,9 @@ void core_pause(void)
 	core.paused = true;
 }
 
-bool core_masks_all(void)
-{
-	return get(UC_ARM_REG_PRIMASK) & 1;
-}
-
-bool core_masks_control(void)
-{
-	uint32_t base = get(UC_ARM_REG_BASEPRI) & 0xF0;
-
-	return core_masks_all() || (base != 0 && priority_of(BOARD_PENDSV) >= base);
-}
-
 uint32_t core_register(unsigned number)
 {
-	return get(number == 14 ? UC_ARM_REG_LR : UC_ARM_REG_R0 + (int)number);
+	return core_get(number == 14 ? UC_ARM_REG_LR : UC_ARM_REG_R0 + (int)number);
 }
 
 void core_state(void)
@@ -502,6 +353,7 @@ static void boot(enum board_reset cause)
 	sampling_reset();
 	can_reset();
 	plant_reset();
+	exception_reset();
 	core_reset();
 }
 
@@ -526,7 +378,7 @@ static bool was_idle(void)
 {
 	bool quiet = !core.interrupted && !board.wrote, same;
 
-	add_tally(POLL, core.level[0].instructions);
+	add_tally(POLL, *exception_instructions());
 	if (!quiet)
 		return false;
 	same = memcmp(core.before, board.sram, sizeof(core.before)) == 0;
@@ -537,12 +389,12 @@ static bool was_idle(void)
 
 bool core_waits(void)
 {
-	return core.waiting && core.depth == 0;
+	return core.waiting && exception_depth() == 0;
 }
 
 static void begin_poll(void)
 {
-	core.level[0].instructions = 0;
+	*exception_instructions() = 0;
 	core.interrupted = board.wrote = board.woken = core.waiting = false;
 	core.pass_idle = true;
 	if (watch != NULL)
@@ -561,7 +413,7 @@ static void idle(void)
 	if (!core.waiting)
 		board.woken = false;
 	core.waiting = true;
-	while (!board.over && !board.reset_wanted && (board.hung || !board.woken) && next_exception() == 0) {
+	while (!board.over && !board.reset_wanted && (board.hung || !board.woken) && exception_next() == 0) {
 		board.now = next_event();
 		run_events();
 	}
@@ -573,11 +425,11 @@ static void run_processor(void)
 
 	core.limit = next_event();
 	core.stopped = 0;
-	error = uc_emu_start(core.uc, get(UC_ARM_REG_PC) | 1, 0xFFFFFFFE, 0, 0);
+	error = uc_emu_start(core.uc, core_get(UC_ARM_REG_PC) | 1, 0xFFFFFFFE, 0, 0);
 	if (error != UC_ERR_OK && !core.returning)
 		board_fail("%s", uc_strerror(error));
 	if (core.stopped != 0)
-		set(UC_ARM_REG_PC, core.stopped | 1);
+		core_set(UC_ARM_REG_PC, core.stopped | 1);
 }
 
 void core_boot(const struct core_watch *watching)
@@ -599,17 +451,17 @@ void core_pass(void)
 	run_events();
 	if (board.over || board.reset_wanted)
 		return;
-	take_exceptions();
+	exception_take();
 	if (core.paused)
 		return;
-	if (core.depth == core.held) { /* as if this instruction took so long */
+	if (exception_depth() == core.held) { /* as if this instruction took so long */
 		board.now = next_event();
 		return;
 	}
 	run_processor();
 	if (core.returning) {
 		core.returning = false;
-		leave_handler();
+		exception_leave();
 	} else if (core.at_idle) {
 		idle();
 	}
@@ -641,7 +493,6 @@ void core_report(const char *path)
 			fprintf(file, "%s %llu %u %u %llu\n", names[i],
 			        (unsigned long long)core.tally[i].calls, core.tally[i].least,
 			        core.tally[i].most, (unsigned long long)core.tally[i].sum);
-	fprintf(file, "stack 1 %u %u 0\n", BOARD_CCM + 4096 - core.lowest_stack,
-	        BOARD_CCM + 4096 - core.lowest_stack);
+	fprintf(file, "stack 1 %u %u 0\n", exception_stack(), exception_stack());
 	fclose(file);
 }

@@ -298,7 +298,7 @@ static void on_access(unsigned depth, uint32_t address, unsigned bytes, bool wri
 
 	if (phase != SURVEY || address - BOARD_SRAM >= BOARD_SRAM_BYTES - bytes)
 		return;
-	if (depth == 0 && !core_masks_control())
+	if (depth == 0 && !exception_masks_control())
 		bit = write ? MAIN_WROTE_OPEN : MAIN_READ_OPEN;
 	else if (depth > 0 && place_of(follow.exception[depth]) < PLACES_OF_CODE)
 		bit = write ? CONTROL_WROTE : CONTROL_READ;
@@ -390,13 +390,13 @@ static bool held_enough(void)
 {
 	unsigned control = follow.left[BOARD_PENDSV], turns = follow.left[BOARD_TIM1];
 
-	if (core_masks_all())
+	if (exception_masks_all())
 		return true;
 	switch (walk.variant) {
 	case TICK:
-		return control >= 1 || (core_masks_control() && turns >= 1);
+		return control >= 1 || (exception_masks_control() && turns >= 1);
 	case DOOR:
-		return control >= DOOR_TICKS || (core_masks_control() && turns >= 1);
+		return control >= DOOR_TICKS || (exception_masks_control() && turns >= 1);
 	case TURN:
 		return turns >= 1 && samples_left() >= 1;
 	default:
@@ -572,6 +572,7 @@ static void judge_sharing(void)
 void preempt_run(void)
 {
 	core_state();
+	exception_state();
 	registers_state();
 	system_state();
 	timer_state();

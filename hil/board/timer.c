@@ -54,7 +54,7 @@ static uint32_t count_at(const struct counter *c, int64_t time)
 static void raise_line(const struct counter *c)
 {
 	if (c->exception != 0)
-		core_line(c->exception, stored(c, TIM_SR) & stored(c, TIM_DIER) & 0x1F);
+		exception_line(c->exception, stored(c, TIM_SR) & stored(c, TIM_DIER) & 0x1F);
 }
 
 static void set_flag(const struct counter *c, uint32_t flag)
