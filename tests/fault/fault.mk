@@ -18,7 +18,7 @@ MUTATED_UNITS = $(MUTATED_UNIT_C:tests/unit/%.c=$(BUILD)/mutate/%)
 $(BUILD)/mutate/%.src.i: %.c Makefile
 	$(Q)mkdir -p $(@D)
 	$(Q)clang -std=c11 $(if $(filter $(FREESTANDING_C),$<),-ffreestanding,$(LINUX)) $(CPPFLAGS) -DDT_MUTANTS -E -MMD -MP -MT $@ \
-		-MF $(@:.i=.d) $< -o $@ && sed -i '/^#pragma GCC unroll/d' $@
+		-MF $(@:.i=.d) $< -o $@ && sed -i 's/^#pragma GCC unroll.*//' $@
 
 $(BUILD)/mutate/%.i: $(BUILD)/mutate/%.src.i tests/fault/instrument tests/fault/fault.mk
 	$(call say,MUTATE,$*.c)
