@@ -72,16 +72,28 @@ static bool clock_zone(struct scan *scan, int64_t *ns)
 	return true;
 }
 
+/* "2026-11-24" or "24.11.2026", and what parts it from the time of day. */
+static bool clock_date(struct scan *scan, int64_t *year, int64_t *month, int64_t *day)
+{
+	bool found = scan->at[4] == '-'
+	                     ? clock_number(scan, 4, 4, 9999, year) && clock_sign(scan, "-") &&
+	                               clock_number(scan, 2, 2, 12, month) && clock_sign(scan, "-") &&
+	                               clock_number(scan, 2, 2, 31, day)
+	                     : clock_number(scan, 2, 2, 31, day) && clock_sign(scan, ".") &&
+	                               clock_number(scan, 2, 2, 12, month) && clock_sign(scan, ".") &&
+	                               clock_number(scan, 4, 4, 9999, year);
+
+	return found && clock_sign(scan, "T ") && *month >= 1 && *day >= 1;
+}
+
 bool clock_parse(struct piece text, int64_t *ns, int *digits)
 {
 	struct scan scan = {text.text, text.text + text.length};
 	int64_t year, month, day, hour, minute, second, found = 0;
-	bool dated = text.length > 10 && text.text[4] == '-';
+	bool dated = text.length > 10 && (text.text[4] == '-' || text.text[2] == '.');
 
 	if (dated) {
-		if (!clock_number(&scan, 4, 4, 9999, &year) || !clock_sign(&scan, "-") ||
-		    !clock_number(&scan, 2, 2, 12, &month) || !clock_sign(&scan, "-") ||
-		    !clock_number(&scan, 2, 2, 31, &day) || !clock_sign(&scan, "T ") || month < 1 || day < 1)
+		if (!clock_date(&scan, &year, &month, &day))
 			return false;
 		found = timegm(&(struct tm){
 		                .tm_year = (int)year - 1900, .tm_mon = (int)month - 1, .tm_mday = (int)day}) *

@@ -2,7 +2,7 @@
 #ifndef DT_HOST_RECORD_CLOCK_H
 #define DT_HOST_RECORD_CLOCK_H
 /*
- * Times of day and dates as text: "13:04:05.123", "2026-11-24T13:04:05.123Z", "2026-11-24 13:04:05,1". Whole
+ * Times of day and dates as text: "13:04:05.123", "2026-11-24T13:04:05.123Z", "24.11.2026 13:04:05,1". Whole
  * nanoseconds, since a double of this century's seconds ends at a quarter of a microsecond. Any context.
  */
 #include <stdbool.h>

@@ -140,6 +140,8 @@ static bool is_data(const struct reading *reading)
 /* Leaves the first row of numbers in reading->row. */
 static int find_data(struct reading *reading)
 {
+	const char *rows = reading->source->bytes +
+	                   (reading->sniff != NULL && !reading->is_lvm ? reading->sniff->first : 0);
 	uint64_t first = 0;
 
 	/* behind the headers of a LabVIEW file stands one line of names, and nothing else */
@@ -151,7 +153,7 @@ static int find_data(struct reading *reading)
 	while (next_row(reading) && reading->line.number <= HEADER_LINES_MAX) {
 		if (first == 0)
 			first = reading->line.number;
-		if (is_data(reading))
+		if (reading->line.text >= rows && is_data(reading))
 			return 0;
 		header_offer(&reading->header, reading->style, &reading->columns, &reading->line);
 	}

@@ -87,6 +87,8 @@ struct piece sniff_stem(struct piece name)
 		}
 	while (name.length > 0 && strchr(" \t-,:", name.text[name.length - 1]))
 		name.length--;
+	if (name.length > 3 && memcmp(name.text + name.length - 3, " in", 3) == 0) /* "acceleration in g" */
+		name.length -= 3;
 	return name;
 }
 
