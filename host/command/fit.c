@@ -21,6 +21,7 @@
 
 struct arguments {
 	const char *scene_file, *output, *html, *archive;
+	const struct language *language;
 	double angle_sd_deg, speed_sd, gain_sd, common_gain_sd;
 	bool json;
 };
@@ -32,6 +33,7 @@ static const struct option_row rows[] = {
                     "write the scene with what was found, its standard uncertainties and their correlations"),
         OPTION_TEXT("html", "PAGE", struct arguments, html,
                     "write a page: tables, residuals, and what is predicted over the angle"),
+        COMMAND_LANGUAGE_ROW(struct arguments, language),
         OPTION_TEXT("archive", "DIR", struct arguments, archive,
                     "the archive of a SERIES (default $DROPTOWER_ARCHIVE or ./archive)"),
         OPTION_NUMBER("angle-sd", "DEG", struct arguments, angle_sd_deg, 0.01, 10,
@@ -239,7 +241,9 @@ static int fit_page(const struct fitted *fitted, const char *file)
 static int fit_told(const struct fitting *f)
 {
 	const struct fit *fit = &f->fit;
-	const struct fitted fitted = {fit, f->name, &f->scene, f->drop, &f->options, DT_VERSION};
+	const struct translation translation = {f->a->language, command_untranslated, NULL};
+	const struct fitted fitted = {fit,         f->name,    &f->scene,   f->drop,
+	                              &f->options, DT_VERSION, &translation};
 
 	(f->a->json ? fitted_json : fitted_text)(&fitted, stdout);
 	if (f->a->html != NULL && fit_page(&fitted, f->a->html) != COMMAND_DONE)

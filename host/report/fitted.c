@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/report/fitted.h"
+#include "host/base/html.h"
 
 #include <math.h>
 
@@ -23,7 +24,8 @@ struct parameter_row {
 };
 
 static const struct table_column parameter_columns[] = {
-        TABLE_COLUMN(WORDS, struct parameter_row, name, .key = "name", .title = "parameter", .width = -18),
+        TABLE_COLUMN(WORDS, struct parameter_row, name, .key = "name", .title = "parameter", .width = -18,
+                     .own = true),
         TABLE_COLUMN(VALUE, struct parameter_row, value, .key = "value", .sigma = "u", .title = "value",
                      .width = 12, .digits = TABLE_DIGITS_G),
         TABLE_COLUMN(NUMBER, struct parameter_row, value.sigma, .title = "+-", .width = 11, .digits = -3),
@@ -217,14 +219,17 @@ void fitted_json(const struct fitted *f, FILE *out)
 	        fit->next.largest >= 0 ? scene_fitted[fit->next.largest] : "", fit->next.largest_sd);
 }
 
-void fitted_next(const struct fit *fit, FILE *out)
+void fitted_next(const struct fit *fit, enum table_format format, FILE *out)
 {
+	bool page = format == TABLE_HTML;
+
 	if (fit->next.largest >= 0 && fitted_holds(fit))
 		fprintf(out,
 		        "next drop: %.0f deg from %.3f m tells most of %d to %d deg (%.1f in the log of the "
-		        "information); the weakest is then %s\n",
+		        "information); the weakest is then %s%s%s\n",
 		        fit->next.angle_deg, fit->next.height_m, FIT_JUDGED_FROM_DEG, FIT_JUDGED_TO_DEG,
-		        fit->next.d_gain, scene_fitted[fit->next.largest]);
+		        fit->next.d_gain, page ? (char[]){HTML_OWN, '\0'} : "",
+		        scene_fitted[fit->next.largest], page ? (char[]){HTML_OWN_END, '\0'} : "");
 }
 
 void fitted_text(const struct fitted *f, FILE *out)
@@ -246,5 +251,5 @@ void fitted_text(const struct fitted *f, FILE *out)
 		fprintf(out, "gains scatter more than --gain-sd says: all variances are taken %.1f times\n",
 		        fit->widened);
 	fprintf(out, "starts: %u of %u came to the same\n", fit->agreed, fit->starts);
-	fitted_next(fit, out);
+	fitted_next(fit, TABLE_TEXT, out);
 }

@@ -14,7 +14,8 @@ struct fitted {
 	const struct scene *start;
 	const struct fit_drop *drop;
 	const struct fit_options *options;
-	const char *version; /* of the program */
+	const char *version;                   /* of the program */
+	const struct translation *translation; /* of the page; NULL: English */
 };
 
 /* Whether its bars hold: nothing is left unexplained, and no parameter is beyond what is allowed. */
@@ -28,7 +29,7 @@ enum { FITTED_FROM_DEG = 15, FITTED_TO_DEG = 45, FITTED_STEP_DEG = 5 };
 void fitted_predictions(const struct fit *fit, enum table_format format, FILE *out);
 
 /* Which drop to do next, one line; nothing where the fit does not hold. */
-void fitted_next(const struct fit *fit, FILE *out);
+void fitted_next(const struct fit *fit, enum table_format format, FILE *out);
 
 void fitted_text(const struct fitted *fitted, FILE *out);
 void fitted_json(const struct fitted *fitted, FILE *out);

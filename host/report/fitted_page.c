@@ -196,13 +196,16 @@ static void fitted_head(FILE *out, const struct fitted *f)
 	fprintf(out, "<p>A product's parameters, fitted to the whole histories of %u drop%s.</p>\n",
 	        f->fit->drops, f->fit->drops == 1 ? "" : "s");
 	fprintf(out, "<div class=\"verdict %s\">%s ", holds ? "good" : "bad", holds ? "&#10003;" : "&#9888;");
-	if (holds)
-		fputs("Nothing is left unexplained.", out);
-	else if (f->fit->doubt.words[0])
+	if (holds) {
+		fputs("Nothing is left unexplained.</div>\n", out);
+		return;
+	}
+	fputs("No uncertainty holds.</div>\n<p>", out);
+	if (f->fit->doubt.words[0])
 		html_text(out, f->fit->doubt.words);
 	else
-		fputs("A parameter came out beyond what the scene allows.", out);
-	fputs(holds ? "</div>\n" : " No uncertainty holds.</div>\n", out);
+		fputs("A parameter came out beyond what the scene allows", out);
+	fputs(".</p>\n", out);
 }
 
 static void fitted_residuals(struct page *page, const struct fitted *f)
@@ -218,7 +221,7 @@ static void fitted_residuals(struct page *page, const struct fitted *f)
 	        doubt->periodogram_hz);
 	pictures_left(page, f, 0, f->fit->drops, false);
 	fputs("<h2>", page->out);
-	html_text(page->out, f->name[worst]);
+	html_own(page->out, f->name[worst]);
 	fputs("</h2>\n<p class=\"soft\">The drop whose angle, speed and gains are furthest from what was "
 	      "said of "
 	      "them: samples, and the fit as a line.</p>\n",
@@ -247,7 +250,7 @@ static void fitted_write(struct page *page, const struct fitted *f)
 		fputs("</div>\n", out);
 		fitted_predictions(f->fit, TABLE_HTML, out);
 		fputs("<p>", out);
-		fitted_next(f->fit, out);
+		fitted_next(f->fit, TABLE_HTML, out);
 		fputs("</p>\n", out);
 	}
 	fitted_residuals(page, f);
@@ -257,7 +260,7 @@ static void fitted_write(struct page *page, const struct fitted *f)
 
 int fitted_page(const struct fitted *f, FILE *out, char *message, size_t size)
 {
-	struct page page = {.message = message, .size = size};
+	struct page page = {.translation = f->translation, .message = message, .size = size};
 	int result = page_open(&page, out);
 
 	snprintf(message, size, "%s", error_text(DT_E_MEMORY));
