@@ -34,6 +34,111 @@ bool number_whole(const char *text, uint64_t min, uint64_t max, uint64_t *value)
 	return true;
 }
 
+/* ---- what strtod would say of what is usual, without it ---- */
+
+enum { HELD = 19 }; /* digits that a uint64_t holds */
+
+static const uint64_t power_of_ten[HELD + 1] = {1,
+                                                10,
+                                                100,
+                                                1000,
+                                                10000,
+                                                100000,
+                                                1000000,
+                                                10000000,
+                                                100000000,
+                                                1000000000,
+                                                10000000000,
+                                                100000000000,
+                                                1000000000000,
+                                                10000000000000,
+                                                100000000000000,
+                                                1000000000000000,
+                                                10000000000000000,
+                                                100000000000000000,
+                                                1000000000000000000,
+                                                10000000000000000000u};
+
+/* digits / divisor, rounded once: 63 or 64 bits of the quotient with all that is below them in the last. */
+static double quotient(uint64_t digits, uint64_t divisor)
+{
+	const int up = __builtin_clzll(digits), divisor_up = __builtin_clzll(divisor);
+	const unsigned __int128 dividend = (unsigned __int128)(digits << up) << 63;
+	const uint64_t whole = (uint64_t)(dividend / (divisor << divisor_up));
+	const bool rest = dividend != (unsigned __int128)whole * (divisor << divisor_up);
+
+	return ldexp((double)(whole | rest), divisor_up - up - 63);
+}
+
+/* digits times 10^exponent; false where one rounding does not do. */
+static bool scaled(uint64_t digits, int exponent, double *value)
+{
+	const uint64_t exact = UINT64_C(1) << DBL_MANT_DIG;
+
+	if (digits == 0)
+		*value = 0;
+	else if (exponent < -HELD || exponent > HELD || (exponent > 0 && digits > exact))
+		return false;
+	else if (exponent >= 0)
+		*value = (double)digits * (double)power_of_ten[exponent];
+	else if (digits <= exact)
+		*value = (double)digits / (double)power_of_ten[-exponent];
+	else
+		*value = quotient(digits, power_of_ten[-exponent]);
+	return true;
+}
+
+static bool read_exponent(const char *text, size_t length, int *exponent)
+{
+	size_t at = length > 0 && (text[0] == '+' || text[0] == '-');
+	int size = 0;
+
+	if ((length - at) - 1 > 2) /* 1 to 3 digits */
+		return false;
+	for (size_t i = at; i < length; i++) {
+		if (text[i] < '0' || text[i] > '9')
+			return false;
+		size = 10 * size + (text[i] - '0');
+	}
+	*exponent += at > 0 && text[0] == '-' ? -size : size;
+	return true;
+}
+
+/* Sign, up to HELD digits with a decimal sign among them, exponent. False: strtod has to say what it is. */
+static bool parse_usual(const char *text, size_t length, char decimal, double *value)
+{
+	const bool sign = text[0] == '-' || text[0] == '+';
+	unsigned held = 0, point = 0, seen = 0;
+	uint64_t digits = 0;
+	int exponent = 0;
+	size_t at = sign;
+
+	for (; at < length; at++) {
+		const unsigned digit = (unsigned)(unsigned char)text[at] - '0';
+
+		if (digit < 10) {
+			digits = 10 * digits + digit;
+			held += held > 0 || digit != 0;
+			exponent -= (int)point;
+			seen = 1;
+			if (held > HELD)
+				return false;
+		} else if (text[at] == decimal && point == 0) {
+			point = 1;
+		} else {
+			break;
+		}
+	}
+	if (seen == 0 ||
+	    (at < length &&
+	     ((text[at] | 0x20) != 'e' || !read_exponent(text + at + 1, length - at - 1, &exponent))) ||
+	    !scaled(digits, exponent, value))
+		return false;
+	if (text[0] == '-')
+		*value = -*value;
+	return true;
+}
+
 bool number_parse(const char *text, size_t length, char decimal, double *value)
 {
 	char copy[LENGTH_MAX + 1];
@@ -42,6 +147,10 @@ bool number_parse(const char *text, size_t length, char decimal, double *value)
 
 	if (length == 0 || length > LENGTH_MAX)
 		return false;
+	if (parse_usual(text, length, decimal, &parsed)) {
+		*value = parsed;
+		return true;
+	}
 	for (size_t i = 0; i < length; i++) {
 		char c = text[i];
 
@@ -59,7 +168,7 @@ bool number_parse(const char *text, size_t length, char decimal, double *value)
 
 /* ---- the shortest form ---- */
 
-enum { HELD = 19, ENOUGH = 17 }; /* digits that a uint64_t holds; that read back equal whatever the value */
+enum { ENOUGH = 17 }; /* digits that read back equal whatever the value */
 
 /* d.ddd times 10^exponent, the last of the HELD digits rounded. */
 struct decimal {

@@ -221,12 +221,10 @@ double cells_last_digit(const struct cells *cells, size_t i, int *digits)
 	return pow(10, exponent - places);
 }
 
-size_t cells_tail(const struct cells *cells, size_t i)
+size_t cells_tail(struct piece cell, char decimal)
 {
-	struct piece cell = cells->cell[i];
-
 	for (size_t k = 0; k < cell.length; k++)
-		if (cell.text[k] == cells->decimal || cell.text[k] == 'e' || cell.text[k] == 'E')
+		if (cell.text[k] == decimal || cell.text[k] == 'e' || cell.text[k] == 'E')
 			return cell.length - k;
 	return 0;
 }

@@ -59,7 +59,7 @@ double cells_last_digit(const struct cells *cells, size_t i, int *digits);
 
 /* Digits behind the decimal sign, with the exponent's length: what a number loses first when its end is cut.
  */
-size_t cells_tail(const struct cells *cells, size_t i);
+size_t cells_tail(struct piece cell, char decimal);
 
 /* Cells of a line of names, cut at the one separator that gives this many; false where none does. Of blanks,
  * a unit in brackets belongs to the name before it. */

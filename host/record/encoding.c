@@ -68,9 +68,22 @@ static size_t from_cp1252(const unsigned char *bytes, size_t size, char *to)
 	return used;
 }
 
+/* Where the next byte beyond ASCII may be. */
+static size_t skip_ascii(const unsigned char *bytes, size_t size, size_t at)
+{
+	uint64_t eight;
+
+	for (; size - at >= sizeof(eight); at += sizeof(eight)) {
+		memcpy(&eight, bytes + at, sizeof(eight));
+		if ((eight & UINT64_C(0x8080808080808080)) != 0)
+			break;
+	}
+	return at;
+}
+
 static bool is_utf8(const unsigned char *bytes, size_t size)
 {
-	for (size_t at = 0; at < size; at++) {
+	for (size_t at = skip_ascii(bytes, size, 0); at < size; at = skip_ascii(bytes, size, at + 1)) {
 		unsigned char c = bytes[at];
 		size_t more = c < 0x80 ? 0 : c >> 5 == 6 ? 1 : c >> 4 == 14 ? 2 : c >> 3 == 30 ? 3 : 4;
 

@@ -44,8 +44,8 @@ struct reading {
 	size_t bad[COLUMNS_MAX];  /* by column */
 	size_t used[COLUMNS_MAX]; /* rows up to the last that is not empty */
 	struct cells row;
-	size_t tail[COLUMNS_MAX];   /* of the row before */
-	size_t length[COLUMNS_MAX]; /* of its cells, without a sign */
+	struct piece before[COLUMNS_MAX]; /* of each column, the last that was a number */
+	char decimal_before[COLUMNS_MAX];
 
 	/* of the time column, in its own unit: the finest place of all rows, most digits, the largest number
 	 */
@@ -216,8 +216,8 @@ static void note_number(struct reading *reading, size_t i)
 {
 	struct piece cell = reading->row.cell[i];
 
-	reading->tail[i] = cells_tail(&reading->row, i);
-	reading->length[i] = unsigned_length(cell);
+	reading->before[i] = cell;
+	reading->decimal_before[i] = reading->row.decimal;
 	if ((reading->style.decimal && reading->sniff == NULL) || reading->is_lvm ||
 	    reading->row.decimal != ',' || cell.length == 0)
 		return;
@@ -231,16 +231,17 @@ static void note_number(struct reading *reading, size_t i)
  * A whole number loses its last digits first. */
 static bool read_delimited_is_cut(const struct reading *reading, size_t i)
 {
-	size_t tail = cells_tail(&reading->row, i);
+	size_t tail;
 	double value;
 
 	if (!reading->unterminated || i + 1 != reading->row.count)
 		return false;
 	if (!cells_number(&reading->row, i, &value))
 		return true;
+	tail = cells_tail(reading->row.cell[i], reading->row.decimal);
 	return reading->rows > 0 &&
-	       (tail < reading->tail[i] ||
-	        (tail == 0 && unsigned_length(reading->row.cell[i]) < reading->length[i]));
+	       (tail < cells_tail(reading->before[i], reading->decimal_before[i]) ||
+	        (tail == 0 && unsigned_length(reading->row.cell[i]) < unsigned_length(reading->before[i])));
 }
 
 static int take_clock(struct reading *reading, size_t i)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * The shortest form of a number against printf and strtod asked for one digit more each time.
+ * The shortest form of a number against printf and strtod asked for one digit more each time, and the reading
+ * of one against strtod.
  */
 #include <math.h>
 #include <stdarg.h>
@@ -75,11 +76,96 @@ static void any(void **state)
 	}
 }
 
+/* A number or none, as strtod says, to the bit. */
+static void check_read(const char *text)
+{
+	double value = 7, expected;
+	bool read = number_parse(text, strlen(text), '.', &value), is;
+	char *end;
+
+	expected = strtod(text, &end);
+	is = end != text && *end == '\0' && isfinite(expected) &&
+	     text[strspn(text, "0123456789+-.eE")] == '\0';
+	if (read != is || (is && memcmp(&value, &expected, sizeof(value)) != 0))
+		fail_msg("'%s' is read as %d %a, expected %d %a", text, read, value, is, expected);
+}
+
+static void reads(void **state)
+{
+	static const char *const text[] = {"0",
+	                                   "-0",
+	                                   "+5",
+	                                   ".5",
+	                                   "5.",
+	                                   ".",
+	                                   "-",
+	                                   "+",
+	                                   "e5",
+	                                   "1e",
+	                                   "1e+",
+	                                   "1e-5",
+	                                   "1E05",
+	                                   "1e0005",
+	                                   "1e22",
+	                                   "1e23",
+	                                   "9007199254740993",
+	                                   "9007199254740992.5",
+	                                   "9007199254740993e1",
+	                                   "18446744073709551615",
+	                                   "9999999999999999999",
+	                                   "0.9999999999999999999",
+	                                   "99999999999999999999",
+	                                   "0.000142857142857143",
+	                                   "1e400",
+	                                   "1e-400",
+	                                   "1.2.3",
+	                                   "1 ",
+	                                   " 1",
+	                                   "0x10",
+	                                   "inf",
+	                                   "nan",
+	                                   "--1",
+	                                   "1-",
+	                                   "1e5.0",
+	                                   "00000000000000000000000001.5",
+	                                   "1e999",
+	                                   "-0.0e-7",
+	                                   "4.35",
+	                                   "1.7976931348623157e308",
+	                                   "8.5e-19",
+	                                   "0.0000000000000000001"};
+	struct synth_random random = {2};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(text) / sizeof(text[0]); i++)
+		check_read(text[i]);
+	for (int i = 0; i < 200000; i++) {
+		uint64_t digits = (uint64_t)(ldexp(synth_uniform(&random), 32)) << 32 |
+		                  (uint64_t)(ldexp(synth_uniform(&random), 32));
+		char line[64], whole[24];
+		int used, point;
+
+		digits >>= (int)(64 * synth_uniform(&random));
+		used = snprintf(whole, sizeof(whole), "%llu", (unsigned long long)digits);
+		point = (int)((used + 1) * synth_uniform(&random));
+		snprintf(line, sizeof(line), "%s%.*s.%s", i % 2 ? "-" : "", point, whole, whole + point);
+		check_read(line);
+		snprintf(line, sizeof(line), "0.%0*d%s", 1 + i % 4, 0, whole);
+		check_read(line);
+		snprintf(line, sizeof(line), "%.*s.%se%d", point, whole, whole + point, i % 61 - 30);
+		check_read(line);
+		/* halfway between two doubles, and a last digit beside it */
+		snprintf(line, sizeof(line), "%.*f", i % 9, (double)(digits >> 11) + 0.5);
+		check_read(line);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(edges),
 	        cmocka_unit_test(any),
+	        cmocka_unit_test(reads),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
