@@ -398,6 +398,8 @@ static bool held_enough(void)
 	case DOOR:
 		return control >= DOOR_TICKS || (exception_masks_control() && turns >= 1);
 	case TURN:
+		if (turns == 0) /* those of the millisecond before do not count */
+			follow.left[BOARD_TIM3] = follow.left[BOARD_TIM4] = 0;
 		return turns >= 1 && samples_left() >= 1;
 	default:
 		return samples_left() >= 1;
