@@ -21,6 +21,7 @@ MAN_DATE = $(shell git log -1 --format=%cs 2>/dev/null || date +%F)
 man: all ## write the manual's pages into build/man
 	@rm -rf $(MAN)
 	@$(INSTALL_IN)/manual $(BUILD)/droptower $(MAN) $(MAN_DATE) $(VERSION)
+	@for p in $(filter-out droptower,$(notdir $(INSTALLED_PROGRAMS))); do echo '.so man1/droptower.1' >$(MAN)/$$p.1; done
 
 # put MODE FILES FOLDER
 put = @install -d '$(DESTDIR)$(3)' && install -m $(1) $(2) '$(DESTDIR)$(3)/'
@@ -28,7 +29,8 @@ put = @install -d '$(DESTDIR)$(3)' && install -m $(1) $(2) '$(DESTDIR)$(3)/'
 install: man $(CONSOLE) ## install below PREFIX (/usr/local), all of it below DESTDIR
 	$(call put,755,$(INSTALLED_PROGRAMS),$(BINDIR))
 	$(call put,644,$(INSTALLED_SCENES),$(SHARE)/droptower/scenes)
-	$(call put,644,host/batch/droptower.sbatch $(wildcard $(INSTALL_IN)/droptower_example.*),$(SHARE)/droptower)
+	$(call put,755,host/batch/droptower.sbatch,$(SHARE)/droptower)
+	$(call put,644,$(wildcard $(INSTALL_IN)/droptower_example.*),$(SHARE)/droptower)
 	$(call put,644,$(wildcard common/scenes/sensors/*.ini),$(SHARE)/droptower/scenes/sensors)
 	$(call put,644,$(MAN)/*.1,$(SHARE)/man/man1)
 	$(call put,644,$(INSTALL_IN)/80-can0.network,$(LIBDIR)/systemd/network)
@@ -60,7 +62,7 @@ DEB = $(BUILD)/droptower.deb
 DEB_STAGE = $(BUILD)/deb
 
 .PHONY: deb
-deb: ## build a Debian package of this version, build/droptower.deb
+deb: ## build a Debian package of this version, build/droptower.deb; DEBEMAIL= is its maintainer's address
 	@rm -rf $(DEB_STAGE)
 	@$(MAKE) --no-print-directory BUILD=$(BUILD) PREFIX=/usr DESTDIR=$(abspath $(DEB_STAGE)) install
 	@$(INSTALL_IN)/deb $(DEB_STAGE) 0~git$(shell git log -1 --format=%cd --date=format:%Y%m%d 2>/dev/null).$(subst -,.,$(VERSION)) $(DEB)
