@@ -21,7 +21,7 @@ MAN_DATE = $(shell git log -1 --format=%cs 2>/dev/null || date +%F)
 man: all ## write the manual's pages into build/man
 	@rm -rf $(MAN)
 	@$(INSTALL_IN)/manual $(BUILD)/droptower $(MAN) $(MAN_DATE) $(VERSION)
-	@for p in $(filter-out droptower,$(notdir $(INSTALLED_PROGRAMS))); do echo '.so man1/droptower.1' >$(MAN)/$$p.1; done
+	@for p in $(filter-out droptower,$(notdir $(INSTALLED_PROGRAMS))); do ln -s droptower.1 $(MAN)/$$p.1; done
 
 # put MODE FILES FOLDER
 put = @install -d '$(DESTDIR)$(3)' && install -m $(1) $(2) '$(DESTDIR)$(3)/'
