@@ -43,7 +43,7 @@ struct place {
 	uint8_t length;
 };
 
-static struct place find(struct segment_join *join, uint32_t id)
+static struct place find_place(struct segment_join *join, uint32_t id)
 {
 	switch (id) {
 	case WIRE_ID_RESENT_S1:
@@ -78,8 +78,8 @@ static void give_up(struct segment_join *join, struct segment_copy *copy)
 
 /* A copy begins with its first segment, or with one that lies before the position expected: then the first
  * was lost. */
-static void begin(struct segment_join *join, const struct place *place, unsigned position,
-                  const uint8_t *payload)
+static void begin_copy(struct segment_join *join, const struct place *place, unsigned position,
+                       const uint8_t *payload)
 {
 	struct segment_copy *copy = place->copy;
 
@@ -96,7 +96,8 @@ static void begin(struct segment_join *join, const struct place *place, unsigned
 
 /* True when it completes the message. What is held and differs, or has another first segment, is another's:
  * the new one is believed. */
-static bool keep(struct segment_message *message, unsigned position, const uint8_t *payload, unsigned length)
+static bool keep_payload(struct segment_message *message, unsigned position, const uint8_t *payload,
+                         unsigned length)
 {
 	uint8_t *to = message->data + PAYLOAD * position;
 	unsigned bytes = bytes_in(length, position);
@@ -124,16 +125,16 @@ static bool append(struct segment_join *join, const struct place *place, const s
 	if (repeated(copy, position, piece->payload, place->length))
 		return false;
 	if (position == 0 || position < copy->next)
-		begin(join, place, position, piece->payload);
+		begin_copy(join, place, position, piece->payload);
 	if (position != copy->next)
 		give_up(join, copy);
 	copy->next = (uint8_t)(position + 1);
-	return copy->message != NULL && keep(copy->message, position, piece->payload, place->length);
+	return copy->message != NULL && keep_payload(copy->message, position, piece->payload, place->length);
 }
 
 const struct frame *segment_feed(struct segment_join *join, const struct frame *frame)
 {
-	struct place place = find(join, frame->id);
+	struct place place = find_place(join, frame->id);
 	struct wire_segment piece;
 
 	if (place.copy == NULL || (frame->flags & FRAME_FD) || wire_unpack_segment(frame, &piece) != 0)

@@ -80,7 +80,7 @@ static void judge_clocks(struct acquire *acquire, const struct acquire_page *pag
 	acquire->clock_yz = 0;
 }
 
-static void fill(int16_t *code, unsigned count, unsigned places)
+static void fill_places(int16_t *code, unsigned count, unsigned places)
 {
 	for (unsigned k = count; k < places; k++)
 		code[k] = WIRE_SAMPLE_NOT_TAKEN;
@@ -92,9 +92,9 @@ static void fill_page(struct acquire_page *page)
 	for (unsigned s = 0; s < WIRE_SENSORS; s++) {
 		struct acquire_samples *samples = &page->tick.sensor[s];
 
-		fill(samples->x, page->x_count, WIRE_X_PER_TICK);
-		fill(samples->y, page->yz_count, WIRE_YZ_PER_TICK);
-		fill(samples->z, page->yz_count, WIRE_YZ_PER_TICK);
+		fill_places(samples->x, page->x_count, WIRE_X_PER_TICK);
+		fill_places(samples->y, page->yz_count, WIRE_YZ_PER_TICK);
+		fill_places(samples->z, page->yz_count, WIRE_YZ_PER_TICK);
 	}
 }
 
@@ -211,7 +211,7 @@ static bool all_small(const struct acquire_samples *samples)
 	return (differ & 0xC000C000u) == 0;
 }
 
-static void judge(struct acquire *acquire, struct acquire_tick *tick, unsigned sensor)
+static void judge_sample(struct acquire *acquire, struct acquire_tick *tick, unsigned sensor)
 {
 	const struct acquire_samples *samples = &tick->sensor[sensor];
 	uint32_t range = acquire->parameters->value[WIRE_PARAMETER_range_counts];
@@ -229,7 +229,7 @@ int acquire_take(struct acquire *acquire, struct acquire_tick *tick)
 	int result = ring_get(&acquire->queue, tick);
 
 	for (unsigned s = 0; s < WIRE_SENSORS && result == 0; s++)
-		judge(acquire, tick, s);
+		judge_sample(acquire, tick, s);
 	return result;
 }
 

@@ -55,7 +55,7 @@ bool hosts_here(const struct hosts *hosts, uint32_t session)
 	return false;
 }
 
-static bool named(const struct hosts *hosts, unsigned i, uint16_t low)
+static bool has_session(const struct hosts *hosts, unsigned i, uint16_t low)
 {
 	return hosts->host[i].session != 0 && (uint16_t)hosts->host[i].session == low;
 }
@@ -63,7 +63,7 @@ static bool named(const struct hosts *hosts, unsigned i, uint16_t low)
 bool hosts_hash_differs(const struct hosts *hosts, uint16_t low)
 {
 	for (unsigned i = 0; i < HOSTS_MAX; i++)
-		if (named(hosts, i, low) && !hosts->host[i].hash_good)
+		if (has_session(hosts, i, low) && !hosts->host[i].hash_good)
 			return true;
 	return false;
 }
@@ -74,7 +74,7 @@ int hosts_find(const struct hosts *hosts, uint16_t low, uint32_t answer, uint32_
 	int result = DT_E_SESSION;
 
 	for (unsigned i = 0; i < HOSTS_MAX; i++) {
-		if (!named(hosts, i, low) || !hosts->host[i].hash_good)
+		if (!has_session(hosts, i, low) || !hosts->host[i].hash_good)
 			continue;
 		if (wire_answer(nonce, hosts->host[i].session, parameters_crc32) == answer) {
 			*session = hosts->host[i].session;

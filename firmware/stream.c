@@ -13,21 +13,21 @@ void stream_init(struct stream *stream, volatile uint32_t *counters)
 	stream->requests = (struct ring)RING_OVER(stream->requests_storage);
 }
 
-static bool idle(const struct stream *stream)
+static bool is_idle(const struct stream *stream)
 {
 	return !stream->waiting && ring_fill(&stream->queue) == 0;
 }
 
-static bool fits(const struct stream *stream, const struct frame *frame)
+static bool fits_bus(const struct stream *stream, const struct frame *frame)
 {
 	return !stream->classic || frame->length <= WIRE_LENGTH_segment;
 }
 
-static void put(struct stream *stream, const struct frame *frame)
+static void put_frame(struct stream *stream, const struct frame *frame)
 {
 	bool is_block = frame->length == WIRE_LENGTH_block;
 
-	if (idle(stream) && port_can_send(frame) == 0) {
+	if (is_idle(stream) && port_can_send(frame) == 0) {
 		stream->counters[WIRE_COUNTER_frames_sent]++;
 		return;
 	}
@@ -42,13 +42,13 @@ void stream_send(struct stream *stream, const struct frame *frame)
 {
 	struct frame segment;
 
-	if (fits(stream, frame)) {
-		put(stream, frame);
+	if (fits_bus(stream, frame)) {
+		put_frame(stream, frame);
 		return;
 	}
 	for (unsigned i = 0; i < segment_count(frame->length); i++) {
 		segment_cut(frame, i, &segment);
-		put(stream, &segment);
+		put_frame(stream, &segment);
 	}
 }
 
@@ -59,12 +59,12 @@ void stream_set_classic(struct stream *stream, bool classic)
 	struct frame frame;
 
 	stream->classic = classic;
-	if (stream->waiting && !fits(stream, &stream->next)) {
+	if (stream->waiting && !fits_bus(stream, &stream->next)) {
 		stream->waiting = false;
 		stream->counters[WIRE_COUNTER_frames_dropped]++;
 	}
 	for (; waiting > 0 && ring_get(&stream->queue, &frame) == 0; waiting--)
-		if (!fits(stream, &frame) || ring_put(&stream->queue, &frame) != 0)
+		if (!fits_bus(stream, &frame) || ring_put(&stream->queue, &frame) != 0)
 			stream->counters[WIRE_COUNTER_frames_dropped]++;
 }
 
@@ -161,7 +161,7 @@ static void resend_one(struct stream *stream, const struct capture *capture)
 
 static bool ready_for_block(const struct stream *stream)
 {
-	return stream->classic ? ring_fill(&stream->queue) < STREAM_UPLOAD_WAITING : idle(stream);
+	return stream->classic ? ring_fill(&stream->queue) < STREAM_UPLOAD_WAITING : is_idle(stream);
 }
 
 void stream_resend(struct stream *stream, const struct capture *capture)

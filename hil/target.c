@@ -282,7 +282,7 @@ static int bytes_needed(const struct target *target)
 	return (int)needed;
 }
 
-static void unpack(struct target *target, struct sensorbus_request *request, struct frame *frames)
+static void unpack_request(struct target *target, struct sensorbus_request *request, struct frame *frames)
 {
 	const uint8_t *p = target->input + sensorbus_get_request(target->input, request);
 
@@ -369,7 +369,7 @@ int target_receive(struct target *target, struct sensorbus_request *request,
 		if (got > 0)
 			target->fill += (size_t)got;
 	}
-	unpack(target, request, frames);
+	unpack_request(target, request, frames);
 	return 1;
 }
 

@@ -223,7 +223,7 @@ static void lay_out(char *at, struct decimal decimal, int digits)
 
 /* Without asking strtod whether it reads back equal: it does where it lies by less than half a place of the
  * value's from it. False where that is too near to say, and where places are not even to both sides. */
-static bool shorten(char *text, double value, int least)
+static bool shorten_decimal(char *text, double value, int least)
 {
 	const double size = fabs(value);
 	struct decimal decimal;
@@ -262,7 +262,7 @@ static bool shorten(char *text, double value, int least)
 
 void number_format(char text[NUMBER_CHARS], double value, int least)
 {
-	if (shorten(text, value, least))
+	if (shorten_decimal(text, value, least))
 		return;
 	for (int digits = least; digits <= ENOUGH; digits++) {
 		snprintf(text, NUMBER_CHARS, "%.*g", digits, value);

@@ -43,7 +43,7 @@ static int settle_series(struct archive *archive, const char *file, int64_t *row
 	return result == 0 ? sidecar_write_series(archive, *row) : result;
 }
 
-static int settle(struct archive *archive, const char *file)
+static int settle_file(struct archive *archive, const char *file)
 {
 	int64_t row;
 	int result;
@@ -68,6 +68,6 @@ int archive_change(struct archive *archive)
 	left = chain_left(archive, file);
 	if (left <= 0)
 		return left < 0 ? archive_end(archive, left) : 0;
-	result = archive_end(archive, settle(archive, file));
+	result = archive_end(archive, settle_file(archive, file));
 	return result != 0 ? result : archive_start(archive);
 }

@@ -62,8 +62,8 @@ static int said_of(struct text *text, const char *err, const char *path, bool fi
 	return result == 0 ? text_close(text, 0) : result;
 }
 
-static void refuse(struct worker *worker, const struct input *input, const struct noted *noted, int code,
-                   const char *why)
+static void refuse_input(struct worker *worker, const struct input *input, const struct noted *noted,
+                         int code, const char *why)
 {
 	atomic_fetch_add(&worker->shared->refused, 1);
 	input_note(worker->crew->notes, input, noted, code, why[0] != '\0' ? why : "no result");
@@ -89,24 +89,24 @@ static void count_results(struct worker *worker, unsigned long results, int code
 		atomic_fetch_add(&shared->failed, 1);
 }
 
-static void keep(struct worker *worker, const struct input *input, const struct noted *noted, int code,
-                 char *out, const char *err)
+static void keep_part(struct worker *worker, const struct input *input, const struct noted *noted, int code,
+                      char *out, const char *err)
 {
 	struct part part = {.bytes = out, .size = strlen(out), .results = lines_in(out), .code = code};
 	struct text said;
 
 	if (said_of(&said, err, input->path, part.results == 0) != 0) {
-		refuse(worker, input, noted, worker->crew->failed_code, error_text(DT_E_MEMORY));
+		refuse_input(worker, input, noted, worker->crew->failed_code, error_text(DT_E_MEMORY));
 		return;
 	}
 	part.said = said.bytes;
 	part.said_size = said.size;
 	if (!input_stayed(input, noted))
-		refuse(worker, input, noted, worker->crew->failed_code, "changed while it was read");
+		refuse_input(worker, input, noted, worker->crew->failed_code, "changed while it was read");
 	else if (part.results == 0)
-		refuse(worker, input, noted, code, said.bytes);
+		refuse_input(worker, input, noted, code, said.bytes);
 	else if (store_put(worker->crew->store, noted->key, &part) != 0)
-		refuse(worker, input, noted, worker->crew->failed_code, strerror(errno));
+		refuse_input(worker, input, noted, worker->crew->failed_code, strerror(errno));
 	else {
 		count_results(worker, part.results, code);
 		input_note(worker->crew->notes, input, noted, code, NULL);
@@ -126,7 +126,7 @@ static void analyse(struct worker *worker, const struct input *input, const stru
 	int code;
 
 	if (!empty(worker->out) || !empty(worker->err)) {
-		refuse(worker, input, noted, worker->crew->failed_code, strerror(errno));
+		refuse_input(worker, input, noted, worker->crew->failed_code, strerror(errno));
 		return;
 	}
 	code = worker->crew->analyse(input->path, worker->crew->context);
@@ -135,9 +135,9 @@ static void analyse(struct worker *worker, const struct input *input, const stru
 		err = process_read(worker->err, &size);
 	}
 	if (out != NULL && err != NULL)
-		keep(worker, input, noted, code, out, err);
+		keep_part(worker, input, noted, code, out, err);
 	else
-		refuse(worker, input, noted, worker->crew->failed_code, error_text(DT_E_MEMORY));
+		refuse_input(worker, input, noted, worker->crew->failed_code, error_text(DT_E_MEMORY));
 	clearerr(stdout);
 	free(out);
 	free(err);
@@ -151,7 +151,7 @@ static void crew_do(struct worker *worker, const struct input *input)
 	struct part part;
 
 	if (!was_noted && input_look(input, &noted) != 0) {
-		refuse(worker, input, &noted, worker->crew->failed_code, strerror(errno));
+		refuse_input(worker, input, &noted, worker->crew->failed_code, strerror(errno));
 	} else if (store_get(worker->crew->store, noted.key, &part)) {
 		atomic_fetch_add(&worker->shared->found, 1);
 		count_results(worker, part.results, part.code);
@@ -255,7 +255,7 @@ static size_t crew_give_up(struct leading *leading, size_t number, int status)
 	snprintf(why, sizeof(why), "the analysis died of it, %d times, by %s %d", ATTEMPTS,
 	         WIFSIGNALED(status) ? "signal" : "exit",
 	         WIFSIGNALED(status) ? WTERMSIG(status) : WEXITSTATUS(status));
-	refuse(&worker, input, &noted, leading->crew->failed_code, why);
+	refuse_input(&worker, input, &noted, leading->crew->failed_code, why);
 	atomic_fetch_add(&leading->shared->bytes, input->bytes);
 	atomic_fetch_add(&leading->shared->files, 1);
 	return 0;

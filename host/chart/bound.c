@@ -96,7 +96,7 @@ static void bound_sample(const struct fisher *fisher, const struct synthetic_sig
 }
 
 /* Scaled to a diagonal of 1 first: the units are far apart. */
-static int invert(double m[PARAMETERS][PARAMETERS], unsigned size)
+static int invert_fisher(double m[PARAMETERS][PARAMETERS], unsigned size)
 {
 	double scale[PARAMETERS], flat[PARAMETERS * PARAMETERS];
 	gsl_matrix_view view = gsl_matrix_view_array(flat, size, size);
@@ -140,7 +140,7 @@ static int bound_fill(struct fisher *fisher, double *jacobian, double *low, size
 				sum += jacobian[i * n + k] * jacobian[j * n + k];
 			fisher->covariance[i][j] = weight * sum;
 		}
-	return invert(fisher->covariance, size);
+	return invert_fisher(fisher->covariance, size);
 }
 
 static int fisher_open(struct fisher *fisher, struct synthetic *synthetic, int axis, enum part part)

@@ -75,7 +75,7 @@ struct question {
 	const struct model_options *options;
 };
 
-static void ask(const void *context)
+static void ask_model(const void *context)
 {
 	const struct question *q = context;
 	struct model_prediction p;
@@ -110,7 +110,7 @@ static int ask_drop(size_t rung, enum study_product product, size_t angle, struc
 	truth = (struct answer){fabs(truth.s1_r), fabs(truth.s2_x), fabs(truth.s2_y)};
 	add_answer(finest, product, &a, &truth);
 	if (cost_us)
-		*cost_us = timing_us(ask, &question, TIMING_BATCH_US, TIMING_BATCHES);
+		*cost_us = timing_us(ask_model, &question, TIMING_BATCH_US, TIMING_BATCHES);
 	return 0;
 }
 

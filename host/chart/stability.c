@@ -39,7 +39,7 @@ static void length(struct synthetic_scene *scene, double value)
 	scene->post_s = scene->contact_s + value / scene->damped_hz + PLAY_S;
 }
 
-static void rate(struct synthetic_scene *scene, double value)
+static void set_rate(struct synthetic_scene *scene, double value)
 {
 	scene->rate_hz[0] = value * 1e3;
 	scene->rate_hz[1] = value * 1e3 * 10 / 7;
@@ -101,7 +101,7 @@ static const struct sweep sweeps[] = {
         {"noise", "g", noise, {0.1, 0.3, 1, 3, 10, 30, 100}, 7},
         {"pulse", "", family, {0, 1, 2, 3}, 4},
         {"Y after X", "ms", skew, {0.1, 0.2, 0.5, 1}, 4},
-        {"rate", "kHz", rate, {28, 14, 7, 3.5, 2}, 5},
+        {"rate", "kHz", set_rate, {28, 14, 7, 3.5, 2}, 5},
         {"clipped", "% of peak", clipping, {1, 3, 10, 20, 30, 50}, 6},
         {"missing", "%", stability_missing, {1, 5, 10, 20, 40}, 5},
         {"run lost", "samples", lost, {1, 2, 4, 8, 20}, 5},
@@ -134,7 +134,7 @@ static const char *value_text(const struct sweep *sweep, size_t i, char text[32]
 	return text;
 }
 
-static bool fails(const struct map *map, const struct tally *t)
+static bool is_failing(const struct map *map, const struct tally *t)
 {
 	return !(tally_ratio(t) <= quantity_text(map->quantity)->fails) ||
 	       compare_gross(map->compare, t) > GROSS_MOST * map->compare->drops;
@@ -170,7 +170,7 @@ static int stability_write_csv(const struct chart_options *options, const struct
 				        map->method[m].told, sweeps[s].name, value_text(&sweeps[s], i, value),
 				        sweeps[s].unit, map->compare->drops, t->values,
 				        compare_gross(map->compare, t), t->doubted, tally_bias(t),
-				        tally_rms(t), t->bound, tally_ratio(t), fails(map, t));
+				        tally_rms(t), t->bound, tally_ratio(t), is_failing(map, t));
 			}
 	}
 	status = file_write(&text, options->folder, "stability", quantity_text(map->quantity)->name, "csv",
@@ -243,9 +243,9 @@ enum layer { LAYER_FAILS = SHADES + 1, LAYER_SAYS_SO, LAYERS };
 static bool stability_in_layer(const struct map *map, const struct tally *t, int layer)
 {
 	if (layer == LAYER_FAILS)
-		return fails(map, t);
+		return is_failing(map, t);
 	if (layer == LAYER_SAYS_SO)
-		return fails(map, t) && 2 * t->doubted >= map->compare->drops;
+		return is_failing(map, t) && 2 * t->doubted >= map->compare->drops;
 	return stability_shade_of(t) == layer;
 }
 
@@ -424,7 +424,7 @@ static void stability_print_table(FILE *out, const struct map *map)
 			continue;
 		fprintf(out, "  %-10s %-24s %-5s", map->method[m].ours ? "droptower" : "others",
 		        map->method[m].name, map->method[m].told ? "told" : "");
-		if (fails(map, &cell[CLEAN].tally[m])) {
+		if (is_failing(map, &cell[CLEAN].tally[m])) {
 			fputs("a drop with nothing wrong\n", out);
 			continue;
 		}
@@ -434,7 +434,7 @@ static void stability_print_table(FILE *out, const struct map *map)
 			for (size_t i = 0; i < sweeps[s].count; i++, cell++) {
 				char value[32];
 
-				if (said || !fails(map, &cell->tally[m]))
+				if (said || !is_failing(map, &cell->tally[m]))
 					continue;
 				said = true;
 				fprintf(out, "%s%s %s%s%s", failing++ ? ", " : "", sweeps[s].name,

@@ -455,7 +455,7 @@ static void add_spikes(struct synthetic *synthetic, enum synthetic_channel c)
 		        scene->spike_g;
 }
 
-static double converted(const struct synthetic_scene *scene, double value)
+static double quantized(const struct synthetic_scene *scene, double value)
 {
 	if (scene->clip_g > 0)
 		value = fmax(-scene->clip_g, fmin(scene->clip_g, value));
@@ -494,7 +494,7 @@ static void synthetic_fill(struct synthetic *synthetic, enum synthetic_channel c
 	}
 	add_spikes(synthetic, c);
 	for (size_t k = 0; k < channel->count; k++) {
-		channel->value_g[k] = converted(scene, channel->value_g[k]);
+		channel->value_g[k] = quantized(scene, channel->value_g[k]);
 		damage(synthetic, c, k);
 	}
 }

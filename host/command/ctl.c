@@ -141,7 +141,7 @@ static int not_over_lcm(const char *verb)
 	return COMMAND_LINK;
 }
 
-static int set(struct session *session, enum wire_parameter_number number, uint32_t value)
+static int set_parameter(struct session *session, enum wire_parameter_number number, uint32_t value)
 {
 	const struct wire_parameter_info *parameter = &wire_parameters[number];
 	int result = session_set_parameter(session, number, value);
@@ -300,7 +300,7 @@ static int ctl_carry_out(struct session *session, const struct arguments *argume
 	int result;
 
 	if (strcmp(order->verb, "set") == 0)
-		return set(session, order->number, order->value);
+		return set_parameter(session, order->number, order->value);
 	if (strcmp(order->verb, "get") == 0)
 		return get(session, order->all ? 0 : order->number,
 		           order->all ? WIRE_PARAMETERS - 1 : order->number);

@@ -199,7 +199,7 @@ int evaluate_take_limits(const struct option_table *table, const char *name, con
 }
 
 /* Against the scene's limits, or a preset's. */
-static int judge(struct evaluated *e, const struct evaluate_options *options)
+static int judge_limits(struct evaluated *e, const struct evaluate_options *options)
 {
 	const char *file = options->limits != NULL ? "--limits" : options->scene ? options->scene->name : "";
 	const char *limits = options->scene ? options->scene->limits : "";
@@ -392,7 +392,7 @@ static int evaluate_on(struct evaluated *e, const struct evaluate_options *optio
 		result = find_shocks(e, options, &e->report.options);
 	if (result == 0 && options->scene != NULL)
 		result = find_motion(e, options->scene);
-	return result == 0 ? judge(e, options) : result;
+	return result == 0 ? judge_limits(e, options) : result;
 }
 
 int evaluate_open(struct evaluated *e, const struct record *record, const struct evaluate_options *options)

@@ -21,7 +21,7 @@ struct table_pair {
 	int wrong;
 };
 
-static bool same(struct piece a, struct piece b)
+static bool is_same_text(struct piece a, struct piece b)
 {
 	return a.length == b.length && memcmp(a.at, b.at, a.length) == 0;
 }
@@ -64,7 +64,7 @@ static bool cell_named(struct piece head, struct piece line, struct piece title,
 	struct piece t;
 
 	for (size_t i = 0; cell_of(head, i, &t); i++)
-		if (same(t, title))
+		if (is_same_text(t, title))
 			return cell_of(line, i, cell);
 	return false;
 }
@@ -93,7 +93,8 @@ static void hold_row(struct table_pair *p, struct piece number, struct piece was
 	struct piece title, a, b;
 
 	for (size_t i = 0; cell_of(p->head[0], i, &title) && cell_of(was, i, &a); i++)
-		if (!same(title, named("note")) && cell_named(p->head[1], is, title, &b) && !same(a, b))
+		if (!is_same_text(title, named("note")) && cell_named(p->head[1], is, title, &b) &&
+		    !is_same_text(a, b))
 			tell_cell(p, number, title, a, b);
 }
 
@@ -103,7 +104,7 @@ static bool find_row(const struct table_pair *p, struct piece number, struct pie
 	struct piece other;
 
 	while (take_line(&at, row))
-		if (cell_named(p->head[1], *row, named("number"), &other) && same(number, other))
+		if (cell_named(p->head[1], *row, named("number"), &other) && is_same_text(number, other))
 			return true;
 	return false;
 }

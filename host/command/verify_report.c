@@ -43,7 +43,7 @@ bool verify_is_report(const char *file)
 	       strncmp(head, "<!doctype html", 14) == 0;
 }
 
-static void wrong(struct evidence *e, const char *what)
+static void tell_wrong(struct evidence *e, const char *what)
 {
 	e->wrong++;
 	command_error("%s: %s", e->file, what);
@@ -142,14 +142,14 @@ static int hold_drop(void *context, const struct archive_drop *drop)
 	if (strcmp(hash, drop->sha256) != 0) {
 		snprintf(text, sizeof(text), "exchanged: it names SHA-256 %.64s for %s/%u, expected %s", hash,
 		         drop->series.name, drop->number, drop->sha256);
-		wrong(e, text);
+		tell_wrong(e, text);
 	}
 	return 0;
 }
 
 static void verify_report_tell(void *context, const char *text)
 {
-	wrong(context, text);
+	tell_wrong(context, text);
 }
 
 static unsigned verify_report_named(const struct evidence *e)
@@ -195,7 +195,7 @@ static int verify_report_data(struct evidence *e, const struct archive_filter *f
 	if (result == 0)
 		result = text_close(&is, print_drops(e->archive, filter, false, TABLE_CSV, is.out));
 	if (result == 0 && (was == NULL || verify_data(was, is.bytes, verify_report_tell, e) < 0))
-		wrong(e, "its table of drops cannot be read");
+		tell_wrong(e, "its table of drops cannot be read");
 	free(is.bytes);
 	free(was);
 	return result;
@@ -216,12 +216,12 @@ static int verify_report_hold(struct evidence *e)
 		snprintf(text, sizeof(text), "%s in %.400s: no entry %lld with the head %s",
 		         e->entry == 0 ? "not sealed" : "chain broken", archive_folder(e->archive), e->entry,
 		         e->head);
-		wrong(e, text);
+		tell_wrong(e, text);
 	}
 	if (e->logs < verify_report_named(e)) {
 		snprintf(text, sizeof(text), "missing: it names %u drops of %s, %.300s has %u of them",
 		         verify_report_named(e), e->series, archive_folder(e->archive), e->logs);
-		wrong(e, text);
+		tell_wrong(e, text);
 	}
 	if (e->wrong > 0 || e->altered)
 		return COMMAND_INPUT;

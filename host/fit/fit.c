@@ -106,7 +106,7 @@ void fit_align(struct solve *s, struct solve_drop *d)
 }
 
 /* Stiffness of contact and mounts where the histories fit best, the rest as a start has it. */
-static void scan(struct solve *s)
+static void scan_starts(struct solve *s)
 {
 	int points = s->prior_sd[MOTION_LN_MOUNT_K] > 0.0 ? SCAN_POINTS : 1;
 	unsigned drops = s->drops;
@@ -211,7 +211,7 @@ static const struct minimum *lowest(const struct minimum *reached, unsigned coun
 }
 
 /* The lowest two go through the last stage: loose weights may rank them wrongly. */
-static bool choose(struct solve *s, const struct minimum *reached, unsigned count)
+static bool choose_minimum(struct solve *s, const struct minimum *reached, unsigned count)
 {
 	const struct minimum *first = lowest(reached, count, NULL), *second;
 	struct minimum end[2];
@@ -227,7 +227,7 @@ static bool choose(struct solve *s, const struct minimum *reached, unsigned coun
 }
 
 /* All starts through the first two stages. */
-static bool search(struct solve *s, struct fit *fit, struct minimum reached[STARTS])
+static bool search_minima(struct solve *s, struct fit *fit, struct minimum reached[STARTS])
 {
 	double from[FIT_COMMON], zero[FIT_DROPS_MAX][MOTION_AXES];
 	unsigned count = starts_of(s), n = 0;
@@ -238,7 +238,7 @@ static bool search(struct solve *s, struct fit *fit, struct minimum reached[STAR
 	s->common[MOTION_LN_GRIP] = log(starts[0].grip);
 	s->nodes = MOTION_NODES;
 	start_drops(s, (const double(*)[MOTION_AXES])zero, 0.0);
-	scan(s);
+	scan_starts(s);
 	memcpy(from, s->common, sizeof(from));
 	for (unsigned i = 0; i < count; i++) {
 		memcpy(s->common, from, sizeof(from));
@@ -255,7 +255,7 @@ static bool search(struct solve *s, struct fit *fit, struct minimum reached[STAR
 	fit->agreed = 0;
 	for (unsigned i = 0; i < n; i++)
 		fit->agreed += reached[i].squares < lowest(reached, n, NULL)->squares + 0.5;
-	return choose(s, reached, n);
+	return choose_minimum(s, reached, n);
 }
 
 /* ---- results ---- */
@@ -426,7 +426,7 @@ static int fit_prepared(const struct scene *start, const struct fit_options *opt
 		return DT_E_MEMORY;
 	}
 	fit_start_common(start, options, s);
-	found = search(s, fit, reached);
+	found = search_minima(s, fit, reached);
 	free(reached);
 	if (!found) {
 		snprintf(message, FIT_MESSAGE_MAX, "no parameters explain these drops: nothing converged");

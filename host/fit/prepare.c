@@ -136,7 +136,7 @@ static double impulse(const struct fit_channel *c, double touch_s, double zero_g
 	return sum / c->rate_hz;
 }
 
-static int refuse(char *message, const char *text)
+static int refuse_drop(char *message, const char *text)
 {
 	snprintf(message, FIT_MESSAGE_MAX, "%s", text);
 	return DT_E_ARGUMENT;
@@ -157,7 +157,7 @@ static int check_wiring(const struct scene *scene, const struct fit_drop *in, co
 			return DT_E_ARGUMENT;
 		}
 	if (scene->mount_plate_mass_kg > 0.0 && d->quarter_s[MOTION_S1X] < d->quarter_s[MOTION_S2X])
-		return refuse(
+		return refuse_drop(
 		        message,
 		        "S1 feels the impact before S2, expected the plate's sensor after the box's: are "
 		        "the sensors swapped?");
@@ -224,7 +224,8 @@ int prepare_drop(const struct scene *scene, const struct fit_drop *in, const str
 	*d = (struct solve_drop){.count = 0};
 	tenth = rise(&in->axis[MOTION_S2X], 0.1, &peak[MOTION_S2X]);
 	if (!isfinite(tenth))
-		return refuse(message, "S2X shows no impact, expected one pulse with a quiet part before it");
+		return refuse_drop(message,
+		                   "S2X shows no impact, expected one pulse with a quiet part before it");
 	d->touch_s = tenth - TOUCH_BEFORE_TENTH_S;
 	for (unsigned a = 0; a < MOTION_AXES; a++) {
 		if (!quiet_find(&in->axis[a], d->touch_s, &d->noise_g[a], &d->colour[a],
@@ -237,7 +238,7 @@ int prepare_drop(const struct scene *scene, const struct fit_drop *in, const str
 		d->quarter_s[a] = rise(&in->axis[a], 0.25, &peak[a]);
 	}
 	if (fabs(peak[MOTION_S2X]) < PEAK_MIN_NOISES * d->noise_g[MOTION_S2X])
-		return refuse(message, "S2X shows no impact above its noise");
+		return refuse_drop(message, "S2X shows no impact above its noise");
 	error = check_wiring(scene, in, d, message);
 	if (!error)
 		error = take_samples(in, d);

@@ -16,7 +16,7 @@ enum { PATH_BYTES = 512, NUMBERS_MOST = 1 << 27, TEXTS_MOST = 1 << 20, MEMBERS_M
 /* Whole numbers beyond this are told after the first one: they are instants in ns. */
 static const double WHOLE_MOST = 9007199254740992.0;
 
-static int refuse(const char *what, const char *why)
+static int refuse_foreign(const char *what, const char *why)
 {
 	fprintf(stderr, "HDF5: %.200s: %s\n", what, why);
 	return -1;
@@ -41,8 +41,9 @@ static int read_values(const struct values *of, hid_t type, void *to)
 	                                : H5Dread(of->id, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, to);
 
 	return error >= 0 ? 0
-	                  : refuse(of->path,
-	                           "cannot be read: cut or damaged, or packed in a way that is not known");
+	                  : refuse_foreign(
+	                            of->path,
+	                            "cannot be read: cut or damaged, or packed in a way that is not known");
 }
 
 /* ---- numbers ---- */
@@ -51,7 +52,8 @@ static int read_values(const struct values *of, hid_t type, void *to)
 static int take_instants(const struct values *of, double *value)
 {
 	int64_t *whole = malloc(of->count * sizeof(*whole));
-	int result = whole != NULL ? read_values(of, H5T_NATIVE_INT64, whole) : refuse(of->path, "no memory");
+	int result = whole != NULL ? read_values(of, H5T_NATIVE_INT64, whole)
+	                           : refuse_foreign(of->path, "no memory");
 
 	for (size_t k = 0; k < of->count && result == 0; k++)
 		value[k] = (double)(int64_t)((uint64_t)whole[k] - (uint64_t)whole[0]);
@@ -85,7 +87,7 @@ static void leave_fills(const struct values *of, double *value)
 static int put_numbers(const struct values *of, hid_t type, hid_t read_as, const char *path)
 {
 	double *value = malloc(of->count * sizeof(*value)), largest = 0;
-	int result = value != NULL ? read_values(of, read_as, value) : refuse(path, "no memory");
+	int result = value != NULL ? read_values(of, read_as, value) : refuse_foreign(path, "no memory");
 
 	for (size_t k = 0; k < of->count && result == 0; k++)
 		largest = fmax(largest, fabs(value[k]));
@@ -122,11 +124,11 @@ static int put_members(const struct values *of)
 
 		if (name == NULL ||
 		    snprintf(path, sizeof(path), "%s/%s", of->path, name) >= (int)sizeof(path))
-			result = refuse(of->path, "names that are too long");
+			result = refuse_foreign(of->path, "names that are too long");
 		else if (H5Tget_class(type) != H5T_INTEGER && H5Tget_class(type) != H5T_FLOAT)
 			result = put_other(path, "neither numbers nor text");
 		else if (H5Tinsert(one, name, 0, H5T_NATIVE_DOUBLE) < 0)
-			result = refuse(path, "cannot be read");
+			result = refuse_foreign(path, "cannot be read");
 		else
 			result = put_numbers(of, type, one, path);
 		H5free_memory(name);
@@ -183,7 +185,7 @@ static int put_texts(const struct values *of)
 	if (of->count > TEXTS_MOST)
 		return put_other(of->path, "too many texts");
 	if (text_open(&text) != 0)
-		return refuse(of->path, "no memory");
+		return refuse_foreign(of->path, "no memory");
 	result = H5Tis_variable_str(of->type) > 0 ? take_variable_text(of, text.out)
 	                                          : take_fixed_text(of, text.out);
 	if (text_close(&text, result) != 0)
@@ -274,7 +276,7 @@ static int put_one(hid_t id, const char *path, bool is_attribute)
 	of.type = is_attribute ? H5Aget_type(id) : H5Dget_type(id);
 	of.space = is_attribute ? H5Aget_space(id) : H5Dget_space(id);
 	if (of.type < 0 || of.space < 0)
-		result = refuse(path, "damaged");
+		result = refuse_foreign(path, "damaged");
 	else
 		result = put_values(&of);
 	if (of.space >= 0)
@@ -296,7 +298,7 @@ static herr_t on_attribute(hid_t object, const char *name, const H5A_info_t *inf
 	(void)info;
 	if (attribute < 0 ||
 	    snprintf(path, sizeof(path), "%s%s%s", of, of[0] != '\0' ? "/" : "", name) >= (int)sizeof(path))
-		refuse(name, "damaged, or a name that is too long");
+		refuse_foreign(name, "damaged, or a name that is too long");
 	else
 		result = put_one(attribute, path, true);
 	if (attribute >= 0)
@@ -313,7 +315,7 @@ static herr_t on_object(hid_t file, const char *name, const H5O_info_t *info, vo
 	(void)context;
 	if (object < 0 ||
 	    snprintf(path, sizeof(path), "%s", strcmp(name, ".") == 0 ? "" : name) >= (int)sizeof(path))
-		result = refuse(name, "damaged, or a name that is too long");
+		result = refuse_foreign(name, "damaged, or a name that is too long");
 	if (result == 0 && info->type == H5O_TYPE_DATASET)
 		result = put_one(object, path, false);
 	if (result == 0 && H5Aiterate2(object, H5_INDEX_NAME, H5_ITER_INC, NULL, on_attribute, path) < 0)
@@ -326,7 +328,7 @@ static herr_t on_object(hid_t file, const char *name, const H5O_info_t *info, vo
 int foreign_put(hid_t file)
 {
 	if (fwrite(TREE_HEAD, strlen(TREE_HEAD), 1, stdout) != 1)
-		return refuse("standard output", "no room");
+		return refuse_foreign("standard output", "no room");
 	if (H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_NATIVE, on_object, NULL, H5O_INFO_BASIC) < 0) {
 		fprintf(stderr, "HDF5: cut or damaged\n"); /* the first line tells, if there is one */
 		return -1;

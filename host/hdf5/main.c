@@ -26,7 +26,7 @@ enum {
 };
 
 /* Every failing call comes through here: says what of the file is not as expected. */
-static int refuse(const char *what, const char *expected)
+static int refuse_written(const char *what, const char *expected)
 {
 	fprintf(stderr, "HDF5: %s, expected %s\n", what, expected);
 	return -1;
@@ -43,7 +43,7 @@ static int put_attribute(hid_t at, const char *name, hid_t type, const void *val
 	if (attribute >= 0)
 		H5Aclose(attribute);
 	H5Sclose(space);
-	return result == 0 ? 0 : refuse(name, "room for the attribute");
+	return result == 0 ? 0 : refuse_written(name, "room for the attribute");
 }
 
 static int put_real(hid_t at, const char *name, double value)
@@ -119,7 +119,7 @@ static int hold_count(hid_t at, const char *path, int attributes)
 	if (same)
 		return 0;
 	snprintf(told, sizeof(told), "altered: attributes of %.40s added or taken away", path);
-	return refuse(told, "those that it was sealed with");
+	return refuse_written(told, "those that it was sealed with");
 }
 
 static int hold_text(hid_t at, const char *name, const char *expected)
@@ -129,7 +129,7 @@ static int hold_text(hid_t at, const char *name, const char *expected)
 	if (get_text(at, name, text, sizeof(text)) == 0 && strcmp(text, expected) == 0)
 		return 0;
 	snprintf(told, sizeof(told), "altered: %s is \"%.48s\"", name, text);
-	return refuse(told, expected);
+	return refuse_written(told, expected);
 }
 
 /* ---- writing ---- */
@@ -162,7 +162,7 @@ static int put_samples(hid_t group, const struct channel *channel)
 	int result;
 
 	if (!mask)
-		return refuse("no memory", "some");
+		return refuse_written("no memory", "some");
 	for (size_t k = 0; k < channel->count; k++)
 		mask[k] = channel->sample[k] & MASK;
 	result = put_array(group, "acceleration", H5T_NATIVE_DOUBLE, channel->value_g, channel->count,
@@ -191,7 +191,7 @@ static int put_channel(hid_t file, const struct channel *channel)
 	name_link(channel->name, link);
 	group = H5Gcreate2(file, link, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
 	if (group < 0)
-		return refuse(channel->name, "names of channels that differ in more than a stroke");
+		return refuse_written(channel->name, "names of channels that differ in more than a stroke");
 	result |= put_text(group, "name", channel->name);
 	result |= put_real(group, "rate_hz", channel->rate_hz);
 	result |= put_real(group, "start_s", channel->start_s);
@@ -215,7 +215,7 @@ static int put_seal(hid_t file, const struct record *record)
 	struct text csv;
 
 	if (write_sealed_csv(record, &csv) != 0)
-		return refuse("a channel's name is impossible or there is no memory", "neither");
+		return refuse_written("a channel's name is impossible or there is no memory", "neither");
 	snprintf(seal, sizeof(seal), "%.64s", seal_of(&csv));
 	free(csv.bytes);
 	return put_text(file, "sha256", seal);
@@ -252,7 +252,7 @@ static int put_image(hid_t file)
 	            fwrite(image, 1, (size_t)size, stdout) == (size_t)size && fflush(stdout) == 0;
 
 	free(image);
-	return done ? 0 : refuse("cannot be written", "room for it");
+	return done ? 0 : refuse_written("cannot be written", "room for it");
 }
 
 static int write_image(const struct record *record)
@@ -263,7 +263,8 @@ static int write_image(const struct record *record)
 	H5Pset_fapl_core(access, IMAGE_STEP, false);
 	H5Pset_link_creation_order(plan, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
 	file = H5Fcreate("record", H5F_ACC_TRUNC, plan, access);
-	result = file >= 0 ? put_record(file, record) : refuse("cannot be made", "a library that can");
+	result =
+	        file >= 0 ? put_record(file, record) : refuse_written("cannot be made", "a library that can");
 	if (result == 0)
 		result = put_image(file);
 	if (file >= 0)
@@ -291,10 +292,10 @@ static int get_samples(struct channel *channel, hid_t values, hid_t mask)
 {
 	if (H5Dread(values, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, channel->value_g) < 0 ||
 	    H5Dread(mask, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, channel->sample) < 0)
-		return refuse("samples cannot be read", "numbers");
+		return refuse_written("samples cannot be read", "numbers");
 	for (size_t k = 0; k < channel->count; k++)
 		if (channel->sample[k] & ~MASK)
-			return refuse("a mask has unknown bits", "1, 2 and 4");
+			return refuse_written("a mask has unknown bits", "1, 2 and 4");
 	return 0;
 }
 
@@ -307,9 +308,9 @@ static int get_arrays(struct record *record, hid_t group, const char *name, doub
 	int result = -1;
 
 	if (count < 0 || count > SAMPLES_MAX || count_of(mask) != count)
-		refuse(name, "arrays acceleration and mask of one length");
+		refuse_written(name, "arrays acceleration and mask of one length");
 	else if ((channel = record_add_channel(record, name, rate_hz, (size_t)count)) == NULL)
-		refuse("no memory", "some");
+		refuse_written("no memory", "some");
 	else
 		result = get_samples(channel, values, mask);
 	if (result == 0 && sealed)
@@ -331,7 +332,7 @@ static int hold_channel(hid_t group, const char *link, const char *name)
 	if (strcmp(link, expected) == 0 && H5Gget_info(group, &info) >= 0 && info.nlinks == 2)
 		return hold_count(group, ".", 5);
 	snprintf(told, sizeof(told), "altered: group %.40s", link);
-	return refuse(told, "each named as its channel, with acceleration and mask in it");
+	return refuse_written(told, "each named as its channel, with acceleration and mask in it");
 }
 
 static int get_channel(struct record *record, hid_t file, const char *link, bool sealed)
@@ -343,11 +344,11 @@ static int get_channel(struct record *record, hid_t file, const char *link, bool
 	int result;
 
 	if (group < 0)
-		return refuse(link, "groups, one for each channel");
+		return refuse_written(link, "groups, one for each channel");
 	if (get_text(group, "name", name, sizeof(name)) != 0 || get_real(group, "rate_hz", &rate_hz) != 0 ||
 	    get_real(group, "start_s", &start_s) != 0 || get_real(group, "range_g", &range_g) != 0 ||
 	    get_real(group, "uneven", &uneven) != 0)
-		result = refuse(link, "attributes name, rate_hz, start_s, range_g and uneven");
+		result = refuse_written(link, "attributes name, rate_hz, start_s, range_g and uneven");
 	else
 		result = sealed ? hold_channel(group, link, name) : 0;
 	if (result == 0)
@@ -371,7 +372,7 @@ static int get_channels(struct record *record, hid_t file, bool sealed)
 	int result = 0;
 
 	if (H5Gget_info(file, &info) < 0)
-		return refuse("no root", "a group for each channel");
+		return refuse_written("no root", "a group for each channel");
 	if (info.nlinks > 0 && H5Lget_name_by_idx(file, ".", index, H5_ITER_INC, 0, NULL, 0, H5P_DEFAULT) < 0)
 		index = H5_INDEX_NAME;
 	for (hsize_t i = 0; i < info.nlinks && result == 0; i++) {
@@ -379,7 +380,7 @@ static int get_channels(struct record *record, hid_t file, bool sealed)
 		        H5Lget_name_by_idx(file, ".", index, H5_ITER_INC, i, link, sizeof(link), H5P_DEFAULT);
 
 		if (length <= 0 || length >= (ssize_t)sizeof(link))
-			result = refuse("a group's name is too long", "one for each channel");
+			result = refuse_written("a group's name is too long", "one for each channel");
 		else
 			result = get_channel(record, file, link, sealed);
 	}
@@ -404,7 +405,7 @@ static int get_fields(struct record *record, hid_t file)
 			result = get_real(file, entry->name, &value) != 0 ||
 			         fields_set(record, entry, value) != 0;
 		if (result != 0)
-			return refuse(entry->name, "a value that fits");
+			return refuse_written(entry->name, "a value that fits");
 	}
 	return 0;
 }
@@ -428,12 +429,12 @@ static int check_sample(const struct channel *channel, size_t k)
 	if (good && !drop_is_count(channel->value_g[k])) {
 		snprintf(what, sizeof(what), "acceleration[%zu] of %s is %.15g g", k, channel->name,
 		         channel->value_g[k]);
-		return refuse(what, "a whole count of 1/32 g within full scale");
+		return refuse_written(what, "a whole count of 1/32 g within full scale");
 	}
 	if ((channel->sample[k] & SAMPLE_CLIPPED) != (good ? drop_mark(channel, channel->value_g[k]) : 0)) {
 		snprintf(what, sizeof(what), "mask[%zu] of %s at %.15g g is %u", k, channel->name,
 		         channel->value_g[k], channel->sample[k]);
-		return refuse(what, "4 beyond the range and nowhere else");
+		return refuse_written(what, "4 beyond the range and nowhere else");
 	}
 	return 0;
 }
@@ -457,10 +458,11 @@ static int get_record(struct record *record, hid_t file, char seal[DIGEST_CHARS]
 
 	if (get_text(file, "format", format, sizeof(format)) != 0 || strcmp(format, "droptower") != 0 ||
 	    get_real(file, "version", &version) != 0 || version != LAYOUT)
-		return refuse("not by droptower", "attributes format = \"droptower\" and version = 1");
+		return refuse_written("not by droptower",
+		                      "attributes format = \"droptower\" and version = 1");
 	seal[0] = '\0';
 	if (H5Aexists(file, "sha256") > 0 && get_text(file, "sha256", seal, DIGEST_CHARS) != 0)
-		return refuse("sha256 is no text", "64 digits");
+		return refuse_written("sha256 is no text", "64 digits");
 	sealed = seal[0] != '\0';
 	result = get_fields(record, file);
 	if (result == 0)
@@ -499,11 +501,11 @@ static int put_out(const struct record *record, const char *seal)
 	int result;
 
 	if (write_sealed_csv(record, &csv) != 0)
-		return refuse("a channel's name is impossible or there is no memory", "neither");
+		return refuse_written("a channel's name is impossible or there is no memory", "neither");
 	size = csv.size - (seal[0] == '\0' ? strlen("# " SEAL_BLANK "\n") : 0);
 	if (seal[0] != '\0' && strncmp(seal_of(&csv), seal, DIGEST_CHARS - 1) != 0) {
 		snprintf(what, sizeof(what), "altered: the SHA-256 of what it holds is %.64s", seal_of(&csv));
-		result = refuse(what, seal);
+		result = refuse_written(what, seal);
 	} else {
 		result = fwrite(csv.bytes, 1, size, stdout) == size && fflush(stdout) == 0 ? 0 : -1;
 	}
@@ -531,10 +533,10 @@ static int read_image(const struct source *source)
 	int result;
 
 	if (file < 0)
-		return refuse("damaged", "a whole file");
+		return refuse_written("damaged", "a whole file");
 	if (H5Aexists(file, "sha256") < 0 ||
 	    H5Aexists(file, "format") < 0) /* of ours it would pass for another's */
-		result = refuse("damaged: the attributes of its root cannot be read", "a whole file");
+		result = refuse_written("damaged: the attributes of its root cannot be read", "a whole file");
 	else
 		result = is_ours(file) ? record_to_csv(file) : foreign_put(file);
 	H5Fclose(file);

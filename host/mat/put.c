@@ -21,7 +21,7 @@ static int put_refuse(const char *what)
 	return -1;
 }
 
-static matvar_t *number(const char *name, double value)
+static matvar_t *new_number(const char *name, double value)
 {
 	size_t one[2] = {1, 1};
 
@@ -103,8 +103,8 @@ static int put_channel(mat_t *mat, const struct record *record, size_t i)
 	if (variable != NULL)
 		result = set(variable, "name", words("name", channel->name)) |
 		         set(variable, "units", words("units", "g")) |
-		         set(variable, "rate_hz", number("rate_hz", channel->rate_hz)) |
-		         set(variable, "start_s", number("start_s", channel->start_s)) |
+		         set(variable, "rate_hz", new_number("rate_hz", channel->rate_hz)) |
+		         set(variable, "start_s", new_number("start_s", channel->start_s)) |
 		         set(variable, "data", samples(channel));
 	return write_and_free(mat, variable, result);
 }
@@ -131,7 +131,7 @@ static int put_drop(mat_t *mat, const struct record *record)
 		if (result == 0)
 			result = set(variable, entry->name,
 			             entry->kind >= FIELDS_TIME ? words(entry->name, text)
-			                                        : number(entry->name, value));
+			                                        : new_number(entry->name, value));
 	}
 	return write_and_free(mat, variable, result);
 }

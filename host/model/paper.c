@@ -11,7 +11,7 @@ static double square(double x)
 }
 
 /* sqrt(1 - zeta^2) */
-static double damped(double zeta)
+static double damped_ratio(double zeta)
 {
 	return sqrt((1.0 - zeta) * (1.0 + zeta));
 }
@@ -44,7 +44,7 @@ static void paper_contact(const struct paper_input *in, struct paper_result *r)
 
 static void box(const struct paper_input *in, struct paper_result *r)
 {
-	double omega = UNITS_PI / r->contact_time_s, zeta = in->case_damping_ratio, s = damped(zeta);
+	double omega = UNITS_PI / r->contact_time_s, zeta = in->case_damping_ratio, s = damped_ratio(zeta);
 	double turn = 0.0;
 
 	/* (13) */
@@ -60,7 +60,7 @@ static void box(const struct paper_input *in, struct paper_result *r)
 static int plate(const struct paper_input *in, struct paper_result *r)
 {
 	double omega = UNITS_PI / r->contact_time_s, xi = in->mount_damping_ratio;
-	double ratio = omega * damped(in->case_damping_ratio) / (in->plate_omega * damped(xi));
+	double ratio = omega * damped_ratio(in->case_damping_ratio) / (in->plate_omega * damped_ratio(xi));
 	double lead = atan(2.0 * xi * omega / in->plate_omega), wait;
 
 	/* (17) */
@@ -98,7 +98,7 @@ int paper_solve(const struct paper_input *in, struct paper_result *result)
 
 double paper_box(const struct paper_input *in, const struct paper_result *r, double time_s)
 {
-	double omega = UNITS_PI / r->contact_time_s, zeta = in->case_damping_ratio, s = damped(zeta);
+	double omega = UNITS_PI / r->contact_time_s, zeta = in->case_damping_ratio, s = damped_ratio(zeta);
 	double x = omega * (time_s - r->contact_time_s);
 
 	if (!(x >= 0.0))

@@ -20,7 +20,7 @@ struct blocks_writer {
 	char packed[BLOCKS_BYTES + (BLOCKS_BYTES >> 8) + 1024];
 };
 
-static int put(FILE *out, const void *bytes, size_t size)
+static int put_bytes(FILE *out, const void *bytes, size_t size)
 {
 	return fwrite(bytes, 1, size, out) == size ? 0 : DT_E_SYSTEM;
 }
@@ -30,7 +30,7 @@ static int put_little(FILE *out, uint32_t value)
 	const unsigned char bytes[] = {(unsigned char)value, (unsigned char)(value >> 8),
 	                               (unsigned char)(value >> 16), (unsigned char)(value >> 24)};
 
-	return put(out, bytes, sizeof(bytes));
+	return put_bytes(out, bytes, sizeof(bytes));
 }
 
 static int add_entry(struct blocks_writer *writer, size_t packed, size_t size)
@@ -46,7 +46,7 @@ static int put_skippable(struct blocks_writer *writer, uint32_t magic, const cha
 
 	if (!error)
 		error = put_little(writer->out, (uint32_t)size);
-	return error ? error : put(writer->out, bytes, size);
+	return error ? error : put_bytes(writer->out, bytes, size);
 }
 
 int blocks_begin(struct blocks_writer **writer, FILE *out)
@@ -99,7 +99,7 @@ static int put_block(struct blocks_writer *writer, size_t size)
 
 	if (ZSTD_isError(packed))
 		return DT_E_MEMORY;
-	error = put(writer->out, writer->packed, packed);
+	error = put_bytes(writer->out, writer->packed, packed);
 	if (!error)
 		error = add_entry(writer, packed, size);
 	writer->held -= size;
@@ -130,8 +130,8 @@ static int put_table(struct blocks_writer *writer)
 {
 	const size_t size = writer->table.size + BLOCKS_FOOTER_BYTES;
 	int error = put_little(writer->out, BLOCKS_TABLE) | put_little(writer->out, (uint32_t)size) |
-	            put(writer->out, writer->table.bytes, writer->table.size) |
-	            put_little(writer->out, writer->entries) | put(writer->out, "", 1) |
+	            put_bytes(writer->out, writer->table.bytes, writer->table.size) |
+	            put_little(writer->out, writer->entries) | put_bytes(writer->out, "", 1) |
 	            put_little(writer->out, BLOCKS_END);
 
 	return error ? DT_E_SYSTEM : 0;

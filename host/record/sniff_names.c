@@ -41,7 +41,7 @@ static bool is_mass_name(struct piece name)
 
 /* The unit of a label like "t/ms" or "a/(m/s2)", a quantity over its unit (ISO 80000-1), and its stem; NULL
  * for another, so that "mV/g" and "counts/s" are none. */
-static const struct unit *quotient(struct piece name, struct piece *stem)
+static const struct unit *unit_quotient(struct piece name, struct piece *stem)
 {
 	size_t at = 0;
 	const struct unit *unit;
@@ -67,7 +67,7 @@ struct piece sniff_stem(struct piece name)
 {
 	struct piece stem;
 
-	if (quotient(name, &stem) != NULL)
+	if (unit_quotient(name, &stem) != NULL)
 		return stem;
 	for (size_t at = name.length; at-- > 1;)
 		if (name.text[at] == '(' || name.text[at] == '[') {
@@ -122,7 +122,7 @@ static const struct unit *sniff_unit(struct piece name, struct piece told, bool 
 	struct piece stem;
 
 	if (name.length > 0 && !unit_alone(name)) {
-		by_name = quotient(name, &stem);
+		by_name = unit_quotient(name, &stem);
 		if (by_name == NULL)
 			by_name = unit_of_name(name.text, name.length,
 			                       sniff_is_time(name) ? UNIT_TIME : UNIT_ACCELERATION);

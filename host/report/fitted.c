@@ -7,8 +7,8 @@
 enum { COLUMNS_MAX = 16 };
 
 /* A page has the bar in the value's own cell: columns of bars alone, which have no key, are left out. */
-static void begin(struct table *table, struct table_column kept[COLUMNS_MAX],
-                  const struct table_column *columns, size_t count)
+static void begin_table(struct table *table, struct table_column kept[COLUMNS_MAX],
+                        const struct table_column *columns, size_t count)
 {
 	size_t n = 0;
 
@@ -86,7 +86,7 @@ void fitted_parameters(const struct fit *fit, enum table_format format, FILE *ou
 	struct table table = {.out = out, .format = format};
 	struct table_column kept[COLUMNS_MAX];
 
-	begin(&table, kept, parameter_columns, TABLE_COUNT(parameter_columns));
+	begin_table(&table, kept, parameter_columns, TABLE_COUNT(parameter_columns));
 	for (size_t i = 0; i < MOTION_SHARED; i++) {
 		double slope, value = motion_value((enum motion_shared)i, fit->common[i], &slope);
 		struct parameter_row row = {scene_fitted[i],
@@ -112,7 +112,7 @@ void fitted_drops(const struct fitted *f, enum table_format format, FILE *out)
 	struct table table = {.out = out, .format = format};
 	struct table_column kept[COLUMNS_MAX];
 
-	begin(&table, kept, drop_columns, TABLE_COUNT(drop_columns));
+	begin_table(&table, kept, drop_columns, TABLE_COUNT(drop_columns));
 	for (unsigned k = 0; k < f->fit->drops; k++) {
 		const struct fit_drop_result *r = &f->fit->drop[k];
 		struct drop_row row = {f->name[k],
@@ -165,7 +165,7 @@ void fitted_predictions(const struct fit *fit, enum table_format format, FILE *o
 	struct table_column kept[COLUMNS_MAX];
 	struct scene at = fit->scene;
 
-	begin(&table, kept, prediction_columns, TABLE_COUNT(prediction_columns));
+	begin_table(&table, kept, prediction_columns, TABLE_COUNT(prediction_columns));
 	for (int angle = FITTED_FROM_DEG; angle <= FITTED_TO_DEG && fitted_holds(fit);
 	     angle += FITTED_STEP_DEG) {
 		double value[MOTION_DERIVED], sd[MOTION_DERIVED];

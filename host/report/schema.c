@@ -9,7 +9,7 @@
 #include "host/result/quantity.h"
 
 /* object[key], made when it is not there. */
-static cJSON *within(struct builder *b, cJSON *object, const char *key)
+static cJSON *object_within(struct builder *b, cJSON *object, const char *key)
 {
 	cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
 
@@ -54,7 +54,7 @@ static const char *family_name(unsigned i)
 
 static void put_property(struct builder *b, cJSON *properties, const struct quantity *q)
 {
-	cJSON *item = within(b, properties, q->key), *items;
+	cJSON *item = object_within(b, properties, q->key), *items;
 
 	put_text(b, item, "description", q->meaning);
 	switch (q->kind) {
@@ -90,17 +90,17 @@ static cJSON *schema_at(struct builder *b, cJSON *root, const struct quantity_ho
 	const char *path = home->path;
 
 	if (home->array[0]) {
-		node = within(b, within(b, node, "properties"), home->array);
+		node = object_within(b, object_within(b, node, "properties"), home->array);
 		if (!cJSON_HasObjectItem(node, "type"))
 			put_type(b, node, "array", false);
-		node = within(b, node, "items");
+		node = object_within(b, node, "items");
 	}
 	while (*path) {
 		size_t length = strcspn(path, ".");
 		char name[40];
 
 		snprintf(name, sizeof(name), "%.*s", (int)length, path);
-		node = within(b, within(b, node, "properties"), name);
+		node = object_within(b, object_within(b, node, "properties"), name);
 		if (!cJSON_HasObjectItem(node, "type"))
 			put_type(b, node, "object", !home->array[0]);
 		path += length + (path[length] == '.');
@@ -116,13 +116,13 @@ int report_schema(FILE *out)
 	put_text(&b, root, "$schema", "https://json-schema.org/draft/2020-12/schema");
 	put_text(&b, root, "title", "Result of droptower analyze --json, one drop");
 	put_type(&b, root, "object", false);
-	version = within(&b, within(&b, root, "properties"), "quantities");
+	version = object_within(&b, object_within(&b, root, "properties"), "quantities");
 	put_text(&b, version, "description", "version of this table");
 	put_text(&b, version, "const", quantity_version());
-	put_type(&b, within(&b, within(&b, root, "properties"), "origin"), "object", false);
+	put_type(&b, object_within(&b, object_within(&b, root, "properties"), "origin"), "object", false);
 	for (int p = 0; p < QUANTITY_PLACES; p++) {
 		cJSON *node = schema_at(&b, root, &quantity_homes[p]);
-		cJSON *properties = within(&b, node, "properties"),
+		cJSON *properties = object_within(&b, node, "properties"),
 		      *required = put_array(&b, node, "required");
 		const struct quantity *q = NULL;
 

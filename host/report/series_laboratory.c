@@ -10,7 +10,7 @@
 
 /* ---- the sensors of the drops that count ---- */
 
-static void copy(char *to, size_t room, const char *from)
+static void copy_field(char *to, size_t room, const char *from)
 {
 	snprintf(to, room, "%s", from);
 }
@@ -27,14 +27,14 @@ static struct series_sensor *sensor_of(struct series_page *page, const struct se
 		return NULL;
 	page->sensors++;
 	s->overdue = used->overdue;
-	copy(s->name, sizeof(s->name), used->name);
-	copy(s->serial, sizeof(s->serial), used->serial);
-	copy(s->model, sizeof(s->model), used->model);
-	copy(s->certificate, sizeof(s->certificate), used->certificate);
-	copy(s->laboratory, sizeof(s->laboratory), used->laboratory);
-	copy(s->date, sizeof(s->date), used->date);
-	copy(s->due, sizeof(s->due), used->due);
-	copy(s->file_sha256, sizeof(s->file_sha256), used->file_sha256);
+	copy_field(s->name, sizeof(s->name), used->name);
+	copy_field(s->serial, sizeof(s->serial), used->serial);
+	copy_field(s->model, sizeof(s->model), used->model);
+	copy_field(s->certificate, sizeof(s->certificate), used->certificate);
+	copy_field(s->laboratory, sizeof(s->laboratory), used->laboratory);
+	copy_field(s->date, sizeof(s->date), used->date);
+	copy_field(s->due, sizeof(s->due), used->due);
+	copy_field(s->file_sha256, sizeof(s->file_sha256), used->file_sha256);
 	return s;
 }
 

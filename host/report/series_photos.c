@@ -12,7 +12,7 @@ struct photos {
 	size_t count;
 };
 
-static void fail(struct series_page *page, int result)
+static void fail_page(struct series_page *page, int result)
 {
 	if (page->page.error)
 		return;
@@ -63,7 +63,7 @@ void series_photos(struct series_page *page, const struct series_drop *drop)
 
 	fputs(photos.count ? "</div>\n" : "", page->page.out);
 	if (result != 0)
-		fail(page, result);
+		fail_page(page, result);
 }
 
 static int count_photo(void *context, const struct archive_photo *photo)
@@ -81,6 +81,6 @@ size_t series_photos_count(struct series_page *page)
 	for (size_t i = 0; i < page->count && result == 0; i++)
 		result = each_photo(page, page->drop[i], count_photo, &count);
 	if (result != 0)
-		fail(page, result);
+		fail_page(page, result);
 	return count;
 }

@@ -8,7 +8,7 @@
 #include <string.h>
 
 /* All ones say that it was not measured. */
-static double u16(uint16_t value, double scale)
+static double scaled_u16(uint16_t value, double scale)
 {
 	return value == UINT16_MAX ? (double)NAN : value * scale;
 }
@@ -28,14 +28,14 @@ struct measured measured_of(const struct record *record)
 	        .seal_agrees = all.seal_agrees,
 	        .calibrated = all.calibrated,
 	        .parameters_crc32 = all.parameters_crc32,
-	        .dropout_s = u16(m->dropout_us, 1e-6),
-	        .dropout_used_s = u16(m->dropout_used_us, 1e-6),
+	        .dropout_s = scaled_u16(m->dropout_us, 1e-6),
+	        .dropout_used_s = scaled_u16(m->dropout_used_us, 1e-6),
 	        .separation_m = m->separation_um == UINT32_MAX ? (double)NAN : m->separation_um * 1e-6,
-	        .separation_speed_m_s = u16(m->separation_mm_s, 1e-3),
-	        .acceleration_m_s2 = u16(m->acceleration_mm_s2, 1e-3),
-	        .latch_delay_s = u16(m->latch_delay_us, 1e-6),
+	        .separation_speed_m_s = scaled_u16(m->separation_mm_s, 1e-3),
+	        .acceleration_m_s2 = scaled_u16(m->acceleration_mm_s2, 1e-3),
+	        .latch_delay_s = scaled_u16(m->latch_delay_us, 1e-6),
 	        .clock_ratio_ppm = m->clock_ppm == INT16_MAX ? (double)NAN : m->clock_ppm,
-	        .trigger_latency_s = u16(m->trigger_latency_us, 1e-6),
+	        .trigger_latency_s = scaled_u16(m->trigger_latency_us, 1e-6),
 	};
 }
 

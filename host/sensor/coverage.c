@@ -40,7 +40,7 @@ static double characteristic(const struct coverage *c, double t)
 	return product;
 }
 
-static double within(const double *series, int terms, double u_over_period)
+static double probability_within(const double *series, int terms, double u_over_period)
 {
 	double probability = u_over_period;
 
@@ -68,7 +68,7 @@ double coverage_expanded(const struct coverage *coverage)
 	for (int i = 0; i < BISECTIONS; i++) {
 		double middle = 0.5 * (low + high);
 
-		*(within(series, terms, middle) < COVERAGE_PROBABILITY ? &low : &high) = middle;
+		*(probability_within(series, terms, middle) < COVERAGE_PROBABILITY ? &low : &high) = middle;
 	}
 	return low * period;
 }

@@ -206,7 +206,7 @@ static void wait_for(struct timespec *next)
 	}
 }
 
-static void boot(enum port_reset cause, uint8_t kept, const struct posix_options *options)
+static void boot_process(enum port_reset cause, uint8_t kept, const struct posix_options *options)
 {
 	port.kicked_us = 0;
 	port.bitten = false;
@@ -220,14 +220,14 @@ static int run(const struct posix_options *options)
 
 	clock_gettime(CLOCK_MONOTONIC, &next);
 	port.realtime = options->realtime;
-	boot(options->cause, options->kept, options);
+	boot_process(options->cause, options->kept, options);
 	while (result == 0) {
 		for (unsigned i = 0;
 		     i < LOCKSTEP_INSTANTS && result == 0 && !lockstep_reset_wanted() && !port.bitten; i++)
 			result = run_instant(i);
 		if (port.bitten || lockstep_reset_wanted())
-			boot(port.bitten ? PORT_RESET_WATCHDOG : PORT_RESET_COMMAND, lockstep_kept(),
-			     options);
+			boot_process(port.bitten ? PORT_RESET_WATCHDOG : PORT_RESET_COMMAND, lockstep_kept(),
+			             options);
 		if (options->realtime)
 			wait_for(&next);
 	}
