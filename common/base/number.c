@@ -36,7 +36,7 @@ bool number_whole(const char *text, uint64_t min, uint64_t max, uint64_t *value)
 
 /* ---- what strtod would say of what is usual, without it ---- */
 
-enum { HELD = 19 }; /* digits that a uint64_t holds */
+enum { HELD = NUMBER_SCAN_DIGITS };
 
 static const uint64_t power_of_ten[HELD + 1] = {1,
                                                 10,
@@ -59,15 +59,55 @@ static const uint64_t power_of_ten[HELD + 1] = {1,
                                                 1000000000000000000,
                                                 10000000000000000000u};
 
-/* digits / divisor, rounded once: 63 or 64 bits of the quotient with all that is below them in the last. */
-static double quotient(uint64_t digits, uint64_t divisor)
-{
-	const int up = __builtin_clzll(digits), divisor_up = __builtin_clzll(divisor);
-	const unsigned __int128 dividend = (unsigned __int128)(digits << up) << 63;
-	const uint64_t whole = (uint64_t)(dividend / (divisor << divisor_up));
-	const bool rest = dividend != (unsigned __int128)whole * (divisor << divisor_up);
+/* 2^(63 + up) / 10^n, cut, of which the first bit is one. */
+static const struct {
+	uint64_t bits;
+	int up;
+} tenth[HELD + 1] = {
+        {0x8000000000000000u, 0},  {0xccccccccccccccccu, 4},  {0xa3d70a3d70a3d70au, 7},
+        {0x83126e978d4fdf3bu, 10}, {0xd1b71758e219652bu, 14}, {0xa7c5ac471b478423u, 17},
+        {0x8637bd05af6c69b5u, 20}, {0xd6bf94d5e57a42bcu, 24}, {0xabcc77118461cefcu, 27},
+        {0x89705f4136b4a597u, 30}, {0xdbe6fecebdedd5beu, 34}, {0xafebff0bcb24aafeu, 37},
+        {0x8cbccc096f5088cbu, 40}, {0xe12e13424bb40e13u, 44}, {0xb424dc35095cd80fu, 47},
+        {0x901d7cf73ab0acd9u, 50}, {0xe69594bec44de15bu, 54}, {0xb877aa3236a4b449u, 57},
+        {0x9392ee8e921d5d07u, 60}, {0xec1e4a7db69561a5u, 64},
+};
 
-	return ldexp((double)(whole | rest), divisor_up - up - 63);
+/* 2^power. */
+static double two_to(int power)
+{
+	const uint64_t bits = (uint64_t)(DBL_MAX_EXP - 1 + power) << (DBL_MANT_DIG - 1);
+	double value;
+
+	memcpy(&value, &bits, sizeof(value));
+	return value;
+}
+
+/* digits / 10^n, rounded once: 63 or 64 bits of the quotient with all that is below them in the last. */
+static double quotient(uint64_t digits, int n)
+{
+	const int up = __builtin_clzll(digits), divisor_up = __builtin_clzll(power_of_ten[n]);
+	const unsigned __int128 dividend = (unsigned __int128)(digits << up) << 63;
+	const uint64_t divisor = power_of_ten[n] << divisor_up, whole = (uint64_t)(dividend / divisor);
+	const bool rest = dividend != (unsigned __int128)whole * divisor;
+
+	return (double)(whole | rest) * two_to(divisor_up - up - 63);
+}
+
+/* The same by multiplying, which is at most two too small in the last of 64 bits: where that may round it
+ * another way, the division has to say. */
+static double over_ten(uint64_t digits, int n)
+{
+	enum { BELOW = 11 }; /* bits that a double has no room for */
+	const int up = __builtin_clzll(digits);
+	uint64_t high = (uint64_t)(((unsigned __int128)(digits << up) * tenth[n].bits) >> 64), below;
+	const int lifted = !(high >> 63);
+
+	high <<= lifted;
+	below = high & ((1u << BELOW) - 1);
+	if (below + 4 >= 1u << (BELOW - 1) && below <= 1u << (BELOW - 1))
+		return quotient(digits, n);
+	return (double)high * two_to(1 - lifted - up - tenth[n].up);
 }
 
 /* digits times 10^exponent; false where one rounding does not do. */
@@ -84,71 +124,110 @@ static bool scaled(uint64_t digits, int exponent, double *value)
 	else if (digits <= exact)
 		*value = (double)digits / (double)power_of_ten[-exponent];
 	else
-		*value = quotient(digits, power_of_ten[-exponent]);
+		*value = over_ten(digits, -exponent);
 	return true;
 }
 
-static bool read_exponent(const char *text, size_t length, int *exponent)
+/* Decimal digits from `at` on onto *digits, as long as they fit; where they end. */
+static const char *take_digits(const char *at, const char *end, uint64_t *digits)
 {
-	size_t at = length > 0 && (text[0] == '+' || text[0] == '-');
-	int size = 0;
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+	/* up to eight at once: those before the first that is none, as if zeros were before them */
+	while (end - at >= 8) {
+		uint64_t c, other;
+		unsigned count;
 
-	if ((length - at) - 1 > 2) /* 1 to 3 digits */
-		return false;
-	for (size_t i = at; i < length; i++) {
-		if (text[i] < '0' || text[i] > '9')
-			return false;
-		size = 10 * size + (text[i] - '0');
+		memcpy(&c, at, sizeof(c));
+		c ^= 0x3030303030303030u;
+		other = ((c + 0x7676767676767676u) | c) & 0x8080808080808080u;
+		count = other != 0 ? (unsigned)__builtin_ctzll(other) / 8 : 8;
+		if (count == 0)
+			return at;
+		c <<= 64 - 8 * count;
+		c = (c * 10 + (c >> 8)) & 0x00FF00FF00FF00FFu;
+		c = (c * 100 + (c >> 16)) & 0x0000FFFF0000FFFFu;
+		c = (c * 10000 + (c >> 32)) & 0xFFFFFFFFu;
+		*digits = *digits * power_of_ten[count] + c;
+		at += count;
+		if (count < 8)
+			return at;
 	}
-	*exponent += at > 0 && text[0] == '-' ? -size : size;
-	return true;
+#endif
+	for (; at < end && (unsigned char)(*at - '0') < 10; at++)
+		*digits = 10 * *digits + (uint64_t)(*at - '0');
+	return at;
 }
 
-/* Sign, up to HELD digits with a decimal sign among them, exponent. False: strtod has to say what it is. */
-static bool parse_usual(const char *text, size_t length, char decimal, double *value)
+static const char *skip_zeros(const char *at, const char *end)
 {
-	const bool sign = text[0] == '-' || text[0] == '+';
-	unsigned held = 0, point = 0, seen = 0;
-	uint64_t digits = 0;
-	int exponent = 0;
-	size_t at = sign;
+	while (at < end && *at == '0')
+		at++;
+	return at;
+}
 
-	for (; at < length; at++) {
-		const unsigned digit = (unsigned)(unsigned char)text[at] - '0';
+/* 1 to 3 digits behind an e; NULL for others. */
+static const char *take_exponent(const char *at, const char *end, int *exponent)
+{
+	const bool sign = at < end && (*at == '+' || *at == '-'), down = sign && *at == '-';
+	const char *start = at + sign;
+	uint64_t size = 0;
 
-		if (digit < 10) {
-			digits = 10 * digits + digit;
-			held += held > 0 || digit != 0;
-			exponent -= (int)point;
-			seen = 1;
-			if (held > HELD)
-				return false;
-		} else if (text[at] == decimal && point == 0) {
-			point = 1;
-		} else {
-			break;
-		}
+	at = take_digits(start, end, &size);
+	if (at == start || at - start > 3)
+		return NULL;
+	*exponent += down ? -(int)size : (int)size;
+	return at;
+}
+
+size_t number_scan(const char *text, const char *end, char decimal, struct number_scan *number)
+{
+	const bool sign = text < end && (*text == '-' || *text == '+');
+	const char *const start = text + sign, *first = skip_zeros(start, end), *at;
+	ptrdiff_t held, seen;
+
+	number->digits = 0;
+	number->exponent = 0;
+	at = take_digits(first, end, &number->digits);
+	held = at - first;
+	seen = at - start;
+	if (at < end && *at == decimal) {
+		const char *point = ++at;
+
+		if (held == 0)
+			at = skip_zeros(at, end);
+		held -= at - point;
+		at = take_digits(at, end, &number->digits);
+		held += at - point;
+		seen += at - point;
+		if (held > HELD)
+			return 0;
+		number->exponent = (int)(point - at);
 	}
-	if (seen == 0 ||
-	    (at < length &&
-	     ((text[at] | 0x20) != 'e' || !read_exponent(text + at + 1, length - at - 1, &exponent))) ||
-	    !scaled(digits, exponent, value))
-		return false;
-	if (text[0] == '-')
-		*value = -*value;
-	return true;
+	if (seen == 0 || held > HELD)
+		return 0;
+	if (at < end && (*at | 0x20) == 'e') {
+		at = take_exponent(at + 1, end, &number->exponent);
+		if (at == NULL)
+			return 0;
+	}
+	if (!scaled(number->digits, number->exponent, &number->value))
+		return 0;
+	if (*text == '-')
+		number->value = -number->value;
+	return (size_t)(at - text);
 }
 
 bool number_parse(const char *text, size_t length, char decimal, double *value)
 {
+	struct number_scan number;
 	char copy[LENGTH_MAX + 1];
 	double parsed;
 	char *end;
 
 	if (length == 0 || length > LENGTH_MAX)
 		return false;
-	if (parse_usual(text, length, decimal, &parsed)) {
-		*value = parsed;
+	if (number_scan(text, text + length, decimal, &number) == length) {
+		*value = number.value;
 		return true;
 	}
 	for (size_t i = 0; i < length; i++) {

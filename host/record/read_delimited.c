@@ -3,6 +3,7 @@
  * Text with columns, as other people's programs write it, among them LabVIEW measurement files (.lvm).
  */
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,10 +15,14 @@
 #include "host/record/header.h"
 #include "host/record/lvm.h"
 #include "host/record/profile.h"
+#include "host/record/row.h"
 #include "host/record/sniff.h"
 #include "host/record/timebase.h"
 
-enum { HEADER_LINES_MAX = 1000 };
+enum {
+	HEADER_LINES_MAX = 1000,
+	PLAIN_PLACES = 32,
+};
 
 struct reading {
 	const struct source *source;
@@ -44,6 +49,7 @@ struct reading {
 	size_t bad[COLUMNS_MAX];  /* by column */
 	size_t used[COLUMNS_MAX]; /* rows up to the last that is not empty */
 	struct cells row;
+	struct row_shape shape;           /* of the first row, when it is a plain one */
 	struct piece before[COLUMNS_MAX]; /* of each column, the last that was a number */
 	char decimal_before[COLUMNS_MAX];
 
@@ -212,14 +218,12 @@ static size_t unsigned_length(struct piece cell)
 
 /* Notes of a number what tells a decimal comma from a thousands separator, and one that the file's end has
  * cut. */
-static void note_number(struct reading *reading, size_t i)
+static void note_number(struct reading *reading, size_t i, struct piece cell, char decimal)
 {
-	struct piece cell = reading->row.cell[i];
-
 	reading->before[i] = cell;
-	reading->decimal_before[i] = reading->row.decimal;
-	if ((reading->style.decimal && reading->sniff == NULL) || reading->is_lvm ||
-	    reading->row.decimal != ',' || cell.length == 0)
+	reading->decimal_before[i] = decimal;
+	if ((reading->style.decimal && reading->sniff == NULL) || reading->is_lvm || decimal != ',' ||
+	    cell.length == 0)
 		return;
 	if (cells_could_be_thousands(cell))
 		reading->comma_doubt = reading->comma_doubt ? reading->comma_doubt : reading->line.number;
@@ -259,6 +263,15 @@ static int take_clock(struct reading *reading, size_t i)
 	return 0;
 }
 
+static void note_time(struct reading *reading, size_t i, double value, double digit, int digits)
+{
+	reading->digit = reading->rows == 0 ? digit : fmin(reading->digit, digit);
+	reading->digits = digits > reading->digits ? digits : reading->digits;
+	reading->largest = fmax(reading->largest, fabs(value));
+	reading->time_s[reading->rows] = value / reading->columns.column[i].divisor;
+	reading->row_line[reading->rows] = reading->line.number;
+}
+
 static int read_delimited_take_time(struct reading *reading, size_t i)
 {
 	double value, digit;
@@ -274,12 +287,8 @@ static int read_delimited_take_time(struct reading *reading, size_t i)
 	if (read_delimited_is_cut(reading, i))
 		return REFUSE(reading, DT_E_FORMAT, "the file ends within a time, expected a line end");
 	digit = cells_last_digit(&reading->row, i, &digits);
-	reading->digit = reading->rows == 0 ? digit : fmin(reading->digit, digit);
-	reading->digits = digits > reading->digits ? digits : reading->digits;
-	reading->largest = fmax(reading->largest, fabs(value));
-	reading->time_s[reading->rows] = value / reading->columns.column[i].divisor;
-	reading->row_line[reading->rows] = reading->line.number;
-	note_number(reading, i);
+	note_time(reading, i, value, digit, digits);
+	note_number(reading, i, reading->row.cell[i], reading->row.decimal);
 	return 0;
 }
 
@@ -296,7 +305,7 @@ static int read_delimited_take_sample(struct reading *reading, size_t i, struct 
 	if (!cut && cells_number(&reading->row, i, &value)) {
 		channel->value_g[k] = value / reading->columns.column[i].divisor;
 		channel->sample[k] = 0;
-		note_number(reading, i);
+		note_number(reading, i, reading->row.cell[i], reading->row.decimal);
 		return 0;
 	}
 	reading->bad[i]++;
@@ -328,6 +337,85 @@ static int take_row(struct reading *reading)
 	return error;
 }
 
+/* ---- rows that are as the one before, which most are ---- */
+
+/* What the time column of plain rows has been written like. */
+struct plain_time {
+	double digit[PLAIN_PLACES]; /* what a digit in the place behind the decimal sign counts; 0: not looked
+	                               up */
+	int digits;
+	uint64_t more; /* the least number of more digits than these */
+};
+
+static void take_plain_time(struct reading *reading, size_t i, const struct number_scan *number,
+                            struct plain_time *plain)
+{
+	const int place = -number->exponent;
+	double digit = place >= 0 && place < PLAIN_PLACES ? plain->digit[place] : 0;
+
+	if (digit == 0) {
+		digit = pow(10, number->exponent);
+		if (place >= 0 && place < PLAIN_PLACES)
+			plain->digit[place] = digit;
+	}
+	while (number->digits >= plain->more && plain->digits < NUMBER_SCAN_DIGITS) {
+		plain->digits++;
+		plain->more = plain->digits < NUMBER_SCAN_DIGITS ? plain->more * 10 : UINT64_MAX;
+	}
+	note_time(reading, i, number->value, digit, plain->digits);
+}
+
+/* The numbers that channels want, and the row's end. */
+static void take_plain_row(struct reading *reading, const struct row *row, struct plain_time *plain)
+{
+	const struct columns *columns = &reading->columns;
+	struct channel *channel = reading->record->channels;
+	const size_t k = reading->rows;
+	struct source_line *line = &reading->line;
+
+	line->text = reading->source->bytes + line->next;
+	line->length = (size_t)(row->end - line->text);
+	line->next = (size_t)(row->next - reading->source->bytes);
+	line->number++;
+	for (size_t i = 0; i < columns->count; i++) {
+		if (columns->column[i].kind == COLUMN_TIME) {
+			take_plain_time(reading, i, &row->number[i], plain);
+		} else if (columns->column[i].kind == COLUMN_CHANNEL) {
+			channel->value_g[k] = row->number[i].value / columns->column[i].divisor;
+			channel->sample[k] = 0;
+			channel++;
+			reading->used[i] = k + 1;
+		}
+	}
+	reading->rows++;
+}
+
+static void note_row(struct reading *reading, const struct row *row)
+{
+	for (size_t i = 0; i < reading->columns.count; i++)
+		if (reading->columns.column[i].kind != COLUMN_SKIP)
+			note_number(reading, i, row->cell[i], reading->row.decimal);
+}
+
+/* As many as follow on each other; what is left to next_row begins with another. */
+static void take_plain_rows(struct reading *reading)
+{
+	const struct source *source = reading->source;
+	const char *end = source->bytes + source->size;
+	struct plain_time plain = {.more = 1};
+	struct row row[2]; /* the last and one that may be none */
+	unsigned taken = 0;
+
+	while (row_read(&reading->shape, source->bytes + reading->line.next, end, &row[taken % 2])) {
+		take_plain_row(reading, &row[taken % 2], &plain);
+		if (reading->row.decimal == ',')
+			note_row(reading, &row[taken % 2]);
+		taken++;
+	}
+	if (taken > 0)
+		note_row(reading, &row[(taken - 1) % 2]);
+}
+
 static int check_commas(const struct reading *reading)
 {
 	if (reading->comma_sure || reading->comma_doubt == 0)
@@ -341,9 +429,13 @@ static int take_rows(struct reading *reading)
 {
 	int error;
 
-	do
+	do {
+		if (reading->rows == 0)
+			row_learn(&reading->shape, reading->style, &reading->row, &reading->columns);
 		error = take_row(reading);
-	while (!error && next_row(reading));
+		if (!error)
+			take_plain_rows(reading);
+	} while (!error && next_row(reading));
 	if (!error)
 		error = check_commas(reading);
 	if (error)
