@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "common/crc.h"
 
-/* The table of byte b is the remainder of b x^8; written as a sum over the bits of b it is a constant
- * expression, so that the compiler makes the tables and nobody types them. */
+/* The table of byte b is the remainder of b x^8; written as a sum over the bits
+ * of b it is a constant expression, so that the compiler makes the tables and
+ * nobody types them. */
 #define BIT(b, n, value) ((((b) >> (n)) & 1u) ? (value) : 0u)
 
 #define CRC8_BYTE(b)                                                                          \
@@ -18,10 +19,11 @@
 #define SIXTY_FOUR(f, b) SIXTEEN(f, b), SIXTEEN(f, (b) + 16u), SIXTEEN(f, (b) + 32u), SIXTEEN(f, (b) + 48u)
 #define ALL(f) SIXTY_FOUR(f, 0u), SIXTY_FOUR(f, 64u), SIXTY_FOUR(f, 128u), SIXTY_FOUR(f, 192u)
 
-/* Where there is room for tables, eight bytes at once: the remainder of b x^(8 + 8 n) is a sum over the bits
- * of b as well, of what a byte's table makes of the sums before. */
+/* Where there is room for tables, eight bytes at once: the remainder of b x^(8
+ * + 8 n) is a sum over the bits of b as well, of what a byte's table makes of
+ * the sums before. */
 #if UINTPTR_MAX > 0xFFFFFFFFu
-#define CRC8_AT_ONCE 8
+#define CRC_AT_ONCE 8
 #define LATER(to, from)                                                                     \
 	to##0 = CRC8_BYTE(from##0), to##1 = CRC8_BYTE(from##1), to##2 = CRC8_BYTE(from##2), \
 	to##3 = CRC8_BYTE(from##3), to##4 = CRC8_BYTE(from##4), to##5 = CRC8_BYTE(from##5), \
@@ -48,6 +50,40 @@ enum {
 	LATER(g, f),
 	LATER(h, g)
 };
+/* The same of crc32: p of b, r and so on of it later. */
+#define LATER32(z) (((z) >> 8) ^ CRC32_BYTE((z)&0xFFu))
+#define ALL_LATER32(to, from)                                                         \
+	to##0 = LATER32(from##0), to##1 = LATER32(from##1), to##2 = LATER32(from##2), \
+	to##3 = LATER32(from##3), to##4 = LATER32(from##4), to##5 = LATER32(from##5), \
+	to##6 = LATER32(from##6), to##7 = LATER32(from##7)
+#define BY32(z, b)                                                                                 \
+	(BIT(b, 0, z##0) ^ BIT(b, 1, z##1) ^ BIT(b, 2, z##2) ^ BIT(b, 3, z##3) ^ BIT(b, 4, z##4) ^ \
+	 BIT(b, 5, z##5) ^ BIT(b, 6, z##6) ^ BIT(b, 7, z##7))
+
+enum {
+	p0 = CRC32_BYTE(1u),
+	p1 = CRC32_BYTE(2u),
+	p2 = CRC32_BYTE(4u),
+	p3 = CRC32_BYTE(8u),
+	p4 = CRC32_BYTE(16u),
+	p5 = CRC32_BYTE(32u),
+	p6 = CRC32_BYTE(64u),
+	p7 = CRC32_BYTE(128u),
+	ALL_LATER32(q, p),
+	ALL_LATER32(r, q),
+	ALL_LATER32(s, r),
+	ALL_LATER32(t, s),
+	ALL_LATER32(u, t),
+	ALL_LATER32(v, u),
+	ALL_LATER32(w, v)
+};
+#define BY_Q(n) BY32(q, n)
+#define BY_R(n) BY32(r, n)
+#define BY_S(n) BY32(s, n)
+#define BY_T(n) BY32(t, n)
+#define BY_U(n) BY32(u, n)
+#define BY_V(n) BY32(v, n)
+#define BY_W(n) BY32(w, n)
 #define BY_B(n) BY(b, n)
 #define BY_C(n) BY(c, n)
 #define BY_D(n) BY(d, n)
@@ -56,23 +92,28 @@ enum {
 #define BY_G(n) BY(g, n)
 #define BY_H(n) BY(h, n)
 #else
-#define CRC8_AT_ONCE 1
+#define CRC_AT_ONCE 1
 #endif
 
-static const uint8_t table8[CRC8_AT_ONCE][256] = {
+static const uint8_t table8[CRC_AT_ONCE][256] = {
         {ALL(CRC8_BYTE)},
-#if CRC8_AT_ONCE == 8
+#if CRC_AT_ONCE == 8
         {ALL(BY_B)},      {ALL(BY_C)}, {ALL(BY_D)}, {ALL(BY_E)}, {ALL(BY_F)}, {ALL(BY_G)}, {ALL(BY_H)},
 #endif
 };
-static const uint32_t table32[256] = {ALL(CRC32_BYTE)};
+static const uint32_t table32[CRC_AT_ONCE][256] = {
+        {ALL(CRC32_BYTE)},
+#if CRC_AT_ONCE == 8
+        {ALL(BY_Q)},       {ALL(BY_R)}, {ALL(BY_S)}, {ALL(BY_T)}, {ALL(BY_U)}, {ALL(BY_V)}, {ALL(BY_W)},
+#endif
+};
 
 uint8_t crc8(uint8_t crc, const uint8_t *bytes, size_t count)
 {
 	size_t i = 0;
 
 	crc ^= 0xFFu;
-#if CRC8_AT_ONCE == 8
+#if CRC_AT_ONCE == 8
 	for (; i + 8 <= count; i += 8)
 		crc = table8[7][crc ^ bytes[i]] ^ table8[6][bytes[i + 1]] ^ table8[5][bytes[i + 2]] ^
 		      table8[4][bytes[i + 3]] ^ table8[3][bytes[i + 4]] ^ table8[2][bytes[i + 5]] ^
@@ -85,8 +126,17 @@ uint8_t crc8(uint8_t crc, const uint8_t *bytes, size_t count)
 
 uint32_t crc32(uint32_t crc, const uint8_t *bytes, size_t count)
 {
+	size_t i = 0;
+
 	crc = ~crc;
-	for (size_t i = 0; i < count; i++)
-		crc = table32[(crc ^ bytes[i]) & 0xFFu] ^ (crc >> 8);
+#if CRC_AT_ONCE == 8
+	for (; i + 8 <= count; i += 8)
+		crc = table32[7][(crc ^ bytes[i]) & 0xFFu] ^ table32[6][(crc >> 8 & 0xFFu) ^ bytes[i + 1]] ^
+		      table32[5][(crc >> 16 & 0xFFu) ^ bytes[i + 2]] ^ table32[4][crc >> 24 ^ bytes[i + 3]] ^
+		      table32[3][bytes[i + 4]] ^ table32[2][bytes[i + 5]] ^ table32[1][bytes[i + 6]] ^
+		      table32[0][bytes[i + 7]];
+#endif
+	for (; i < count; i++)
+		crc = table32[0][(crc ^ bytes[i]) & 0xFFu] ^ (crc >> 8);
 	return ~crc;
 }
