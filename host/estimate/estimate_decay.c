@@ -81,6 +81,7 @@ struct contact {
 	size_t channel; /* record->channel_count: none looked at yet */
 	struct ringdown_span span;
 	double again_s;
+	const struct ringdown_law *law; /* the last that an axis needed */
 };
 
 static void look_at_contact(const struct desk *desk, const struct analysis *analysis, size_t i,
@@ -115,7 +116,10 @@ static void analyse_ringdown(const struct desk *desk, size_t i, struct contact *
 		span->peak_g = fabs(channel->peak.value_g);
 	if (hit != i)
 		span->until_s = contact->again_s;
+	span->law = contact->law;
 	ringdown_find(&work->trace, span, &work->ringdown);
+	if (work->ringdown.law.found)
+		contact->law = &work->ringdown.law;
 	if (!isfinite(span->from_s) && !isfinite(channel->peak.value_g))
 		work->ringdown.result.how.status = channel->peak.how.status;
 	channel->ringdown = work->ringdown.result;

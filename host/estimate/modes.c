@@ -201,13 +201,13 @@ unsigned modes_stronger(const struct modes *modes)
 	return modes->count > 1 && modes_swing_g(modes, 1) > modes_swing_g(modes, 0);
 }
 
-double modes_mean_hz(const struct modes *modes, unsigned cycles)
+double modes_mean_hz(const struct modes *modes, unsigned cycles, unsigned steps)
 {
 	double decay = modes->p[MODES_DECAY], omega = modes->p[MODES_OMEGA];
 	double turns = 2 * UNITS_PI * cycles, span = turns / omega;
 
 	if (modes->law == MODES_LAW_SPRING)
-		return spring_mean_hz(modes->p, cycles);
+		return spring_mean_hz(modes->p, cycles, steps);
 	for (int i = 0; i < MEAN_ROUNDS; i++)
 		span *= turns /
 		        (omega * span + modes->p[MODES_LAW] * (1 - exp(-2 * decay * span)) / (2 * decay));

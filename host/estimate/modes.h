@@ -68,8 +68,8 @@ void modes_residual(const struct modes *modes, const struct series *series, doub
 double modes_swing_g(const struct modes *modes, unsigned m);
 unsigned modes_stronger(const struct modes *modes);
 
-/* Mean damped frequency of a law's first cycles. */
-double modes_mean_hz(const struct modes *modes, unsigned cycles);
+/* Mean damped frequency of a law's first cycles; a spring's in so many steps a cycle. */
+double modes_mean_hz(const struct modes *modes, unsigned cycles, unsigned steps);
 
 /* From block means, which a fit to them describes, to the samples themselves: each mode's cosine and sine. */
 void modes_unblock(struct modes *modes, const struct series *series);

@@ -19,7 +19,12 @@
 /* Of these the plain decay is not the whole. */
 #define RICHER (ESTIMATE_FLAG_TWO_MODES | ESTIMATE_FLAG_AMPLITUDE | ESTIMATE_FLAG_HUM | ESTIMATE_FLAG_MODEL)
 
-enum { MEAN_CYCLES = 3, SAMPLES_MIN = 10 };
+enum {
+	MEAN_CYCLES = 3,
+	MEAN_STEPS = 64,  /* a cycle, for the value */
+	SLOPE_STEPS = 24, /* for what it hangs on */
+	SAMPLES_MIN = 10,
+};
 
 void ringdown_try(struct ringdown_job *job, const char *method)
 {
@@ -93,28 +98,29 @@ static double ringdown_spread(const struct ringdown_job *job, unsigned m, double
 /* What a law's mean has instead of the vanishing swing's. */
 enum { MEAN_HZ, MEAN_NATURAL, MEAN_DAMPING, MEAN_VALUES };
 
-static void mean_values(const struct modes *modes, double value[MEAN_VALUES])
+static void mean_values(const struct modes *modes, unsigned steps, double value[MEAN_VALUES])
 {
 	const double *p = modes->p;
 
-	value[MEAN_HZ] = modes_mean_hz(modes, MEAN_CYCLES);
+	value[MEAN_HZ] = modes_mean_hz(modes, MEAN_CYCLES, steps);
 	value[MEAN_NATURAL] = value[MEAN_HZ] * hypot(1, p[MODES_DECAY] / p[MODES_OMEGA]);
 	value[MEAN_DAMPING] = p[MODES_DECAY] / (2 * UNITS_PI * value[MEAN_NATURAL]);
 }
 
 /* Of value. The vanishing swing is extrapolated; a mean of cycles that are there is far more certain. */
-static void mean_sigmas(const struct ringdown_job *job, const double value[MEAN_VALUES],
-                        double sigma[MEAN_VALUES])
+static void mean_sigmas(const struct ringdown_job *job, double sigma[MEAN_VALUES])
 {
 	double row[MEAN_VALUES][CHOLESKY_MAX] = {{0}}, point = ringdown_sigma_point(job, &job->modes);
+	double value[MEAN_VALUES];
 
+	mean_values(&job->modes, SLOPE_STEPS, value);
 	for (unsigned i = MODES_DECAY; i < modes_size(&job->modes); i++) {
 		struct modes above = job->modes;
 		double high[MEAN_VALUES];
 		double step = LIMIT_SMALL * fmax(fabs(job->modes.p[i]), LIMIT_LEAST);
 
 		above.p[i] += step;
-		mean_values(&above, high);
+		mean_values(&above, SLOPE_STEPS, high);
 		for (unsigned v = 0; v < MEAN_VALUES; v++)
 			row[v][i] = (high[v] - value[v]) / step;
 	}
@@ -128,8 +134,8 @@ static void express_mean(const struct ringdown_job *job, struct estimate_ringdow
 {
 	double value[MEAN_VALUES], sigma[MEAN_VALUES];
 
-	mean_values(&job->modes, value);
-	mean_sigmas(job, value, sigma);
+	mean_values(&job->modes, MEAN_STEPS, value);
+	mean_sigmas(job, sigma);
 	result->small_swing_hz = result->frequency_hz;
 	result->frequency_hz = value[MEAN_HZ];
 	result->sigma_hz = sigma[MEAN_HZ];
@@ -137,6 +143,17 @@ static void express_mean(const struct ringdown_job *job, struct estimate_ringdow
 	result->sigma_natural_hz = sigma[MEAN_NATURAL];
 	result->damping_ratio = value[MEAN_DAMPING];
 	result->sigma_damping = sigma[MEAN_DAMPING];
+}
+
+/* For the other axes: a spring that its residual allows. */
+static struct ringdown_law law_of(const struct ringdown_job *job)
+{
+	const double *p = job->modes.p, swing = modes_swing_g(&job->modes, 0);
+
+	if (job->modes.law != MODES_LAW_SPRING || !ringdown_passes(job, &job->modes))
+		return (struct ringdown_law){.found = false};
+	return (struct ringdown_law){true, p[MODES_DECAY], p[MODES_OMEGA], p[MODES_LAW] * swing * swing,
+	                             p[MODES_LAW + 1]};
 }
 
 /* Values and uncertainties of the stronger mode, and the other's values. */
@@ -169,6 +186,7 @@ static void ringdown_express(const struct ringdown_job *job, struct ringdown *ri
 	ringdown->amplitude_g = result->amplitude_g;
 	ringdown->offset_g = job->modes.p[MODES_OFFSET];
 	ringdown->start_s = trace_time(job->trace, job->first);
+	ringdown->law = law_of(job);
 }
 
 static const char *method_of(const struct ringdown_job *job)

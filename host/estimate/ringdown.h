@@ -21,6 +21,9 @@
  * 3): then the mean of the window stays, and the distance to the other's answer is added to its uncertainty.
  * A fit that is not refused but less certain than the tolerance is flagged.
  *
+ * What two modes and the quadratic law did not explain on another axis of the same thing, but the softening
+ * spring did, is tried first, from there.
+ *
  * The window opens where the decay is surely free and then reaches back as far as the fit foretells the
  * samples before it, since every cycle lost at the start costs most.
  *
@@ -37,11 +40,20 @@
 #include "host/estimate/estimate.h"
 #include "host/estimate/trace.h"
 
+/* How much of a mount's stiffness the swing at the start has taken, and over which swings, as spring.h has
+ * it. */
+struct ringdown_law {
+	bool found; /* no other shape passed before it */
+	double decay, omega;
+	double q, d; /* q: of that swing */
+};
+
 struct ringdown {
 	struct estimate_ringdown result;
 	double amplitude_g; /* at start_s; 0 unless the status is ok */
 	double start_s;     /* of the samples that were fitted */
 	double offset_g;
+	struct ringdown_law law;
 };
 
 /* What to look at: the decay is free from from_s until until_s. */
@@ -50,6 +62,7 @@ struct ringdown_span {
 	double peak_g;    /* magnitude of the channel's peak, which says what is small */
 	double tolerance; /* part of the value; 0 = ESTIMATE_TOLERANCE */
 	double margin_s;  /* the decay may have been free this much before from_s; 0 = not looked for */
+	const struct ringdown_law *law; /* what another axis of the thing needed is tried first; NULL: none */
 };
 
 void ringdown_find(const struct trace *trace, const struct ringdown_span *span, struct ringdown *ringdown);

@@ -113,20 +113,32 @@ static double try_square(struct ringdown_job *job)
 	return modes.p[MODES_LAW];
 }
 
-/* The mount that softens, or stiffens, as the quadratic law has it. */
-static void try_spring(struct ringdown_job *job, double k)
+static void try_spring(struct ringdown_job *job, const struct ringdown_law *law)
 {
 	struct modes modes = job->single;
 	double swing = modes_swing_g(&modes, 0);
 
 	modes.law = MODES_LAW_SPRING;
-	modes.p[MODES_OMEGA] -= k / 2;
+	modes.p[MODES_DECAY] = law->decay;
+	modes.p[MODES_OMEGA] = law->omega;
 	modes.p[MODES_COSINE] *= -1;
 	modes.p[MODES_SINE] *= -1;
-	modes.p[MODES_LAW] = 1 / (swing * swing);
-	modes.p[MODES_LAW + 1] = (k < 0 ? SPRING_B / (1 + SPRING_B) : -SPRING_B / (1 - SPRING_B)) / 2;
+	modes.p[MODES_LAW] = law->q / (swing * swing);
+	modes.p[MODES_LAW + 1] = law->d;
 	if (modes_fit(&modes, &job->series))
 		consider(job, &modes);
+}
+
+/* The mount that softens, or stiffens, as the quadratic law has it. */
+static void try_spring_like(struct ringdown_job *job, double k)
+{
+	const double *p = job->single.p;
+
+	try_spring(job, &(struct ringdown_law){
+	                        .decay = p[MODES_DECAY],
+	                        .omega = p[MODES_OMEGA] - k / 2,
+	                        .q = 1,
+	                        .d = (k < 0 ? SPRING_B / (1 + SPRING_B) : -SPRING_B / (1 - SPRING_B)) / 2});
 }
 
 /* A second mode's frequency over the first's, or the first's over it, to start from. */
@@ -208,7 +220,7 @@ static void search(struct ringdown_job *job)
 	k = try_square(job);
 	try_two(job);
 	if (!ringdown_passes(job, &job->modes) && fabs(k) > 0)
-		try_spring(job, k);
+		try_spring_like(job, k);
 }
 
 /* Where holes leave no blocks but many whole ones, these are enough to look for more than one mode, and what
@@ -248,6 +260,25 @@ void ringdown_try_hum(struct ringdown_job *job)
 	look_on_blocks(job, fit_hum);
 }
 
+static void search_law(struct ringdown_job *job)
+{
+	try_spring(job, job->span->law);
+}
+
+/* Whether what another axis needed passes here; if not, nothing has changed. */
+static bool is_like_another(struct ringdown_job *job)
+{
+	if (job->span->law == NULL)
+		return false;
+	look_on_blocks(job, search_law);
+	if (ringdown_passes(job, &job->modes)) {
+		ringdown_try(job, "amplitude");
+		return true;
+	}
+	job->modes = job->single;
+	return false;
+}
+
 void ringdown_try_richer(struct ringdown_job *job)
 {
 	const struct ringdown_job before = *job;
@@ -256,7 +287,8 @@ void ringdown_try_richer(struct ringdown_job *job)
 		ringdown_richer_restore(job, &before);
 		return;
 	}
-	look_on_blocks(job, search);
+	if (!is_like_another(job))
+		look_on_blocks(job, search);
 	if (ringdown_passes(job, &job->modes))
 		job->flags &= ~(unsigned)ESTIMATE_FLAG_NOT_SEPARABLE;
 	else if (ringdown_chi_square(&before, &before.modes) < ringdown_chi_square(job, &job->modes))

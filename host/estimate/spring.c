@@ -15,7 +15,7 @@
 #define B_MIN -0.9
 #define B_MAX 10.0
 
-/* Of spring_at's steps and those of the first cycles. */
+/* Of spring_at's steps. */
 #define STEPS_PER_CYCLE 64.0
 
 enum { PLACE_Q = MODES_LAW, PLACE_D = MODES_LAW + 1, LANES = 4 };
@@ -137,11 +137,11 @@ static unsigned spring_turn(struct spring *s, unsigned cycles, double step, unsi
 	return steps;
 }
 
-double spring_mean_hz(const double *p, unsigned cycles)
+double spring_mean_hz(const double *p, unsigned cycles, unsigned steps)
 {
-	const double longest = 2 * UNITS_PI / STEPS_PER_CYCLE;
+	const double longest = 2 * UNITS_PI / steps;
 	/* No spring takes longer. */
-	const unsigned most = (unsigned)(B_MAX * STEPS_PER_CYCLE) * cycles;
+	const unsigned most = (unsigned)(B_MAX * steps) * cycles;
 	struct spring s = spring_of(p);
 	const struct state start = s.at;
 	const unsigned whole = spring_turn(&s, cycles, longest, most);
@@ -166,87 +166,100 @@ static bool spring_possible(const double *p)
 	       spring_lost(p) < B_MAX / (1 + B_MAX);
 }
 
-/* The spring at p and, for each unknown but the offset, at p a little changed by difference. */
-static void start_all(struct spring *s, double *difference, const double *p, const struct series *series)
-{
-	const double swing = hypot(p[MODES_COSINE], p[MODES_SINE]);
-	const double least[SPRING_SIZE] = {
-	        1, 0, 0, LIMIT_LEAST, LIMIT_LEAST, LIMIT_SMALL / (swing * swing), LIMIT_LEAST};
-	const double sample_s = series->step_s / series->block;
-
-	for (unsigned i = 0; i < SPRING_SIZE; i++) {
-		double q[SPRING_SIZE];
-
-		memcpy(q, p, sizeof(q));
-		difference[i] = LIMIT_SMALL * fmax(fabs(p[i]), least[i]);
-		if (i != MODES_OFFSET)
-			q[i] += difference[i];
-		s[i] = spring_of(q);
-		spring_go(&s[i], series->first_s - (series->block - 1) * sample_s / 2, sample_s);
-	}
-}
-
-/* Four solutions. */
+/* Four solutions, in steps: times are parts of one, and x of what Q calls large. Stiffness is
+ * still + soft / (1 + x^2). */
 struct quad {
-	QUAD loss, q, k, step; /* step in 1/w0 */
+	QUAD loss, still, soft;
 	QUAD x, v;
 };
 
-static void quad_set(struct quad *quad, const struct spring *s, double step_s)
+/* What the solutions are off the spring at p: loss, k, the swing of time 0 as a part of itself. */
+enum { LANE_LOSS = 1, LANE_K, LANE_SWING };
+
+/* Where the series begins. */
+static void quad_start(struct quad *quad, double difference[LANES], const struct spring *spring,
+                       double first_s, double sample_s)
 {
+	const double swing = spring->at.x * spring->at.x + spring->at.v * spring->at.v,
+	             root = sqrt(spring->q);
+	const double step = spring->omega0 * sample_s;
+
+	difference[LANE_LOSS] = LIMIT_SMALL * fmax(fabs(spring->loss), LIMIT_LEAST);
+	difference[LANE_K] = LIMIT_SMALL * fmax(fabs(spring->k), LIMIT_LEAST / swing);
+	difference[LANE_SWING] = LIMIT_SMALL;
 	for (unsigned i = 0; i < LANES; i++) {
-		quad->loss[i] = s[i].loss;
-		quad->q[i] = s[i].q;
-		quad->k[i] = s[i].k;
-		quad->step[i] = s[i].omega0 * step_s;
-		quad->x[i] = s[i].at.x;
-		quad->v[i] = s[i].at.v;
+		struct spring s = *spring;
+
+		s.loss += i == LANE_LOSS ? difference[i] : 0;
+		s.k += i == LANE_K ? difference[i] : 0;
+		s.at.x *= i == LANE_SWING ? 1 + difference[i] : 1;
+		s.at.v *= i == LANE_SWING ? 1 + difference[i] : 1;
+		spring_go(&s, first_s, sample_s);
+		quad->loss[i] = s.loss * step;
+		quad->still[i] = (1 - s.k / s.q) * step * step;
+		quad->soft[i] = s.k / s.q * step * step;
+		quad->x[i] = s.at.x * root;
+		quad->v[i] = s.at.v * root * step;
 	}
 }
 
-INSIDE push_quad(const struct quad *s, const QUAD *x, const QUAD *v, QUAD *a)
+INSIDE push_quad(const struct quad *s, const QUAD *x, const QUAD *v, QUAD *near, QUAD *a)
 {
-	const QUAD y = *x * *x;
-
-	*a = -s->loss * *v - *x * (1 - s->k * y / (1 + s->q * y));
+	*near = 1 / (1 + *x * *x);
+	*a = -s->loss * *v - *x * (s->still + s->soft * *near);
 }
 
-/* As spring_step. */
-INSIDE quad_step(struct quad *s, QUAD *a1)
+/* As spring_step: gives the acceleration before it, and how fast the first solution's changes there. */
+INSIDE quad_step(struct quad *s, QUAD *a1, double *slope)
 {
-	const QUAD x = s->x, v = s->v, h = s->step;
-	QUAD x2, v2, a2, x3, v3, a3, x4, v4, a4;
+	const QUAD x = s->x, v = s->v;
+	QUAD x2, v2, a2, x3, v3, a3, x4, v4, a4, near;
 
-	push_quad(s, &x, &v, a1);
-	x2 = x + h / 2 * v;
-	v2 = v + h / 2 * *a1;
-	push_quad(s, &x2, &v2, &a2);
-	x3 = x + h / 2 * v2;
-	v3 = v + h / 2 * a2;
-	push_quad(s, &x3, &v3, &a3);
-	x4 = x + h * v3;
-	v4 = v + h * a3;
-	push_quad(s, &x4, &v4, &a4);
-	s->x = x + h / 6 * (v + 2 * v2 + 2 * v3 + v4);
-	s->v = v + h / 6 * (*a1 + 2 * a2 + 2 * a3 + a4);
+	push_quad(s, &x, &v, &near, a1);
+	*slope = -s->loss[0] * (*a1)[0] - v[0] * (s->still[0] + s->soft[0] * near[0] * (2 * near[0] - 1));
+	x2 = x + v * 0.5;
+	v2 = v + *a1 * 0.5;
+	push_quad(s, &x2, &v2, &near, &a2);
+	x3 = x + v2 * 0.5;
+	v3 = v + a2 * 0.5;
+	push_quad(s, &x3, &v3, &near, &a3);
+	x4 = x + v3;
+	v4 = v + a3;
+	push_quad(s, &x4, &v4, &near, &a4);
+	s->x = x + (v + 2 * (v2 + v3) + v4) * (1.0 / 6);
+	s->v = v + (*a1 + 2 * (a2 + a3) + a4) * (1.0 / 6);
 }
 
-/* The next block's mean of each solution: of the accelerations before its steps. */
-INSIDE quad_block_mean(struct quad *quad, unsigned block, QUAD *mean)
+/* Of a block's samples: the accelerations; the first solution's slope, and that times the steps since time 0.
+ */
+struct block {
+	QUAD push;
+	double slope, late;
+};
+
+INSIDE quad_block(struct quad *quad, unsigned samples, double gone, struct block *sum)
 {
 	struct quad here = *quad;
-	QUAD sum = {0}, a;
 
-	for (unsigned j = 0; j < block; j++) {
-		quad_step(&here, &a);
-		sum += a;
+	*sum = (struct block){.push = {0}};
+	for (unsigned j = 0; j < samples; j++) {
+		double slope;
+		QUAD a;
+
+		quad_step(&here, &a, &slope);
+		sum->push += a;
+		sum->slope += slope;
+		sum->late += slope * (gone + j);
 	}
 	*quad = here;
-	*mean = sum / block;
 }
 
-/* Derivatives and, last, the residual: a row of the normal equations, and the sums of its products. */
-_Static_assert(SPRING_SIZE + 1 == 2 * LANES, "a row fills two registers");
+/* What the derivatives by the unknowns are made of: that by the offset, the lanes' (the swing's twice: once
+ * less the acceleration itself), the slope in time, and that times the time. The last column is the residual.
+ */
+enum { OF_OFFSET, OF_LOSS, OF_K, OF_SWING, OF_SLOPE, OF_TIME, OF_BENT, OF_RESIDUAL };
+_Static_assert((int)OF_RESIDUAL == (int)SPRING_SIZE && SPRING_SIZE + 1 == 2 * LANES,
+               "a row fills two registers");
 
 struct spring_sums {
 	QUAD of[2 * LANES][2]; /* of a column with the first four and the last four */
@@ -263,52 +276,114 @@ INSIDE spring_add(struct spring_sums *sums, const QUAD *low, const QUAD *high)
 	sums->taken++;
 }
 
-WIDE static void spring_sum(struct spring_sums *sums, struct quad quad[2], const QUAD difference[2],
-                            const struct series *series, double offset_g)
+/* How the solutions stand to the series. */
+struct spring_scale {
+	QUAD by;     /* differences of the lanes */
+	double push; /* from the sum of a block to its mean in g */
+	double step; /* in 1/w0 */
+	double gone; /* steps from time 0 to the first sample */
+	double offset_g;
+};
+
+WIDE static void spring_sum(struct spring_sums *sums, const struct quad *start,
+                            const struct spring_scale *scale, const struct series *series)
 {
 	struct spring_sums all = {.taken = 0};
+	struct quad quad = *start;
 
 	for (unsigned k = 0; k < series->count; k++) {
-		QUAD low, high;
-		double at;
+		struct block sum;
+		QUAD low, high, push;
 
-		quad_block_mean(&quad[0], series->block, &low);
-		quad_block_mean(&quad[1], series->block, &high);
+		quad_block(&quad, series->block, scale->gone + (double)k * series->block, &sum);
 		if (!series->good[k])
 			continue;
-		at = low[MODES_OFFSET];
-		low = (low - at) / difference[0];
-		high = (high - at) / difference[1];
-		low[MODES_OFFSET] = 1;
-		high[LANES - 1] = series->value_g[k] - offset_g - at;
+		push = sum.push * scale->push;
+		low = (push - push[0]) / scale->by;
+		high[OF_SLOPE - LANES] = sum.slope * scale->push / scale->step;
+		high[OF_TIME - LANES] = sum.late * scale->push;
+		high[OF_BENT - LANES] = low[OF_SWING] - push[0];
+		high[OF_RESIDUAL - LANES] = series->value_g[k] - scale->offset_g - push[0];
+		low[OF_OFFSET] = 1;
 		spring_add(&all, &low, &high);
 	}
 	*sums = all;
 }
 
+/* The derivatives by the unknowns from the columns: a row each. The solution is scaled with its swing where q
+ * and k are scaled by its inverse square, and states along it are it, later. False where these do not tell
+ * two states' derivatives apart. */
+static bool by_unknowns(double by[SPRING_SIZE][SPRING_SIZE], const struct spring *s, const double *p)
+{
+	const double x = s->at.x, v = s->at.v, push_0 = push(s, x, v), apart = x * push_0 - v * v;
+	const double a = p[MODES_DECAY], w = p[MODES_OMEGA], swing = spring_swing(p);
+	const double cube = s->omega0 * s->omega0 * s->omega0, by_swing = -2 * p[PLACE_D] / (swing * swing);
+
+	memset(by, 0, SPRING_SIZE * sizeof(*by));
+	if (!(fabs(apart) > LIMIT_SMALL * swing))
+		return false;
+	by[MODES_OFFSET][OF_OFFSET] = 1;
+	by[MODES_DECAY][OF_LOSS] = 2 * w * w / cube;
+	by[MODES_DECAY][OF_TIME] = a / (s->omega0 * s->omega0);
+	by[MODES_OMEGA][OF_LOSS] = -2 * a * w / cube;
+	by[MODES_OMEGA][OF_TIME] = w / (s->omega0 * s->omega0);
+	by[MODES_COSINE][OF_SWING] = push_0 / apart;
+	by[MODES_COSINE][OF_SLOPE] = -v / apart;
+	by[MODES_COSINE][OF_K] = x * by_swing;
+	by[MODES_SINE][OF_SWING] = -v / apart;
+	by[MODES_SINE][OF_SLOPE] = x / apart;
+	by[MODES_SINE][OF_K] = v * by_swing;
+	by[PLACE_Q][OF_BENT] = 1 / (2 * s->q);
+	by[PLACE_Q][OF_K] = p[PLACE_D] - s->k / s->q;
+	by[PLACE_D][OF_K] = 1 / swing + s->q;
+	return true;
+}
+
+/* From sums over columns to those over derivatives. */
+static void spring_turn_sums(const struct spring_sums *sums, double by[SPRING_SIZE][SPRING_SIZE],
+                             double normal[CHOLESKY_MAX][CHOLESKY_MAX], double right[CHOLESKY_MAX])
+{
+	double half[SPRING_SIZE][SPRING_SIZE + 1] = {{0}};
+
+	for (unsigned i = 0; i < SPRING_SIZE; i++)
+		for (unsigned j = 0; j <= SPRING_SIZE; j++)
+			for (unsigned n = 0; n < SPRING_SIZE; n++) {
+				const unsigned high = j > n ? j : n, low = j > n ? n : j;
+
+				half[i][j] += by[i][n] * sums->of[high][low / LANES][low % LANES];
+			}
+	for (unsigned i = 0; i < SPRING_SIZE; i++) {
+		for (unsigned j = 0; j <= i; j++)
+			for (unsigned n = 0; n < SPRING_SIZE; n++)
+				normal[i][j] += by[j][n] * half[i][n];
+		right[i] = half[i][OF_RESIDUAL];
+	}
+}
+
 size_t spring_normal(const struct series *series, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
                      double right[CHOLESKY_MAX], double *squares)
 {
-	struct spring s[2 * LANES];
+	double by[SPRING_SIZE][SPRING_SIZE], difference[LANES] = {1};
+	const double sample_s = series->step_s / series->block;
+	const double first_s = series->first_s - (series->block - 1) * sample_s / 2;
+	struct spring_scale scale;
 	struct spring_sums sums;
-	struct quad quad[2];
-	double difference[2 * LANES];
-	QUAD by[2];
+	struct quad quad;
+	struct spring s;
 
 	if (!spring_possible(p))
 		return 0;
-	start_all(s, difference, p, series);
-	s[SPRING_SIZE] = s[0]; /* one too few */
-	difference[SPRING_SIZE] = 1;
-	for (unsigned i = 0; i < 2; i++)
-		quad_set(&quad[i], &s[LANES * i], series->step_s / series->block);
-	memcpy(by, difference, sizeof(by));
-	spring_sum(&sums, quad, by, series, p[MODES_OFFSET]);
-	for (unsigned i = 0; i < SPRING_SIZE; i++) {
-		for (unsigned j = 0; j <= i; j++)
-			normal[i][j] = sums.of[i][j / LANES][j % LANES];
-		right[i] = sums.of[SPRING_SIZE][i / LANES][i % LANES];
-	}
-	*squares = sums.of[SPRING_SIZE][1][LANES - 1];
+	s = spring_of(p);
+	if (!by_unknowns(by, &s, p))
+		return 0;
+	quad_start(&quad, difference, &s, first_s, sample_s);
+	memcpy(&scale.by, difference, sizeof(scale.by));
+	scale.step = s.omega0 * sample_s;
+	scale.push = 1 / (scale.step * scale.step * sqrt(s.q) * series->block);
+	scale.gone = first_s / sample_s;
+	scale.offset_g = p[MODES_OFFSET];
+	spring_sum(&sums, &quad, &scale, series);
+	spring_turn_sums(&sums, by, normal, right);
+	*squares = sums.of[OF_RESIDUAL][1][OF_RESIDUAL - LANES];
 	return sums.taken;
 }

@@ -12,6 +12,7 @@
 #include "host/estimate/modes.h"
 #include "host/estimate/outlier.h"
 #include "host/estimate/scan.h"
+#include "host/estimate/spring.h"
 #include "tests/unit/near.h"
 #include "tests/unit/synth.h"
 
@@ -295,12 +296,59 @@ static void bump(void **state)
 	}
 }
 
+/* What the derivatives say of the sum of squares is what it does, and the model is the spring. */
+static void spring_slopes(void **state)
+{
+	static const double by[SPRING_SIZE] = {1e-3, 1e-3, 1e-2, 1e-2, 1e-2, 1e-9, 1e-5};
+	static const double d[] = {0.3, -0.2};
+
+	(void)state;
+	for (unsigned round = 0; round < 6; round++) {
+		const double p[SPRING_SIZE] = {
+		        -2, 80, w1, 200, -150, (1.0 + round) / (250.0 * 250.0), d[round % 2]};
+		struct trace trace = open_sum(0, 0, 3, 1);
+		struct series s;
+		double normal[CHOLESKY_MAX][CHOLESKY_MAX] = {{0}}, right[CHOLESKY_MAX] = {0}, squares,
+		       model = 0;
+
+		trace.sample[100] = SAMPLE_LOST;
+		series_take(&s, &trace, 3, 300, 0.25, 1 + round % 4);
+		assert_int_equal(spring_normal(&s, p, normal, right, &squares), s.used);
+		for (unsigned k = 0; k < s.count; k++) {
+			double mean = 0;
+
+			for (unsigned j = 0; j < s.block; j++)
+				mean += spring_at(p, s.first_s + k * s.step_s +
+				                             (j - (s.block - 1) / 2.0) * s.step_s / s.block) /
+				        s.block;
+			model += s.good[k] ? (s.value_g[k] - mean) * (s.value_g[k] - mean) : 0;
+		}
+		assert_near(model / squares, 1, 1e-4);
+		for (unsigned i = 0; i < SPRING_SIZE; i++) {
+			double q[SPRING_SIZE], none[CHOLESKY_MAX][CHOLESKY_MAX], unused[CHOLESKY_MAX],
+			        side[2];
+
+			for (int up = 0; up < 2; up++) {
+				memset(none, 0, sizeof(none));
+				memset(unused, 0, sizeof(unused));
+				memcpy(q, p, sizeof(q));
+				q[i] += up ? by[i] : -by[i];
+				assert_true(spring_normal(&s, q, none, unused, &side[up]) > 0);
+			}
+			assert_near((side[0] - side[1]) / (4 * by[i]) / sqrt(normal[i][i] * squares),
+			            right[i] / sqrt(normal[i][i] * squares), 1e-4);
+		}
+		trace_close(&trace);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(series),   cmocka_unit_test(thinned),    cmocka_unit_test(exact),
-	        cmocka_unit_test(holes),    cmocka_unit_test(impossible), cmocka_unit_test(scanned),
-	        cmocka_unit_test(outliers), cmocka_unit_test(crossings),  cmocka_unit_test(bump),
+	        cmocka_unit_test(spring_slopes), cmocka_unit_test(series),   cmocka_unit_test(thinned),
+	        cmocka_unit_test(exact),         cmocka_unit_test(holes),    cmocka_unit_test(impossible),
+	        cmocka_unit_test(scanned),       cmocka_unit_test(outliers), cmocka_unit_test(crossings),
+	        cmocka_unit_test(bump),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
