@@ -94,7 +94,7 @@ int process_write(int fd, const void *bytes, size_t size)
 	return 0;
 }
 
-void process_streams_close(struct process_streams *streams)
+void process_streams_close(const struct process_streams *streams)
 {
 	for (int i = 0; i < 3; i++)
 		if (streams->fd[i] >= 0)
@@ -116,6 +116,28 @@ int process_streams_open(struct process_streams *streams, const void *bytes, siz
 		error = errno;
 	if (error != 0)
 		process_streams_close(streams);
+	return error;
+}
+
+int process_scratch(void)
+{
+	const char *folder = getenv("TMPDIR");
+
+	return open(folder != NULL && folder[0] == '/' ? folder : "/var/tmp", O_TMPFILE | O_RDWR | O_CLOEXEC,
+	            0600);
+}
+
+int process_streams_open_file(struct process_streams *streams, const char *file)
+{
+	int error = 0;
+
+	streams->fd[0] = open(file, O_RDONLY | O_CLOEXEC);
+	streams->fd[1] = streams->fd[0] >= 0 ? process_scratch() : -1;
+	streams->fd[2] = streams->fd[1] >= 0 ? memfd_create("stream", MFD_CLOEXEC) : -1;
+	if (streams->fd[2] < 0) {
+		error = errno;
+		process_streams_close(streams);
+	}
 	return error;
 }
 

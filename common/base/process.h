@@ -25,6 +25,9 @@ int process_start(const struct process *process, pid_t *pid);
 /* Until it ends: its exit status, or 128 plus the signal that ended it. */
 int process_wait(pid_t pid);
 
+/* A file without a name in $TMPDIR, else /var/tmp: its descriptor, or -1 with errno. */
+int process_scratch(void);
+
 /* Three streams as files in memory: no pipe can fill up while the other end waits. */
 struct process_streams {
 	int fd[3];
@@ -33,7 +36,10 @@ struct process_streams {
 /* The first holds these bytes and is read from their beginning on. An errno; then there is nothing to close.
  */
 int process_streams_open(struct process_streams *streams, const void *bytes, size_t size);
-void process_streams_close(struct process_streams *streams);
+
+/* For large ones: the first is this file, the second a file on the disk. */
+int process_streams_open_file(struct process_streams *streams, const char *file);
+void process_streams_close(const struct process_streams *streams);
 
 /* Runs words on the streams. Its exit status as process_wait, or minus an errno when it could not be started.
  */

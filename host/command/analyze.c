@@ -262,6 +262,7 @@ int analyze_ready(struct analyze_arguments *arguments, const char *command)
 {
 	int code = analyze_agree(arguments, command);
 
+	arguments->stretch.whole = arguments->evaluate.html != NULL;
 	if (arguments->profile != NULL) {
 		snprintf(arguments->profile_as_columns, sizeof(arguments->profile_as_columns), "@%s",
 		         arguments->profile);

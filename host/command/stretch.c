@@ -26,6 +26,9 @@ int stretch_take_window(const struct option_table *table, const char *name, cons
 	return option_wrong(table, "--%s is '%s', expected FROM:TO in seconds", name, text);
 }
 
+/* Beyond so many samples a result of all of them takes gigabytes, and is about one shock of many. */
+static const size_t WHOLE_MOST = 1 << 24;
+
 bool stretch_is_twofold(const struct stretch *stretch)
 {
 	return stretch->every_shock + (stretch->shock > 0) + !isnan(stretch->window_s[0]) > 1;
@@ -65,11 +68,13 @@ static int stretch_shocks(const struct stretching *stretching, unsigned wanted,
 		command_error("%s: %s", stretching->record->file, error_text(DT_E_MEMORY));
 		return COMMAND_INPUT;
 	}
-	if (windows.count == 0 || wanted > windows.count) {
+	if (wanted > windows.count)
 		command_error("%s: no shock %u, %zu are there", stretching->record->file, wanted,
 		              windows.count);
+	else if (windows.count == 0)
+		command_error("%s: no shock in it", stretching->record->file);
+	if (windows.count == 0 || wanted > windows.count)
 		code = COMMAND_INPUT;
-	}
 	for (size_t i = 0; i < windows.count && !interrupt_came(); i++) {
 		const struct shock_window *w = &windows.window[i];
 		int one;
@@ -83,6 +88,15 @@ static int stretch_shocks(const struct stretching *stretching, unsigned wanted,
 	return code;
 }
 
+static bool is_too_long(const struct record *record)
+{
+	size_t samples = 0;
+
+	for (size_t i = 0; i < record->channel_count; i++)
+		samples += record->channels[i].count;
+	return samples > WHOLE_MOST;
+}
+
 int stretch_each(struct record *record, const struct stretch *stretch, const struct events_options *events,
                  int (*each)(struct record *cut, void *context), void *context)
 {
@@ -92,5 +106,9 @@ int stretch_each(struct record *record, const struct stretch *stretch, const str
 		return stretch_shocks(&stretching, stretch->shock, events);
 	if (!isnan(stretch->window_s[0]))
 		return stretch_cut(&stretching, stretch->window_s[0], stretch->window_s[1], 0, 0);
-	return each(record, context);
+	if (stretch->whole || !is_too_long(record))
+		return each(record, context);
+	command_error("%s: too long for one result, so one for each shock, as with --every-shock",
+	              record->file);
+	return stretch_shocks(&stretching, 0, events);
 }

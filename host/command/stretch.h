@@ -13,6 +13,7 @@ struct stretch {
 	bool every_shock;
 	unsigned shock;     /* by its number, from 1; 0: none */
 	double window_s[2]; /* NAN: none */
+	bool whole;         /* none of them means all of the record, however long */
 };
 
 /* None of them. */
@@ -32,8 +33,8 @@ option_take stretch_take_window;
 bool stretch_is_twofold(const struct stretch *stretch);
 
 /* Calls each for every stretch that is named, a record of its own with its number, or for the record itself
- * where none is. The exit code of the last that is not COMMAND_DONE, or COMMAND_INPUT where there is no such
- * shock or no sample, errors printed. */
+ * where none is; of one that is very long, for each shock, and says so on stderr. The exit code of the last
+ * that is not COMMAND_DONE, or COMMAND_INPUT where there is no such shock or no sample, errors printed. */
 int stretch_each(struct record *record, const struct stretch *stretch, const struct events_options *events,
                  int (*each)(struct record *cut, void *context), void *context);
 

@@ -9,9 +9,12 @@
 #include <string.h>
 
 #include "common/base/text.h"
+#include "host/base/mapped.h"
 #include "host/record/tree.h"
 
-enum { PATH_BYTES = 512, NUMBERS_MOST = 1 << 27, TEXTS_MOST = 1 << 20, MEMBERS_MOST = 256 };
+enum { PATH_BYTES = 512, PART = 1 << 16 /* numbers at once */, TEXTS_MOST = 1 << 20, MEMBERS_MOST = 256 };
+
+static const hssize_t NUMBERS_MOST = UINT32_MAX - 1;
 
 /* Whole numbers beyond this are told after the first one: they are instants in ns. */
 static const double WHOLE_MOST = 9007199254740992.0;
@@ -32,18 +35,21 @@ struct values {
 	const char *path;
 	hid_t id, type, space;
 	bool is_attribute;
-	size_t count, rows, columns;
+	size_t rank, count, rows, columns;
 };
+
+static int refuse_values(const struct values *of)
+{
+	return refuse_foreign(of->path,
+	                      "cannot be read: cut or damaged, or packed in a way that is not known");
+}
 
 static int read_values(const struct values *of, hid_t type, void *to)
 {
 	herr_t error = of->is_attribute ? H5Aread(of->id, type, to)
 	                                : H5Dread(of->id, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, to);
 
-	return error >= 0 ? 0
-	                  : refuse_foreign(
-	                            of->path,
-	                            "cannot be read: cut or damaged, or packed in a way that is not known");
+	return error >= 0 ? 0 : refuse_values(of);
 }
 
 /* ---- numbers ---- */
@@ -74,9 +80,12 @@ static void leave_fills(const struct values *of, double *value)
 
 		if (space >= 0 && H5Sget_simple_extent_npoints(space) == 1 &&
 		    H5Aread(attribute, H5T_NATIVE_DOUBLE, &fill) >= 0)
-			for (size_t k = 0; k < of->count; k++)
+			for (size_t k = 0; k < of->count; k++) {
 				if (!(value[k] < fill || value[k] > fill))
 					value[k] = NAN;
+				if (k % PART == 0)
+					mapped_seen(PART * sizeof(*value));
+			}
 		if (space >= 0)
 			H5Sclose(space);
 		if (attribute >= 0)
@@ -84,13 +93,41 @@ static void leave_fills(const struct values *of, double *value)
 	}
 }
 
+/* The same, some rows at a time, as doubles. */
+static int read_parts(const struct values *of, hid_t type, double *value)
+{
+	size_t part = of->columns < PART ? PART / of->columns : 1, rank = of->rank;
+	hid_t space = H5Scopy(of->space);
+	int result = 0;
+
+	for (size_t row = 0; row < of->rows && result == 0; row += part) {
+		size_t rows = of->rows - row < part ? of->rows - row : part;
+		const hsize_t from[2] = {row, 0}, size[2] = {rows, of->columns}, count = rows * of->columns;
+		hid_t memory = H5Screate_simple(1, &count, NULL);
+
+		if (rank > 0 && H5Sselect_hyperslab(space, H5S_SELECT_SET, from, NULL, size, NULL) < 0)
+			result = -1;
+		else if (H5Dread(of->id, type, memory, space, H5P_DEFAULT, value + row * of->columns) < 0)
+			result = -1;
+		H5Sclose(memory);
+		mapped_seen(2 * (size_t)count * sizeof(*value));
+	}
+	H5Sclose(space);
+	return result == 0 ? 0 : refuse_values(of);
+}
+
 static int put_numbers(const struct values *of, hid_t type, hid_t read_as, const char *path)
 {
-	double *value = malloc(of->count * sizeof(*value)), largest = 0;
-	int result = value != NULL ? read_values(of, read_as, value) : refuse_foreign(path, "no memory");
+	double *value = mapped_array(of->count, sizeof(*value)), largest = 0;
+	int result = value == NULL      ? refuse_foreign(path, "no memory")
+	             : of->is_attribute ? read_values(of, read_as, value)
+	                                : read_parts(of, read_as, value);
 
-	for (size_t k = 0; k < of->count && result == 0; k++)
+	for (size_t k = 0; k < of->count && result == 0; k++) {
 		largest = fmax(largest, fabs(value[k]));
+		if (k % PART == 0)
+			mapped_seen(PART * sizeof(*value));
+	}
 	if (result == 0 && largest > WHOLE_MOST && of->count > 1 && H5Tget_class(type) == H5T_INTEGER &&
 	    read_as == H5T_NATIVE_DOUBLE)
 		result = take_instants(of, value);
@@ -106,7 +143,7 @@ static int put_numbers(const struct values *of, hid_t type, hid_t read_as, const
 		                                      .by_rows = 1},
 		                  value);
 	}
-	free(value);
+	mapped_free(value);
 	return result;
 }
 
@@ -208,6 +245,7 @@ static bool take_extent(struct values *of)
 	if (ranks < 0 || ranks > 2 || count < 1 || count > NUMBERS_MOST ||
 	    H5Sget_simple_extent_dims(of->space, size, NULL) < 0)
 		return false;
+	of->rank = (size_t)ranks;
 	of->count = (size_t)count;
 	of->rows = (size_t)size[0];
 	of->columns = (size_t)size[1];

@@ -485,6 +485,12 @@ static hid_t open_image(const struct source *source)
 {
 	hid_t access = H5Pcreate(H5P_FILE_ACCESS), file = -1;
 
+	if (source->mapped != NULL) { /* too large for an image */
+		setenv("HDF5_USE_FILE_LOCKING", "FALSE", 1);
+		file = H5Fopen("/dev/stdin", H5F_ACC_RDONLY, access);
+		H5Pclose(access);
+		return file;
+	}
 	H5Pset_fapl_core(access, IMAGE_STEP, false);
 	if (H5Pset_file_image(access, source->bytes, source->size) >= 0)
 		file = H5Fopen("record", H5F_ACC_RDONLY, access);

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/units.h"
+#include "host/base/mapped.h"
 #include "host/record/source.h"
 
 static const double RATE_LEAST_HZ = 10, RATE_MOST_HZ = 20e6, CHANGE_LEAST_M_S = 0.02, CHANGE_MOST_M_S = 200;
@@ -16,12 +17,15 @@ static double largest_area(const struct record *record)
 	size_t at = 0;
 
 	for (size_t c = 0; c < record->channel_count; c++)
-		for (size_t k = 0; k < record->channels[c].count; k++)
+		for (size_t k = 0; k < record->channels[c].count; k++) {
 			if (fabs(record->channels[c].value_g[k]) > fabs(peak)) {
 				of = &record->channels[c];
 				peak = of->value_g[k];
 				at = k;
 			}
+			if (k % RECORD_PART == 0)
+				mapped_seen(RECORD_PART * sizeof(double));
+		}
 	for (size_t k = at; of != NULL && k < of->count && of->value_g[k] / peak > 0.1; k++)
 		area += fabs(of->value_g[k]);
 	for (size_t k = at; of != NULL && k-- > 0 && of->value_g[k] / peak > 0.1;)

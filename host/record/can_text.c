@@ -72,8 +72,6 @@ int can_text(struct source *source, char message[READ_MESSAGE_MAX])
 		        "a CAN log of more than 2 GiB as candump text: cut it, or save it as such");
 	if (text_close(&made, error) != 0)
 		return error ? error : source_no_memory(message, source->file);
-	free(source->bytes);
-	source->bytes = made.bytes;
-	source->size = made.size;
+	source_replace(source, made.bytes, made.size);
 	return 0;
 }

@@ -4,6 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/mapped.h"
+
+enum { PART = 1 << 20 /* bytes of a pass, then mapped_seen is told */ };
 enum { LOOKED_AT = 4096, UTF8_MOST = 4, REPLACEMENT = 0xFFFD };
 
 /* Part of the odd or even bytes that are zero in UTF-16 of Latin letters and digits. */
@@ -77,6 +80,8 @@ static size_t skip_ascii(const unsigned char *bytes, size_t size, size_t at)
 		memcpy(&eight, bytes + at, sizeof(eight));
 		if ((eight & UINT64_C(0x8080808080808080)) != 0)
 			break;
+		if (at % PART < sizeof(eight))
+			mapped_seen(PART);
 	}
 	return at;
 }
@@ -122,11 +127,24 @@ static uint64_t line_of(const struct source *source, const char *byte)
 	return line;
 }
 
+static const char *find_zero(const struct source *source)
+{
+	const char *zero = NULL;
+
+	for (size_t at = 0; at < source->size && zero == NULL; at += PART) {
+		size_t part = source->size - at < PART ? source->size - at : PART;
+
+		zero = memchr(source->bytes + at, '\0', part);
+		mapped_seen(part);
+	}
+	return zero;
+}
+
 int encoding_settle(struct source *source, const char **name, char message[READ_MESSAGE_MAX])
 {
 	const unsigned char *bytes = (const unsigned char *)source->bytes;
 	char order = utf16_order(bytes, source->size), *text;
-	const char *zero = source->size > 0 ? memchr(source->bytes, '\0', source->size) : NULL;
+	const char *zero = find_zero(source);
 	size_t used;
 
 	*name = "utf-8";
@@ -144,8 +162,6 @@ int encoding_settle(struct source *source, const char **name, char message[READ_
 	*name = order == 'l' ? "utf-16le" : order == 'b' ? "utf-16be" : "cp1252";
 	used = order != '\0' ? from_utf16(bytes, source->size, order == 'b', text)
 	                     : from_cp1252(bytes, source->size, text);
-	free(source->bytes);
-	source->bytes = text;
-	source->size = used;
+	source_replace(source, text, used);
 	return 0;
 }

@@ -57,7 +57,7 @@ int read_hdf5(struct record *record, const struct source *source, const char *co
               char message[READ_MESSAGE_MAX])
 {
 	struct process_streams streams;
-	int error = helper_run(&helper, "read", source->bytes, source->size, source->file, &streams, message);
+	int error = helper_read(&helper, source, &streams, message);
 	char head[sizeof(TREE_HEAD)];
 	ssize_t size;
 

@@ -39,28 +39,37 @@ static int helper_complain(const struct helper *helper, char *message, const cha
 	                     helper->program, helper->format);
 }
 
-int helper_run(const struct helper *helper, const char *verb, const void *bytes, size_t size,
-               const char *file, struct process_streams *streams, char message[READ_MESSAGE_MAX])
+/* Closes the streams where it fails. */
+static int helper_run(const struct helper *helper, const char *verb, const char *file,
+                      const struct process_streams *streams, char *message)
 {
 	char path[PATH_MAX];
 	const char *words[] = {path, verb, NULL};
 	int error, status;
 
 	if (path_of_helper(helper->program, path) != 0)
-		return source_refuse(message, DT_E_UNKNOWN, file, 0,
-		                     "this build cannot do %s: install %s and run make again", helper->format,
-		                     helper->packages);
-	error = process_streams_open(streams, bytes, size);
-	if (error != 0)
-		return source_refuse(message, DT_E_SYSTEM, file, 0, "%s", strerror(error));
-	status = process_filter(words, streams);
-	if (status == 0)
+		error = source_refuse(message, DT_E_UNKNOWN, file, 0,
+		                      "this build cannot do %s: install %s and run make again",
+		                      helper->format, helper->packages);
+	else if ((status = process_filter(words, streams)) == 0)
 		return 0;
-	error = status < 0 ? source_refuse(message, DT_E_SYSTEM, file, 0, "%s: %s", helper->program,
-	                                   strerror(-status))
-	                   : helper_complain(helper, message, file, streams->fd[2], status);
+	else
+		error = status < 0 ? source_refuse(message, DT_E_SYSTEM, file, 0, "%s: %s", helper->program,
+		                                   strerror(-status))
+		                   : helper_complain(helper, message, file, streams->fd[2], status);
 	process_streams_close(streams);
 	return error;
+}
+
+int helper_read(const struct helper *helper, const struct source *source, struct process_streams *streams,
+                char message[READ_MESSAGE_MAX])
+{
+	int error = source->mapped != NULL ? process_streams_open_file(streams, source->file)
+	                                   : process_streams_open(streams, source->bytes, source->size);
+
+	if (error != 0)
+		return source_refuse(message, DT_E_SYSTEM, source->file, 0, "%s", strerror(error));
+	return helper_run(helper, "read", source->file, streams, message);
 }
 
 static int copy_all(int fd, FILE *out)
@@ -84,8 +93,11 @@ int helper_write(const struct helper *helper, const struct record *record, FILE 
 		error = text_close(&text, write_csv(record, text.out));
 	if (error != 0)
 		return source_refuse(message, error, file, 0, "%s", error_text(error));
-	error = helper_run(helper, "write", text.bytes, text.size, file, &streams, message);
+	error = process_streams_open(&streams, text.bytes, text.size);
 	free(text.bytes);
+	if (error != 0)
+		return source_refuse(message, DT_E_SYSTEM, file, 0, "%s", strerror(error));
+	error = helper_run(helper, "write", file, &streams, message);
 	if (error != 0)
 		return error;
 	if (copy_all(streams.fd[1], out) != 0)

@@ -18,10 +18,10 @@ struct helper {
 	const char *packages;         /* what it is built with: "libhdf5-dev and pkg-config" */
 };
 
-/* Runs it on the bytes; what it gave is in streams, to be closed after success. Without it DT_E_UNKNOWN, and
- * message says what to install. */
-DT_MUST_USE int helper_run(const struct helper *helper, const char *verb, const void *bytes, size_t size,
-                           const char *file, struct process_streams *streams, char message[READ_MESSAGE_MAX]);
+/* Its verb "read" on the source; what it gave is in streams, to be closed after success. Without it
+ * DT_E_UNKNOWN, and message says what to install. */
+DT_MUST_USE int helper_read(const struct helper *helper, const struct source *source,
+                            struct process_streams *streams, char message[READ_MESSAGE_MAX]);
 
 /* Its verb "write": our CSV of the record to what it gives, all of it to out. */
 DT_MUST_USE int helper_write(const struct helper *helper, const struct record *record, FILE *out,

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/mapped.h"
 #include "host/record/assume.h"
 #include "host/record/clock.h"
 #include "host/record/encoding.h"
@@ -173,20 +174,24 @@ static int read_delimited_allocate(struct reading *reading)
 {
 	const struct columns *columns = &reading->columns;
 	const char *at = reading->source->bytes + reading->line.next;
-	const char *end = reading->source->bytes + reading->source->size;
+	const char *end = reading->source->bytes + reading->source->size, *counted = at;
 	size_t rows = 2; /* this one, and one without a line end */
 	bool whole = true;
 
 	while ((at = memchr(at, '\n', (size_t)(end - at))) != NULL) {
 		rows++;
 		at++;
+		if (rows % RECORD_PART == 0) {
+			mapped_seen((size_t)(at - counted));
+			counted = at;
+		}
 	}
 	for (size_t i = 0; i < columns->count && whole; i++)
 		if (columns->column[i].kind == COLUMN_CHANNEL)
 			whole = record_add_channel(reading->record, columns->column[i].name, 0, rows) != NULL;
 	if (columns->has_time) {
-		reading->time_s = calloc(rows, sizeof(*reading->time_s));
-		reading->row_line = calloc(rows, sizeof(*reading->row_line));
+		reading->time_s = mapped_array(rows, sizeof(*reading->time_s));
+		reading->row_line = mapped_array(rows, sizeof(*reading->row_line));
 		whole = whole && reading->time_s && reading->row_line;
 	}
 	return whole ? 0 : refuse_memory(reading);
@@ -780,8 +785,8 @@ int read_delimited(struct record *record, struct source *source, const char *col
 	reading->encoding = encoding;
 	record_init(&filled);
 	error = read_delimited_by(reading, columns);
-	free(reading->time_s);
-	free(reading->row_line);
+	mapped_free(reading->time_s);
+	mapped_free(reading->row_line);
 	free(reading);
 	if (error)
 		record_free(&filled);

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/mapped.h"
 #include "host/record/ide.h"
 #include "host/record/unit.h"
 
@@ -342,13 +343,15 @@ static void fill_column(const struct grid *grid, struct chain *chain, struct tab
 
 	for (size_t k = 0; k < column->count; k++)
 		column->value[k] = NAN;
-	for (size_t b = 0; b < channel->blocks; b++)
+	for (size_t b = 0; b < channel->blocks; b++) {
+		mapped_seen(channel->block[b].samples * 2 * sizeof(double));
 		for (size_t k = 0; k < channel->block[b].samples; k++) {
 			size_t place = grid->place[b] + k;
 			double time_s = (grid->first + (double)place * grid->step) * channel->tick_s;
 
 			column->value[place] = calibrated(chain, raw(chain, &channel->block[b], k), time_s);
 		}
+	}
 }
 
 static int add_column(const struct ide *ide, struct table_data *table, const struct grid *grid,

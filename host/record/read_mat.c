@@ -76,7 +76,7 @@ static const struct helper helper = {"droptower-mat", "MAT files", "libmatio-dev
 int read_mat(struct table_data *table, const struct source *source, char message[READ_MESSAGE_MAX])
 {
 	struct process_streams streams;
-	int error = helper_run(&helper, "read", source->bytes, source->size, source->file, &streams, message);
+	int error = helper_read(&helper, source, &streams, message);
 
 	if (error)
 		return error;

@@ -106,16 +106,14 @@ int read_npy(struct table_data *table, const struct source *source, char message
 
 	table->format = "npy";
 	for (size_t c = 0; c < npy.columns && !error; c++) {
-		struct table_column *column = table_data_add(table, npy.rows);
+		size_t size = bytes_size(npy.kind), from = npy.fortran ? c * npy.rows : c;
+		const struct bytes_view view = {.data = npy.data + from * size,
+		                                .stride = npy.fortran ? size : npy.columns * size,
+		                                .kind = npy.kind,
+		                                .big = npy.big};
 
-		if (column == NULL)
+		if (table_data_view(table, npy.rows, view) == NULL)
 			return source_no_memory(message, source->file);
-		for (size_t k = 0; k < npy.rows; k++) {
-			size_t at = npy.fortran ? c * npy.rows + k : k * npy.columns + c;
-
-			column->value[k] =
-			        bytes_value(npy.data + at * bytes_size(npy.kind), npy.kind, npy.big);
-		}
 	}
 	return error;
 }

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/mapped.h"
 #include "host/record/table_data.h"
 #include "host/record/unit.h"
 
@@ -275,7 +276,7 @@ static bool tdms_make_room(struct tdms_object *object, size_t more)
 		room *= 2;
 	if (room == object->room)
 		return true;
-	value = realloc(object->value, room * sizeof(*value));
+	value = mapped_array_resize(object->value, object->used, room, sizeof(*value));
 	if (value == NULL)
 		return false;
 	object->value = value;
@@ -303,6 +304,7 @@ static int take_chunk(struct tdms *tdms, size_t at, size_t stride)
 				        tdms->source->bytes + at + within + k * step, kind, tdms->big);
 		}
 		within += stride > 0 ? size : (size_t)object->bytes;
+		mapped_seen((size_t)object->bytes + (size_t)object->count * sizeof(double));
 	}
 	return 0;
 }
@@ -393,6 +395,8 @@ static int give_columns(struct tdms *tdms, struct table_data *table)
 		if (column == NULL)
 			return source_no_memory(tdms->message, tdms->source->file);
 		memcpy(column->value, object->value, object->used * sizeof(double));
+		mapped_free(object->value);
+		object->value = NULL;
 		memcpy(column->name, object->name, sizeof(column->name));
 		memcpy(column->unit, object->unit, sizeof(column->unit));
 		column->rate_hz = object->increment > 0 ? 1 / (object->increment * unit_s) : 0;
@@ -419,7 +423,7 @@ int read_tdms(struct table_data *table, const struct source *source, char messag
 	if (!error)
 		error = give_columns(tdms, table);
 	for (size_t i = 0; tdms != NULL && i < tdms->objects; i++)
-		free(tdms->object[i].value);
+		mapped_free(tdms->object[i].value);
 	if (tdms != NULL)
 		free(tdms->object);
 	free(tdms);

@@ -87,17 +87,15 @@ int read_wav(struct table_data *table, const struct source *source, char message
 		return error;
 	rows = wav.bytes / (wav.channels * width);
 	for (size_t c = 0; c < wav.channels; c++) {
-		struct table_column *column = table_data_add(table, rows);
+		struct table_column *column =
+		        table_data_view(table, rows,
+		                        (struct bytes_view){wav.data + c * width, wav.channels * width, kind,
+		                                            false, kind == BYTES_U8 ? 128 : 0, full});
 
 		if (column == NULL)
 			return source_no_memory(message, source->file);
 		snprintf(column->name, sizeof(column->name), "ch%zu", c + 1);
 		column->rate_hz = wav.rate_hz;
-		for (size_t k = 0; k < rows; k++) {
-			double value = bytes_value(wav.data + (k * wav.channels + c) * width, kind, false);
-
-			column->value[k] = (value - (kind == BYTES_U8 ? 128 : 0)) / full;
-		}
 	}
 	return 0;
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "common/wire.h"
+#include "host/base/mapped.h"
 
 void record_init(struct record *record)
 {
@@ -15,8 +16,8 @@ void record_init(struct record *record)
 void record_free(struct record *record)
 {
 	for (size_t i = 0; i < record->channel_count; i++) {
-		free(record->channels[i].value_g);
-		free(record->channels[i].sample);
+		mapped_free(record->channels[i].value_g);
+		mapped_free(record->channels[i].sample);
 	}
 	free(record->channels);
 	free(record->gaps);
@@ -34,16 +35,19 @@ struct channel *record_add_channel(struct record *record, const char *name, doub
 	struct channel *channel = &channels[record->channel_count];
 	*channel = (struct channel){.rate_hz = rate_hz, .count = count};
 	strncpy(channel->name, name, sizeof(channel->name) - 1);
-	channel->value_g = calloc(count ? count : 1, sizeof(*channel->value_g));
-	channel->sample = malloc(count ? count : 1);
+	channel->value_g = mapped_array(count, sizeof(*channel->value_g));
+	channel->sample = mapped_array(count, 1);
 	if (!channel->value_g || !channel->sample) {
-		free(channel->value_g);
-		free(channel->sample);
+		mapped_free(channel->value_g);
+		mapped_free(channel->sample);
 		return NULL;
 	}
-	for (size_t k = 0; k < count; k++)
+	for (size_t k = 0; k < count; k++) {
 		channel->value_g[k] = NAN;
-	memset(channel->sample, SAMPLE_LOST, count);
+		channel->sample[k] = SAMPLE_LOST;
+		if (k % RECORD_PART == 0)
+			mapped_seen(RECORD_PART * (sizeof(*channel->value_g) + 1));
+	}
 	record->channel_count++;
 	return channel;
 }
@@ -80,8 +84,11 @@ static void record_finish_channel(struct record *record, struct channel *channel
 	unsigned marks = 0, full = 0;
 	uint64_t lost = 0;
 
-	for (size_t k = 0; k < channel->count; k++)
+	for (size_t k = 0; k < channel->count; k++) {
 		marks |= channel->sample[k];
+		if (k % RECORD_PART == 0)
+			mapped_seen(RECORD_PART);
+	}
 	for (size_t k = 0; k < channel->count && marks & SAMPLE_LOST; k++)
 		lost += (channel->sample[k] & SAMPLE_LOST) != 0;
 	for (size_t k = 0; k < channel->count && record->is_drop; k++)

@@ -81,6 +81,8 @@ struct channel {
 	unsigned flags;    /* RECORD_FLAG_* */
 };
 
+enum { RECORD_PART = 1 << 14 }; /* samples of a pass through a channel, then mapped_seen is told */
+
 struct record_gap {
 	unsigned sensor;        /* 1 or 2 */
 	uint32_t first_tick_ms; /* inclusive */

@@ -10,6 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "host/base/mapped.h"
+
 /* Nobody records this much of a drop; a device that never ends would fill the memory. */
 static const size_t SIZE_MAX_BYTES = (size_t)2 << 30;
 
@@ -93,26 +95,48 @@ static void source_skip_mark(struct source *source)
 	if (source->size <= sizeof(mark) || memcmp(source->bytes, mark, sizeof(mark)) != 0)
 		return;
 	source->size -= sizeof(mark);
-	memmove(source->bytes, source->bytes + sizeof(mark), source->size);
+	if (source->mapped != NULL)
+		source->bytes += sizeof(mark);
+	else
+		memmove(source->bytes, source->bytes + sizeof(mark), source->size);
+}
+
+/* All of a regular file. */
+static bool source_map(struct source *source, int descriptor, const struct stat *stat)
+{
+	if (!S_ISREG(stat->st_mode) || stat->st_size < MAPPED_LEAST)
+		return false;
+	source->size = (size_t)stat->st_size;
+	source->mapped = source->bytes = mapped_file(descriptor, source->size);
+	return source->mapped != NULL;
+}
+
+static int source_copy(struct source *source, int descriptor, const struct stat *stat, char *message)
+{
+	size_t room = 1 << 16;
+
+	if (S_ISREG(stat->st_mode) && stat->st_size > 0)
+		room = (size_t)stat->st_size + 1; /* the byte that finds the end */
+	source->size = 0;
+	source->bytes = malloc(room);
+	return source->bytes != NULL ? source_read_all(source, descriptor, room, message)
+	                             : source_refuse(message, DT_E_MEMORY, source->file, 0,
+	                                             "no memory for %zu bytes", room);
 }
 
 int source_load(struct source *source, const char *file, const char *expected, char message[READ_MESSAGE_MAX])
 {
 	int descriptor = open(file, O_RDONLY | O_CLOEXEC);
 	struct source loaded = {.file = file, .expected = expected};
-	size_t room = 1 << 16;
 	struct stat stat;
-	int error;
+	int error = 0;
 
 	if (descriptor < 0)
 		return refuse_system(message, &loaded);
-	if (fstat(descriptor, &stat) == 0 && S_ISREG(stat.st_mode) && stat.st_size > 0)
-		room = (size_t)stat.st_size + 1; /* the byte that finds the end */
-	loaded.bytes = malloc(room);
-	if (loaded.bytes)
-		error = source_read_all(&loaded, descriptor, room, message);
-	else
-		error = source_refuse(message, DT_E_MEMORY, file, 0, "no memory for %zu bytes", room);
+	if (fstat(descriptor, &stat) != 0)
+		stat = (struct stat){0};
+	if (!source_map(&loaded, descriptor, &stat))
+		error = source_copy(&loaded, descriptor, &stat, message);
 	close(descriptor);
 	if (!error)
 		source_skip_mark(&loaded);
@@ -126,9 +150,19 @@ int source_load(struct source *source, const char *file, const char *expected, c
 
 void source_free(struct source *source)
 {
-	free(source->bytes);
-	source->bytes = NULL;
+	if (source->mapped != NULL)
+		mapped_free(source->mapped);
+	else
+		free(source->bytes);
+	source->mapped = source->bytes = NULL;
 	source->size = 0;
+}
+
+void source_replace(struct source *source, char *bytes, size_t size)
+{
+	source_free(source);
+	source->bytes = bytes;
+	source->size = size;
 }
 
 bool source_next_line(const struct source *source, struct source_line *line)
@@ -143,6 +177,7 @@ bool source_next_line(const struct source *source, struct source_line *line)
 	if (end)
 		line->length = (size_t)(end - line->text);
 	line->next += line->length + (end != NULL);
+	mapped_seen(line->length);
 	line->number++;
 	while (line->length > 0 && line->text[line->length - 1] == '\r')
 		line->length--;

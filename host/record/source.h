@@ -5,8 +5,8 @@
  * A file as the readers see it: its bytes in memory, walked line by line, and the one form in which all
  * of them refuse it: "FILE:LINE: what is wrong, what was expected".
  *
- * The bytes are a copy (a pipe cannot be mapped, and a mapped file that shrinks kills its reader); they
- * belong to the source until source_free.
+ * The bytes of a large file are mapped, those of any other, and of a pipe, are a copy (host/base/mapped.h).
+ * They belong to the source until source_free.
  */
 #include <stdbool.h>
 #include <stddef.h>
@@ -19,6 +19,7 @@ struct source {
 	const char *expected; /* of it, for its refusal */
 	char *bytes;          /* not terminated */
 	size_t size;
+	void *mapped; /* what bytes lie in, when they must not be written to; else NULL */
 };
 
 struct source_line {
@@ -32,6 +33,9 @@ struct source_line {
 DT_MUST_USE int source_load(struct source *source, const char *file, const char *expected,
                             char message[READ_MESSAGE_MAX]);
 void source_free(struct source *source);
+
+/* Other bytes in place of its own, from malloc. */
+void source_replace(struct source *source, char *bytes, size_t size);
 
 /* Steps from line to line; start with a zeroed *line. */
 bool source_next_line(const struct source *source, struct source_line *line);

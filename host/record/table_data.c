@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/mapped.h"
 #include "host/record/assume.h"
 #include "host/record/ide.h"
 #include "host/record/profile.h"
@@ -65,28 +66,66 @@ double bytes_value(const char *at, enum bytes_kind kind, bool big)
 
 /* ---- a table ---- */
 
-struct table_column *table_data_add(struct table_data *table, size_t count)
+struct table_column *table_data_view(struct table_data *table, size_t count, struct bytes_view view)
 {
 	struct table_column *more = realloc(table->column, (table->count + 1) * sizeof(*more));
-	struct table_column *column;
 
 	if (more == NULL)
 		return NULL;
 	table->column = more;
-	column = &more[table->count];
-	*column =
-	        (struct table_column){.count = count, .value = calloc(count > 0 ? count : 1, sizeof(double))};
-	if (column->value == NULL)
-		return NULL;
-	table->count++;
+	more[table->count] = (struct table_column){.count = count, .view = view};
+	return &more[table->count++];
+}
+
+struct table_column *table_data_add(struct table_data *table, size_t count)
+{
+	double *value = mapped_array(count, sizeof(*value));
+	const struct bytes_view view = {
+	        (const char *)value, sizeof(*value), BYTES_F64, __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__, 0, 0};
+	struct table_column *column = value != NULL ? table_data_view(table, count, view) : NULL;
+
+	if (column != NULL)
+		column->value = value;
+	else
+		mapped_free(value);
 	return column;
+}
+
+#define TAKE(type)                                                \
+	for (size_t k = 0; k < count; k++) {                      \
+		type number;                                      \
+                                                                  \
+		memcpy(&number, at + k * stride, sizeof(number)); \
+		value[k] = (double)number;                        \
+	}
+
+void table_column_take(const struct table_column *column, size_t from, size_t count, double *value)
+{
+	const struct bytes_view *view = &column->view;
+	const char *at = view->data + from * view->stride;
+	const size_t stride = view->stride;
+
+	if (view->kind == BYTES_F64 && view->big == (__BYTE_ORDER__ == __ORDER_BIG_ENDIAN__)) {
+		TAKE(double)
+	} else if (view->kind == BYTES_F32 && view->big == (__BYTE_ORDER__ == __ORDER_BIG_ENDIAN__)) {
+		TAKE(float)
+	} else if (view->kind == BYTES_I16 && view->big == (__BYTE_ORDER__ == __ORDER_BIG_ENDIAN__)) {
+		TAKE(int16_t)
+	} else {
+		for (size_t k = 0; k < count; k++)
+			value[k] = bytes_value(at + k * stride, view->kind, view->big);
+	}
+	for (size_t k = 0; k < count && view->full > 0; k++)
+		value[k] = (value[k] - view->zero) / view->full;
+	mapped_seen(count * stride);
 }
 
 void table_data_free(struct table_data *table)
 {
 	for (size_t i = 0; i < table->count; i++)
-		free(table->column[i].value);
+		mapped_free(table->column[i].value);
 	free(table->column);
+	source_free(&table->made);
 	*table = (struct table_data){.format = NULL};
 }
 
@@ -103,18 +142,25 @@ struct making {
 	char *message;
 };
 
+static size_t part_of(size_t count, size_t from)
+{
+	return count - from < RECORD_PART ? count - from : RECORD_PART;
+}
+
 static int make_time(struct making *making)
 {
 	const struct column *spec = &making->columns.column[making->time];
 	const struct table_column *column = &making->table->column[making->time];
-	double *time_s = malloc((column->count > 0 ? column->count : 1) * sizeof(*time_s)), largest = 0;
+	double *time_s = mapped_array(column->count, sizeof(*time_s)), largest = 0;
 	struct timebase_fault fault;
 	int error = 0;
 
 	if (time_s == NULL)
 		return source_no_memory(making->message, making->source->file);
 	for (size_t k = 0; k < column->count; k++) {
-		time_s[k] = column->value[k] / spec->divisor;
+		if (k % RECORD_PART == 0)
+			table_column_take(column, k, part_of(column->count, k), time_s + k);
+		time_s[k] /= spec->divisor;
 		largest = fmax(largest, fabs(time_s[k]));
 		if (!isfinite(time_s[k]))
 			error = source_refuse(making->message, DT_E_FORMAT, making->source->file, 0,
@@ -131,7 +177,7 @@ static int make_time(struct making *making)
 			source_refuse(making->message, error, making->source->file, 0, "row %zu: %s",
 			              fault.row + 1, error == DT_E_MEMORY ? error_text(error) : fault.why);
 	}
-	free(time_s);
+	mapped_free(time_s);
 	return error;
 }
 
@@ -179,9 +225,15 @@ static int make_channel(struct making *making, size_t i)
 	channel->start_s = timed ? 0 : column->start_s;
 	channel->flags = (timed ? making->timebase.uneven : column->uneven) ? RECORD_FLAG_UNEVEN : 0;
 	for (size_t k = 0; k < column->count; k++) {
-		bool good = isfinite(column->value[k] / spec->divisor);
+		bool good;
 
-		channel->value_g[k] = good ? column->value[k] / spec->divisor : NAN;
+		if (k % RECORD_PART == 0)
+			table_column_take(column, k, part_of(column->count, k), channel->value_g + k);
+		if (k % RECORD_PART == 0)
+			mapped_seen(RECORD_PART * (sizeof(double) + 1));
+		channel->value_g[k] /= spec->divisor;
+		good = isfinite(channel->value_g[k]);
+		channel->value_g[k] = good ? channel->value_g[k] : NAN;
 		channel->sample[k] = good ? 0 : column->gaps ? SAMPLE_LOST : SAMPLE_BAD;
 	}
 	if (timed && timebase_spread(&making->timebase, channel) != 0)

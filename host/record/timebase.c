@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/mapped.h"
+
 /* Of a step. What a header's step is off may add up over the rows to DRIFT of them. */
 static const double EVEN = 0.1, JITTER = 0.5, HEADER = 0.75, DRIFT = 0.01;
 
@@ -62,6 +64,8 @@ static double worst_of(const struct search *search, double step_s, const size_t 
 			worst = e;
 			*row = k;
 		}
+		if (k % RECORD_PART == 0)
+			mapped_seen(RECORD_PART * sizeof(double));
 	}
 	return worst;
 }
@@ -118,6 +122,8 @@ static int check_order(const struct search *search, bool equal_allowed)
 		if (!(now > before) && !(equal_allowed && now >= before))
 			return timebase_refuse(search, k, "time %.9g s after %.9g s, expected it to increase",
 			                       now, before);
+		if (k % RECORD_PART == 0)
+			mapped_seen(RECORD_PART * sizeof(double));
 	}
 	return 0;
 }
@@ -353,8 +359,8 @@ int timebase_spread(const struct timebase *timebase, struct channel *channel)
 	if (!timebase->place || channel->count == 0)
 		return 0;
 	at = places = timebase->place[channel->count - 1] + 1;
-	value = realloc(channel->value_g, places * sizeof(*value));
-	sample = value ? realloc(channel->sample, places) : NULL;
+	value = mapped_array_resize(channel->value_g, channel->count, places, sizeof(*value));
+	sample = value ? mapped_array_resize(channel->sample, channel->count, places, 1) : NULL;
 	channel->value_g = value ? value : channel->value_g;
 	channel->sample = sample ? sample : channel->sample;
 	if (!value || !sample)

@@ -3,15 +3,23 @@
 
 #include <string.h>
 
+#include "host/base/mapped.h"
 #include "host/record/sniff.h"
+
+enum { PART = 1 << 20 /* bytes at once */ };
 
 int tree_put(FILE *out, const char *path, struct tree_entry entry, const void *data)
 {
 	bool right;
 
 	entry.path_bytes = (uint32_t)strlen(path) + 1;
-	right = fwrite(&entry, sizeof(entry), 1, out) == 1 && fwrite(path, entry.path_bytes, 1, out) == 1 &&
-	        (entry.bytes == 0 || fwrite(data, entry.bytes, 1, out) == 1);
+	right = fwrite(&entry, sizeof(entry), 1, out) == 1 && fwrite(path, entry.path_bytes, 1, out) == 1;
+	for (uint64_t at = 0; at < entry.bytes && right; at += PART) {
+		size_t part = entry.bytes - at < PART ? (size_t)(entry.bytes - at) : PART;
+
+		right = fwrite((const char *)data + at, part, 1, out) == 1;
+		mapped_seen(part);
+	}
 	return right ? 0 : DT_E_SYSTEM;
 }
 

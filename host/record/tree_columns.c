@@ -64,19 +64,21 @@ static void give_name(const struct tree *tree, const struct tree_node *node, siz
 static int add_column(const struct tree *tree, const struct tree_node *node, size_t i,
                       const struct shape *shape)
 {
-	struct table_column *column = table_data_add(tree->table, shape->count);
 	size_t columns = shape->across ? node->is.rows : node->is.columns, step, from;
+	struct table_column *column;
 	bool is_named;
 	int error;
 
-	if (column == NULL)
-		return source_no_memory(tree->message, tree->source->file);
 	if (shape->columns == 1)
 		columns = 1;
 	step = node->is.by_rows != shape->across ? columns : 1;
 	from = step == 1 ? i * shape->count : i;
-	for (size_t k = 0; k < shape->count; k++)
-		column->value[k] = tree_number(node, from + k * step);
+	column =
+	        table_data_view(tree->table, shape->count,
+	                        (struct bytes_view){node->data + from * sizeof(double), step * sizeof(double),
+	                                            BYTES_F64, __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__, 0, 0});
+	if (column == NULL)
+		return source_no_memory(tree->message, tree->source->file);
 	column->exact = !node->is.single;
 	column->timed = !tree_is_time(node) && tree_has_time(tree, node, shape->count);
 	give_name(tree, node, i, shape, column, &is_named);
@@ -184,11 +186,11 @@ int read_tree(struct table_data *table, const char *format, const char *bytes, s
 int read_tree_of(struct table_data *table, const char *format, int fd, const struct source *source,
                  char message[READ_MESSAGE_MAX])
 {
-	size_t size;
-	char *bytes = process_read(fd, &size);
-	int error = bytes != NULL ? read_tree(table, format, bytes, size, source, message)
-	                          : source_no_memory(message, source->file);
+	char path[32];
+	int error;
 
-	free(bytes);
-	return error;
+	snprintf(path, sizeof(path), "/proc/self/fd/%d", fd);
+	error = source_load(&table->made, path, "a recording", message);
+	table->made.file = source->file;
+	return error ? error : read_tree(table, format, table->made.bytes, table->made.size, source, message);
 }

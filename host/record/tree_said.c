@@ -332,11 +332,26 @@ void tree_give_unit(const struct tree *tree, const struct tree_node *node, size_
 	tree_copy(column->unit, sizeof(column->unit), text);
 }
 
+/* How many numbers from the first on only increase. */
+static size_t ramp_length(const struct table_column *column)
+{
+	double before, now;
+	size_t k = 1;
+
+	table_column_take(column, 0, 1, &before);
+	for (; k < column->count; k++, before = now) {
+		table_column_take(column, k, 1, &now);
+		if (!(now > before))
+			break;
+	}
+	return k;
+}
+
 void tree_give_doubts(const struct tree *tree, const struct tree_node *node, bool is_named,
                       struct table_column *column)
 {
 	enum tree_where where;
-	size_t folder, k = 1;
+	size_t folder, k = 0;
 	const struct tree_node *scale = tree_nearest(tree, node, says_scale, &where, &folder);
 
 	if (scale != NULL)
@@ -347,8 +362,8 @@ void tree_give_doubts(const struct tree *tree, const struct tree_node *node, boo
 	if (memchr(node->path, '(', strlen(node->path)) != NULL)
 		snprintf(column->doubt, sizeof(column->doubt),
 		         "element of an array: a channel of one recording, or a recording of several");
-	while (k < column->count && column->value[k] > column->value[k - 1])
-		k++;
-	if (node->is.rows > 1 && node->is.columns > 1 && k == column->count && k >= RAMP_LEAST)
+	if (node->is.rows > 1 && node->is.columns > 1)
+		k = ramp_length(column);
+	if (k == column->count && k >= RAMP_LEAST)
 		snprintf(column->doubt, sizeof(column->doubt), "only increases: the time, or a channel");
 }

@@ -8,6 +8,7 @@
 #include <gsl/gsl_statistics_double.h>
 
 #include "common/units.h"
+#include "host/base/mapped.h"
 
 #define LEVEL_SIGMAS 8.0
 #define LEVEL_PART 0.02
@@ -15,6 +16,7 @@
 #define MAD_TO_SIGMA 1.482602218505602
 
 enum { SPREAD_SAMPLES = 256, HOLD_OFF_SAMPLES = 3, BLOCK = 64, LANES = 8 };
+enum { READ_AHEAD = 1 << 16 }; /* bytes that come with a sample of a mapped file */
 
 struct source {
 	struct axes axes;
@@ -49,9 +51,11 @@ static void rest_of(const struct channel *channel, double *rest_g, double *noise
 	size_t step = channel->count / SPREAD_SAMPLES + 1, n = 0;
 	double work[SPREAD_SAMPLES], scratch[SPREAD_SAMPLES];
 
-	for (size_t k = 0; k < channel->count; k += step)
+	for (size_t k = 0; k < channel->count; k += step) {
 		if (isfinite(channel->value_g[k]))
 			work[n++] = channel->value_g[k];
+		mapped_seen(step < RECORD_PART ? step * sizeof(double) : READ_AHEAD);
+	}
 	*rest_g = 0;
 	*noise_g = 0;
 	if (n == 0)
@@ -78,9 +82,12 @@ static double events_reach(const struct channel *channel, double from_s, double 
 		return 0;
 	if (last + 1 < (double)end)
 		end = (size_t)last + 1;
-	for (; k + LANES <= end; k += LANES)
+	for (; k + LANES <= end; k += LANES) {
 		for (unsigned i = 0; i < LANES; i++)
 			most[i] = events_larger(fabs(channel->value_g[k + i] - rest_g), most[i]);
+		if (k % RECORD_PART < LANES)
+			mapped_seen(RECORD_PART * sizeof(double));
+	}
 	for (; k < end; k++)
 		most[0] = events_larger(fabs(channel->value_g[k] - rest_g), most[0]);
 	for (unsigned i = 1; i < LANES; i++)

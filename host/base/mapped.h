@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef DT_HOST_BASE_MAPPED_H
+#define DT_HOST_BASE_MAPPED_H
+/*
+ * Recordings that are larger than memory: files mapped to be read, and arrays that lie in a temporary file.
+ * Who goes through them says how much of them was looked at (mapped_seen), and now and then all of it leaves
+ * this process; what is looked at again comes back. Small ones are plain memory.
+ *
+ * The temporary file lies in $TMPDIR, else /var/tmp, has no name and its room from the beginning on. When a
+ * mapped file becomes shorter, the program ends with a message and 3: there is no way back from that.
+ * One thread.
+ */
+#include <stddef.h>
+
+enum {
+	MAPPED_LEAST = 1 << 21, /* bytes that are worth it */
+	MAPPED_STEP = 1 << 22,  /* between two leavings */
+};
+
+/* All of a regular file, never to be written to; NULL where it cannot be mapped. */
+char *mapped_file(int descriptor, size_t size);
+
+/* count elements, all bytes zero: in memory where the disk has no room. NULL without memory. */
+void *mapped_array(size_t count, size_t size);
+
+/* The same with another count than it holds; NULL leaves it as it was. */
+void *mapped_array_resize(void *array, size_t held, size_t count, size_t size);
+
+/* Either, or what malloc gave. */
+void mapped_free(void *memory);
+
+void mapped_seen(size_t bytes);
+
+#endif

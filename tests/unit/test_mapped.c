@@ -1,0 +1,126 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ *
+ * Memory that leaves the process: what is in it comes back, and a file that becomes shorter is told.
+ */
+#include <fcntl.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "common/base/process.h"
+#include "host/base/mapped.h"
+
+enum { COUNT = 3 * MAPPED_LEAST / 8, PAGE = 4096 };
+
+static long resident_kb(void)
+{
+	char line[128];
+	FILE *status = fopen("/proc/self/status", "re");
+	long kb = -1;
+
+	assert_non_null(status);
+	while (kb < 0 && fgets(line, sizeof(line), status) != NULL)
+		sscanf(line, "VmRSS: %ld", &kb);
+	fclose(status);
+	return kb;
+}
+
+static void fill(uint64_t *array)
+{
+	for (size_t k = 0; k < COUNT; k++) {
+		assert_int_equal(array[k], 0);
+		array[k] = k * k + 1;
+	}
+}
+
+static void hold(const uint64_t *array)
+{
+	for (size_t k = 0; k < COUNT; k++)
+		assert_int_equal(array[k], k * k + 1);
+}
+
+static void test_array_leaves_and_comes_back(void **state)
+{
+	uint64_t *array = mapped_array(COUNT, sizeof(*array));
+	long held_kb;
+
+	(void)state;
+	assert_non_null(array);
+	fill(array);
+	held_kb = resident_kb();
+	mapped_seen(MAPPED_STEP);
+	assert_true(resident_kb() < held_kb - (long)(COUNT * sizeof(*array) / 1024) / 2);
+	hold(array);
+	array = mapped_array_resize(array, COUNT, 2 * COUNT, sizeof(*array));
+	assert_non_null(array);
+	hold(array);
+	assert_int_equal(array[2 * COUNT - 1], 0);
+	array = mapped_array_resize(array, 2 * COUNT, 5, sizeof(*array));
+	assert_int_equal(array[4], 17);
+	mapped_free(array);
+	mapped_free(NULL);
+}
+
+/* Without a place for the file it is memory, which nothing leaves. */
+static void test_no_room(void **state)
+{
+	uint64_t *array;
+
+	(void)state;
+	setenv("TMPDIR", "/nowhere", 1);
+	array = mapped_array(COUNT, sizeof(*array));
+	unsetenv("TMPDIR");
+	assert_non_null(array);
+	fill(array);
+	mapped_seen(MAPPED_STEP);
+	hold(array);
+	mapped_free(array);
+	assert_null(mapped_array(SIZE_MAX / 4, 8));
+}
+
+static void test_file_that_becomes_shorter(void **state)
+{
+	static char bytes[3 * PAGE];
+	int descriptor = process_scratch(), status = 0;
+	char *file;
+	pid_t child;
+
+	(void)state;
+	assert_true(descriptor >= 0);
+	memset(bytes, 'x', sizeof(bytes));
+	assert_int_equal(process_write(descriptor, bytes, sizeof(bytes)), 0);
+	file = mapped_file(descriptor, sizeof(bytes));
+	assert_non_null(file);
+	assert_memory_equal(file, bytes, sizeof(bytes));
+	child = fork();
+	assert_true(child >= 0);
+	if (child == 0) {
+		close(STDERR_FILENO);
+		if (ftruncate(descriptor, PAGE) != 0)
+			_exit(9);
+		_exit(((volatile char *)file)[2 * PAGE] == 'x' ? 8 : 7);
+	}
+	assert_int_equal(waitpid(child, &status, 0), child);
+	assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 3);
+	mapped_free(file);
+	close(descriptor);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(test_array_leaves_and_comes_back),
+	        cmocka_unit_test(test_no_room),
+	        cmocka_unit_test(test_file_that_becomes_shorter),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
