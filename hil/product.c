@@ -42,13 +42,23 @@ static double product_wedge(double angle_rad)
 	return sin(UNITS_RAD(50.0)) / fmax(fabs(sin(2 * angle_rad)), sin(2 * WEDGE_ANGLE_MIN_RAD));
 }
 
-static struct corner corner_at(const struct product *p, const double s[], int i, double sn, double cs)
+/* Sine and cosine of the angle in a state. */
+struct turn {
+	double sn, cs;
+};
+
+static inline struct turn turn_of(const double s[])
+{
+	return (struct turn){sin(s[PRODUCT_ANGLE]), cos(s[PRODUCT_ANGLE])};
+}
+
+static inline struct corner corner_at(const struct product *p, const double s[], int i, struct turn turn)
 {
 	const double along_x = corner_side[i][0] * p->lever_x_m, along_y = corner_side[i][1] * p->lever_y_m;
 	struct corner c;
 
-	c.arm_x_m = along_x * sn - along_y * cs;
-	c.arm_y_m = along_x * cs + along_y * sn;
+	c.arm_x_m = along_x * turn.sn - along_y * turn.cs;
+	c.arm_y_m = along_x * turn.cs + along_y * turn.sn;
 	c.depth_m = -(s[PRODUCT_Y] + c.arm_y_m);
 	/* turning by +angle is clockwise */
 	c.closing_m_s = -(s[PRODUCT_VY] - s[PRODUCT_SPIN] * c.arm_x_m);
@@ -91,13 +101,12 @@ static struct load product_mount_force(const struct product *p, const double s[]
 	return (struct load){k * x + p->mount_damping_n_s_m * vx, k * y + p->mount_damping_n_s_m * vy, 0};
 }
 
-static void product_rates(const struct product *p, const double s[], double rate[])
+static void product_rates(const struct product *p, const double s[], struct turn turn, double rate[])
 {
-	const double sn = sin(s[PRODUCT_ANGLE]), cs = cos(s[PRODUCT_ANGLE]);
 	struct load load = {0, 0, 0}, mount = {0, 0, 0};
 
 	for (int i = 0; i < PRODUCT_CORNERS; i++) {
-		const struct corner c = corner_at(p, s, i, sn, cs);
+		const struct corner c = corner_at(p, s, i, turn);
 
 		rate[PRODUCT_GRIP + i] =
 		        c.depth_m > 0 ? product_contact_force(p, i, &c, s[PRODUCT_GRIP + i], &load) : 0;
@@ -119,17 +128,17 @@ static void product_rates(const struct product *p, const double s[], double rate
 }
 
 /* A corner clear of the mat forgets its last contact and is ready for the next. */
-static void corners_renew(struct product *p)
+static void corners_renew(struct product *p, struct turn turn)
 {
-	const double sn = sin(p->state[PRODUCT_ANGLE]), cs = cos(p->state[PRODUCT_ANGLE]);
+	const double stiffness_n_m15 = p->stiffness25_n_m15 * product_wedge(p->state[PRODUCT_ANGLE]);
 
 	for (int i = 0; i < PRODUCT_CORNERS; i++) {
-		const struct corner c = corner_at(p, p->state, i, sn, cs);
+		const struct corner c = corner_at(p, p->state, i, turn);
 
 		if (c.depth_m > 0)
 			continue;
 		p->state[PRODUCT_GRIP + i] = 0;
-		p->stiffness_n_m15[i] = p->stiffness25_n_m15 * product_wedge(p->state[PRODUCT_ANGLE]);
+		p->stiffness_n_m15[i] = stiffness_n_m15;
 		p->approach_m_s[i] = fmax(c.closing_m_s, PRODUCT_APPROACH_MIN_M_S);
 	}
 }
@@ -198,11 +207,11 @@ void product_strike(struct product *p, double speed_m_s)
 	p->state[PRODUCT_ANGLE] = angle;
 	p->state[PRODUCT_SPIN] = spin;
 	for (int i = 0; i < PRODUCT_CORNERS; i++)
-		height_m = fmax(height_m, -corner_at(p, p->state, i, sin(angle), cos(angle)).arm_y_m);
+		height_m = fmax(height_m, -corner_at(p, p->state, i, turn_of(p->state)).arm_y_m);
 	p->state[PRODUCT_Y] = p->state[PRODUCT_PLATE_Y] = height_m;
 	p->state[PRODUCT_VY] = p->state[PRODUCT_PLATE_VY] = -speed_m_s;
-	corners_renew(p);
-	product_rates(p, p->state, p->rate);
+	corners_renew(p, turn_of(p->state));
+	product_rates(p, p->state, turn_of(p->state), p->rate);
 	p->longest_step_s = longest_step_s(p, speed_m_s);
 }
 
@@ -210,6 +219,7 @@ void product_step(struct product *p, double step_s)
 {
 	static const double reach[3] = {0.5, 0.5, 1.0};
 	double at[PRODUCT_STATES], slope[PRODUCT_STATES], sum[PRODUCT_STATES];
+	struct turn turn;
 
 	memcpy(slope, p->rate, sizeof(slope));
 	memcpy(sum, p->rate, sizeof(sum));
@@ -218,14 +228,15 @@ void product_step(struct product *p, double step_s)
 
 		for (int i = 0; i < PRODUCT_STATES; i++)
 			at[i] = p->state[i] + reach[stage] * step_s * slope[i];
-		product_rates(p, at, slope);
+		product_rates(p, at, turn_of(at), slope);
 		for (int i = 0; i < PRODUCT_STATES; i++)
 			sum[i] += weight * slope[i];
 	}
 	for (int i = 0; i < PRODUCT_STATES; i++)
 		p->state[i] += step_s / 6 * sum[i];
-	corners_renew(p);
-	product_rates(p, p->state, p->rate);
+	turn = turn_of(p->state);
+	corners_renew(p, turn);
+	product_rates(p, p->state, turn, p->rate);
 }
 
 void product_read(const struct product *p, struct product_reading *reading)

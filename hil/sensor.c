@@ -13,19 +13,23 @@ void sensor_settle(struct sensor *sensor, double input_g)
 	sensor->output_g = sensor->time_constant_s > 0 ? 0 : input_g;
 }
 
-void sensor_advance(struct sensor *sensor, double step_s, double input_g)
+struct sensor_fading sensor_fading(double time_constant_s, double step_s)
 {
-	const double part = sensor->time_constant_s > 0 ? step_s / sensor->time_constant_s : 0;
+	const double part = time_constant_s > 0 ? step_s / time_constant_s : 0;
 
-	if (sensor->time_constant_s <= 0) {
+	return (struct sensor_fading){part, part > 0 ? -expm1(-part) : 0};
+}
+
+void sensor_advance(struct sensor *sensor, struct sensor_fading fading, double input_g)
+{
+	const double change_g = input_g - sensor->input_g;
+
+	if (sensor->time_constant_s <= 0)
 		sensor->output_g = input_g;
-	} else if (part <= 0) {
-		sensor->output_g += input_g - sensor->input_g;
-	} else {
-		const double faded = -expm1(-part);
-
-		sensor->output_g += (input_g - sensor->input_g) * faded / part - sensor->output_g * faded;
-	}
+	else if (fading.part <= 0)
+		sensor->output_g += change_g;
+	else
+		sensor->output_g += change_g * fading.faded / fading.part - sensor->output_g * fading.faded;
 	sensor->input_g = input_g;
 }
 

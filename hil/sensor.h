@@ -26,8 +26,14 @@ struct sensor {
 /* The supply has been on for long, with this input. */
 void sensor_settle(struct sensor *sensor, double input_g);
 
-/* Time went on by step_s while the input went straight to input_g. */
-void sensor_advance(struct sensor *sensor, double step_s, double input_g);
+/* What a step is to all sensors of a time constant: its part of that, and how much of an output fades. */
+struct sensor_fading {
+	double part, faded;
+};
+struct sensor_fading sensor_fading(double time_constant_s, double step_s);
+
+/* Time went on by that step while the input went straight to input_g. */
+void sensor_advance(struct sensor *sensor, struct sensor_fading fading, double input_g);
 
 /* -32767 to 32767; never -32768, which on the wire means "not taken". */
 int16_t sensor_convert(const struct sensor *sensor, gsl_rng *noise);

@@ -56,6 +56,8 @@ bool tower_sensor_cut_off(const struct tower *t, int sensor)
 void tower_sensors_feel(struct tower *t, double step_s)
 {
 	const double z_ratio[SENSORS] = {t->scene.sensor_s1_z_ratio, t->scene.sensor_s2_z_ratio};
+	/* all have the same supply */
+	const struct sensor_fading fading = sensor_fading(t->sensor[0].time_constant_s, step_s);
 	struct product_reading r;
 
 	product_read(&t->product, &r);
@@ -68,9 +70,9 @@ void tower_sensors_feel(struct tower *t, double step_s)
 		const double sign = t->fault[TOWER_S1_REVERSED + s] ? -1 : 1;
 		struct sensor *sensor = &t->sensor[s * AXES];
 
-		sensor_advance(&sensor[0], step_s, sign * felt_x);
-		sensor_advance(&sensor[1], step_s, sign * felt_y);
-		sensor_advance(&sensor[2], step_s, z_ratio[s] * felt_x);
+		sensor_advance(&sensor[0], fading, sign * felt_x);
+		sensor_advance(&sensor[1], fading, sign * felt_y);
+		sensor_advance(&sensor[2], fading, z_ratio[s] * felt_x);
 	}
 }
 

@@ -90,7 +90,9 @@ void by_hand_drop(const struct by_hand *h, gsl_rng *random, struct by_hand_drop 
 		for (int a = 0; a < 4; a++) {
 			double late = a >= 2 ? h->late_s : 0, at;
 
-			sensor_advance(&sensor[a], t > 0 ? STEP_S : 0, t > 0 ? felt[a] : 0);
+			sensor_advance(&sensor[a],
+			               sensor_fading(sensor[a].time_constant_s, t > 0 ? STEP_S : 0),
+			               t > 0 ? felt[a] : 0);
 			for (; done[a] < d->drop.axis[a].count; done[a]++) {
 				at = (double)done[a] / rate[a % 2] - touch - late;
 				if (at > t)

@@ -18,17 +18,17 @@ static void high_pass_fades_a_step(void **state)
 	sensor_settle(&fine, 1);
 	assert_near(fine.output_g, 0.0, 0);
 	sensor_settle(&coarse, 1);
-	sensor_advance(&fine, 0, 101);
-	sensor_advance(&coarse, 0, 101);
+	sensor_advance(&fine, sensor_fading(fine.time_constant_s, 0), 101);
+	sensor_advance(&coarse, sensor_fading(coarse.time_constant_s, 0), 101);
 	assert_near(fine.output_g, 100.0, 1e-12);
 	for (int i = 0; i < 9000; i++) {
 		const double step_s = i % 2 ? 59e-6 : 142e-6;
 
-		sensor_advance(&fine, step_s, 101);
+		sensor_advance(&fine, sensor_fading(fine.time_constant_s, step_s), 101);
 		time_s += step_s;
 		assert_near(fine.output_g, 100 * exp(-time_s / 0.3), 1e-9);
 	}
-	sensor_advance(&coarse, time_s, 101);
+	sensor_advance(&coarse, sensor_fading(coarse.time_constant_s, time_s), 101);
 	assert_near(coarse.output_g, fine.output_g, 1e-9);
 }
 
@@ -39,7 +39,7 @@ static void high_pass_follows_a_ramp(void **state)
 	(void)state;
 	sensor_settle(&s, -3);
 	for (int i = 1; i <= 100; i++) { /* 200 g/s */
-		sensor_advance(&s, 1e-3, -3 + 0.2 * i);
+		sensor_advance(&s, sensor_fading(s.time_constant_s, 1e-3), -3 + 0.2 * i);
 		assert_near(s.output_g, 200 * 0.05 * (1 - exp(-1e-3 * i / 0.05)), 1e-10);
 	}
 }
@@ -51,8 +51,8 @@ static void without_time_constant_all_passes(void **state)
 	(void)state;
 	sensor_settle(&s, 1);
 	assert_near(s.output_g, 1.0, 0);
-	sensor_advance(&s, 10, 400);
-	sensor_advance(&s, 10, 400);
+	sensor_advance(&s, sensor_fading(s.time_constant_s, 10), 400);
+	sensor_advance(&s, sensor_fading(s.time_constant_s, 10), 400);
 	assert_near(s.output_g, 400.0, 0);
 }
 
