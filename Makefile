@@ -48,6 +48,7 @@ COMMON_C = $(wildcard common/*.c)
 FIRMWARE_C = $(wildcard firmware/*.c)
 POSIX_C = $(wildcard firmware/port/posix/*.c)
 LOCKSTEP_C = firmware/port/lockstep.c
+INSIDE_C = firmware/port/inside/inside.c firmware/port/posix/port.c
 LINK_C = $(wildcard common/base/*.c common/link/*.c common/scenes/*.c)
 HOST_C = $(filter-out host/main.c host/hdf5/% host/mat/% host/console/%,$(wildcard host/*.c host/*/*.c))
 # The page's program: its main is built by console.mk, the rest is a library that tests use too.
@@ -61,7 +62,7 @@ obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 lib = $(BUILD)/lib/lib$(1).a
 
 LCM_O = $(LCM_C:.c=.o)
-ALL_O = $(call obj,$(FREESTANDING_C) $(LOCKSTEP_C) $(POSIX_C) $(LINK_C) $(HOST_C) host/main.c $(CONSOLE_C) $(HIL_C) hil/main.c \
+ALL_O = $(call obj,$(FREESTANDING_C) $(LOCKSTEP_C) $(sort $(POSIX_C) $(INSIDE_C)) $(LINK_C) $(HOST_C) host/main.c $(CONSOLE_C) $(HIL_C) hil/main.c \
 	$(UNIT_C) $(UNIT_HELPER_C) $(TOOL_C))
 PROGRAMS = $(BUILD)/droptower $(BUILD)/droptower-firmware $(BUILD)/droptower-bench
 UNITS = $(UNIT_C:tests/unit/%.c=$(BUILD)/tests/%)
@@ -73,7 +74,7 @@ all: $(PROGRAMS) ## build the three programs into build/
 # ---- compiling --------------------------------------------------------------------------------------
 
 $(call obj,$(FREESTANDING_C) $(LOCKSTEP_C)): CFLAGS += -ffreestanding
-$(call obj,$(POSIX_C) $(LINK_C) $(HOST_C) host/main.c $(CONSOLE_C) host/console/main.c $(HIL_C) hil/main.c $(UNIT_C) \
+$(call obj,$(POSIX_C) $(INSIDE_C) $(LINK_C) $(HOST_C) host/main.c $(CONSOLE_C) host/console/main.c $(HIL_C) hil/main.c $(UNIT_C) \
 	$(UNIT_HELPER_C) $(TOOL_C)): CPPFLAGS += $(LINUX)
 
 $(BUILD)/obj/%.o: %.c Makefile
@@ -119,7 +120,7 @@ $(BUILD)/droptower: $(call obj,host/main.c) $(foreach l,host link common,$(call 
 	$(call say,LINK,$@)
 	$(link)
 
-$(BUILD)/droptower-bench: $(call obj,hil/main.c) $(foreach l,hil link common,$(call lib,$l))
+$(BUILD)/droptower-bench: $(call obj,hil/main.c $(LOCKSTEP_C) $(INSIDE_C)) $(foreach l,hil firmware link common,$(call lib,$l))
 	$(call say,LINK,$@)
 	$(link)
 

@@ -81,6 +81,15 @@ enum { SENSORBUS_ASK, SENSORBUS_STOP, SENSORBUS_MORE };
 
 enum { SENSORBUS_BUS_ACTIVE, SENSORBUS_BUS_PASSIVE, SENSORBUS_BUS_OFF };
 
+/* A port in the program of the bench: no process, no pipes, the same bytes. Its answer must stay where it is
+ * until the next request is asked for. */
+struct sensorbus_inside {
+	void (*start)(unsigned cause, uint8_t kept);
+	size_t (*ask)(const uint8_t **request); /* bytes of the next request; 0: it has ended */
+	void (*answer)(const uint8_t *bytes, size_t count);
+};
+extern const struct sensorbus_inside sensorbus_inside; /* firmware/port/inside */
+
 /* Each returns the bytes it wrote or read. Buffers hold at least the fixed length. */
 size_t sensorbus_put_request(uint8_t *out, const struct sensorbus_request *request);
 size_t sensorbus_get_request(const uint8_t *in, struct sensorbus_request *request);

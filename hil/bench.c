@@ -148,7 +148,8 @@ static void tell_ready(struct bench *bench)
 
 static void start_target(struct bench *bench, unsigned cause)
 {
-	const struct target_options options = {.command = bench->options->firmware,
+	const struct target_options options = {.inside = bench->options->inside,
+	                                       .command = bench->options->firmware,
 	                                       .realtime = bench->options->link != NULL,
 	                                       .cause = cause,
 	                                       .kept = cause == 0 ? 0 : bench->kept};

@@ -14,6 +14,7 @@
 #include <stdint.h>
 
 #include "common/scenes/scene.h"
+#include "common/sensorbus.h"
 #include "hil/busfault.h"
 #include "hil/event.h"
 #include "hil/observe.h"
@@ -34,8 +35,9 @@ enum {
 
 struct bench_options {
 	struct scene scene;
-	const char *link;     /* by the clock; NULL: the script is the host, as fast as it goes */
-	const char *firmware; /* NULL: droptower-firmware beside this program */
+	const char *link; /* by the clock; NULL: the script is the host, as fast as it goes */
+	const struct sensorbus_inside *inside; /* the firmware in this program; NULL: a process of its own */
+	const char *firmware;                  /* NULL: droptower-firmware beside this program */
 	uint64_t seed;
 	bool quiet; /* nothing is said of how it goes on */
 	struct script_options script;

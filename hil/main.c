@@ -19,13 +19,17 @@
 
 enum { NO_FD = 1 << 20 };
 
+#ifndef __has_feature
+#define __has_feature(x) 0
+#endif
+
 /* What is read besides the bench's own options. */
 struct line {
 	struct bench_options bench;
 	const char *scene_file, *scenario_file, *timeline_file;
 	double angle_deg;  /* NAN: the scene's */
 	unsigned ready_fd; /* or NO_FD */
-	bool operate;
+	bool operate, inside;
 };
 
 /* "LEFT@SECONDS" or "LEFT@+SECONDS": copies LEFT and finds the seconds. */
@@ -75,8 +79,8 @@ static int take_burst(const struct option_table *table, const char *name, const 
 
 static const struct option_row rows[] = {
         OPTION_TEXT("scenario", "FILE", struct line, scenario_file,
-                    "makes a scenario instead of a scene; only --firmware, --timeline, --log and --truth go "
-                    "with it"),
+                    "makes a scenario instead of a scene; only --firmware, --inside, --timeline, --log and "
+                    "--truth go with it"),
         OPTION_TEXT("scene", "FILE", struct line, scene_file, "what is dropped (common/scenes/*.ini)"),
         OPTION_NUMBER("angle", "DEG", struct line, angle_deg, -360, 360,
                       "contact angle instead of the scene's"), /* which knows the true limits */
@@ -89,6 +93,9 @@ static const struct option_row rows[] = {
                         "as many drops of the operator (1)"),
         OPTION_TEXT("firmware", "COMMAND", struct line, bench.firmware,
                     "instead of droptower-firmware beside this program"),
+        OPTION_FLAG("inside", struct line, inside,
+                    "the firmware runs in this program, not in a process of its own: the same frames in less "
+                    "time; not with --link and --firmware"),
         OPTION_UINT64("seed", "N", struct line, bench.seed, 0, 0x1p64,
                       "of the tower's scatter and noise and of the bus (1)"),
         OPTION_FLAG("ideal", struct line, bench.ideal, "no noise, no scatter, no high-pass"),
@@ -156,6 +163,7 @@ static bool says_run(const struct line *line)
 	memcpy(&rest, line, sizeof(rest)); /* with what lies between the fields */
 	rest.scenario_file = rest.timeline_file = NULL;
 	rest.bench.firmware = rest.bench.log = rest.bench.truth = NULL;
+	rest.inside = false;
 	return memcmp(&rest, &nothing_given, sizeof(rest)) != 0;
 }
 
@@ -164,9 +172,11 @@ static int main_check(const struct line *line)
 {
 	const struct option_table *table = &known_options;
 
+	if (line->inside && (line->bench.link != NULL || line->bench.firmware != NULL))
+		return option_wrong(table, "--inside goes without --link and --firmware");
 	if (line->scenario_file != NULL && says_run(line))
-		return option_wrong(table, "--scenario says all about the run; only --firmware, --timeline, "
-		                           "--log and --truth go "
+		return option_wrong(table, "--scenario says all about the run; only --firmware, --inside, "
+		                           "--timeline, --log and --truth go "
 		                           "with it");
 	if (line->scenario_file != NULL)
 		return OPTIONS_READ;
@@ -317,5 +327,8 @@ int main(int argc, char **argv)
 		return code;
 	if (line.ready_fd != NO_FD)
 		line.bench.ready_fd = (int)line.ready_fd;
+	if (line.inside &&
+	    !__has_feature(address_sanitizer)) /* which knows one stack: a process does the same */
+		line.bench.inside = &sensorbus_inside;
 	return line.scenario_file != NULL ? run_scenario(&line) : main_run_scene(&line);
 }

@@ -22,6 +22,7 @@
 enum {
 	SILENCE_MS = 5000, /* a firmware that asks for nothing hangs */
 	SLICE_MS = 100,
+	LOOK_EACH = 256,  /* requests from inside, then for a signal */
 	ENDING_MS = 2000, /* how long it may take to end by itself */
 	PATH_MAX_BYTES = 4096,
 };
@@ -29,9 +30,12 @@ enum {
 struct target {
 	struct temporary folder;
 	char prefix[104], request_path[112], answer_path[112];
-	pid_t pid;       /* 0: not running */
-	bool killed;     /* by us, after it did not end */
-	int wait_status; /* of waitpid, once it has ended */
+	pid_t pid;                             /* 0: not running */
+	bool killed;                           /* by us, after it did not end */
+	int wait_status;                       /* of waitpid, once it has ended */
+	const struct sensorbus_inside *inside; /* in place of process and pipes; else NULL */
+	unsigned asked;                        /* requests of it */
+	uint8_t output[SENSORBUS_MESSAGE_MAX];
 	int request_fd, answer_fd, signal_fd;
 	sigset_t signals_before;
 	size_t fill; /* bytes of the next request that are here */
@@ -102,6 +106,13 @@ int target_end(struct target *target, char message[TARGET_MESSAGE_MAX])
 
 	if (target == NULL)
 		return 0;
+	if (target->inside != NULL) {
+		const uint8_t *request;
+
+		(void)target->inside->ask(&request); /* it takes the last answer, which says stop, and ends */
+		close_all(target);
+		return 0;
+	}
 	wait_for_end(target, ENDING_MS);
 	kill_now(target);
 	result = say_status(target, message);
@@ -237,12 +248,17 @@ struct target *target_start(const struct target_options *options, char message[T
 		return NULL;
 	}
 	target->request_fd = target->answer_fd = target->signal_fd = -1;
-	if (block_signals(target) < 0 || make_bus(target) != 0) {
+	target->inside = options->inside;
+	if (block_signals(target) < 0 || (target->inside == NULL && make_bus(target) != 0)) {
 		snprintf(message, TARGET_MESSAGE_MAX, "cannot make the sensor bus in %s: %s",
 		         target->folder.path[0] ? target->folder.path : "a temporary directory",
 		         strerror(errno));
 		close_all(target);
 		return NULL;
+	}
+	if (target->inside != NULL) {
+		target->inside->start(options->cause, (uint8_t)options->kept);
+		return target;
 	}
 	if (!options->realtime)
 		share_processor();
@@ -325,6 +341,13 @@ static int say_garbage(struct target *target, char message[TARGET_MESSAGE_MAX])
 	return DT_E_FORMAT;
 }
 
+static bool is_told_to_stop(struct target *target)
+{
+	struct signalfd_siginfo signal;
+
+	return read(target->signal_fd, &signal, sizeof(signal)) > 0;
+}
+
 /* 1 when there are bytes or their end, else as target_receive. */
 static int wait_for_bytes(struct target *target, char message[TARGET_MESSAGE_MAX])
 {
@@ -332,11 +355,9 @@ static int wait_for_bytes(struct target *target, char message[TARGET_MESSAGE_MAX
 	                        {.fd = target->signal_fd, .events = POLLIN}};
 
 	for (int waited_ms = 0; waited_ms < SILENCE_MS; waited_ms += SLICE_MS) {
-		struct signalfd_siginfo signal;
-
 		if (poll(fds, 2, SLICE_MS) < 0)
 			continue;
-		if (fds[1].revents && read(target->signal_fd, &signal, sizeof(signal)) > 0)
+		if (fds[1].revents && is_told_to_stop(target))
 			return 0;
 		if (fds[0].revents)
 			return 1;
@@ -347,13 +368,31 @@ static int wait_for_bytes(struct target *target, char message[TARGET_MESSAGE_MAX
 	return say_silent(target, message);
 }
 
+/* 1, or 0 and below as target_receive. */
+static int ask_inside(struct target *target, char message[TARGET_MESSAGE_MAX])
+{
+	const uint8_t *request;
+
+	if (target->asked++ % LOOK_EACH == 0 && is_told_to_stop(target))
+		return 0;
+	target->fill = target->inside->ask(&request);
+	memcpy(target->input, request, target->fill);
+	if (target->fill > 0 && bytes_needed(target) == (int)target->fill)
+		return 1;
+	snprintf(message, TARGET_MESSAGE_MAX, "the firmware ended, or gave no request");
+	return DT_E_CLOSED;
+}
+
 int target_receive(struct target *target, struct sensorbus_request *request,
                    struct frame frames[SENSORBUS_FRAMES_MAX], char message[TARGET_MESSAGE_MAX])
 {
+	int result = target->inside != NULL ? ask_inside(target, message) : 1;
+
+	if (result != 1)
+		return result;
 	for (;;) {
 		int needed = bytes_needed(target);
 		ssize_t got;
-		int result;
 
 		if (needed < 0 || target->fill > (size_t)needed)
 			return say_garbage(target, message);
@@ -376,13 +415,17 @@ int target_receive(struct target *target, struct sensorbus_request *request,
 int target_answer(struct target *target, const struct sensorbus_answer *answers, unsigned count,
                   const struct frame *frames, char message[TARGET_MESSAGE_MAX])
 {
-	uint8_t output[SENSORBUS_MESSAGE_MAX];
+	uint8_t *output = target->output;
 	size_t length = 0;
 
 	for (unsigned i = 0; i < count; i++)
 		length += sensorbus_put_answer(output + length, &answers[i]);
 	for (unsigned i = 0; i < answers[count - 1].frames; i++)
 		length += sensorbus_put_frame(output + length, &frames[i], 0);
+	if (target->inside != NULL) {
+		target->inside->answer(output, length);
+		return 0;
+	}
 	/* Shorter than PIPE_BUF, so it is written whole; this end is a reader too, so it never breaks. */
 	if (write(target->answer_fd, output, length) == (ssize_t)length)
 		return 0;

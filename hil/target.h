@@ -2,8 +2,9 @@
 #ifndef DT_HIL_TARGET_H
 #define DT_HIL_TARGET_H
 /*
- * The firmware under test: a process of its own on a sensor bus of two FIFOs (common/sensorbus.h), which
- * lie in a temporary directory for as long as it runs. It is always ended, and only it: by its own pid.
+ * The firmware under test: within this program, or a process of its own on a sensor bus of two FIFOs
+ * (common/sensorbus.h), which lie in a temporary directory for as long as it runs. It is always ended, and
+ * only it: by its own pid.
  *
  * While a target lives SIGINT, SIGTERM and SIGHUP are blocked and arrive as a result of target_receive,
  * so that nothing is left behind. One thread, one target at a time.
@@ -21,6 +22,7 @@ struct target;
 
 /* How it starts. cause and kept are those of common/sensorbus.h and firmware's --help, 0 after power-on. */
 struct target_options {
+	const struct sensorbus_inside *inside; /* in this program; NULL: a process of its own, by */
 	const char *command; /* split into words as a shell would, without running any other; NULL:
 	                        droptower-firmware next to this program */
 	bool realtime;

@@ -52,7 +52,7 @@ KNOCKOUT_DATA = $(patsubst %,%=time:ms$(,)a:g$(,)-$(,)-$(,)-$(,)-,$(wildcard ../
 
 $(BUILD)/knockout/%.log: $(BUILD)/droptower-bench $(BUILD)/droptower-firmware
 	$(Q)mkdir -p $(@D)
-	$(Q)drop=$*; $(BUILD)/droptower-bench --operate --quiet --seed 1 --log $@ \
+	$(Q)drop=$*; $(BUILD)/droptower-bench --operate --inside --quiet --seed 1 --log $@ \
 		--scene common/scenes/$${drop%-*}.ini --angle $${drop##*-}
 
 knockout: all $(BUILD)/tests/knockout $(KNOCKOUT_DROPS) ## what each special mechanism of the estimators is worth

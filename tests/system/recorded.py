@@ -161,7 +161,7 @@ def recording():
 
 
 def record(log, scene, angle_deg, seed):
-    run("droptower-bench", "--scene", f"common/scenes/{scene}.ini", "--angle", angle_deg, "--seed", seed, "--operate",
+    run("droptower-bench", "--scene", f"common/scenes/{scene}.ini", "--angle", angle_deg, "--seed", seed, "--operate", "--inside",
         "--quiet", "--log", log, timeout=900)
     return from_host(read(log))
 

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <errno.h>
-#include <fcntl.h>
 #include <linux/can/error.h>
 #include <stdio.h>
 #include <string.h>
@@ -16,7 +15,6 @@
 enum { LATE_MS = 50 };
 
 static struct {
-	int request_fd, answer_fd;
 	struct link *link; /* NULL: frames ride in the exchange */
 	int link_error;
 	enum port_bus link_bus;
@@ -114,44 +112,6 @@ void lockstep_release(uint32_t before)
 	(void)before;
 }
 
-/* ---- the two pipes ---- */
-
-static int complain(const char *what, const char *detail)
-{
-	fprintf(stderr, "droptower-firmware: %s: %s\n", what, detail);
-	return POSIX_EXIT_LINK;
-}
-
-int lockstep_write(const void *bytes, size_t count)
-{
-	const uint8_t *p = bytes;
-
-	while (count > 0) {
-		ssize_t done = write(port.request_fd, p, count);
-
-		if (done < 0 && errno == EINTR)
-			continue;
-		if (done < 0)
-			return errno == EPIPE ? LOCKSTEP_GONE : DT_E_SYSTEM;
-		p += done;
-		count -= (size_t)done;
-	}
-	return 0;
-}
-
-int lockstep_read(void *bytes, size_t size, size_t *count)
-{
-	ssize_t done;
-
-	do
-		done = read(port.answer_fd, bytes, size);
-	while (done < 0 && errno == EINTR);
-	if (done <= 0)
-		return done == 0 ? LOCKSTEP_GONE : DT_E_SYSTEM;
-	*count += (size_t)done;
-	return 0;
-}
-
 /* ---- time ---- */
 
 static void poll(void)
@@ -234,14 +194,10 @@ static int run(const struct posix_options *options)
 	return result;
 }
 
-static int open_pipe(const char *prefix, const char *suffix, int flags, int *fd)
+static int complain(const char *what, const char *detail)
 {
-	char path[4096];
-
-	if (snprintf(path, sizeof(path), "%s.%s", prefix, suffix) >= (int)sizeof(path))
-		return complain(prefix, "path too long");
-	*fd = open(path, flags | O_CLOEXEC);
-	return *fd >= 0 ? 0 : complain(path, strerror(errno));
+	fprintf(stderr, "droptower-firmware: %s: %s\n", what, detail);
+	return POSIX_EXIT_LINK;
 }
 
 static int open_all(const struct posix_options *options)
@@ -254,10 +210,8 @@ static int open_all(const struct posix_options *options)
 		if (port.link == NULL)
 			return complain("no CAN link", message);
 	}
-	result = open_pipe(options->bus, "request", O_WRONLY, &port.request_fd);
-	if (result == 0)
-		result = open_pipe(options->bus, "answer", O_RDONLY, &port.answer_fd);
-	return result;
+	result = pipes_open(options->bus, message, sizeof(message));
+	return result == 0 ? 0 : complain(options->bus, message);
 }
 
 int posix_run(const struct posix_options *options)

@@ -6,6 +6,7 @@
  * One thread; the core's "interrupts" are calls between two calls of app_poll, so lock has nothing to do.
  */
 #include <stdbool.h>
+#include <stddef.h>
 
 #include "firmware/port.h"
 
@@ -21,6 +22,10 @@ struct posix_options {
 	enum port_reset cause;
 	uint8_t kept; /* by the firmware before the reset */
 };
+
+/* The two pipes of the exchange (lockstep_write, lockstep_read): pipes.c, or whoever brings others. 0, or an
+ * error told in message. */
+DT_MUST_USE int pipes_open(const char *bus, char *message, size_t size);
 
 /* Runs until the other end is gone or says stop. Returns the exit code; what is wrong goes to stderr. */
 int posix_run(const struct posix_options *options);
