@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  *
- * WAV (RIFF): whole numbers are +-1 of full scale, which the file does not tell: --columns "a:g*500" does.
- * Floats are as they stand.
+ * WAV (RIFF, and RF64 for more than 4 GiB): whole numbers are +-1 of full scale, which the file does not
+ * tell: --columns "a:g*500" does. Floats are as they stand.
  */
 #include <math.h>
 #include <stdio.h>
@@ -41,7 +41,8 @@ static int wav_format(struct wav *wav, const char *at, size_t size, const struct
 
 static int wav_chunks(struct wav *wav, const struct source *source, char *message)
 {
-	size_t at = 12;
+	static const size_t ELSEWHERE = UINT32_MAX; /* the size stands in ds64 */
+	size_t at = 12, told = ELSEWHERE;
 
 	if (source->size < 12 || memcmp(source->bytes + 8, "WAVE", 4) != 0)
 		return source_refuse(message, DT_E_FORMAT, source->file, 0, "RIFF file that is no WAV");
@@ -50,6 +51,10 @@ static int wav_chunks(struct wav *wav, const struct source *source, char *messag
 		size_t size = (size_t)bytes_whole(chunk + 4, 4, false), room = source->size - at - 8;
 		int error;
 
+		if (memcmp(chunk, "ds64", 4) == 0 && size >= 16 && size <= room)
+			told = (size_t)bytes_whole(chunk + 16, 8, false);
+		if (memcmp(chunk, "data", 4) == 0 && size == ELSEWHERE)
+			size = told;
 		if (size > room)
 			return source_refuse(message, DT_E_FORMAT, source->file, 0,
 			                     "WAV file cut: a chunk of %zu bytes, %zu are there", size, room);

@@ -24,7 +24,7 @@ void record_free(struct record *record)
 	record_init(record);
 }
 
-struct channel *record_add_channel(struct record *record, const char *name, double rate_hz, size_t count)
+struct channel *record_add_room(struct record *record, const char *name, double rate_hz, size_t count)
 {
 	struct channel *channels =
 	        realloc(record->channels, (record->channel_count + 1) * sizeof(*record->channels));
@@ -42,13 +42,20 @@ struct channel *record_add_channel(struct record *record, const char *name, doub
 		mapped_free(channel->sample);
 		return NULL;
 	}
-	for (size_t k = 0; k < count; k++) {
+	record->channel_count++;
+	return channel;
+}
+
+struct channel *record_add_channel(struct record *record, const char *name, double rate_hz, size_t count)
+{
+	struct channel *channel = record_add_room(record, name, rate_hz, count);
+
+	for (size_t k = 0; channel != NULL && k < count; k++) {
 		channel->value_g[k] = NAN;
 		channel->sample[k] = SAMPLE_LOST;
 		if (k % RECORD_PART == 0)
 			mapped_seen(RECORD_PART * (sizeof(*channel->value_g) + 1));
 	}
-	record->channel_count++;
 	return channel;
 }
 

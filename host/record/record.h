@@ -149,8 +149,9 @@ void record_init(struct record *record);
 void record_free(struct record *record);
 
 /* Appends an empty channel with room for count samples, all SAMPLE_LOST; NULL without memory. The pointer
- * is valid until the next call. */
+ * is valid until the next call. Of record_add_room who calls it fills all samples and marks. */
 struct channel *record_add_channel(struct record *record, const char *name, double rate_hz, size_t count);
+struct channel *record_add_room(struct record *record, const char *name, double rate_hz, size_t count);
 
 /* Whether it is a drop from a file that should say its SHA-256 and does not: by an older version, or by
  * another program. Logs have the capture's CRC-32 instead. */

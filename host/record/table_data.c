@@ -91,6 +91,21 @@ struct table_column *table_data_add(struct table_data *table, size_t count)
 	return column;
 }
 
+/* A power of two divides as its inverse multiplies. */
+static void table_column_scale(const struct bytes_view *view, size_t count, double *value)
+{
+	int exponent;
+	bool whole = frexp(view->full, &exponent) <= 0.5;
+	double part = 1 / view->full, zero = view->zero;
+
+	if (!(view->full > 0))
+		return;
+	for (size_t k = 0; k < count && whole; k++)
+		value[k] = (value[k] - zero) * part;
+	for (size_t k = 0; k < count && !whole; k++)
+		value[k] = (value[k] - zero) / view->full;
+}
+
 #define TAKE(type)                                                \
 	for (size_t k = 0; k < count; k++) {                      \
 		type number;                                      \
@@ -115,8 +130,7 @@ void table_column_take(const struct table_column *column, size_t from, size_t co
 		for (size_t k = 0; k < count; k++)
 			value[k] = bytes_value(at + k * stride, view->kind, view->big);
 	}
-	for (size_t k = 0; k < count && view->full > 0; k++)
-		value[k] = (value[k] - view->zero) / view->full;
+	table_column_scale(view, count, value);
 	mapped_seen(count * stride);
 }
 
@@ -219,7 +233,7 @@ static int make_channel(struct making *making, size_t i)
 		        making->message, DT_E_FORMAT, making->source->file, 0,
 		        "%s has %zu samples, expected as many as there are times, and two or more",
 		        spec->name, column->count);
-	channel = record_add_channel(making->record, spec->name, rate_hz, column->count);
+	channel = record_add_room(making->record, spec->name, rate_hz, column->count);
 	if (channel == NULL)
 		return source_no_memory(making->message, making->source->file);
 	channel->start_s = timed ? 0 : column->start_s;
@@ -506,7 +520,10 @@ table_reader *table_reader_of(const struct source *source)
 		const char *magic;
 		size_t length;
 		table_reader *reader;
-	} readers[] = {{"\x93NUMPY", 6, read_npy}, {"RIFF", 4, read_wav}, {"TDSm", 4, read_tdms}};
+	} readers[] = {{"\x93NUMPY", 6, read_npy},
+	               {"RIFF", 4, read_wav},
+	               {"RF64", 4, read_wav},
+	               {"TDSm", 4, read_tdms}};
 
 	for (size_t i = 0; i < sizeof(readers) / sizeof(readers[0]); i++)
 		if (source->size > readers[i].length &&

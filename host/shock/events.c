@@ -16,7 +16,7 @@
 #define MAD_TO_SIGMA 1.482602218505602
 
 enum { SPREAD_SAMPLES = 256, HOLD_OFF_SAMPLES = 3, BLOCK = 64, LANES = 8 };
-enum { READ_AHEAD = 1 << 16 }; /* bytes that come with a sample of a mapped file */
+enum { READ_AHEAD = 1 << 21 }; /* bytes that come with a sample of a mapped file */
 
 struct source {
 	struct axes axes;

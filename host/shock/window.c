@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/mapped.h"
+
 static const double BEFORE_MOST_S = 0.25, AFTER_MOST_S = 1, PAUSE_PART = 0.25;
 
 static int window_compare(const void *a, const void *b)
@@ -97,7 +99,7 @@ static int cut_channel(const struct channel *channel, double from_s, double to_s
 		until = last >= 0 ? (size_t)last + 1 : 0;
 	if (from + 2 > until)
 		return 0;
-	part = record_add_channel(cut, channel->name, channel->rate_hz, until - from);
+	part = record_add_room(cut, channel->name, channel->rate_hz, until - from);
 	if (part == NULL)
 		return DT_E_MEMORY;
 	part->start_s = channel->start_s + (double)from / channel->rate_hz;
@@ -105,6 +107,7 @@ static int cut_channel(const struct channel *channel, double from_s, double to_s
 	part->flags = channel->flags;
 	memcpy(part->value_g, channel->value_g + from, (until - from) * sizeof(*part->value_g));
 	memcpy(part->sample, channel->sample + from, until - from);
+	mapped_seen(MAPPED_STEP); /* megabytes come with the first sample */
 	return 0;
 }
 
