@@ -487,12 +487,10 @@ static hid_t open_image(const struct source *source)
 
 	if (source->mapped != NULL) { /* too large for an image */
 		setenv("HDF5_USE_FILE_LOCKING", "FALSE", 1);
-		file = H5Fopen("/dev/stdin", H5F_ACC_RDONLY, access);
-		H5Pclose(access);
-		return file;
+		file = H5Fopen("/dev/stdin", H5F_ACC_RDONLY, access); /* which fails for one without a name */
 	}
 	H5Pset_fapl_core(access, IMAGE_STEP, false);
-	if (H5Pset_file_image(access, source->bytes, source->size) >= 0)
+	if (file < 0 && H5Pset_file_image(access, source->bytes, source->size) >= 0)
 		file = H5Fopen("record", H5F_ACC_RDONLY, access);
 	H5Pclose(access);
 	return file;
