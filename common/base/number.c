@@ -255,11 +255,41 @@ struct decimal {
 	int exponent;
 };
 
+/* Where a power of ten that takes the value to HELD digits is held exactly, from 1e-9 to 1e19, by one
+ * product. */
+static bool decimal_by_product(double size, struct decimal *decimal)
+{
+	enum { FIVES = 27 }; /* 5^27 fits 64 bits */
+	const uint64_t end = power_of_ten[HELD - 1];
+	int power, places;
+	uint64_t mantissa = (uint64_t)ldexp(frexp(size, &power), 64), five = 1;
+
+	places = HELD - 1 - (power * 1233 >> 12); /* log10(2); one too many, or right */
+	if (places > FIVES || places < 0)
+		return false;
+	for (int i = 0; i < places; i++)
+		five *= 5;
+	for (;; places--, five /= 5) {
+		const unsigned __int128 product = (unsigned __int128)mantissa * five;
+		const int down = 64 - power - places;
+
+		if (down < 1 || down > 127)
+			return false;
+		if (product >> down < (unsigned __int128)end * 10) {
+			decimal->digits = (uint64_t)((product >> down) + (product >> (down - 1) & 1));
+			decimal->exponent = HELD - 1 - places;
+			return decimal->digits >= end && decimal->digits < end * 10;
+		}
+	}
+}
+
 static struct decimal decimal_of(double size)
 {
 	char text[HELD + 8]; /* d.ddd and e-308 */
 	struct decimal decimal;
 
+	if (decimal_by_product(size, &decimal))
+		return decimal;
 	snprintf(text, sizeof(text), "%.*e", HELD - 1, size);
 	decimal.digits = (uint64_t)(text[0] - '0');
 	for (unsigned i = 2; i <= HELD; i++)
