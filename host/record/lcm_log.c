@@ -87,7 +87,7 @@ static bool event_at(struct log_file *log, uint64_t *at, uint64_t end, struct lc
 	return true;
 }
 
-bool lcm_log_is(struct log_file *log)
+static bool lcm_log_looks(struct log_file *log)
 {
 	size_t held;
 	const uint8_t *head = bytes_at(log, 0, LOOK_BYTES, &held), *end;
@@ -98,6 +98,13 @@ bool lcm_log_is(struct log_file *log)
 	end = head + (held < LOOK_BYTES ? held : LOOK_BYTES);
 	head = memchr(head, sync_word[0], (size_t)(end - head));
 	return head != NULL && memmem(head, (size_t)(end - head), sync_word, SYNC_BYTES) != NULL;
+}
+
+bool lcm_log_is(struct log_file *log)
+{
+	if (log->kind == LOG_UNKNOWN)
+		log->kind = lcm_log_looks(log) ? LOG_LCM : LOG_OTHER;
+	return log->kind == LOG_LCM;
 }
 
 /* To the next byte that a sync word may begin with. */

@@ -22,6 +22,11 @@ struct log_file {
 	uint64_t at; /* place of its first byte */
 	size_t held, room;
 	int failed; /* errno of a read, ENODATA when the file became shorter */
+	enum {
+		LOG_UNKNOWN,
+		LOG_LCM,
+		LOG_OTHER
+	} kind; /* lcm_log_is's answer, for whom the window need not go back */
 };
 
 /* The most that log_file_get may be asked for. */
