@@ -18,7 +18,10 @@
 /* Of spring_at's steps. */
 #define STEPS_PER_CYCLE 64.0
 
-enum { PLACE_Q = MODES_LAW, PLACE_D = MODES_LAW + 1, LANES = 4 };
+/* Of steps that go by what was before, over 1 + the swing that Q calls large. */
+#define STEP_ON 0.5
+
+enum { PLACE_Q = MODES_LAW, PLACE_D = MODES_LAW + 1, LANES = 4, BEFORE = 5 };
 
 /* Where the processor has registers of four they are used. The numbers are the same, as nothing is fused or
  * reordered. */
@@ -171,6 +174,7 @@ static bool spring_possible(const double *p)
 struct quad {
 	QUAD loss, still, soft;
 	QUAD x, v;
+	QUAD gained, a[BEFORE]; /* x's last step; the accelerations one step ago, two, .. */
 };
 
 /* What the solutions are off the spring at p: loss, k, the swing of time 0 as a part of itself. */
@@ -230,6 +234,42 @@ INSIDE quad_step(struct quad *s, QUAD *a1, double *slope)
 	s->v = v + (*a1 + 2 * (a2 + a3) + a4) * (1.0 / 6);
 }
 
+/* What there was before: the same in a time that runs the other way. */
+static void quad_look_back(struct quad *s)
+{
+	struct quad back = *s;
+	double slope;
+	QUAD a;
+
+	back.loss = -s->loss;
+	back.v = -s->v;
+	quad_step(&back, &a, &slope);
+	s->gained = s->x - back.x;
+	for (unsigned i = 0; i < BEFORE; i++)
+		quad_step(&back, &s->a[i], &slope);
+}
+
+/* The same as quad_step by what was before: one look at the forces a step, not four one after the other.
+ * Stoermer's and Adams' formulas of the sixth order. */
+INSIDE quad_step_on(struct quad *s, QUAD *a0, double *slope)
+{
+	const QUAD *a = s->a;
+	QUAD near;
+
+	push_quad(s, &s->x, &s->v, &near, a0);
+	*slope = -s->loss[0] * (*a0)[0] - s->v[0] * (s->still[0] + s->soft[0] * near[0] * (2 * near[0] - 1));
+	s->v += (*a0 * 4277 - a[0] * 7923 + (a[1] * 9982 - a[2] * 7298) + (a[3] * 2877 - a[4] * 475)) *
+	        (1.0 / 1440);
+	s->gained +=
+	        (*a0 * 317 - a[0] * 266 + (a[1] * 374 - a[2] * 276) + (a[3] * 109 - a[4] * 18)) * (1.0 / 240);
+	s->x += s->gained;
+	s->a[4] = a[3];
+	s->a[3] = a[2];
+	s->a[2] = a[1];
+	s->a[1] = a[0];
+	s->a[0] = *a0;
+}
+
 /* Of a block's samples: the accelerations; the first solution's slope, and that times the steps since time 0.
  */
 struct block {
@@ -237,21 +277,21 @@ struct block {
 	double slope, late;
 };
 
-INSIDE quad_block(struct quad *quad, unsigned samples, double gone, struct block *sum)
+INSIDE quad_block(struct quad *quad, bool on, unsigned samples, double gone, struct block *sum)
 {
-	struct quad here = *quad;
-
 	*sum = (struct block){.push = {0}};
 	for (unsigned j = 0; j < samples; j++) {
 		double slope;
 		QUAD a;
 
-		quad_step(&here, &a, &slope);
+		if (on)
+			quad_step_on(quad, &a, &slope);
+		else
+			quad_step(quad, &a, &slope);
 		sum->push += a;
 		sum->slope += slope;
 		sum->late += slope * (gone + j);
 	}
-	*quad = here;
 }
 
 /* What the derivatives by the unknowns are made of: that by the offset, the lanes' (the swing's twice: once
@@ -285,8 +325,8 @@ struct spring_scale {
 	double offset_g;
 };
 
-WIDE static void spring_sum(struct spring_sums *sums, const struct quad *start,
-                            const struct spring_scale *scale, const struct series *series)
+INSIDE spring_sum_by(struct spring_sums *sums, const struct quad *start, bool on,
+                     const struct spring_scale *scale, const struct series *series)
 {
 	struct spring_sums all = {.taken = 0};
 	struct quad quad = *start;
@@ -295,7 +335,7 @@ WIDE static void spring_sum(struct spring_sums *sums, const struct quad *start,
 		struct block sum;
 		QUAD low, high, push;
 
-		quad_block(&quad, series->block, scale->gone + (double)k * series->block, &sum);
+		quad_block(&quad, on, series->block, scale->gone + (double)k * series->block, &sum);
 		if (!series->good[k])
 			continue;
 		push = sum.push * scale->push;
@@ -308,6 +348,15 @@ WIDE static void spring_sum(struct spring_sums *sums, const struct quad *start,
 		spring_add(&all, &low, &high);
 	}
 	*sums = all;
+}
+
+WIDE static void spring_sum(struct spring_sums *sums, const struct quad *start, bool on,
+                            const struct spring_scale *scale, const struct series *series)
+{
+	if (on)
+		spring_sum_by(sums, start, true, scale, series);
+	else
+		spring_sum_by(sums, start, false, scale, series);
 }
 
 /* The derivatives by the unknowns from the columns: a row each. The solution is scaled with its swing where q
@@ -370,6 +419,7 @@ size_t spring_normal(const struct series *series, const double *p, double normal
 	struct spring_sums sums;
 	struct quad quad;
 	struct spring s;
+	bool on;
 
 	if (!spring_possible(p))
 		return 0;
@@ -382,7 +432,10 @@ size_t spring_normal(const struct series *series, const double *p, double normal
 	scale.push = 1 / (scale.step * scale.step * sqrt(s.q) * series->block);
 	scale.gone = first_s / sample_s;
 	scale.offset_g = p[MODES_OFFSET];
-	spring_sum(&sums, &quad, &scale, series);
+	on = scale.step * (1 + sqrt(p[PLACE_Q] * spring_swing(p))) < STEP_ON;
+	if (on)
+		quad_look_back(&quad);
+	spring_sum(&sums, &quad, on, &scale, series);
 	spring_turn_sums(&sums, by, normal, right);
 	*squares = sums.of[OF_RESIDUAL][1][OF_RESIDUAL - LANES];
 	return sums.taken;
