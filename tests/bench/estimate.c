@@ -11,6 +11,7 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_multifit_nlinear.h>
 
+#include "common/units.h"
 #include "host/estimate/baseline.h"
 #include "host/estimate/dropout.h"
 #include "host/estimate/estimate.h"

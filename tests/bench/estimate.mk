@@ -17,7 +17,8 @@ $(BUILD)/bench/drop-0001.log: $(PROGRAMS)
 	$(Q)rm -rf $(@D) && $(BUILD)/droptower run --scene $(SCENE) --angle $(ANGLE) --out $(@D) >/dev/null 2>&1
 
 .PHONY: bench
-bench: $(BUILD)/tests/bench $(BUILD)/bench/drop-0001.log ## what each estimate costs, beside a reference loop and its target
+bench: $(BUILD)/tests/bench $(BUILD)/bench/drop-0001.log ## what estimates, readers and batch cost in processor time, beside what was asked for and other programs
 	@$< $(BUILD)/droptower $(BUILD)/bench/drop-0001.log
+	@python3 tests/bench/throughput.py $(BUILD) $(BUILD)/bench/drop-0001.log
 	@if python3 -c 'import scipy' 2>/dev/null; then python3 tests/bench/peers.py; \
 	else echo 'peers: python3-scipy is not installed'; fi
