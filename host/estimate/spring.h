@@ -10,10 +10,11 @@
  * read as the acceleration x'' + b. D is what the swing of time 0, x0, has taken of the stiffness, and Q says
  * over which swings it goes: of all ways to write this law the one whose unknowns hang on each other least,
  * so that a fit needs half the steps. A negative D stiffens. Unlike a frequency that is a function of the
- * envelope it has the harmonics too. Integrated by Runge-Kutta, one step per sample: four solutions side by
- * side, of which the differences give the derivatives by damping, loss of stiffness and swing; those by time
- * and Q follow, since a later state and another scale have the same solution. Unknowns at the places of
- * modes.h: b, a, w (damped, of a small swing), w0^2 x and w0 x' at time 0 in g, Q in 1/g^2 of the former, D.
+ * envelope it has the harmonics too. Integrated one step per sample, where steps
+ * are short by Stoermer's and Adams' formulas, else by Runge-Kutta: four solutions side by side, of which the
+ * differences give the derivatives by damping, loss of stiffness and swing; those by time and Q follow, since
+ * a later state and another scale have the same solution. Unknowns at the places of modes.h: b, a, w (damped,
+ * of a small swing), w0^2 x and w0 x' at time 0 in g, Q in 1/g^2 of the former, D.
  */
 #include "host/estimate/cholesky.h"
 #include "host/estimate/series.h"

@@ -2,9 +2,9 @@
 #ifndef DT_TESTS_BENCH_STOPWATCH_H
 #define DT_TESTS_BENCH_STOPWATCH_H
 /*
- * How much processor time something takes: the median and the best of many repetitions, each long enough for the
- * clock. What else a machine does is in it only as far as it shares caches and units of the processor. Times in
- * us.
+ * How much processor time something takes: the median and the best of many repetitions, each long enough for
+ * the clock. What else a machine does is in it only as far as it shares caches and units of the processor.
+ * Times in us.
  */
 struct stopwatch {
 	double median_us, best_us;
