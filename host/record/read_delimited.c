@@ -382,6 +382,7 @@ static void take_plain_row(struct reading *reading, const struct row *row, struc
 	line->length = (size_t)(row->end - line->text);
 	line->next = (size_t)(row->next - reading->source->bytes);
 	line->number++;
+	mapped_seen(3 * line->length); /* of the text and of what is kept of it */
 	for (size_t i = 0; i < columns->count; i++) {
 		if (columns->column[i].kind == COLUMN_TIME) {
 			take_plain_time(reading, i, &row->number[i], plain);
