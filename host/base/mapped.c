@@ -2,6 +2,7 @@
 #include "host/base/mapped.h"
 
 #include <fcntl.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -21,7 +22,8 @@ struct region {
 };
 
 static struct region *regions;
-static size_t seen;
+static pthread_mutex_t regions_lock = PTHREAD_MUTEX_INITIALIZER;
+static _Thread_local size_t seen;
 
 static void mapped_shrunk(int signal)
 {
@@ -50,10 +52,12 @@ static void *add_region(int descriptor, size_t bytes, int protection, int flags)
 		free(region);
 		return NULL;
 	}
+	pthread_mutex_lock(&regions_lock);
 	if (regions == NULL)
 		watch_for_shrinking();
 	*region = (struct region){.next = regions, .at = at, .bytes = bytes};
 	regions = region;
+	pthread_mutex_unlock(&regions_lock);
 	return at;
 }
 
@@ -102,18 +106,28 @@ void *mapped_array_resize(void *array, size_t held, size_t count, size_t size)
 	return other;
 }
 
-void mapped_free(void *memory)
+static struct region *take_region(const void *memory)
 {
 	struct region **at = &regions, *region;
 
+	pthread_mutex_lock(&regions_lock);
 	while (*at != NULL && (*at)->at != memory)
 		at = &(*at)->next;
 	region = *at;
+	if (region != NULL)
+		*at = region->next;
+	pthread_mutex_unlock(&regions_lock);
+	return region;
+}
+
+void mapped_free(void *memory)
+{
+	struct region *region = take_region(memory);
+
 	if (region == NULL) {
 		free(memory);
 		return;
 	}
-	*at = region->next;
 	(void)munmap(region->at, region->bytes);
 	free(region);
 }
@@ -124,6 +138,8 @@ void mapped_seen(size_t bytes)
 	if (seen < MAPPED_STEP)
 		return;
 	seen = 0;
+	pthread_mutex_lock(&regions_lock);
 	for (const struct region *region = regions; region != NULL; region = region->next)
 		(void)madvise(region->at, region->bytes, MADV_DONTNEED);
+	pthread_mutex_unlock(&regions_lock);
 }

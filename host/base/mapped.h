@@ -8,7 +8,7 @@
  *
  * The temporary file lies in $TMPDIR, else /var/tmp, has no name and its room from the beginning on. When a
  * mapped file becomes shorter, the program ends with a message and 3: there is no way back from that.
- * One thread.
+ * Any thread.
  */
 #include <stddef.h>
 
