@@ -41,6 +41,8 @@ struct bench_options {
 	uint64_t seed;
 	bool quiet; /* nothing is said of how it goes on */
 	struct script_options script;
+	unsigned lift_after_ms; /* how long the technician takes once the tower is safe; 0: 2 s, watched 0.1 s
+	                         */
 	bool ideal;
 	double clock_ppm;            /* the firmware's clock is this much too fast */
 	struct busfault_options bus; /* cut_resend counts for the way to the host */

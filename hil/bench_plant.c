@@ -166,6 +166,13 @@ static void watch_impact(struct bench *bench)
 	}
 }
 
+static int64_t lift_after_ms(const struct bench *bench)
+{
+	if (bench->options->lift_after_ms > 0)
+		return bench->options->lift_after_ms;
+	return bench->watch != NULL ? LIFT_SOON_MS : LIFT_AFTER_MS;
+}
+
 /* The technician: lifts frame and product once the tower is safe. */
 void bench_plant_attend(struct bench *bench)
 {
@@ -175,7 +182,7 @@ void bench_plant_attend(struct bench *bench)
 		bench->safe_ms = -1;
 	else if (bench->safe_ms < 0)
 		bench->safe_ms = bench_now_ms(bench);
-	else if (bench_now_ms(bench) - bench->safe_ms >= (bench->watch ? LIFT_SOON_MS : LIFT_AFTER_MS))
+	else if (bench_now_ms(bench) - bench->safe_ms >= lift_after_ms(bench))
 		tower_lift(bench->tower);
 }
 

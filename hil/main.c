@@ -91,6 +91,9 @@ static const struct option_row rows[] = {
                     "no host: a scripted operator in virtual time, as fast as it goes"),
         OPTION_UNSIGNED("drops", "N", struct line, bench.script.drops, 1, 1000000,
                         "as many drops of the operator (1)"),
+        OPTION_UNSIGNED("lift-after", "MS", struct line, bench.lift_after_ms, 1, 60000,
+                        "how long the technician takes to lift the frame (2000); the product lies on the mat "
+                        "meanwhile"),
         OPTION_TEXT("firmware", "COMMAND", struct line, bench.firmware,
                     "instead of droptower-firmware beside this program"),
         OPTION_FLAG("inside", struct line, inside,
