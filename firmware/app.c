@@ -317,6 +317,18 @@ static void receive(void)
 			send_capture();
 }
 
+static void send_block(const struct acquire_tick *tick, unsigned sensor)
+{
+	struct frame block;
+
+	receive();
+	if (app.stream.classic)
+		return;
+	acquire_pack(tick, sensor, sensor == 0 ? WIRE_ID_BLOCK_S1 : WIRE_ID_BLOCK_S2, &block);
+	receive();
+	stream_block(&app.stream, &block);
+}
+
 /* The ticks that the interrupt has finished: into the ring, and out. */
 static void take_ticks(void)
 {
@@ -324,14 +336,14 @@ static void take_ticks(void)
 	struct acquire_tick tick;
 
 	for (unsigned i = 0; i < TICKS_PER_POLL && acquire_take(&app.acquire, &tick) == 0; i++) {
-		receive();
-		health_samples(&app.health, &tick);
-		receive();
-		capture_put(&app.capture, &tick);
 		for (unsigned sensor = 0; sensor < WIRE_SENSORS; sensor++) {
 			receive();
-			stream_block(&app.stream, &tick, sensor);
+			health_samples(&app.health, &tick, sensor);
 		}
+		receive();
+		capture_put(&app.capture, &tick);
+		for (unsigned sensor = 0; sensor < WIRE_SENSORS; sensor++)
+			send_block(&tick, sensor);
 	}
 	if (before == CAPTURE_ROLLING && app.capture.phase != CAPTURE_ROLLING)
 		note_trigger();
@@ -400,6 +412,7 @@ static void beat(const struct glance *now, uint32_t tick_ms)
 		start_bus();
 	if (sequence_captured(now->state) && tick_ms - app.capture_end_ms >= BEAT_MS)
 		send_capture();
+	receive();
 	stream_resend(&app.stream, &app.capture);
 }
 

@@ -16,18 +16,27 @@ void health_init(struct health *health, const struct parameters *parameters, vol
 /* Adds one tick of one channel; true when all its samples have the value of the sample before. */
 static bool add(struct health_channel *channel, const int16_t *code, unsigned count)
 {
-	bool same = true;
+	int32_t last = channel->last, sum = channel->sum, differ = 0;
+	uint64_t squares = channel->squares;
+	unsigned missing = 0;
 
 	for (unsigned k = 0; k < count; k++) {
-		if (code[k] == WIRE_SAMPLE_NOT_TAKEN)
+		int32_t now = code[k];
+
+		if (now == WIRE_SAMPLE_NOT_TAKEN) {
+			missing++;
 			continue;
-		same = same && code[k] == channel->last;
-		channel->last = code[k];
-		channel->sum += code[k];
-		channel->squares += (uint64_t)((int32_t)code[k] * code[k]);
-		channel->count++;
+		}
+		differ |= now ^ last;
+		last = now;
+		sum += now;
+		squares += (uint64_t)(now * now);
 	}
-	return same;
+	channel->last = (int16_t)last;
+	channel->sum = sum;
+	channel->squares = squares;
+	channel->count = (uint16_t)(channel->count + count - missing);
+	return differ == 0;
 }
 
 /* True while it is stuck. */
@@ -59,35 +68,44 @@ static void keep_zero(struct health *health, unsigned channel)
 		health->zero[channel] = (int16_t)(seen->sum / seen->count);
 }
 
-static void judge_window(struct health *health)
+static void judge_sensor(struct health *health, unsigned sensor)
 {
 	static const uint32_t sensor_check[WIRE_SENSORS] = {WIRE_CHECK_SENSOR_S1, WIRE_CHECK_SENSOR_S2};
 	int64_t limit = health->parameters->value[WIRE_PARAMETER_noise_counts];
-	uint32_t checks = health->window_triggered ? WIRE_CHECK_TRIGGER : 0;
 
-	for (unsigned i = 0; i < ACQUIRE_CHANNELS; i++) {
+	for (unsigned i = 3 * sensor; i < 3 * sensor + 3; i++) {
 		struct health_channel *channel = &health->channel[i];
 		unsigned per_tick = i % 3 == 0 ? WIRE_X_PER_TICK : WIRE_YZ_PER_TICK;
 
 		if (!quiet(channel, per_tick * HEALTH_WINDOW_TICKS, limit))
-			checks |= sensor_check[i / 3];
+			health->window_checks |= sensor_check[sensor];
 		keep_zero(health, i);
 		channel->sum = 0;
 		channel->squares = 0;
 		channel->count = 0;
 	}
-	health->sensor_checks = checks;
+}
+
+static void end_tick(struct health *health, const struct acquire_tick *tick, bool moving)
+{
+	uint32_t level = health->parameters->value[WIRE_PARAMETER_trigger_counts];
+
+	if (!moving && capture_impact_us(&tick->sensor[1], level) < 1000)
+		health->window_triggered = true;
+	if (++health->window_ticks < HEALTH_WINDOW_TICKS)
+		return;
+	health->sensor_checks = health->window_checks | (health->window_triggered ? WIRE_CHECK_TRIGGER : 0);
+	health->window_checks = 0;
 	health->window_ticks = 0;
 	health->window_moved = false;
 	health->window_triggered = false;
 }
 
-void health_samples(struct health *health, struct acquire_tick *tick)
+void health_samples(struct health *health, struct acquire_tick *tick, unsigned sensor)
 {
-	uint32_t level = health->parameters->value[WIRE_PARAMETER_trigger_counts];
 	bool moving = sequence_moving(tick->status[0] & WIRE_STATUS_STATE);
 
-	for (unsigned i = 0; i < ACQUIRE_CHANNELS; i++) {
+	for (unsigned i = 3 * sensor; i < 3 * sensor + 3; i++) {
 		struct health_channel *channel = &health->channel[i];
 		unsigned count;
 		const int16_t *code = acquire_channel(tick, i, &count);
@@ -95,12 +113,11 @@ void health_samples(struct health *health, struct acquire_tick *tick)
 		if (watch_stuck(health, channel, add(channel, code, count) && moving))
 			tick->marks |= WIRE_MARK_STUCK;
 	}
-	if (moving)
-		health->window_moved = true;
-	else if (capture_impact_us(&tick->sensor[1], level) < 1000)
-		health->window_triggered = true;
-	if (++health->window_ticks == HEALTH_WINDOW_TICKS)
-		judge_window(health);
+	health->window_moved |= moving;
+	if (health->window_ticks == HEALTH_WINDOW_TICKS - 1)
+		judge_sensor(health, sensor);
+	if (sensor == WIRE_SENSORS - 1)
+		end_tick(health, tick, moving);
 }
 
 static uint32_t cable_checks(uint16_t io, uint16_t bias_high)

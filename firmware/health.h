@@ -39,6 +39,7 @@ struct health {
 	volatile uint32_t *counters;
 	struct health_channel channel[ACQUIRE_CHANNELS];
 	int16_t zero[ACQUIRE_CHANNELS]; /* offsets over the last window at rest */
+	uint32_t window_checks;         /* of the sensors that are judged already */
 	uint8_t window_ticks;
 	bool window_moved, window_triggered;
 	volatile uint32_t sensor_checks; /* written by main */
@@ -55,8 +56,9 @@ struct health_view {
 
 void health_init(struct health *health, const struct parameters *parameters, volatile uint32_t *counters);
 
-/* Sets WIRE_MARK_STUCK in the tick where it applies. */
-void health_samples(struct health *health, struct acquire_tick *tick);
+/* One sensor's samples of a tick, S1 (0) first, then S2 (1). Sets WIRE_MARK_STUCK in the tick where it
+ * applies. */
+void health_samples(struct health *health, struct acquire_tick *tick, unsigned sensor);
 
 /* WIRE_CHECK_* bits that are not green, those of the sequence apart. */
 uint32_t health_checks(const struct health *health, const struct health_view *view);

@@ -90,14 +90,10 @@ void stream_flush(struct stream *stream)
 	}
 }
 
-void stream_block(struct stream *stream, const struct acquire_tick *tick, unsigned sensor)
+void stream_block(struct stream *stream, const struct frame *block)
 {
-	struct frame frame;
-
-	if (stream->classic)
-		return;
-	acquire_pack(tick, sensor, sensor == 0 ? WIRE_ID_BLOCK_S1 : WIRE_ID_BLOCK_S2, &frame);
-	stream_send(stream, &frame);
+	if (!stream->classic)
+		stream_send(stream, block);
 }
 
 /* Cuts the request to what the ring holds; the rest is counted. */

@@ -51,8 +51,8 @@ void stream_set_classic(struct stream *stream, bool classic);
 
 void stream_send(struct stream *stream, const struct frame *frame);
 
-/* The block of a tick of sensor 0 (S1) or 1 (S2), live; nothing on classic CAN. */
-void stream_block(struct stream *stream, const struct acquire_tick *tick, unsigned sensor);
+/* A live block; nothing on classic CAN. */
+void stream_block(struct stream *stream, const struct frame *block);
 
 /* Offers the controller what waits. */
 void stream_flush(struct stream *stream);

@@ -65,8 +65,8 @@ struct board_options {
 struct board {
 	struct board_options options;
 	uint8_t *flash, *sram, *ccm;
-	uint32_t app_poll, mark; /* addresses in the image */
-	uint32_t lock, unlock, on_gate;
+	uint32_t app_poll, mark;              /* addresses in the image */
+	uint32_t lock, unlock, on_gate, look; /* look: main looks for a frame */
 	int64_t now;
 	bool over;         /* the bench has ended the run */
 	bool reset_wanted; /* by software or watchdog, as reset_cause says */
@@ -102,8 +102,9 @@ unsigned exception_next(void);              /* that is to be taken now, 0: none 
 void exception_take(void);                  /* that one, if any */
 void exception_leave(void);                 /* the handler that runs returns */
 unsigned exception_depth(void);             /* of what runs; 0: main */
-uint32_t *exception_instructions(void);     /* that it has run */
-uint32_t exception_stack(void);             /* bytes of it that were needed */
+unsigned exception_that_runs(void);
+uint32_t *exception_instructions(void); /* that it has run */
+uint32_t exception_stack(void);         /* bytes of it that were needed */
 bool exception_masks_all(void);
 bool exception_masks_control(void);
 
@@ -135,6 +136,11 @@ void core_hold(unsigned depth); /* what runs at this depth stands still; CORE_HO
 uint32_t core_register(unsigned number);
 
 #define CORE_HOLDS_NONE UINT32_MAX
+
+/* sharing.c: what core_watch.access may be; says, by the file of --shared, what is shared, and ends with 1.
+ */
+void sharing_access(unsigned depth, uint32_t address, unsigned bytes, bool write);
+void sharing_judge(const char *path);
 
 /* preempt.c: what a file calls with all that it keeps, so that a state can be saved and come back. */
 void preempt_run(void);

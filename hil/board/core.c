@@ -7,7 +7,10 @@
 
 enum {
 	UNICORN_EXCEPTION_EXIT = 8,
-	POLL = 0, /* tallies: an exception's, or main's */
+	POLL = 0, /* tallies: an exception's, or main's: of a poll, between two looks for a frame */
+	LOOK = 1,
+	LATCH_OPEN = 1 << 0,
+	WARNING = 1 << 4,
 };
 
 #define RETURN_MASK 0xFFFFFFE0u
@@ -28,7 +31,9 @@ static struct {
 	uint8_t before[BOARD_SRAM_BYTES]; /* the memory when the poll before ended */
 	unsigned held;                    /* the depth that stands still */
 	bool paused;
-	uint32_t stopped; /* the instruction that did not begin; 0: none */
+	uint32_t stopped;     /* the instruction that did not begin; 0: none */
+	uint32_t looked;      /* for a frame: main's count then */
+	bool armed, released; /* by WARNING, and the latch since it came on */
 	struct tally tally[BOARD_EXCEPTIONS];
 } core;
 
@@ -125,6 +130,18 @@ static void stop_before(uint32_t address)
 	uc_emu_stop(core.uc);
 }
 
+/* Counted from ARMED until the latch opens. */
+static void on_look(void)
+{
+	uint16_t outputs = system_outputs();
+
+	if (core.armed && !(outputs & LATCH_OPEN))
+		add_tally(LOOK, *exception_instructions() - core.looked);
+	core.released = outputs & WARNING && (core.released || outputs & LATCH_OPEN);
+	core.armed = outputs & WARNING && !core.released;
+	core.looked = *exception_instructions();
+}
+
 static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *unused)
 {
 	uint32_t address = (uint32_t)address64;
@@ -141,6 +158,8 @@ static void on_block(uc_engine *uc, uint64_t address64, uint32_t size, void *unu
 		stop_before(address);
 		return;
 	}
+	if (exception_depth() == 0 && address == board.look)
+		on_look();
 	if (board.now >= core.limit || exception_next() != 0) {
 		stop_before(address);
 		return;
@@ -394,6 +413,7 @@ bool core_waits(void)
 
 static void begin_poll(void)
 {
+	core.looked -= *exception_instructions();
 	*exception_instructions() = 0;
 	core.interrupted = board.wrote = board.woken = core.waiting = false;
 	core.pass_idle = true;
@@ -480,9 +500,9 @@ void core_run(void)
 void core_report(const char *path)
 {
 	static const char *const names[BOARD_EXCEPTIONS] = {
-	        [POLL] = "poll",       [BOARD_PENDSV] = "control", [BOARD_FDCAN] = "can",
-	        [BOARD_TIM1] = "turn", [BOARD_TIM2] = "gate",      [BOARD_TIM3] = "yz",
-	        [BOARD_TIM4] = "x",
+	        [POLL] = "poll",       [LOOK] = "look",       [BOARD_PENDSV] = "control",
+	        [BOARD_FDCAN] = "can", [BOARD_TIM1] = "turn", [BOARD_TIM2] = "gate",
+	        [BOARD_TIM3] = "yz",   [BOARD_TIM4] = "x",
 	};
 	FILE *file = fopen(path, "ae");
 

@@ -49,7 +49,7 @@ static void image_names(const char *path, const Elf32_Ehdr *head)
 	} names[] = {
 	        {"app_poll", &board.app_poll, 1},   {"board_mark", &board.mark, 0},
 	        {"port_lock", &board.lock, 1},      {"port_unlock", &board.unlock, 1},
-	        {"app_on_gate", &board.on_gate, 1},
+	        {"app_on_gate", &board.on_gate, 1}, {"port_can_receive", &board.look, 1},
 	};
 	const Elf32_Shdr *sections = image_table(path, head->e_shoff, head->e_shnum, sizeof(*sections));
 
@@ -92,7 +92,7 @@ void image_load(const char *path)
 	}
 	image_names(path, head);
 	if (board.app_poll == 0 || board.lock == 0 || board.unlock == 0 || board.on_gate == 0 ||
-	    board.mark < BOARD_SRAM || board.mark - BOARD_SRAM > BOARD_SRAM_BYTES - 12)
+	    board.look == 0 || board.mark < BOARD_SRAM || board.mark - BOARD_SRAM > BOARD_SRAM_BYTES - 12)
 		image_refuse(path, "lacks a name that this program looks for");
 	free(file.bytes);
 }

@@ -5,52 +5,57 @@ PACKAGES_TEST += python3
 
 # ---- mutants ------------------------------------------------------------------------------------------
 
+# Where, of what and by what: hil/board names others.
+MUTATED = $(BUILD)/mutate
 MUTATED_C = $(addprefix firmware/,sequence.c command.c stream.c capture.c measure.c hosts.c input.c health.c) \
 	common/wire.c common/segment.c host/record/join.c
-MUTATED_O = $(MUTATED_C:%.c=$(BUILD)/mutate/%.o)
+MUTATED_O = $(MUTATED_C:%.c=$(MUTATED)/%.o)
 # The unit tests that come near them. Not test_port_faults: thousands of drops for each mutant.
 MUTATED_BY = sequence hosts input measure command stream capture wire segment join acquire health parameter
 MUTATED_UNIT_C = $(wildcard $(foreach m,$(MUTATED_BY),tests/unit/test_$m.c tests/unit/test_$m_*.c))
-MUTATED_UNITS = $(MUTATED_UNIT_C:tests/unit/%.c=$(BUILD)/mutate/%)
+MUTATED_UNITS = $(MUTATED_UNIT_C:tests/unit/%.c=$(MUTATED)/%)
 
 # Each file's mutants are numbered from its place in the list times 10000.
 
-$(BUILD)/mutate/%.src.i: %.c Makefile
+$(MUTATED)/%.src.i: %.c Makefile
 	$(Q)mkdir -p $(@D)
 	$(Q)clang -std=c11 $(if $(filter $(FREESTANDING_C),$<),-ffreestanding,$(LINUX)) $(CPPFLAGS) -DDT_MUTANTS -E -MMD -MP -MT $@ \
 		-MF $(@:.i=.d) $< -o $@ && sed -i 's/^#pragma GCC unroll.*//' $@
 
-$(BUILD)/mutate/%.i: $(BUILD)/mutate/%.src.i tests/fault/instrument tests/fault/fault.mk
+$(MUTATED)/%.i: $(MUTATED)/%.src.i tests/fault/instrument tests/fault/fault.mk
 	$(call say,MUTATE,$*.c)
 	$(Q)tests/fault/instrument $$(echo $(MUTATED_C) | tr ' ' '\n' | grep -n '^$*.c$$' | cut -d: -f1)0000 $< $@ \
-		$(BUILD)/mutate/$(subst /,-,$*).json $*.c $(if $(filter %wire,$*),common/wire.def)
+		$(MUTATED)/$(subst /,-,$*).json $*.c $(if $(filter %wire,$*),common/wire.def)
 
 $(MUTATED_O): %.o: %.i
 	$(Q)clang -std=c11 -O1 -g -w -fsanitize=undefined -fsanitize-trap=undefined \
-		$(if $(filter $(FREESTANDING_C),$(@:$(BUILD)/mutate/%.o=%.c)),-ffreestanding) -x cpp-output -c $< -o $@
+		$(if $(filter $(FREESTANDING_C),$(@:$(MUTATED)/%.o=%.c)),-ffreestanding) -x cpp-output -c $< -o $@
 
-$(BUILD)/mutate/mutant.o: tests/fault/mutant.c Makefile
+$(MUTATED)/mutant.o: tests/fault/mutant.c Makefile
 	$(Q)mkdir -p $(@D)
 	$(Q)$(CC) $(CFLAGS) $(LINUX) -c $< -o $@
 
 # As the unit tests are linked, but for the mutated sources.
-$(BUILD)/mutate/unit: $(DISPATCH_O) $(UNITS_TOGETHER:$(BUILD)/tests/%=$(BUILD)/obj/tests/unit/%.part) \
-		$(call obj,$(UNIT_HELPER_C)) $(MUTATED_O) $(BUILD)/mutate/mutant.o $(UNIT_LIBRARIES) $(call lib,stm32g474)
+$(MUTATED)/unit: $(DISPATCH_O) $(UNITS_TOGETHER:$(BUILD)/tests/%=$(BUILD)/obj/tests/unit/%.part) \
+		$(call obj,$(UNIT_HELPER_C)) $(MUTATED_O) $(MUTATED)/mutant.o $(UNIT_LIBRARIES) $(call lib,stm32g474)
 	$(call say,LINK,$@)
 	$(link_units)
 
-$(MUTATED_UNITS): $(BUILD)/mutate/unit
+$(MUTATED_UNITS): $(MUTATED)/unit
 	$(Q)ln -sf unit $@
 
 .SECONDARY: $(MUTATED_O:.o=.i) $(MUTATED_O:.o=.src.i)
 
 # changed tells which sources are to be judged; system/test_mutants calls mutate-changed.
-MUTATE = tests/fault/mutate $(BUILD)/mutate tests/fault/survivors $(MUTATED_UNITS)
+MUTATE = tests/fault/mutate $(MUTATED) tests/fault/survivors $(MUTATED_UNITS)
 CHANGED = $(BUILD) tests/fault/judged $(MUTATED_C)
 
-.PHONY: mutate mutate-changed
+.PHONY: mutate mutate-changed mutated-units
+mutated-units: $(MUTATED_UNITS)
+	@$(MUTATE) >$(MUTATED)/said || [ -s $(MUTATED)/outcomes ]
+
 mutate: setup-test ## make every small mistake in the heart of the firmware, see a unit test fail, renew tests/fault/judged
-	@rm -f $(filter-out $(foreach s,$(MUTATED_C:.c=),$(BUILD)/mutate/$(subst /,-,$s).json),$(wildcard $(BUILD)/mutate/*.json))
+	@rm -f $(filter-out $(foreach s,$(MUTATED_C:.c=),$(MUTATED)/$(subst /,-,$s).json),$(wildcard $(MUTATED)/*.json))
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(MUTATED_UNITS)
 	@$(MUTATE); judged=$$?; tests/fault/changed --renew $(CHANGED) && exit $$judged
 

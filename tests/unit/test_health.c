@@ -33,6 +33,12 @@ static int16_t *at(struct acquire_tick *tick, unsigned channel, unsigned k)
 	return channel % 3 == 0 ? &samples->x[k] : channel % 3 == 1 ? &samples->y[k] : &samples->z[k];
 }
 
+static void samples(struct acquire_tick *tick)
+{
+	for (unsigned sensor = 0; sensor < WIRE_SENSORS; sensor++)
+		health_samples(&health, tick, sensor);
+}
+
 static struct health_view seen = {.host_good = true, .clocks_good = true, .brown_out_set = true};
 
 static uint32_t checks_of(unsigned io, unsigned bias_high)
@@ -53,7 +59,7 @@ static uint32_t after_window(unsigned channel, int offset, int swing)
 
 		for (unsigned k = 0; k < per_tick; k++)
 			*at(&tick, channel, k) = (int16_t)(offset + (n++ % 2 ? swing : -swing));
-		health_samples(&health, &tick);
+		samples(&tick);
 	}
 	return checks_of(FAKE_ALL_GOOD, 0) & (WIRE_CHECK_SENSOR_S1 | WIRE_CHECK_SENSOR_S2);
 }
@@ -64,9 +70,9 @@ static void sensors_are_red_until_seen(void **state)
 
 	(void)state;
 	for (unsigned t = 0; t < 99; t++)
-		health_samples(&health, &tick);
+		samples(&tick);
 	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), WIRE_CHECK_SENSOR_S1 | WIRE_CHECK_SENSOR_S2);
-	health_samples(&health, &tick);
+	samples(&tick);
 	assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), 0);
 }
 
@@ -97,7 +103,7 @@ static void absent_samples_make_a_sensor_red(void **state)
 
 			for (unsigned k = 0; k < missing; k++)
 				*at(&tick, 5, k) = WIRE_SAMPLE_NOT_TAKEN;
-			health_samples(&health, &tick);
+			samples(&tick);
 		}
 		assert_int_equal((checks_of(FAKE_ALL_GOOD, 0) & WIRE_CHECK_SENSOR_S2) != 0, missing > 5);
 	}
@@ -119,7 +125,7 @@ static void half_of_the_samples_are_enough(void **state)
 						left--;
 					else
 						*at(&tick, channel, k) = WIRE_SAMPLE_NOT_TAKEN;
-				health_samples(&health, &tick);
+				samples(&tick);
 			}
 			assert_int_equal(checks_of(FAKE_ALL_GOOD, 0), short_of == 0 ? 0
 			                                              : channel < 3 ? WIRE_CHECK_SENSOR_S1
@@ -202,7 +208,7 @@ static bool trigger_is_red(unsigned channel, unsigned k, int16_t code, unsigned 
 
 		if (t == 37)
 			*at(&tick, channel, k) = code;
-		health_samples(&health, &tick);
+		samples(&tick);
 	}
 	return (checks_of(FAKE_ALL_GOOD, 0) & WIRE_CHECK_TRIGGER) != 0;
 }
@@ -234,7 +240,7 @@ static void zero_is_the_offset_of_the_last_window_at_rest(void **state)
 
 		for (unsigned k = 0; k < 10; k++)
 			tick.sensor[1].y[k] = 300;
-		health_samples(&health, &tick);
+		samples(&tick);
 	}
 	assert_int_equal(health.zero[4], -100);
 	for (unsigned t = 0; t < 100; t++) { /* no sample, no news */
@@ -242,7 +248,7 @@ static void zero_is_the_offset_of_the_last_window_at_rest(void **state)
 
 		for (unsigned k = 0; k < 10; k++)
 			tick.sensor[1].y[k] = WIRE_SAMPLE_NOT_TAKEN;
-		health_samples(&health, &tick);
+		samples(&tick);
 	}
 	assert_int_equal(health.zero[4], -100);
 }
@@ -256,7 +262,7 @@ static void zero_is_told_again_after_a_drop(void **state)
 
 		for (unsigned k = 0; k < 10; k++)
 			tick.sensor[1].y[k] = t == 150 && k == 5 ? 77 : WIRE_SAMPLE_NOT_TAKEN;
-		health_samples(&health, &tick);
+		samples(&tick);
 		assert_int_equal(health.zero[4], t < 199 ? 0 : 77);
 	}
 }
@@ -271,7 +277,7 @@ static void run_stuck(unsigned ticks, unsigned state, int16_t other)
 		for (unsigned channel = 0; channel < 6; channel++)
 			for (unsigned k = 0; k < (channel % 3 ? 10u : 7u); k++)
 				*at(&tick, channel, k) = channel == 4 ? 123 : (int16_t)((int)k + other);
-		health_samples(&health, &tick);
+		samples(&tick);
 		stuck_marks = tick.marks;
 	}
 }
@@ -306,7 +312,7 @@ static void all_samples_of_a_tick_are_alike_when_it_is_stuck(void **state)
 		for (unsigned channel = 0; channel < 6; channel++)
 			for (unsigned k = 0; k < (channel % 3 ? 10u : 7u); k++)
 				*at(&tick, channel, k) = channel == 3 ? 123 : (int16_t)(k / 2);
-		health_samples(&health, &tick);
+		samples(&tick);
 		assert_int_equal(counters[WIRE_COUNTER_samples_stuck], t >= 20);
 	}
 }

@@ -47,8 +47,12 @@ static void put(uint32_t tick_ms)
 
 static void stream_both(const struct acquire_tick *tick)
 {
-	stream_block(&stream, tick, 0);
-	stream_block(&stream, tick, 1);
+	for (unsigned sensor = 0; sensor < WIRE_SENSORS; sensor++) {
+		struct frame block;
+
+		acquire_pack(tick, sensor, sensor == 0 ? WIRE_ID_BLOCK_S1 : WIRE_ID_BLOCK_S2, &block);
+		stream_block(&stream, &block);
+	}
 }
 
 static struct frame numbered(uint32_t number)
