@@ -11,7 +11,9 @@ enum {
 	RECEIVED = 32, /* what an answer brings at most */
 	ROOM = 8,      /* frames in a request that still leaves room for those of the instants ahead */
 	KEEPER = 2,    /* the capture behind those of the gates */
+	WAITING = 3,   /* frames that the controller takes and cannot send at once */
 	BIAS = WIRE_IO_IEPE_S1 | WIRE_IO_IEPE_S2,
+	COILS = WIRE_IO_LATCH_OPEN | WIRE_IO_DAMPERS_RELIEVE, /* off while the emergency stop is open */
 };
 
 /* The sample instants of a millisecond. Those of X from 1 on are a fraction of a us after floor_us. */
@@ -54,7 +56,9 @@ static struct machine {
 	struct sensorbus_answer answer;
 	uint8_t captures; /* that control has not seen yet ... */
 	uint32_t capture_us[SENSORBUS_CAPTURES];
-	uint8_t kept, kept_before; /* port_keep, now and before the reset */
+	uint8_t kept, kept_before;     /* port_keep, now and before the reset */
+	struct frame waiting[WAITING]; /* in the controller */
+	unsigned waiting_first, waiting_count;
 	unsigned sent_count;
 	size_t request_bytes; /* in request[], its frames included */
 	/* As the frames are sent, so they wait: each is written once. */
@@ -113,9 +117,10 @@ uint16_t port_bias_high(void)
 
 static void set_outputs(uint16_t outputs, uint32_t time_us)
 {
-	uint16_t changed = outputs ^ machine.outputs;
+	uint16_t now = machine.inputs & WIRE_IO_ESTOP_CLEAR ? outputs : outputs & (uint16_t)~COILS;
+	uint16_t changed = now ^ machine.outputs;
 
-	machine.outputs = outputs;
+	machine.outputs = now;
 	if (changed == 0)
 		return;
 	for (unsigned i = 0; i < SENSORBUS_OUTPUTS; i++)
@@ -169,7 +174,10 @@ int port_can_setup(bool classic, uint32_t data_kbit_s)
 	bool known = data_kbit_s == 2000 || data_kbit_s == 5000 || data_kbit_s == 8000;
 
 	/* Neither the sensor bus nor a link of the port has bits to set. */
-	return known && (classic || !machine.bus_classic) ? 0 : DT_E_ARGUMENT;
+	if (!known || (!classic && machine.bus_classic))
+		return DT_E_ARGUMENT;
+	machine.waiting_count = 0;
+	return 0;
 }
 
 bool lockstep_can_open(void)
@@ -177,13 +185,25 @@ bool lockstep_can_open(void)
 	return machine.bus != PORT_BUS_OFF && !machine.tx_blocked;
 }
 
+static void send_waiting(void)
+{
+	while (machine.waiting_count > 0 && lockstep_can_open() &&
+	       machine.sent_count < SENSORBUS_FRAMES_MAX) {
+		machine.request_bytes +=
+		        sensorbus_put_frame(machine.request + machine.request_bytes,
+		                            &machine.waiting[machine.waiting_first], machine.behind);
+		machine.sent_count++;
+		machine.waiting_first = (machine.waiting_first + 1) % WAITING;
+		machine.waiting_count--;
+	}
+}
+
 static int take_frame(const struct frame *frame)
 {
-	if (!lockstep_can_open() || machine.sent_count == SENSORBUS_FRAMES_MAX)
+	if (machine.bus == PORT_BUS_OFF || machine.waiting_count == WAITING)
 		return DT_E_FULL;
-	machine.request_bytes +=
-	        sensorbus_put_frame(machine.request + machine.request_bytes, frame, machine.behind);
-	machine.sent_count++;
+	machine.waiting[(machine.waiting_first + machine.waiting_count++) % WAITING] = *frame;
+	send_waiting();
 	return 0;
 }
 
@@ -256,14 +276,14 @@ static void set_time(const struct instant *instant)
 	machine.now_us = floor_us + (whole ? 0 : 1);
 }
 
-/* Nothing that main or control could do before the next tick changes an output: it has taken all frames, and
- * no edge is planned before. What it sends meanwhile must find room. */
+/* Nothing that main or control could do before the next tick changes an output, nor could the emergency stop:
+ * main has taken all frames, and no edge is planned before. What it sends meanwhile must find room. */
 static bool ahead_is_welcome(const struct instant *instant)
 {
 	uint32_t next_tick_us = (machine.tick_ms + 1) * TICK_US;
 
 	if (!machine.ahead || instant->index == 0 || ring_fill(&machine.received) > 0 ||
-	    machine.sent_count > ROOM)
+	    machine.sent_count > ROOM || (machine.outputs & COILS) != 0)
 		return false;
 	for (unsigned i = 0; i < SENSORBUS_OUTPUTS; i++)
 		if ((machine.off_planned & 1u << i) && (int32_t)(machine.off_us[i] - next_tick_us) <= 0)
@@ -313,6 +333,22 @@ static int take(void *bytes, size_t count)
 	return 0;
 }
 
+/* As the board's filters let it. */
+static bool is_for_the_tower(const struct frame *frame)
+{
+#define SENDER_host(number) (number),
+#define SENDER_tower(number)
+	static const uint16_t ids[] = {
+#define WIRE_ID(NAME, number, layout, sender, doc) SENDER_##sender(number)
+#include "common/wire.def"
+	};
+	bool known = false;
+
+	for (unsigned i = 0; i < sizeof(ids) / sizeof(ids[0]); i++)
+		known |= frame->id == ids[i];
+	return known && (frame->flags & (FRAME_EXTENDED | FRAME_REMOTE)) == 0;
+}
+
 static int read_frame(void)
 {
 	struct frame frame;
@@ -325,7 +361,7 @@ static int read_frame(void)
 	result = sensorbus_frame_head(head, &frame, &behind);
 	if (result > 0)
 		result = take(frame.data, (size_t)result);
-	if (result == 0 && ring_put(&machine.received, &frame) != 0)
+	if (result == 0 && is_for_the_tower(&frame) && ring_put(&machine.received, &frame) != 0)
 		machine.frames_lost++;
 	return result;
 }
@@ -375,6 +411,8 @@ static int read_answer(void)
 	machine.bus_errors += answer->bus_errors;
 	machine.bus = worse(bus_of(answer->bus_state), link_bus);
 	machine.tx_blocked = answer->tx_blocked != 0;
+	set_outputs(machine.outputs, machine.now_us);
+	send_waiting();
 	result = read_frames(answer->frames);
 	return result == 0 && answer->then == SENSORBUS_STOP ? LOCKSTEP_GONE : result;
 }
