@@ -22,7 +22,14 @@ mistakes: $(BUILD)/droptower-bench board ## build the board's image with mistake
 
 MUTANTS ?= 100
 DRIVERS ?=
-mutate-board: $(BUILD)/droptower-bench board ## make MUTANTS= small mistakes in the board's drivers, or all, see a scenario on the board notice each (DRIVERS= some, SEED=)
+# First the unit tests on the register model, which see most of them in milliseconds: their verdicts lie in
+# $(BUILD)/mutate-drivers/outcomes.
+DRIVER_C = $(addprefix firmware/port/stm32g474/,adc.c can.c clock.c interrupt.c output.c pin.c port.c protect.c random.c \
+	reset.c timer.c)
+MUTATE_DRIVERS = MUTATED=$(BUILD)/mutate-drivers MUTATED_C='$(DRIVER_C)' MUTATED_BY=stm32g474
+
+mutate-board: $(BUILD)/droptower-bench board ## make MUTANTS= small mistakes in the board's drivers, or all, see a unit test or a scenario on the board notice each (DRIVERS= some, SEED=)
+	@$(MAKE) --no-print-directory $(MUTATE_DRIVERS) mutated-units
 	@hil/board/mutate $(BUILD) '$(STM32G474_CC) $(STM32G474_CFLAGS)' $(MUTANTS) $(DRIVERS)
 
 preempt: $(BUILD)/droptower-bench board ## interrupt the board's image after every instruction of its longest polls and of control

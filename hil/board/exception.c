@@ -53,6 +53,11 @@ unsigned exception_depth(void)
 	return nest.depth;
 }
 
+unsigned exception_that_runs(void)
+{
+	return nest.level[nest.depth].exception;
+}
+
 uint32_t *exception_instructions(void)
 {
 	return &nest.level[nest.depth].instructions;

@@ -2,7 +2,7 @@
 /*
  * Interrupts after every instruction. The answers of a recorded drop stand in for the bench, so that the
  * image does again what it did. A first run surveys it: which polls of the main loop and which runs of
- * control's interrupts are to be walked through, what the blocks hold, and who touches which memory. A second
+ * control's interrupts are to be walked through, and what the blocks hold. A second
  * one stops at each of them, before each of its instructions, saves the state, lets this instruction take as
  * long as it needs for interrupts to come, goes on until all is at rest again, judges, and goes back to the
  * saved state.
@@ -121,12 +121,7 @@ static struct {
 	uint32_t instructions[PLACES_OF_CODE];
 	uint8_t *wanted[PLACES_OF_CODE]; /* by number of the run: not, each of its instructions, some */
 	uint32_t wanted_count[PLACES_OF_CODE];
-	uint8_t touched[BOARD_SRAM_BYTES]; /* who did, below */
-	uint32_t by[BOARD_SRAM_BYTES];     /* main's instruction */
 } survey;
-
-/* Bits of touched[]; open: where an interrupt of control could come. */
-enum { CONTROL_WROTE = 1, CONTROL_READ = 2, MAIN_WROTE_OPEN = 4, MAIN_READ_OPEN = 8 };
 
 static void begin_following(void)
 {
@@ -290,23 +285,6 @@ static void on_instruction(unsigned depth, uint32_t address)
 		walk.it_end = it_block_end(address);
 	}
 	follow.gates_handled += address == board.on_gate;
-}
-
-static void on_access(unsigned depth, uint32_t address, unsigned bytes, bool write)
-{
-	uint8_t bit = 0;
-
-	if (phase != SURVEY || address - BOARD_SRAM >= BOARD_SRAM_BYTES - bytes)
-		return;
-	if (depth == 0 && !exception_masks_control())
-		bit = write ? MAIN_WROTE_OPEN : MAIN_READ_OPEN;
-	else if (depth > 0 && place_of(follow.exception[depth]) < PLACES_OF_CODE)
-		bit = write ? CONTROL_WROTE : CONTROL_READ;
-	for (unsigned i = 0; i < bytes; i++) {
-		survey.touched[address - BOARD_SRAM + i] |= bit;
-		if (depth == 0 && bit != 0)
-			survey.by[address - BOARD_SRAM + i] = core_pc();
-	}
 }
 
 /* ---- what must hold ---- */
@@ -531,46 +509,6 @@ static void choose(void)
 	}
 }
 
-/* Lines of the file: address, bytes, name of what needs no lock. */
-static void forget_shared(void)
-{
-	FILE *file = fopen(board.options.shared, "r");
-	unsigned address, bytes;
-
-	if (file == NULL)
-		board_fail("%s cannot be read", board.options.shared);
-	while (fscanf(file, "%x %u %*[^\n]", &address, &bytes) == 2)
-		if (address - BOARD_SRAM < BOARD_SRAM_BYTES &&
-		    bytes <= BOARD_SRAM_BYTES - (address - BOARD_SRAM))
-			memset(survey.touched + (address - BOARD_SRAM), 0, bytes);
-	fclose(file);
-}
-
-static bool is_shared(uint8_t touched)
-{
-	return (touched & CONTROL_WROTE && touched & (MAIN_READ_OPEN | MAIN_WROTE_OPEN)) ||
-	       (touched & MAIN_WROTE_OPEN && touched & CONTROL_READ);
-}
-
-/* Memory that both touch, where control could come in between. */
-static void judge_sharing(void)
-{
-	forget_shared();
-	for (uint32_t i = 0; i < BOARD_SRAM_BYTES; i++) {
-		uint32_t begin = i;
-
-		while (i < BOARD_SRAM_BYTES && is_shared(survey.touched[i]))
-			i++;
-		if (i == begin)
-			continue;
-		total.wrong++;
-		printf("0x%08X, %u bytes: control %s, main %s without a lock, at 0x%08X\n",
-		       BOARD_SRAM + begin, i - begin,
-		       survey.touched[begin] & CONTROL_WROTE ? "writes" : "reads",
-		       survey.touched[begin] & MAIN_WROTE_OPEN ? "writes" : "reads", survey.by[begin]);
-	}
-}
-
 void preempt_run(void)
 {
 	core_state();
@@ -586,7 +524,7 @@ void preempt_run(void)
 	preempt_keep(board.sram, BOARD_SRAM_BYTES);
 	preempt_keep(board.ccm, BOARD_CCM_BYTES);
 	if (board.options.shared != NULL)
-		watch.access = on_access;
+		watch.access = sharing_access;
 	begin_following();
 	core_boot(&watch);
 	while (!board.over && !board.reset_wanted)
@@ -594,9 +532,7 @@ void preempt_run(void)
 	if (board.reset_wanted)
 		board_fail("the firmware resets itself, undisturbed");
 	if (board.options.shared != NULL) {
-		judge_sharing();
-		if (total.wrong > 0)
-			exit(1);
+		sharing_judge(board.options.shared);
 		return;
 	}
 	choose();
