@@ -73,7 +73,8 @@ static struct {
 	uint32_t nonce, set;
 	uint16_t drop_id;
 	bool asked, right_release; /* a RELEASE is under way, and it is the right one */
-	bool right_arm;            /* the last ARM answered a challenge that had been asked for */
+	bool right_arm; /* the last ARM answered a challenge that had been asked for, or one that waits before
+	                   it */
 	unsigned visited[WIRE_STATES], opened, let_go, ready, refused_early, resets_in_motion, kept_out;
 } judge;
 
@@ -353,7 +354,9 @@ static void say_arm(void)
 {
 	uint32_t nonce = judge.drop_id == 0 && !one_in(3) ? judge.nonce : up_to(1);
 
-	judge.right_arm = nonce != 0 && nonce == judge.nonce;
+	bool waits = fake.received_next < fake.received_count; /* the ARM before this one perhaps */
+
+	judge.right_arm = (nonce != 0 && nonce == judge.nonce) || (waits && judge.right_arm);
 	say(WIRE_OP_ARM, SESSION, wire_answer(nonce, SESSION, judge.set));
 }
 
