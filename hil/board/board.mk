@@ -22,10 +22,10 @@ mistakes: $(BUILD)/droptower-bench board ## build the board's image with mistake
 
 MUTANTS ?= 100
 DRIVERS ?=
-# First the unit tests on the register model, which see most of them in milliseconds: their verdicts lie in
+# First, but for those in port.c, the unit tests on the register model, which see most of them in milliseconds: their verdicts lie in
 # $(BUILD)/mutate-drivers/outcomes.
-DRIVER_C = $(addprefix firmware/port/stm32g474/,adc.c can.c clock.c interrupt.c output.c pin.c port.c protect.c random.c \
-	reset.c timer.c)
+DRIVER_C = $(addprefix firmware/port/stm32g474/,adc.c can.c clock.c interrupt.c output.c pin.c protect.c random.c reset.c \
+	timer.c)
 MUTATE_DRIVERS = MUTATED=$(BUILD)/mutate-drivers MUTATED_C='$(DRIVER_C)' MUTATED_BY=stm32g474
 
 mutate-board: $(BUILD)/droptower-bench board ## make MUTANTS= small mistakes in the board's drivers, or all, see a unit test or a scenario on the board notice each (DRIVERS= some, SEED=)
