@@ -388,19 +388,30 @@ static double after_tail(const struct trace *trace, const struct after *after)
 	return sum * (double)after->samples / trace->rate_hz;
 }
 
+/* Area in g s of what follows next in its direction: nobody knows whether it is of the pulse. */
+static double after_first(const struct trace *trace, const struct after *after)
+{
+	if (after->n == 0 || !(after->mean_g[0] > LIMIT_SIGNIFICANT * after->sigma_g))
+		return 0;
+	return after->mean_g[0] * (double)after->samples / trace->rate_hz;
+}
+
 /* Nobody knows when zero shifted: it may have by the peak, and before the pulse. */
 static void doubt_after(const struct trace *trace, const struct estimate_baseline *baseline,
                         struct peak *peak, struct estimate_pulse *pulse)
 {
 	struct estimate_peak *top = &peak->result;
 	struct after after;
-	double shift_g, beyond_m_s;
+	double shift_g, beyond_m_s, next_m_s;
 
 	if (baseline->samples == 0)
 		return;
 	after_find(trace, baseline, peak, pulse, &after);
 	shift_g = after_shift(&after);
 	beyond_m_s = UNITS_G_M_S2 * fmax(shift_g * pulse->duration_s, after_tail(trace, &after));
+	next_m_s = UNITS_G_M_S2 * after_first(trace, &after);
+	if (next_m_s > LIMIT_PART * fabs(pulse->velocity_change_m_s))
+		pulse->sigma_velocity_m_s = hypot(pulse->sigma_velocity_m_s, next_m_s);
 	if (beyond_m_s > LIMIT_PART * fabs(pulse->velocity_change_m_s)) {
 		pulse->sigma_velocity_m_s = hypot(pulse->sigma_velocity_m_s, beyond_m_s);
 		pulse->flags |= ESTIMATE_FLAG_TAIL;

@@ -14,6 +14,8 @@
  * rings on after the pulse faster than a plate is "rough". The width of a pulse of fewer than twelve samples
  * is widened.
  *
+ * doubt_share: what an axis' noise hides its sensor's strongest axis shows: flags, and widened bars.
+ *
  * doubt_axes: what two sensors of two axes say against each other is "axes_disagree".
  */
 #include "host/estimate/estimate.h"
@@ -30,6 +32,11 @@ void doubt_channel(const struct trace *trace, const struct estimate_baseline *ba
 /* Of an axis of S2 as read, in its event: when a contact larger than the first begins; INFINITY: none does.
  */
 double doubt_slap_s(const struct trace *trace);
+
+/* What the sensor's strongest axis shows of their one pulse where another one's noise hides it: a flat top,
+ * an unsure time, that no family is it; near noise, that its time, width or velocity change is another. */
+void doubt_share(const struct trace *const trace[2], struct peak *const peak[2],
+                 struct estimate_pulse *const pulse[2]);
 
 /* X and Y of S1, then of S2; all four are there. Flags that any of them got: their resultants have them too.
  */

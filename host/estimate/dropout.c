@@ -18,8 +18,10 @@ enum {
 #define HELD_STEPS 8.0
 #define HELD_CALM_STEPS 20.0
 
-/* Of all samples, those that equal the one before: repeated all along. */
+/* Of all samples, those that equal the one before, where half of what differs does so by more than so many
+ * steps: repeated all along. Of noise one in eight does. */
 #define REPEATED 0.25
+#define REPEATED_STEPS 2.0
 
 /* From the samples of the window that tells the step of their numbers. */
 struct held {
@@ -30,7 +32,7 @@ struct held {
 static struct held held_find(const struct trace *trace)
 {
 	double step = clip_step(trace);
-	size_t rises = 0, level = 0, wide = 0, wider = 0;
+	size_t rises = 0, level = 0, some = 0, wide = 0, wider = 0;
 
 	for (size_t k = 1; k < trace->count && k < CLIP_WINDOW; k++) {
 		double rise = fabs(trace->value_g[k] - trace->value_g[k - 1]);
@@ -39,13 +41,16 @@ static struct held held_find(const struct trace *trace)
 			continue;
 		level += !(rise > 0);
 		rises += rise > 0;
+		some += rise > REPEATED_STEPS * step;
 		wide += rise > HELD_STEPS * step;
 		wider += rise > HELD_CALM_STEPS * step;
 	}
-	if (rises < RISES_MIN || 2 * wide <= rises)
+	if (rises < RISES_MIN)
 		return (struct held){0, false};
-	return (struct held){2 * wider > rises ? HELD_CALM : HELD,
-	                     (double)level > REPEATED * (double)(level + rises)};
+	return (struct held){2 * wider > rises  ? HELD_CALM
+	                     : 2 * wide > rises ? HELD
+	                                        : 0,
+	                     2 * some > rises && (double)level > REPEATED * (double)(level + rises)};
 }
 
 static bool is_zero(const struct trace *trace, size_t k)
@@ -119,11 +124,14 @@ static unsigned dropout_mark_in(struct trace *trace, size_t from, size_t until, 
 
 bool dropout_mark(struct trace *trace, double noise_g)
 {
-	const struct held held = held_find(trace);
+	struct held held;
 	bool was_loud = false;
 	unsigned flags = 0;
 
-	for (size_t i = 0; noise_g > 0 && i < trace_blocks(trace); i++) {
+	if (!(noise_g > 0))
+		return false;
+	held = held_find(trace);
+	for (size_t i = 0; i < trace_blocks(trace); i++) {
 		size_t from = i * TRACE_BLOCK, until = from + TRACE_BLOCK;
 		bool loud = trace_most(trace, from) > LIMIT_SURE * noise_g;
 

@@ -87,10 +87,18 @@ static void analyse_weak(const struct desk *desk, const char *sensor, struct ana
 		size_t i = estimate_find(desk, sensor, *axis);
 		struct work *work = &desk->work[i];
 
-		if (i == analysis->channel_count || i == strong || !peak_is_weak(&work->trace, &work->peak) ||
-		    !peak_weak(&work->trace, desk->options, &desk->work[strong].trace,
-		               &desk->work[strong].peak, &work->peak))
+		if (i == analysis->channel_count || i == strong)
 			continue;
+		if (!peak_is_weak(&work->trace, &work->peak) ||
+		    !peak_weak(&work->trace, desk->options, &desk->work[strong].trace,
+		               &desk->work[strong].peak, &work->peak)) {
+			doubt_share((const struct trace *const[]){&desk->work[strong].trace, &work->trace},
+			            (struct peak *const[]){&desk->work[strong].peak, &work->peak},
+			            (struct estimate_pulse *const[]){&analysis->channels[strong].pulse,
+			                                             &analysis->channels[i].pulse});
+			analysis->channels[i].peak = work->peak.result;
+			continue;
+		}
 		work->strong = &desk->work[strong].peak;
 		pulse_of_weak(&work->trace, &work->peak, &analysis->channels[i].baseline,
 		              &analysis->channels[strong].pulse, &analysis->channels[i].pulse);

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/units.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/phasor.h"
 
 /* The bulge moves an edge by little: each round leaves a hundredth of that. */
@@ -30,6 +31,36 @@ bool guide_from_bell(const struct trace *trace, const struct peak *peak, struct 
 	guide->area_g_s = bell_area(&guide->curve);
 	guide->sigma_peak_g = peak->result.sigma_g;
 	guide->sigma_base_s = 0;
+	return true;
+}
+
+/* Sum of the good samples in between in g s; *n of them. */
+static double guide_beyond_sum(const struct trace *trace, double from_s, double until_s, double *n)
+{
+	double sum = 0;
+
+	*n = 0;
+	for (size_t k = trace_index(trace, from_s); k < trace->count && trace_time(trace, k) < until_s; k++) {
+		if (!trace_usable(trace, k))
+			continue;
+		sum += trace->value_g[k];
+		(*n)++;
+	}
+	return sum / trace->rate_hz;
+}
+
+bool guide_ends(const struct guide *guide, const struct trace *trace)
+{
+	double half = guide->curve.base_s / 2, centre = guide->curve.centre_s, n;
+
+	for (int side = -1; side <= 1; side += 2) {
+		double sum = guide_beyond_sum(trace, centre + (side < 0 ? -2 : 1) * half,
+		                              centre + (side < 0 ? -1 : 2) * half, &n);
+
+		if (fabs(sum) > LIMIT_PART * fabs(guide->area_g_s) &&
+		    fabs(sum) > LIMIT_AGREE * trace->noise_g * sqrt(n) / trace->rate_hz)
+			return false;
+	}
 	return true;
 }
 

@@ -34,6 +34,10 @@ bool guide_from_shape(const struct shape *shape, struct guide *guide);
 /* Without a family. False when no symmetric pulse fits either. */
 bool guide_from_bell(const struct trace *trace, const struct peak *peak, struct guide *guide);
 
+/* Whether what lies beyond the curve's feet, for half of its base on either side, is nothing as far as noise
+ * tells: a pulse with slower feet is no curve's, however well its middle fits. */
+bool guide_ends(const struct guide *guide, const struct trace *trace);
+
 /* Where the pulse meets level_g, a magnitude, before (step -1) or after (step +1) its middle. False where the
  * curve does not reach it or one of the two samples there is missing. */
 bool guide_edge(const struct guide *guide, const struct trace *trace, int step, double level_g,

@@ -41,6 +41,10 @@
 /* A family and the polynomials are of one pulse when they agree within this many sigma. */
 #define AGREE_SIGMAS 4.0
 
+/* From so many sigma of the polynomials on, what their time differs by from a symmetric family's is its
+ * doubt. */
+#define LEAN_SIGMAS 1.5
+
 /* No parabola tells a time better than to this part of a sample. */
 #define SHIFT_MIN 1e-2
 
@@ -222,6 +226,80 @@ static double crest_doubt(const struct trace *trace, const struct peak *peak, co
 	return sharper > 1 ? hypot(doubt_s, sqrt(fmax(noise, 0)) * sharper) : doubt_s;
 }
 
+/* Mean of four samples at the top beyond the crest, in its sigmas. */
+#define CORNER_SIGMAS 1.7
+
+/* Samples whose mean tells a level of the top, and how many of the width's samples they are. */
+#define LEVEL_PART (1.0 / 9)
+
+/* A level is as high as the highest within so many standard deviations of their difference; a top that is so
+ * much wider there than the crest's bend makes it is flat. */
+#define LEVEL_SIGMAS 2.0
+#define LEVEL_WIDER 1.6
+
+/* The time from the first to the last mean of n samples under the pulse that is within fall_g of the highest.
+ */
+static double top_level(const struct trace *trace, const struct peak *peak, size_t n, double fall_g)
+{
+	size_t from = trace_index(trace, peak->start.peak_s - peak->start.half_width_s / 2);
+	size_t until = trace_index(trace, peak->start.peak_s + peak->start.half_width_s / 2), first = until,
+	       last = from;
+	double low = (double)n * fall_g, most = -INFINITY;
+
+	for (int pass = 0; pass < 2; pass++)
+		for (size_t k = from; k + n <= until && k + n <= trace->count; k++) {
+			double sum = 0;
+
+			for (size_t i = k; i < k + n; i++)
+				sum += trace_good(trace, i) ? peak->sign * trace->value_g[i] : -INFINITY;
+			if (pass == 0) {
+				most = fmax(most, sum);
+			} else if (sum > most - low) {
+				first = k < first ? k : first;
+				last = k;
+			}
+		}
+	return first < last ? (double)(last - first) / trace->rate_hz : 0;
+}
+
+/* How far the top is one level by the samples alone, where the crest is sharper than that: a hump that noise
+ * lifted. */
+static double flat_doubt(const struct trace *trace, const struct peak *peak, const double d[3])
+{
+	size_t n = (size_t)fmax(LEVEL_PART * peak->width_s * trace->rate_hz, 1);
+	/* A summit between two samples shows less in their mean. */
+	double fall = LEVEL_SIGMAS * trace->noise_g * sqrt(2.0 / (double)n) +
+	              fabs(d[2]) / (8 * trace->rate_hz * trace->rate_hz);
+	double level = top_level(trace, peak, n, fall);
+	double bent = 2 * sqrt(2 * fall / fabs(d[2])) + 1 / trace->rate_hz;
+
+	return level > LEVEL_WIDER * bent ? level / 2 : 0;
+}
+
+/* Samples at the top that lie above or below the crest by more than noise: a corner no polynomial follows. */
+static double corner_doubt(const struct trace *trace, const struct peak *peak)
+{
+	size_t k = trace_index(trace, peak->result.time_s), n = 0;
+	double sum = 0, most = 0, d[3];
+
+	for (size_t i = k < 2 ? 0 : k - 2; i < k + 2 && i < trace->count; i++) {
+		double beyond;
+
+		if (!trace_usable(trace, i))
+			continue;
+		local_at(&peak->local, trace_time(trace, i), d);
+		beyond = peak->sign * (trace->value_g[i] - d[0]);
+		sum += beyond;
+		most = fmax(most, beyond);
+		n++;
+	}
+	if (n == 0)
+		return 0;
+	sum = fabs(sum) / (double)n;
+	sum = sum > CORNER_SIGMAS * trace->noise_g / sqrt((double)n) ? sum : 0;
+	return most > LIMIT_AGREE * trace->noise_g ? fmax(sum, most) : sum;
+}
+
 static bool take_crest(const struct trace *trace, double width_s, struct peak *peak)
 {
 	const struct trace *axes[1] = {trace};
@@ -248,6 +326,22 @@ static bool take_crest(const struct trace *trace, double width_s, struct peak *p
 	if (hole(trace, crest.time_s) > fmax(HOLE_MAX * peak->width_s, 1.5 / trace->rate_hz))
 		result->how.status = ESTIMATE_AMBIGUOUS;
 	return true;
+}
+
+/* What the samples at the top say against the polynomials that gave the value. */
+static void peak_doubt_top(const struct trace *trace, struct peak *peak)
+{
+	struct estimate_peak *result = &peak->result;
+	double corner, flat, d[3];
+
+	if (peak->model != PEAK_MODEL_LOCAL)
+		return;
+	local_at(&peak->local, result->time_s, d);
+	corner = corner_doubt(trace, peak);
+	flat = hypot(flat_doubt(trace, peak, d), corner > 0 ? 0.5 / trace->rate_hz : 0);
+	result->sigma_g = hypot(result->sigma_g, corner);
+	result->sigma_time_s = hypot(result->sigma_time_s, flat);
+	peak->doubt_s = hypot(peak->doubt_s, flat);
 }
 
 /* A value without any model: it says so in its uncertainty. */
@@ -327,8 +421,12 @@ static void sharpen(const struct trace *trace, struct peak *peak)
 	    apart_g > AGREE_SIGMAS * local.sigma_g || apart_s > AGREE_SIGMAS * local.sigma_time_s ||
 	    sigma_g > local.sigma_g)
 		return;
+	peak->plain = local;
 	peak_take_shape(peak);
 	peak->result.sigma_g = hypot(sigma_g, apart_g / 2);
+	/* A symmetric family knows nothing of a lean. */
+	if (apart_s > LEAN_SIGMAS * local.sigma_time_s)
+		peak->result.sigma_time_s = hypot(peak->result.sigma_time_s, apart_s);
 }
 
 /* Without polynomials: a hole over the summit, and a family that reaches across. It stays ambiguous. */
@@ -435,6 +533,7 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 		peak->result.how.flags |= ESTIMATE_FLAG_RIVAL;
 	if (!peak_unclip(trace, options, peak))
 		peak_climb(trace, options, peak);
+	peak_doubt_top(trace, peak);
 	if (peak->result.how.status == ESTIMATE_OK && may_be_spike(trace, peak))
 		peak->result.how.status = ESTIMATE_AMBIGUOUS;
 	peak_flag_tolerance(peak, options);
@@ -442,9 +541,11 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 
 void peak_narrow(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
 {
-	if (peak->model == PEAK_MODEL_LOCAL && peak->result.how.status == ESTIMATE_OK &&
-	    !(peak->result.how.flags & ESTIMATE_FLAG_WEAK) && take_crest(trace, BENT * peak->width_s, peak))
-		peak_flag_tolerance(peak, options);
+	if (peak->model != PEAK_MODEL_LOCAL || peak->result.how.status != ESTIMATE_OK ||
+	    peak->result.how.flags & ESTIMATE_FLAG_WEAK || !take_crest(trace, BENT * peak->width_s, peak))
+		return;
+	peak_doubt_top(trace, peak);
+	peak_flag_tolerance(peak, options);
 }
 
 bool peak_at(const struct peak *peak, double time_s, double derivative[3], double variance[2])

@@ -65,7 +65,9 @@ struct peak {
 	struct local local;
 	struct shape shape;     /* the family's fit asked for last; its family is AUTO when there was none */
 	struct shape half_sine; /* that fit, likewise */
-	double noise_g;         /* of local */
+	struct estimate_peak plain; /* the polynomials' result where a family's that nobody told stands; else
+	                               its value is 0 */
+	double noise_g;             /* of local */
 	double doubt_s; /* what of sigma_time_s is the polynomials', which have it alike on both axes */
 	double scale;   /* model to axis: 1 but for a weak axis */
 };

@@ -15,6 +15,9 @@
 /* Of the time from the level to twice it: half the window of a parabola on a slow edge. */
 #define SLOW_HALF 0.7
 
+/* What a family that was not told adds to the width at 10 % is its own: so much of it is its doubt. */
+#define FEET_PART 0.2
+
 enum {
 	AGAIN_WITHIN = 4, /* samples */
 	SLOW_NEWTON = 4,  /* steps to where the parabola meets the level */
@@ -237,9 +240,12 @@ static bool fit(const struct trace *trace, const struct peak *peak, enum estimat
 	return shape_fit(shape, trace, family, &peak->start);
 }
 
-/* The best of those that are not refused; best stays AUTO when all are. Families that the noise lets pass
- * differ in their base by more than either's own uncertainty: half of it is added to the best one's. False
- * where no symmetric pulse will do. */
+/* A family that was not told is one power of many: how much worse a free one's base is known, of a half-sine
+ * and of a haversine. */
+static const double free_base[] = {2.4, 5.3};
+
+/* The best of those that are not refused; best stays AUTO when all are. False where no symmetric pulse will
+ * do. */
 static bool pulse_choose(const struct trace *trace, const struct peak *peak, enum estimate_family family,
                          struct shape *best, struct estimate_how *how)
 {
@@ -264,12 +270,8 @@ static bool pulse_choose(const struct trace *trace, const struct peak *peak, enu
 		if (shape_hopeless(&shape))
 			return false;
 		verdict = shape_judge(&shape);
-		if (verdict == SHAPE_FITS && best->family != ESTIMATE_FAMILY_AUTO) {
-			double rival = hypot(best->sigma_base_s, (shape.base_s - best->base_s) / 2);
-
-			best->sigma_base_s = rival;
-			shape.sigma_base_s = fmax(shape.sigma_base_s, rival);
-		}
+		if (family == ESTIMATE_FAMILY_AUTO && i < sizeof(free_base) / sizeof(free_base[0]))
+			shape.sigma_base_s *= free_base[i];
 		/* A doubtful one is not preferred, but what was asked for is given. */
 		if (verdict > (family == ESTIMATE_FAMILY_AUTO ? SHAPE_FITS : SHAPE_DOUBTFUL) ||
 		    (best->family != ESTIMATE_FAMILY_AUTO && !(shape.chi_square < best->chi_square)))
@@ -296,13 +298,21 @@ static bool pulse_contact(const struct trace *trace, const struct peak *peak, en
 	if (shape.family == ESTIMATE_FAMILY_AUTO) {
 		how->flags |= ESTIMATE_FLAG_MODEL;
 		how->status = ESTIMATE_NOT_CONVERGED;
-		return symmetric && guide_from_bell(trace, peak, guide);
+		return symmetric && guide_from_bell(trace, peak, guide) && guide_ends(guide, trace);
+	}
+	if (family == ESTIMATE_FAMILY_AUTO && guide_from_shape(&shape, guide) && !guide_ends(guide, trace)) {
+		how->flags |= ESTIMATE_FLAG_MODEL;
+		how->status = ESTIMATE_NOT_CONVERGED;
+		return false;
 	}
 	how->method = estimate_family_name(shape.family);
 	how->chi_square = shape.chi_square;
 	pulse->family = shape.family;
 	pulse->contact_time_s = shape.base_s;
 	pulse->sigma_contact_s = shape.sigma_base_s;
+	if (family == ESTIMATE_FAMILY_AUTO)
+		pulse->sigma_contact_s =
+		        hypot(shape.sigma_base_s, FEET_PART * (shape.base_s - pulse->duration_s));
 	pulse->contact_start_s = shape.peak_s - shape.base_s / 2;
 	pulse->fitted_velocity_m_s = UNITS_G_M_S2 * shape.area_g_s;
 	pulse->sigma_fitted_velocity_m_s = UNITS_G_M_S2 * shape.sigma_area_g_s;

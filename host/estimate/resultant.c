@@ -176,8 +176,9 @@ static bool resultant_summit(const struct resultant_axes *axes, double *time_s, 
 }
 
 /* Noise through the models, as in crest.h, and what the axes' own uncertainties hold beyond it, the models'
- * error, which two axes of one shape have alike. Variances of half the square's value and of its slope. */
-static void resultant_spread(const struct resultant_axes *axes, double time_s, double variance[2])
+ * error, which two axes of one shape have alike. Variances of half the square's value, of its slope, and of
+ * its slope by noise alone. */
+static void resultant_spread(const struct resultant_axes *axes, double time_s, double variance[3])
 {
 	double model[2] = {0, 0};
 
@@ -195,6 +196,7 @@ static void resultant_spread(const struct resultant_axes *axes, double time_s, d
 		beyond = pow(own->sigma_time_s * top[2], 2) - top_noise[1];
 		model[1] += fabs(d[0]) * sqrt(fmax(beyond, 0));
 	}
+	variance[2] = variance[1];
 	variance[0] += model[0] * model[0];
 	variance[1] += model[1] * model[1];
 }
@@ -219,7 +221,7 @@ static bool resultant_combine(const struct resultant_axes *axes, unsigned strong
 	const struct peak *lead = axes->peak[strong];
 	struct estimate_resultant *result = &found->result;
 	double x = axes->peak[0]->result.time_s, y = axes->peak[1]->result.time_s;
-	double slack = SAME_PULSE * found->width_s, time, half[3], variance[2];
+	double slack = SAME_PULSE * found->width_s, time, half[3], variance[3];
 
 	if (!(near_s >= fmin(x, y) - slack && near_s <= fmax(x, y) + slack) ||
 	    !resultant_reach(axes, found->width_s) || !resultant_summit(axes, &time, half))
@@ -233,7 +235,7 @@ static bool resultant_combine(const struct resultant_axes *axes, unsigned strong
 	result->sigma_time_s = sqrt(variance[1]) / fabs(half[2]);
 	/* As in crest.h: a polynomial's maximum over noise is too high by what its wandering gains. */
 	if (lead->model == PEAK_MODEL_LOCAL && axes->curve[strong] == NULL)
-		result->peak_g -= variance[1] / (2 * fabs(half[2]) * result->peak_g);
+		result->peak_g -= variance[2] / (2 * fabs(half[2]) * result->peak_g);
 	return true;
 }
 

@@ -68,6 +68,8 @@ enum spoil {
 	BURST,
 	INSIDE,
 	GAIN_STEP,
+	GAIN_BACK,
+	LIMITED,
 	S1_GAIN_STEP,
 	LATE,
 	DULL,
@@ -141,6 +143,8 @@ static const struct class classes[] = {
         {"burst before", HALF_SINE, PLAIN, BURST, false},
         {"starts inside", HALF_SINE, PLAIN, INSIDE, false},
         {"gain steps in mid-pulse", HALF_SINE, PLAIN, GAIN_STEP, true},
+        {"gain less for a third of it", HERTZ, PLAIN, GAIN_BACK, false},
+        {"X limited softly", HERTZ, PLAIN, LIMITED, false},
         {"S1's gain steps", HALF_SINE, PLAIN, S1_GAIN_STEP, false},
         {"Y late", HALF_SINE, PLAIN, LATE, false},
         {"X behind 250 Hz", HALF_SINE, PLAIN, DULL, true},
@@ -323,6 +327,10 @@ static double shown(const struct drop *d, int c, double t)
 		return value + 0.2 * height * table(case_g, t + 0.02);
 	case GAIN_STEP:
 		return c == S2X && x > 0.35 + 0.3 * d->at ? 0.7 * value : value;
+	case GAIN_BACK:
+		return c == S2X && x > 0.2 + 0.3 * d->at && x < 0.5 + 0.3 * d->at ? 0.75 * value : value;
+	case LIMITED:
+		return c == S2X ? 0.8 * height * tanh(value / (0.8 * height)) : value;
 	case S1_GAIN_STEP:
 		return c <= S1Y && t > 0.015 ? 0.8 * value : value;
 	case RECTIFIED:
