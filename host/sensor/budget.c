@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/sensor/budget.h"
+#include "host/sensor/budget_sum.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -9,23 +10,10 @@
 #include "common/units.h"
 #include "host/sensor/lowpass.h"
 
-#define NOT_NORMAL 0.3        /* of the variance: from there on the linear rule does not do */
 #define WIDTH_SHARE 0.936     /* of a half-sine's foot to foot: its width at 10 % */
 #define OTHERS_SHARE 0.5      /* of a value: what an axis that is not recorded is taken for */
 #define NEIGHBOUR_SHARE 0.125 /* of the duration: how far slopes are taken from */
 #define PERCENT 0.01
-
-static const char *const part_names[BUDGET_PARTS] = {"noise",     "definition", "sensitivity", "transverse",
-                                                     "linearity", "response",   "zero",        "filter",
-                                                     "clock",     "mounting"};
-
-/* One number while its parts are put together. */
-struct collecting {
-	double part[BUDGET_PARTS];
-	struct coverage coverage; /* without noise */
-	double degrees;           /* of the noise */
-	bool unknown;             /* a part cannot be told: there is no budget */
-};
 
 struct desk {
 	const struct sensors *sensors;
@@ -42,72 +30,9 @@ struct axis {
 	const struct estimate_channel *e;
 };
 
-static void collect(struct collecting *c, enum budget_part part, enum coverage_law law, double u)
-{
-	u = fabs(u);
-	c->unknown |= !isfinite(u);
-	if (!(u > 0.0) || !isfinite(u))
-		return;
-	c->part[part] = hypot(c->part[part], u);
-	coverage_add(&c->coverage, law, u);
-}
-
-/* Half of what is anywhere within +-half. */
-static void within(struct collecting *c, enum budget_part part, double half)
-{
-	collect(c, part, COVERAGE_RECTANGULAR, half / sqrt(3.0));
-}
-
-/* ---- an item ---- */
-
-static void largest_of(struct budget_item *item, const char *noise)
-{
-	bool taken[BUDGET_PARTS] = {false};
-	size_t used = 0;
-
-	for (int n = 0; n < 3; n++) {
-		int most = -1;
-
-		for (int p = 0; p < BUDGET_PARTS; p++)
-			if (!taken[p] && item->part[p] > 0.0 &&
-			    (most < 0 || item->part[p] > item->part[most]))
-				most = p;
-		if (most < 0)
-			break;
-		taken[most] = true;
-		used += (size_t)snprintf(item->largest + used, sizeof(item->largest) - used, "%s%s %.0f %%",
-		                         used > 0 ? ", " : "",
-		                         most == BUDGET_NOISE ? noise : part_names[most],
-		                         100.0 * pow(item->part[most] / item->u, 2));
-	}
-}
-
-/* noise: what that part is called; in the distribution it counts by student times its u. */
-static void settle(struct budget_item *item, const struct collecting *collected, const char *noise_name,
-                   double student)
-{
-	struct collecting c = *collected;
-	double noise = c.part[BUDGET_NOISE], rest = sqrt(c.coverage.normal + c.coverage.other);
-	const double u[2] = {noise, rest}, degrees[2] = {c.degrees, (double)INFINITY};
-
-	memcpy(item->part, c.part, sizeof(item->part));
-	item->u = hypot(noise, rest);
-	item->degrees = coverage_degrees(u, degrees, 2);
-	item->k = coverage_factor(item->degrees);
-	item->expanded = item->k * item->u;
-	item->method = "linear";
-	if (c.coverage.other > NOT_NORMAL * item->u * item->u) {
-		coverage_add(&c.coverage, COVERAGE_NORMAL, noise * student);
-		item->expanded = coverage_expanded(&c.coverage);
-		item->k = item->expanded / item->u;
-		item->method = "distribution";
-	}
-	largest_of(item, noise_name);
-}
-
 /* subject "" for what is of no channel. Nothing without a value, its noise and all that adds to it. */
 static void item_add(struct desk *d, const char *subject, const char *what, const char *unit, double value,
-                     double noise, struct collecting *c)
+                     double noise, struct budget_sum *c)
 {
 	struct budget *b = d->budget;
 	struct budget_item *item;
@@ -129,30 +54,30 @@ static void item_add(struct desk *d, const char *subject, const char *what, cons
 	snprintf(item->what, sizeof(item->what), "%.31s%s%s", subject, subject[0] != '\0' ? "." : "", what);
 	c->part[BUDGET_NOISE] = noise;
 	/* Student's t by its variance */
-	settle(item, c, part_names[BUDGET_NOISE],
-	       isfinite(c->degrees) ? sqrt(c->degrees / fmax(1.0, c->degrees - 2.0)) : 1.0);
+	budget_settle(item, c, budget_part_name(BUDGET_NOISE),
+	              isfinite(c->degrees) ? sqrt(c->degrees / fmax(1.0, c->degrees - 2.0)) : 1.0);
 }
 
 /* ---- what each source does ---- */
 
 /* A relative uncertainty of each axis, correlated, on what has the absolute effect w[i] of each. */
-static void correlated(struct collecting *c, enum budget_part part, enum coverage_law law, double u, double r,
+static void correlated(struct budget_sum *c, enum budget_part part, enum coverage_law law, double u, double r,
                        const double w[3])
 {
 	double sum = w[0] + w[1] + w[2];
 	bool one = fabs(fabs(sum) - fmax(fabs(w[0]), fmax(fabs(w[1]), fabs(w[2])))) <= 0.0;
 
 	if (one) {
-		collect(c, part, law, u * sum);
+		budget_collect(c, part, law, u * sum);
 		return;
 	}
-	collect(c, part, law, u * sqrt(r) * sum);
+	budget_collect(c, part, law, u * sqrt(r) * sum);
 	for (int i = 0; i < 3; i++)
-		collect(c, part, law, u * sqrt(1.0 - r) * w[i]);
+		budget_collect(c, part, law, u * sqrt(1.0 - r) * w[i]);
 }
 
 /* w: change of the value for a gain that is all of it larger, of each axis. */
-static void gains(struct collecting *c, const struct sensor_used *used, const double w[3])
+static void gains(struct budget_sum *c, const struct sensor_used *used, const double w[3])
 {
 	const struct transducer *t = &used->transducer;
 	double r = t->calibration_correlation, root = sqrt(3.0);
@@ -187,21 +112,21 @@ static size_t channel_of(const struct desk *d, const struct sensor_used *used, u
 
 /* What an axis reads of the others, times weight; a: all three, in the value's unit. By the matrix it was
  * taken off, but of those that are not recorded. */
-static void transverse(const struct desk *d, struct collecting *c, const struct sensor_used *used,
+static void transverse(const struct desk *d, struct budget_sum *c, const struct sensor_used *used,
                        unsigned axis, const double a[3], double weight)
 {
 	const struct transducer *t = &used->transducer;
 	double others = weight * hypot(a[(axis + 1) % 3], a[(axis + 2) % 3]);
 
 	if (t->has_matrix)
-		collect(c, BUDGET_TRANSVERSE, COVERAGE_NORMAL, t->calibration_matrix_u * others);
+		budget_collect(c, BUDGET_TRANSVERSE, COVERAGE_NORMAL, t->calibration_matrix_u * others);
 	else
-		collect(c, BUDGET_TRANSVERSE, COVERAGE_ARCSINE,
-		        t->calibration_transverse_percent * PERCENT * others / sqrt(2.0));
+		budget_collect(c, BUDGET_TRANSVERSE, COVERAGE_ARCSINE,
+		               t->calibration_transverse_percent * PERCENT * others / sqrt(2.0));
 	for (unsigned j = 0; j < 3 && t->has_matrix; j++)
 		if (j != axis && channel_of(d, used, j) == d->record->channel_count)
-			within(c, BUDGET_TRANSVERSE, transducer_reads(t, axis, j) * a[j] * weight);
-	within(c, BUDGET_MOUNTING, t->chain_align_deg * UNITS_PI / 180.0 * others);
+			budget_within(c, BUDGET_TRANSVERSE, transducer_reads(t, axis, j) * a[j] * weight);
+	budget_within(c, BUDGET_MOUNTING, t->chain_align_deg * UNITS_PI / 180.0 * others);
 }
 
 static double zero_of(const struct axis *x)
@@ -210,14 +135,15 @@ static double zero_of(const struct axis *x)
 }
 
 /* Where the filter puts an instant, times weight. */
-static void late(struct collecting *c, const struct axis *x, double weight)
+static void late(struct budget_sum *c, const struct axis *x, double weight)
 {
 	const struct transducer *t = &x->used->transducer;
 	double filter_s = lowpass_delay_s(t->filter, (unsigned)t->chain_order,
 	                                  TRANSDUCER_OF(t, chain_cutoff_x_hz, x->axis));
 
-	collect(c, BUDGET_FILTER, COVERAGE_NORMAL, t->chain_cutoff_u_percent * PERCENT * filter_s * weight);
-	collect(c, BUDGET_FILTER, COVERAGE_NORMAL, t->chain_skew_u_us * 1e-6 * weight);
+	budget_collect(c, BUDGET_FILTER, COVERAGE_NORMAL,
+	               t->chain_cutoff_u_percent * PERCENT * filter_s * weight);
+	budget_collect(c, BUDGET_FILTER, COVERAGE_NORMAL, t->chain_skew_u_us * 1e-6 * weight);
 }
 
 /* Foot to foot of a pulse by its width. */
@@ -227,13 +153,14 @@ static double duration_of(const struct axis *x)
 }
 
 /* Times value: what the supply's high-pass is off, by part of T / tau. */
-static void supply(struct collecting *c, const struct axis *x, double value, double part)
+static void supply(struct budget_sum *c, const struct axis *x, double value, double part)
 {
 	const struct transducer *t = &x->used->transducer;
 
 	if (t->chain_tau_s > 0.0)
-		within(c, BUDGET_FILTER,
-		       t->chain_tau_percent * PERCENT * value * part * duration_of(x) / t->chain_tau_s);
+		budget_within(c, BUDGET_FILTER,
+		              t->chain_tau_percent * PERCENT * value * part * duration_of(x) /
+		                      t->chain_tau_s);
 }
 
 static double clock_of(const struct sensor_used *used)
@@ -293,33 +220,33 @@ static void others_area(const struct desk *d, const struct axis *x, double own, 
 
 /* ---- a channel's numbers ---- */
 
-static struct collecting begin(const struct axis *x)
+static struct budget_sum begin(const struct axis *x)
 {
 	double samples = (double)x->e->baseline.samples;
 
-	return (struct collecting){.degrees = fmax(1.0, samples - 2.0)};
+	return (struct budget_sum){.degrees = fmax(1.0, samples - 2.0)};
 }
 
 static void of_peak(struct desk *d, const struct axis *x, const char *name)
 {
 	const struct estimate_peak *p = &x->e->peak;
 	const struct transducer *t = &x->used->transducer;
-	struct collecting c = begin(x);
+	struct budget_sum c = begin(x);
 	double w[3] = {0.0, 0.0, 0.0}, a[3], fc = TRANSDUCER_OF(t, chain_cutoff_x_hz, x->axis);
 
 	w[x->axis] = p->value_g;
 	others_at(d, x, p->time_s, p->value_g, a);
 	gains(&c, x->used, w);
 	transverse(d, &c, x->used, x->axis, a, 1.0);
-	within(&c, BUDGET_ZERO, zero_of(x));
+	budget_within(&c, BUDGET_ZERO, zero_of(x));
 	supply(&c, x, p->value_g, 1.0 / UNITS_PI);
 	if (t->filter != TRANSDUCER_NO_FILTER)
-		within(&c, BUDGET_FILTER, p->value_g * lowpass_peak_share(fc * duration_of(x)));
+		budget_within(&c, BUDGET_FILTER, p->value_g * lowpass_peak_share(fc * duration_of(x)));
 	item_add(d, name, "peak.value_g", "g", p->value_g, p->sigma_g, &c);
 }
 
 /* How far what it reads of the others moves an extreme: their slope over its own bend. */
-static void moved(struct desk *d, struct collecting *c, const struct axis *x, double weight)
+static void moved(struct desk *d, struct budget_sum *c, const struct axis *x, double weight)
 {
 	double half = NEIGHBOUR_SHARE * duration_of(x), bend = pow(UNITS_PI / duration_of(x), 2), before[3],
 	       after[3];
@@ -335,12 +262,12 @@ static void moved(struct desk *d, struct collecting *c, const struct axis *x, do
 static void of_instant(struct desk *d, const struct axis *x, const char *name)
 {
 	const struct estimate_peak *p = &x->e->peak;
-	struct collecting c = begin(x);
+	struct budget_sum c = begin(x);
 
 	late(&c, x, 1.0);
 	moved(d, &c, x, 1.0);
 	supply(&c, x, duration_of(x), 1.0 / (UNITS_PI * UNITS_PI));
-	within(&c, BUDGET_CLOCK, clock_of(x->used) * p->time_s);
+	budget_within(&c, BUDGET_CLOCK, clock_of(x->used) * p->time_s);
 	item_add(d, name, "peak.time_s", "s", p->time_s, p->sigma_time_s, &c);
 }
 
@@ -349,11 +276,11 @@ static void of_width(struct desk *d, const struct axis *x, const char *name, con
 {
 	const struct estimate_pulse *p = &x->e->pulse;
 	const struct transducer *t = &x->used->transducer;
-	struct collecting c = begin(x);
+	struct budget_sum c = begin(x);
 	double duration = duration_of(x), slope = UNITS_PI * fabs(x->e->peak.value_g) / duration;
 	double periods = duration * TRANSDUCER_OF(t, chain_cutoff_x_hz, x->axis), a[3][3];
 
-	within(&c, BUDGET_ZERO, 2.0 * zero_of(x) / slope);
+	budget_within(&c, BUDGET_ZERO, 2.0 * zero_of(x) / slope);
 	others_at(d, x, p->start_s, 0.0, a[0]);
 	others_at(d, x, p->end_s, 0.0, a[1]);
 	others_at(d, x, x->e->peak.time_s, 0.0, a[2]);
@@ -361,24 +288,24 @@ static void of_width(struct desk *d, const struct axis *x, const char *name, con
 		a[0][i] += a[1][i] - 2.0 * 0.1 * a[2][i];
 	transverse(d, &c, x->used, x->axis, a[0], 1.0 / slope);
 	if (t->filter != TRANSDUCER_NO_FILTER)
-		within(&c, BUDGET_FILTER, width_s * lowpass_width_share(periods));
-	within(&c, BUDGET_CLOCK, clock_of(x->used) * width_s);
+		budget_within(&c, BUDGET_FILTER, width_s * lowpass_width_share(periods));
+	budget_within(&c, BUDGET_CLOCK, clock_of(x->used) * width_s);
 	item_add(d, name, what, "s", width_s, noise_s, &c);
 }
 
 static void of_velocity(struct desk *d, const struct axis *x, const char *name, const char *what,
                         double value, double noise)
 {
-	struct collecting c = begin(x);
+	struct budget_sum c = begin(x);
 	double w[3] = {0.0, 0.0, 0.0}, a[3];
 
 	w[x->axis] = value;
 	others_area(d, x, value, a);
 	gains(&c, x->used, w);
 	transverse(d, &c, x->used, x->axis, a, 1.0);
-	within(&c, BUDGET_ZERO, UNITS_G_M_S2 * zero_of(x) * duration_of(x));
+	budget_within(&c, BUDGET_ZERO, UNITS_G_M_S2 * zero_of(x) * duration_of(x));
 	supply(&c, x, value, 0.5);
-	within(&c, BUDGET_CLOCK, clock_of(x->used) * value);
+	budget_within(&c, BUDGET_CLOCK, clock_of(x->used) * value);
 	item_add(d, name, what, "m/s", value, noise, &c);
 }
 
@@ -397,11 +324,11 @@ static void of_decay(struct desk *d, const struct sensor_used *used, const char 
 	                       : 0.0;
 
 	for (size_t i = 0; i < sizeof(number) / sizeof(number[0]); i++) {
-		struct collecting c = {.degrees = degrees};
+		struct budget_sum c = {.degrees = degrees};
 		char key[40];
 
-		within(&c, BUDGET_CLOCK, clock_of(used) * number[i].value * number[i].follows);
-		within(&c, BUDGET_DEFINITION, 0.5 * apart * number[i].follows);
+		budget_within(&c, BUDGET_CLOCK, clock_of(used) * number[i].value * number[i].follows);
+		budget_within(&c, BUDGET_DEFINITION, 0.5 * apart * number[i].follows);
 		snprintf(key, sizeof(key), "%s.%s", what, number[i].key);
 		item_add(d, name, key, number[i].unit, number[i].value, number[i].noise, &c);
 	}
@@ -447,7 +374,7 @@ static bool pair_of(const struct desk *d, const char *sensor, struct axis pair[2
 
 /* Scale times the length of a's components along X and Y, whose zeros are wrong by up to zero, and which the
  * supply changes by that part of T / tau. */
-static void of_length(const struct desk *d, struct collecting *c, const struct axis pair[2],
+static void of_length(const struct desk *d, struct budget_sum *c, const struct axis pair[2],
                       const double a[3], double scale, const double zero[2], double part)
 {
 	double length = hypot(a[pair[0].axis], a[pair[1].axis]), w[3] = {0.0, 0.0, 0.0};
@@ -457,14 +384,14 @@ static void of_length(const struct desk *d, struct collecting *c, const struct a
 
 		w[pair[i].axis] = scale * along * along / length;
 		transverse(d, c, pair[i].used, pair[i].axis, a, scale * fabs(along) / length);
-		within(c, BUDGET_ZERO, scale * zero[i] * along / length);
+		budget_within(c, BUDGET_ZERO, scale * zero[i] * along / length);
 	}
 	gains(c, pair[0].used, w);
 	supply(c, &pair[0], scale * length, part);
 }
 
 /* The instant of the length's maximum: each axis counts by its share. */
-static void late_length(struct desk *d, struct collecting *c, const struct axis pair[2], const double a[3])
+static void late_length(struct desk *d, struct budget_sum *c, const struct axis pair[2], const double a[3])
 {
 	double length = hypot(a[pair[0].axis], a[pair[1].axis]);
 
@@ -479,7 +406,7 @@ static void late_length(struct desk *d, struct collecting *c, const struct axis 
 static void of_resultant(struct desk *d, const struct estimate_resultant *r)
 {
 	struct axis pair[2];
-	struct collecting height, instant;
+	struct budget_sum height, instant;
 	double a[3], zero[2];
 
 	if (!pair_of(d, r->sensor, pair))
@@ -491,14 +418,14 @@ static void of_resultant(struct desk *d, const struct estimate_resultant *r)
 	of_length(d, &height, pair, a, 1.0, zero, 1.0 / UNITS_PI);
 	item_add(d, r->sensor, "peak_g", "g", r->peak_g, r->sigma_g, &height);
 	late_length(d, &instant, pair, a);
-	within(&instant, BUDGET_CLOCK, clock_of(pair[0].used) * r->time_s);
+	budget_within(&instant, BUDGET_CLOCK, clock_of(pair[0].used) * r->time_s);
 	item_add(d, r->sensor, "time_s", "s", r->time_s, r->sigma_time_s, &instant);
 }
 
 static void of_lag(struct desk *d)
 {
 	const struct estimate_lag *lag = &d->analysis->lag;
-	struct collecting c = {.degrees = (double)INFINITY};
+	struct budget_sum c = {.degrees = (double)INFINITY};
 
 	for (size_t i = 0; i < d->analysis->resultant_count; i++) {
 		const struct estimate_resultant *r = &d->analysis->resultants[i];
@@ -517,7 +444,7 @@ static void of_lag(struct desk *d)
 static void of_rebound(struct desk *d)
 {
 	const struct estimate_rebound *r = &d->analysis->rebound;
-	struct collecting c, flight = {.degrees = (double)INFINITY};
+	struct budget_sum c, flight = {.degrees = (double)INFINITY};
 	struct axis pair[2];
 	double a[3], v[2], zero[2];
 
@@ -531,7 +458,7 @@ static void of_rebound(struct desk *d)
 	c = begin(&pair[0]);
 	of_length(d, &c, pair, a, (1.0 + r->velocity_ratio) / hypot(v[0], v[1]), zero, 0.5);
 	item_add(d, "", "rebound.velocity_ratio", "1", r->velocity_ratio, r->sigma_velocity_ratio, &c);
-	within(&flight, BUDGET_CLOCK, clock_of(pair[0].used) * r->flight_ratio);
+	budget_within(&flight, BUDGET_CLOCK, clock_of(pair[0].used) * r->flight_ratio);
 	item_add(d, "", "rebound.flight_ratio", "1", r->flight_ratio, r->sigma_flight_ratio, &flight);
 }
 
@@ -556,14 +483,14 @@ static void of_motion(struct desk *d)
 	if (m->status != ESTIMATE_OK || !pair_of(d, "S1", one) || !pair_of(d, "S2", two))
 		return;
 	for (size_t i = 0; i < sizeof(number) / sizeof(number[0]); i++) {
-		struct collecting c = {.degrees = (double)INFINITY};
+		struct budget_sum c = {.degrees = (double)INFINITY};
 		char what[48];
 
-		collect(&c, BUDGET_DEFINITION, COVERAGE_NORMAL,
-		        number[i].noise * sqrt(fmax(0.0, m->chi_square - 1.0)));
+		budget_collect(&c, BUDGET_DEFINITION, COVERAGE_NORMAL,
+		               number[i].noise * sqrt(fmax(0.0, m->chi_square - 1.0)));
 		late(&c, &one[0], number[i].late);
 		late(&c, &two[0], number[i].late);
-		within(&c, BUDGET_CLOCK, clock_of(two[0].used) * number[i].value * number[i].follows);
+		budget_within(&c, BUDGET_CLOCK, clock_of(two[0].used) * number[i].value * number[i].follows);
 		snprintf(what, sizeof(what), "motion.%s", number[i].key);
 		item_add(d, "", what, number[i].unit, number[i].value, number[i].noise, &c);
 	}
@@ -596,59 +523,6 @@ int budget_make(struct budget *budget, const struct sensors *sensors, const stru
 		return 0;
 	budget_free(budget);
 	return DT_E_MEMORY;
-}
-
-/* ---- of several drops ---- */
-
-void budget_mean_add(struct budget_mean *mean, const struct budget_item *item)
-{
-	mean->count++;
-	for (int p = 0; p < BUDGET_PARTS; p++)
-		mean->part[p] += item->part[p];
-	mean->noise = item->part[BUDGET_NOISE];
-	mean->expanded += item->expanded;
-	mean->distribution |= strcmp(item->method, "distribution") == 0;
-}
-
-/* The parts that all drops have, by the law that most of each is of. transverse: of a direction that nobody
- * knows, or by the matrix. */
-static struct collecting common_parts(const struct budget_mean *mean, enum coverage_law transverse)
-{
-	struct collecting c = {.degrees = (double)INFINITY};
-
-	for (int p = 0; p < BUDGET_PARTS; p++)
-		if (p != BUDGET_NOISE)
-			collect(&c, (enum budget_part)p,
-			        p == BUDGET_TRANSVERSE                          ? transverse
-			        : p == BUDGET_SENSITIVITY || p == BUDGET_FILTER ? COVERAGE_NORMAL
-			                                                        : COVERAGE_RECTANGULAR,
-			        mean->part[p] / (double)mean->count);
-	return c;
-}
-
-/* By which of the two laws U is as far from what it is of the drops themselves. */
-static double missed(const struct budget_mean *mean, const struct collecting *c)
-{
-	struct coverage coverage = c->coverage;
-
-	coverage_add(&coverage, COVERAGE_NORMAL, mean->part[BUDGET_NOISE] / (double)mean->count);
-	return fabs(coverage_expanded(&coverage) - mean->expanded / (double)mean->count);
-}
-
-void budget_mean_item(const struct budget_mean *mean, double value, double sd, struct budget_item *item)
-{
-	struct collecting c = common_parts(mean, COVERAGE_ARCSINE),
-	                  normal = common_parts(mean, COVERAGE_NORMAL);
-	double n = (double)mean->count;
-
-	if (!mean->distribution || missed(mean, &normal) < missed(mean, &c))
-		c = normal;
-	c.degrees = mean->count > 1 ? n - 1.0 : (double)INFINITY;
-	c.part[BUDGET_NOISE] = mean->count > 1 ? sd / sqrt(n) : mean->noise;
-	*item = (struct budget_item){.unit = "", .value = value};
-	/* alone it covers what it has to */
-	settle(item, &c, mean->count > 1 ? "scatter" : part_names[BUDGET_NOISE],
-	       coverage_factor(c.degrees) / coverage_factor((double)INFINITY));
 }
 
 void budget_free(struct budget *budget)
