@@ -25,10 +25,10 @@
 #define END_APART 0.15
 
 /* What X reads beyond its part of Y under one pulse of the case, as part of its peak: its root mean square
- * and what it steps by from three samples to the next. On our own tower 0.02 from 15 to 35 degrees, 0.026
- * from 10 to 40, and 0.015 in six samples. */
+ * and what it steps by from three samples to the next. On our own tower 0.016 and 0.041 at 35 degrees, 0.023
+ * and 0.055 at 40. */
 #define SHAPE_APART 0.032
-#define STEP_APART 0.04
+#define STEP_APART 0.08
 enum { SHAPE_SAMPLES = 12, STEP_SIDE = 3 };
 
 /* An axis that stands out of its noise by less has width, time and area by its sensor's strongest one too. */
@@ -149,22 +149,35 @@ static bool axis_late(struct estimate_channel *const xy[2])
 	        fabs(x->end_s - y->end_s) > END_APART * width + chance);
 }
 
-/* What the stronger axis of the case reads beyond its part of the other, which sees the same pulse. */
+/* What the stronger axis of the case reads beyond its part of the other, which sees the same pulse: a little
+ * earlier or later, as filters of their own let it. */
 struct shapes {
 	const struct trace *trace[2]; /* the stronger one first */
 	size_t from, until;           /* of its samples */
-	double part;
+	double part, rate_part;       /* of the other, and of what it rises by in a sample */
 };
+
+/* The other axis at sample k and what it rises by there; false where it is missing. */
+static bool shapes_other(const struct shapes *shapes, size_t k, double other[2])
+{
+	const struct trace *trace = shapes->trace[1];
+	double time_s = trace_time(shapes->trace[0], k), step_s = 1 / trace->rate_hz, before, behind;
+
+	if (!trace_usable(shapes->trace[0], k) || !trace_at(trace, time_s, &other[0]) ||
+	    !trace_at(trace, time_s - step_s, &before) || !trace_at(trace, time_s + step_s, &behind))
+		return false;
+	other[1] = (behind - before) / 2;
+	return true;
+}
 
 /* Of sample k; NAN where either axis is missing. */
 static double shapes_beyond(const struct shapes *shapes, size_t k)
 {
-	double other;
+	double other[2];
 
-	if (!trace_usable(shapes->trace[0], k) ||
-	    !trace_at(shapes->trace[1], trace_time(shapes->trace[0], k), &other))
+	if (!shapes_other(shapes, k, other))
 		return NAN;
-	return shapes->trace[0]->value_g[k] - shapes->part * other;
+	return shapes->trace[0]->value_g[k] - shapes->part * other[0] - shapes->rate_part * other[1];
 }
 
 /* The largest step from STEP_SIDE samples to as many. */
@@ -182,27 +195,43 @@ static double shapes_step(const struct shapes *shapes)
 	return most;
 }
 
-static bool shapes_differ(struct shapes *shapes, double peak_g)
+/* The parts by least squares; how many samples they are of, 0 where they tell none. */
+static double shapes_fit(struct shapes *shapes)
 {
-	double product = 0, square = 0, rest = 0, n = 0, noise, beyond;
+	double n = 0, square[3] = {0, 0, 0}, product[2] = {0, 0}, determinant;
 
 	for (size_t k = shapes->from; k < shapes->until; k++) {
-		double value = shapes->trace[0]->value_g[k], other = value - shapes_beyond(shapes, k);
+		double other[2], value = shapes->trace[0]->value_g[k];
 
-		if (isnan(other))
+		if (!shapes_other(shapes, k, other))
 			continue;
-		product += value * other;
-		square += other * other;
+		square[0] += other[0] * other[0];
+		square[1] += other[0] * other[1];
+		square[2] += other[1] * other[1];
+		product[0] += value * other[0];
+		product[1] += value * other[1];
 		n++;
 	}
-	if (n < SHAPE_SAMPLES || !(square > 0))
+	determinant = square[0] * square[2] - square[1] * square[1];
+	if (n < SHAPE_SAMPLES || !(determinant > 0))
+		return 0;
+	shapes->part = (product[0] * square[2] - product[1] * square[1]) / determinant;
+	shapes->rate_part = (product[1] * square[0] - product[0] * square[1]) / determinant;
+	return n;
+}
+
+static bool shapes_differ(struct shapes *shapes, double peak_g)
+{
+	double rest = 0, n = shapes_fit(shapes), noise, beyond;
+
+	if (!(n > 0))
 		return false;
-	shapes->part = product / square;
 	for (size_t k = shapes->from; k < shapes->until; k++) {
 		beyond = shapes_beyond(shapes, k);
 		rest += isnan(beyond) ? 0 : beyond * beyond / n;
 	}
-	noise = hypot(shapes->trace[0]->noise_g, shapes->part * shapes->trace[1]->noise_g);
+	noise = hypot(shapes->trace[0]->noise_g,
+	              hypot(shapes->part, shapes->rate_part) * shapes->trace[1]->noise_g);
 	return rest > pow(SHAPE_APART * peak_g, 2) + noise * noise * (1 + LIMIT_CHI * sqrt(2 / n)) ||
 	       shapes_step(shapes) > STEP_APART * peak_g + LIMIT_SIGNIFICANT * noise * sqrt(2.0 / STEP_SIDE);
 }
@@ -212,7 +241,7 @@ static bool axis_unlike(const struct trace *const trace[2], struct estimate_chan
 {
 	unsigned strong =
 	        fabs(xy[1]->peak.value_g) / trace[1]->noise_g > fabs(xy[0]->peak.value_g) / trace[0]->noise_g;
-	struct shapes shapes = {{trace[strong], trace[1 - strong]}, 0, 0, 1};
+	struct shapes shapes = {.trace = {trace[strong], trace[1 - strong]}};
 
 	if (!axis_sure(xy[0]) || !axis_sure(xy[1]))
 		return false;
