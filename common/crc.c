@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "common/crc.h"
 
-/* The table of byte b is the remainder of b x^8; written as a sum over the bits
- * of b it is a constant expression, so that the compiler makes the tables and
- * nobody types them. */
+/* The table of byte b is the remainder of b x^8; written as a sum over the bits of b it is a constant
+ * expression, so that the compiler makes the tables and nobody types them. */
 #define BIT(b, n, value) ((((b) >> (n)) & 1u) ? (value) : 0u)
 
 #define CRC8_BYTE(b)                                                                          \
@@ -19,78 +18,56 @@
 #define SIXTY_FOUR(f, b) SIXTEEN(f, b), SIXTEEN(f, (b) + 16u), SIXTEEN(f, (b) + 32u), SIXTEEN(f, (b) + 48u)
 #define ALL(f) SIXTY_FOUR(f, 0u), SIXTY_FOUR(f, 64u), SIXTY_FOUR(f, 128u), SIXTY_FOUR(f, 192u)
 
-/* Where there is room for tables, eight bytes at once: the remainder of b x^(8
- * + 8 n) is a sum over the bits of b as well, of what a byte's table makes of
- * the sums before. */
+/* Where there is room for tables, eight bytes at once: the remainder of b x^(8 + 8 n) is a sum over the bits
+ * of b as well, of what a byte's table makes of the sums before. */
 #if UINTPTR_MAX > 0xFFFFFFFFu
 #define CRC_AT_ONCE 8
-#define LATER(to, from)                                                                     \
-	to##0 = CRC8_BYTE(from##0), to##1 = CRC8_BYTE(from##1), to##2 = CRC8_BYTE(from##2), \
-	to##3 = CRC8_BYTE(from##3), to##4 = CRC8_BYTE(from##4), to##5 = CRC8_BYTE(from##5), \
-	to##6 = CRC8_BYTE(from##6), to##7 = CRC8_BYTE(from##7)
-#define BY(z, b)                                                                                            \
-	(uint8_t)(BIT(b, 0, z##0) ^ BIT(b, 1, z##1) ^ BIT(b, 2, z##2) ^ BIT(b, 3, z##3) ^ BIT(b, 4, z##4) ^ \
-	          BIT(b, 5, z##5) ^ BIT(b, 6, z##6) ^ BIT(b, 7, z##7))
-
-/* a: of b x^8, bit by bit; then of b x^16 and so on. */
-enum {
-	a0 = CRC8_BYTE(1u),
-	a1 = CRC8_BYTE(2u),
-	a2 = CRC8_BYTE(4u),
-	a3 = CRC8_BYTE(8u),
-	a4 = CRC8_BYTE(16u),
-	a5 = CRC8_BYTE(32u),
-	a6 = CRC8_BYTE(64u),
-	a7 = CRC8_BYTE(128u),
-	LATER(b, a),
-	LATER(c, b),
-	LATER(d, c),
-	LATER(e, d),
-	LATER(f, e),
-	LATER(g, f),
-	LATER(h, g)
-};
-/* The same of crc32: p of b, r and so on of it later. */
-#define LATER32(z) (((z) >> 8) ^ CRC32_BYTE((z)&0xFFu))
-#define ALL_LATER32(to, from)                                                         \
-	to##0 = LATER32(from##0), to##1 = LATER32(from##1), to##2 = LATER32(from##2), \
-	to##3 = LATER32(from##3), to##4 = LATER32(from##4), to##5 = LATER32(from##5), \
-	to##6 = LATER32(from##6), to##7 = LATER32(from##7)
-#define BY32(z, b)                                                                                 \
+#define BITS(f, to)                                                                                 \
+	to##0 = f(1u), to##1 = f(2u), to##2 = f(4u), to##3 = f(8u), to##4 = f(16u), to##5 = f(32u), \
+	to##6 = f(64u), to##7 = f(128u)
+#define LATER(f, to, from)                                                                                  \
+	to##0 = f(from##0), to##1 = f(from##1), to##2 = f(from##2), to##3 = f(from##3), to##4 = f(from##4), \
+	to##5 = f(from##5), to##6 = f(from##6), to##7 = f(from##7)
+#define BY(z, b)                                                                                   \
 	(BIT(b, 0, z##0) ^ BIT(b, 1, z##1) ^ BIT(b, 2, z##2) ^ BIT(b, 3, z##3) ^ BIT(b, 4, z##4) ^ \
 	 BIT(b, 5, z##5) ^ BIT(b, 6, z##6) ^ BIT(b, 7, z##7))
+#define CRC32_LATER(z) (((z) >> 8) ^ CRC32_BYTE((z)&0xFFu))
 
+/* a of crc8, p of crc32: of b x^8, bit by bit; then of b x^16 and so on. */
 enum {
-	p0 = CRC32_BYTE(1u),
-	p1 = CRC32_BYTE(2u),
-	p2 = CRC32_BYTE(4u),
-	p3 = CRC32_BYTE(8u),
-	p4 = CRC32_BYTE(16u),
-	p5 = CRC32_BYTE(32u),
-	p6 = CRC32_BYTE(64u),
-	p7 = CRC32_BYTE(128u),
-	ALL_LATER32(q, p),
-	ALL_LATER32(r, q),
-	ALL_LATER32(s, r),
-	ALL_LATER32(t, s),
-	ALL_LATER32(u, t),
-	ALL_LATER32(v, u),
-	ALL_LATER32(w, v)
+	BITS(CRC8_BYTE, a),
+	LATER(CRC8_BYTE, b, a),
+	LATER(CRC8_BYTE, c, b),
+	LATER(CRC8_BYTE, d, c),
+	LATER(CRC8_BYTE, e, d),
+	LATER(CRC8_BYTE, f, e),
+	LATER(CRC8_BYTE, g, f),
+	LATER(CRC8_BYTE, h, g),
 };
-#define BY_Q(n) BY32(q, n)
-#define BY_R(n) BY32(r, n)
-#define BY_S(n) BY32(s, n)
-#define BY_T(n) BY32(t, n)
-#define BY_U(n) BY32(u, n)
-#define BY_V(n) BY32(v, n)
-#define BY_W(n) BY32(w, n)
-#define BY_B(n) BY(b, n)
-#define BY_C(n) BY(c, n)
-#define BY_D(n) BY(d, n)
-#define BY_E(n) BY(e, n)
-#define BY_F(n) BY(f, n)
-#define BY_G(n) BY(g, n)
-#define BY_H(n) BY(h, n)
+enum {
+	BITS(CRC32_BYTE, p),
+	LATER(CRC32_LATER, q, p),
+	LATER(CRC32_LATER, r, q),
+	LATER(CRC32_LATER, s, r),
+	LATER(CRC32_LATER, t, s),
+	LATER(CRC32_LATER, u, t),
+	LATER(CRC32_LATER, v, u),
+	LATER(CRC32_LATER, w, v),
+};
+#define BY_B(n) (uint8_t) BY(b, n)
+#define BY_C(n) (uint8_t) BY(c, n)
+#define BY_D(n) (uint8_t) BY(d, n)
+#define BY_E(n) (uint8_t) BY(e, n)
+#define BY_F(n) (uint8_t) BY(f, n)
+#define BY_G(n) (uint8_t) BY(g, n)
+#define BY_H(n) (uint8_t) BY(h, n)
+#define BY_Q(n) BY(q, n)
+#define BY_R(n) BY(r, n)
+#define BY_S(n) BY(s, n)
+#define BY_T(n) BY(t, n)
+#define BY_U(n) BY(u, n)
+#define BY_V(n) BY(v, n)
+#define BY_W(n) BY(w, n)
 #else
 #define CRC_AT_ONCE 1
 #endif
