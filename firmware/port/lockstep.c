@@ -5,6 +5,7 @@
 #include "common/ring.h"
 #include "common/sensorbus.h"
 #include "firmware/app.h"
+#include "firmware/host_ids.h"
 
 enum {
 	TICK_US = 1000,
@@ -336,16 +337,10 @@ static int take(void *bytes, size_t count)
 /* As the board's filters let it. */
 static bool is_for_the_tower(const struct frame *frame)
 {
-#define SENDER_host(number) (number),
-#define SENDER_tower(number)
-	static const uint16_t ids[] = {
-#define WIRE_ID(NAME, number, layout, sender, doc) SENDER_##sender(number)
-#include "common/wire.def"
-	};
 	bool known = false;
 
-	for (unsigned i = 0; i < sizeof(ids) / sizeof(ids[0]); i++)
-		known |= frame->id == ids[i];
+	for (unsigned i = 0; i < HOST_IDS; i++)
+		known |= frame->id == host_ids[i];
 	return known && (frame->flags & (FRAME_EXTENDED | FRAME_REMOTE)) == 0;
 }
 

@@ -2,6 +2,7 @@
 #include "firmware/port/stm32g474/can.h"
 
 #include "common/ring.h"
+#include "firmware/host_ids.h"
 #include "firmware/port/stm32g474/interrupt.h"
 #include "firmware/port/stm32g474/registers.h"
 
@@ -20,15 +21,6 @@ static const struct timing {
         {40000000, NOMINAL, 31, 8},  {40000000, 2000, 15, 4}, {40000000, 5000, 5, 2}, {40000000, 8000, 3, 1},
         {56000000, NOMINAL, 44, 11}, {56000000, 2000, 21, 6}, {56000000, 8000, 4, 2},
 };
-
-#define SENDER_host(id) (id),
-#define SENDER_tower(id)
-static const uint16_t host_ids[] = {
-#define WIRE_ID(NAME, id, layout, sender, doc) SENDER_##sender(id)
-#include "common/wire.def"
-};
-
-#define HOST_IDS (sizeof(host_ids) / sizeof(host_ids[0]))
 
 static struct {
 	struct ring received;
