@@ -6,8 +6,12 @@
 
 #include "host/base/mapped.h"
 
-enum { PART = 1 << 20 /* bytes of a pass, then mapped_seen is told */ };
-enum { LOOKED_AT = 4096, UTF8_MOST = 4, REPLACEMENT = 0xFFFD };
+enum {
+	LOOKED_AT = 4096,
+	UTF8_MOST = 4,
+	REPLACEMENT = 0xFFFD,
+	PART = 1 << 20, /* bytes of a pass, then mapped_seen is told */
+};
 
 /* Part of the odd or even bytes that are zero in UTF-16 of Latin letters and digits. */
 static const double ZEROS = 0.3;

@@ -150,10 +150,7 @@ int source_load(struct source *source, const char *file, const char *expected, c
 
 void source_free(struct source *source)
 {
-	if (source->mapped != NULL)
-		mapped_free(source->mapped);
-	else
-		free(source->bytes);
+	mapped_free(source->mapped != NULL ? source->mapped : source->bytes);
 	source->mapped = source->bytes = NULL;
 	source->size = 0;
 }
