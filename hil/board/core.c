@@ -408,7 +408,7 @@ static bool was_idle(void)
 
 bool core_waits(void)
 {
-	return core.waiting && exception_depth() == 0;
+	return core.waiting && !board.woken && exception_depth() == 0;
 }
 
 static void begin_poll(void)
