@@ -7,6 +7,8 @@
 
 #include "common/units.h"
 
+#define CLEAR_M 1e-3 /* more than the fastest box moves in a step */
+
 /* Beyond this the imprint is no wedge any more and 1/sin would run away. */
 #define WEDGE_ANGLE_MIN_RAD UNITS_RAD(10.0)
 
@@ -42,17 +44,13 @@ static double product_wedge(double angle_rad)
 	return sin(UNITS_RAD(50.0)) / fmax(fabs(sin(2 * angle_rad)), sin(2 * WEDGE_ANGLE_MIN_RAD));
 }
 
-/* Sine and cosine of the angle in a state. */
-struct turn {
-	double sn, cs;
-};
-
-static inline struct turn turn_of(const double s[])
+static inline struct product_turn turn_of(const double s[])
 {
-	return (struct turn){sin(s[PRODUCT_ANGLE]), cos(s[PRODUCT_ANGLE])};
+	return (struct product_turn){sin(s[PRODUCT_ANGLE]), cos(s[PRODUCT_ANGLE])};
 }
 
-static inline struct corner corner_at(const struct product *p, const double s[], int i, struct turn turn)
+static inline struct corner corner_at(const struct product *p, const double s[], int i,
+                                      struct product_turn turn)
 {
 	const double along_x = corner_side[i][0] * p->lever_x_m, along_y = corner_side[i][1] * p->lever_y_m;
 	struct corner c;
@@ -101,16 +99,31 @@ static struct load product_mount_force(const struct product *p, const double s[]
 	return (struct load){k * x + p->mount_damping_n_s_m * vx, k * y + p->mount_damping_n_s_m * vy, 0};
 }
 
-static void product_rates(const struct product *p, const double s[], struct turn turn, double rate[])
+static bool product_clear(const struct product *p)
 {
-	struct load load = {0, 0, 0}, mount = {0, 0, 0};
+	return p->state[PRODUCT_Y] > p->clear_m;
+}
+
+/* Of all corners, and how fast the deflection under each grows. */
+static struct load product_contact_load(const struct product *p, const double s[], struct product_turn turn,
+                                        double grip_rate[PRODUCT_CORNERS])
+{
+	struct load load = {0, 0, 0};
 
 	for (int i = 0; i < PRODUCT_CORNERS; i++) {
 		const struct corner c = corner_at(p, s, i, turn);
 
-		rate[PRODUCT_GRIP + i] =
+		grip_rate[i] =
 		        c.depth_m > 0 ? product_contact_force(p, i, &c, s[PRODUCT_GRIP + i], &load) : 0;
 	}
+	return load;
+}
+
+/* All but those of PRODUCT_GRIP, which belong to the load. */
+static void product_rates(const struct product *p, const double s[], struct load load, double rate[])
+{
+	struct load mount = {0, 0, 0};
+
 	if (p->plate_mass_kg > 0)
 		mount = product_mount_force(p, s);
 	rate[PRODUCT_X] = s[PRODUCT_VX];
@@ -128,12 +141,12 @@ static void product_rates(const struct product *p, const double s[], struct turn
 }
 
 /* A corner clear of the mat forgets its last contact and is ready for the next. */
-static void corners_renew(struct product *p, struct turn turn)
+static void corners_renew(struct product *p)
 {
 	const double stiffness_n_m15 = p->stiffness25_n_m15 * product_wedge(p->state[PRODUCT_ANGLE]);
 
 	for (int i = 0; i < PRODUCT_CORNERS; i++) {
-		const struct corner c = corner_at(p, p->state, i, turn);
+		const struct corner c = corner_at(p, p->state, i, p->turn);
 
 		if (c.depth_m > 0)
 			continue;
@@ -141,6 +154,31 @@ static void corners_renew(struct product *p, struct turn turn)
 		p->stiffness_n_m15[i] = stiffness_n_m15;
 		p->approach_m_s[i] = fmax(c.closing_m_s, PRODUCT_APPROACH_MIN_M_S);
 	}
+}
+
+/* What the state asks for: the angle's sine and cosine, and all rates. */
+static void product_renew(struct product *p)
+{
+	struct load load = {0, 0, 0};
+
+	p->turn = turn_of(p->state);
+	if (!product_clear(p)) {
+		corners_renew(p);
+		load = product_contact_load(p, p->state, p->turn, &p->rate[PRODUCT_GRIP]);
+	}
+	product_rates(p, p->state, load, p->rate);
+}
+
+static bool product_rests(const struct product *p)
+{
+	static const enum product_state speeds[] = {PRODUCT_VY, PRODUCT_VX, PRODUCT_SPIN, PRODUCT_PLATE_VX,
+	                                            PRODUCT_PLATE_VY};
+
+	for (size_t i = 0; i < sizeof(speeds) / sizeof(speeds[0]); i++)
+		if (fabs(p->state[speeds[i]]) >= PRODUCT_REST_SPEED ||
+		    fabs(p->rate[speeds[i]]) >= PRODUCT_REST_RATE)
+			return false;
+	return true;
 }
 
 void product_init(struct product *p, const struct scene *scene, double angle_rad)
@@ -158,6 +196,7 @@ void product_init(struct product *p, const struct scene *scene, double angle_rad
 	                   12;
 	p->lever_y_m = scene->product_width_m / 2;
 	p->lever_x_m = p->lever_y_m / tan(UNITS_RAD(scene->product_balance_angle_deg));
+	p->clear_m = hypot(p->lever_x_m, p->lever_y_m) + CLEAR_M;
 	p->stiffness25_n_m15 = scene->contact_stiffness_n_m15;
 	p->hysteresis = hysteresis(scene->contact_restitution);
 	p->tangential_ratio = scene->contact_tangential_ratio;
@@ -170,6 +209,7 @@ void product_init(struct product *p, const struct scene *scene, double angle_rad
 	p->yaw_cos = cos(yaw);
 	p->yaw_sin = sin(yaw);
 	p->state[PRODUCT_ANGLE] = angle_rad;
+	p->turn = turn_of(p->state);
 }
 
 void product_carry(struct product *p, double down_m_s2)
@@ -206,42 +246,47 @@ void product_strike(struct product *p, double speed_m_s)
 	memset(p->state, 0, sizeof(p->state));
 	p->state[PRODUCT_ANGLE] = angle;
 	p->state[PRODUCT_SPIN] = spin;
+	p->turn = turn_of(p->state);
 	for (int i = 0; i < PRODUCT_CORNERS; i++)
-		height_m = fmax(height_m, -corner_at(p, p->state, i, turn_of(p->state)).arm_y_m);
+		height_m = fmax(height_m, -corner_at(p, p->state, i, p->turn).arm_y_m);
 	p->state[PRODUCT_Y] = p->state[PRODUCT_PLATE_Y] = height_m;
 	p->state[PRODUCT_VY] = p->state[PRODUCT_PLATE_VY] = -speed_m_s;
-	corners_renew(p, turn_of(p->state));
-	product_rates(p, p->state, turn_of(p->state), p->rate);
+	product_renew(p);
+	p->at_rest = false;
 	p->longest_step_s = longest_step_s(p, speed_m_s);
 }
 
 void product_step(struct product *p, double step_s)
 {
 	static const double reach[3] = {0.5, 0.5, 1.0};
+	const bool clear = product_clear(p);
 	double at[PRODUCT_STATES], slope[PRODUCT_STATES], sum[PRODUCT_STATES];
-	struct turn turn;
 
+	if (p->at_rest)
+		return;
 	memcpy(slope, p->rate, sizeof(slope));
 	memcpy(sum, p->rate, sizeof(sum));
 	for (int stage = 0; stage < 3; stage++) {
 		const double weight = stage < 2 ? 2 : 1;
+		struct load load = {0, 0, 0};
 
 		for (int i = 0; i < PRODUCT_STATES; i++)
 			at[i] = p->state[i] + reach[stage] * step_s * slope[i];
-		product_rates(p, at, turn_of(at), slope);
+		if (!clear)
+			load = product_contact_load(p, at, turn_of(at), &slope[PRODUCT_GRIP]);
+		product_rates(p, at, load, slope);
 		for (int i = 0; i < PRODUCT_STATES; i++)
 			sum[i] += weight * slope[i];
 	}
 	for (int i = 0; i < PRODUCT_STATES; i++)
 		p->state[i] += step_s / 6 * sum[i];
-	turn = turn_of(p->state);
-	corners_renew(p, turn);
-	product_rates(p, p->state, turn, p->rate);
+	product_renew(p);
+	p->at_rest = product_rests(p);
 }
 
 void product_read(const struct product *p, struct product_reading *reading)
 {
-	const double sn = sin(p->state[PRODUCT_ANGLE]), cs = cos(p->state[PRODUCT_ANGLE]);
+	const double sn = p->turn.sn, cs = p->turn.cs;
 	const double x = p->rate[PRODUCT_PLATE_VX], y = p->rate[PRODUCT_PLATE_VY] + p->gravity_m_s2;
 	const double box_x = p->rate[PRODUCT_VX], box_y = p->rate[PRODUCT_VY] + p->gravity_m_s2;
 	const double spin = p->state[PRODUCT_SPIN];

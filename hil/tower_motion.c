@@ -368,7 +368,7 @@ static void event_happen(struct tower *t, enum event event)
 static void go_on(struct tower *t, double time_s)
 {
 	const double span_s = time_s - t->now_s;
-	const bool contact = t->place == PLACE_MAT;
+	const bool contact = t->place == PLACE_MAT && !t->product.at_rest;
 	const bool knocked = product_on_frame(t) && isfinite(t->calm_s);
 	const double longest_s = contact   ? t->product.longest_step_s
 	                         : knocked ? 1 / (KNOCK_STEPS * t->scene.tower_knock_hz)

@@ -457,6 +457,7 @@ static void ring_down_stiffens_as_it_fades(void **state)
 static void later_impacts_come_to_rest(void **state)
 {
 	static const char *const geometry[] = {"1", "2A", "2B"};
+	int rests = 0;
 
 	(void)state;
 	for (int c = 0; c < 15; c++) {
@@ -488,7 +489,19 @@ static void later_impacts_come_to_rest(void **state)
 		assert_near(clearance(&p), 0, 1e-3);
 		assert_near(hypot(r.s1_x, r.s1_y), G, 0.05);
 		assert_near(hypot(r.s2_x, r.s2_y), G, 0.05);
+		rests += p.at_rest; /* one that rocks on its short side takes longer */
+		for (int i = 0; i < 10000 && p.at_rest; i++) { /* it would not have moved */
+			struct product_reading later;
+
+			p.at_rest = false;
+			product_step(&p, PRODUCT_STEP_S);
+			p.at_rest = true;
+			product_read(&p, &later);
+			assert_near(hypot(later.s1_x - r.s1_x, later.s1_y - r.s1_y), 0, 1e-6);
+			assert_near(hypot(later.s2_x - r.s2_x, later.s2_y - r.s2_y), 0, 1e-6);
+		}
 	}
+	assert_in_range(rests, 12, 15);
 }
 
 /* Set down without speed it sinks in a little and stays; and the mat never pulls. */
