@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 #
 # The unit tests are one program, linked once; each $(BUILD)/tests/test_X is a link to it. Those that replace functions
-# of the C library, of the port, of the firmware or of the console are programs of their own. `make unit` and
+# of the C library, of the port or of the firmware are programs of their own. `make unit` and
 # `make check-fast` are the fast loop.
 
-UNITS_ALONE = $(addprefix $(BUILD)/tests/,test_promises test_port_faults test_link_faults test_console_work \
-	test_multibody)
+UNITS_ALONE = $(addprefix $(BUILD)/tests/,test_promises test_port_faults test_link_faults test_multibody)
 UNITS_TOGETHER = $(filter-out $(UNITS_ALONE),$(UNITS))
 DISPATCH_O = $(BUILD)/obj/tests/dispatch/dispatch.o
 UNIT_LIBRARIES = $(foreach l,console host hil firmware link common,$(call lib,$l))
