@@ -23,7 +23,8 @@ struct asc {
 
 bool can_asc_is(const char *head, size_t length)
 {
-	return length > 5 && strncasecmp(head, "date ", 5) == 0 && memmem(head, length, "base ", 5) != NULL;
+	return length > 5 && strncasecmp(head, "date ", 5) == 0 &&
+	       (memmem(head, length, "base hex", 8) != NULL || memmem(head, length, "base dec", 8) != NULL);
 }
 
 static void split(struct asc *asc, const struct source_line *line)

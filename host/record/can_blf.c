@@ -279,7 +279,7 @@ static int take_file(struct blf *blf, const char *bytes, size_t size, size_t at)
 
 bool can_blf_is(const char *head, size_t length)
 {
-	return length >= FILE_HEAD && memcmp(head, "LOGG", 4) == 0;
+	return length >= FILE_HEAD && memcmp(head, "LOGG", 4) == 0 && source_is_binary(head, length);
 }
 
 int can_blf(struct can_text *text, char message[READ_MESSAGE_MAX])

@@ -13,14 +13,16 @@ enum {
 	BUS_RETURNS = 8,         /* a line whose bus was damaged returns once, and rarely twice alike */
 };
 
-/* The first line that says something begins with '('. */
+/* The first line that says something begins with '(', and the first such line that goes on with a digit
+ * stands behind none of another kind: "(s);(g)" is a text's line of units. */
 bool candump_is(struct log_file *log)
 {
 	enum { LOOK_BYTES = 1 << 16 };
 	struct log_line line = {.next = log->begin};
 
 	while (log_file_next_line(log, log->begin + LOOK_BYTES, &line))
-		if (line.length > 0 && line.text[0] != '#')
+		if (line.length > 0 && line.text[0] != '#' &&
+		    (line.text[0] != '(' || (line.length > 1 && line.text[1] >= '0' && line.text[1] <= '9')))
 			return line.text[0] == '(';
 	return false;
 }

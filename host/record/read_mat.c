@@ -63,10 +63,12 @@ long mat4_count(const char *bytes, size_t size)
 bool mat_is(const struct source *source)
 {
 	static const char *const heads[] = {"MATLAB 5.0 ", "MATLAB 7.3 "};
+	enum { ORDER = 126, HEAD = 128 }; /* behind the text of the head: the order of bytes */
 
 	for (size_t i = 0; i < 2; i++)
-		if (source->size >= strlen(heads[i]) &&
-		    memcmp(source->bytes, heads[i], strlen(heads[i])) == 0)
+		if (source->size >= HEAD && memcmp(source->bytes, heads[i], strlen(heads[i])) == 0 &&
+		    (memcmp(source->bytes + ORDER, "MI", 2) == 0 ||
+		     memcmp(source->bytes + ORDER, "IM", 2) == 0))
 			return true;
 	return mat4_count(source->bytes, source->size) != 0;
 }

@@ -155,6 +155,11 @@ void source_free(struct source *source)
 	source->size = 0;
 }
 
+bool source_is_binary(const char *head, size_t length)
+{
+	return memchr(head, '\0', length < 64 ? length : 64) != NULL;
+}
+
 void source_replace(struct source *source, char *bytes, size_t size)
 {
 	source_free(source);

@@ -34,6 +34,9 @@ DT_MUST_USE int source_load(struct source *source, const char *file, const char 
                             char message[READ_MESSAGE_MAX]);
 void source_free(struct source *source);
 
+/* Whether a zero byte is among the first 64, as in no text: a magic of letters alone may be a word. */
+bool source_is_binary(const char *head, size_t length);
+
 /* Other bytes in place of its own, from malloc. */
 void source_replace(struct source *source, char *bytes, size_t size);
 

@@ -527,7 +527,8 @@ table_reader *table_reader_of(const struct source *source)
 
 	for (size_t i = 0; i < sizeof(readers) / sizeof(readers[0]); i++)
 		if (source->size > readers[i].length &&
-		    memcmp(source->bytes, readers[i].magic, readers[i].length) == 0)
+		    memcmp(source->bytes, readers[i].magic, readers[i].length) == 0 &&
+		    source_is_binary(source->bytes, source->size))
 			return readers[i].reader;
 	return ide_is(source)   ? read_ide
 	       : at2_is(source) ? read_at2

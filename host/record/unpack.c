@@ -10,22 +10,22 @@
 #include "common/base/process.h"
 
 static const struct {
+	size_t at;
 	const char *magic;
 	size_t length;
 	const char *program;
 } packers[] = {
-        {"\x1f\x8b", 2, "gzip"},
-        {"\x28\xb5\x2f\xfd", 4, "zstd"},
-        {"\x5d\x2a\x4d\x18", 4, "zstd"}, /* blocks.h */
-        {"\xfd\x37zXZ\0", 6, "xz"},
-        {"\x04\x22\x4d\x18", 4, "lz4"},
-        {"BZh", 3, "bzip2"},
+        {0, "\x1f\x8b", 2, "gzip"},         {0, "\x28\xb5\x2f\xfd", 4, "zstd"},
+        {0, "\x5d\x2a\x4d\x18", 4, "zstd"}, /* blocks.h */
+        {0, "\xfd\x37zXZ\0", 6, "xz"},      {0, "\x04\x22\x4d\x18", 4, "lz4"},
+        {4, "1AY&SY", 6, "bzip2"}, /* behind BZh and a digit: a text may begin so */
 };
 
 const char *unpack_program(const char *head, size_t length)
 {
 	for (size_t i = 0; i < sizeof(packers) / sizeof(packers[0]); i++)
-		if (length > packers[i].length && memcmp(head, packers[i].magic, packers[i].length) == 0)
+		if (length > packers[i].at + packers[i].length &&
+		    memcmp(head + packers[i].at, packers[i].magic, packers[i].length) == 0)
 			return packers[i].program;
 	return NULL;
 }
