@@ -144,7 +144,24 @@ static const char *find_zero(const struct source *source)
 	return zero;
 }
 
-int encoding_settle(struct source *source, const char **name, char message[READ_MESSAGE_MAX])
+/* Lines that end in a carriage return alone, as spreadsheets of another age write them. */
+static bool settle_line_ends(struct source *source)
+{
+	const size_t size = source->size;
+	char *text;
+
+	if (memchr(source->bytes, '\n', size) != NULL || memchr(source->bytes, '\r', size) == NULL)
+		return true;
+	text = malloc(size);
+	if (text == NULL)
+		return false;
+	for (size_t at = 0; at < size; at++)
+		text[at] = source->bytes[at] == '\r' ? '\n' : source->bytes[at];
+	source_replace(source, text, size);
+	return true;
+}
+
+static int settle_bytes(struct source *source, const char **name, char message[READ_MESSAGE_MAX])
 {
 	const unsigned char *bytes = (const unsigned char *)source->bytes;
 	char order = utf16_order(bytes, source->size), *text;
@@ -168,4 +185,11 @@ int encoding_settle(struct source *source, const char **name, char message[READ_
 	                     : from_cp1252(bytes, source->size, text);
 	source_replace(source, text, used);
 	return 0;
+}
+
+int encoding_settle(struct source *source, const char **name, char message[READ_MESSAGE_MAX])
+{
+	int error = settle_bytes(source, name, message);
+
+	return error || settle_line_ends(source) ? error : source_no_memory(message, source->file);
 }

@@ -36,7 +36,7 @@ void header_offer(struct header *header, struct cells_style style, const struct 
 	const char *text = line->text;
 	size_t length = line->length;
 
-	while (length > 0 && (*text == '#' || *text == ' ')) {
+	while (length > 0 && (*text == '#' || *text == '%' || *text == ' ')) {
 		text++;
 		length--;
 	}

@@ -90,7 +90,7 @@ static void take_head(struct sniff_work *work, struct head *head, size_t columns
 	struct cells *cells = &work->other;
 	bool fits;
 
-	while (line.length > 0 && strchr("# ", line.text[0])) {
+	while (line.length > 0 && strchr("#% ", line.text[0])) {
 		line.text++;
 		line.length--;
 	}

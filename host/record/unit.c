@@ -111,13 +111,20 @@ static size_t sign_at(const char *text, size_t length, char *as)
 	static const struct {
 		const char *bytes;
 		char as;
-	} signs[] = {{"\302\265", 'u'}, {"\316\274", 'u'}, {"\302\262", '2'}, {"\302\267", ' '}};
+	} signs[] = {{"\302\265", 'u'},
+	             {"\316\274", 'u'},
+	             {"\302\262", '2'},
+	             {"\302\267", ' '},
+	             {"\342\201\273", '-'}};
 
-	for (size_t i = 0; length >= 2 && i < sizeof(signs) / sizeof(signs[0]); i++)
-		if (memcmp(text, signs[i].bytes, 2) == 0) {
+	for (size_t i = 0; i < sizeof(signs) / sizeof(signs[0]); i++) {
+		const size_t bytes = strlen(signs[i].bytes);
+
+		if (length >= bytes && memcmp(text, signs[i].bytes, bytes) == 0) {
 			*as = signs[i].as;
-			return 2;
+			return bytes;
 		}
+	}
 	/* the same signs in one byte, as files without UTF-8 have them */
 	if (*text == '\262' || *text == '\265') {
 		*as = *text == '\262' ? '2' : 'u';
