@@ -154,6 +154,7 @@ static int take_sample(struct reading *reading, size_t i, struct channel *channe
 	bool empty = i >= reading->row.count || reading->row.cell[i].length == 0, cut = is_cut(reading, i);
 	double value;
 
+	channel->value_g[k] = NAN;
 	channel->sample[k] = SAMPLE_BAD;
 	if (!empty)
 		reading->used[i] = k + 1;

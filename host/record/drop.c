@@ -88,9 +88,10 @@ void drop_put(struct record *record, unsigned sensor, uint32_t tick, const int16
 static void get_axis(const struct channel *channel, size_t at, int16_t *counts, size_t count)
 {
 	for (size_t i = 0; i < count; i++) {
-		double value = round(channel->value_g[at + i] * WIRE_COUNTS_PER_G);
+		double value = channel->value_g[at + i] * WIRE_COUNTS_PER_G;
 
-		counts[i] = fabs(value) <= WIRE_SAMPLE_FULL_SCALE ? (int16_t)value : WIRE_SAMPLE_NOT_TAKEN;
+		value += copysign(0.5, value); /* cut, it is rounded */
+		counts[i] = fabs(value) < WIRE_SAMPLE_FULL_SCALE + 1 ? (int16_t)value : WIRE_SAMPLE_NOT_TAKEN;
 	}
 }
 

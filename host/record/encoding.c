@@ -131,17 +131,60 @@ static uint64_t line_of(const struct source *source, const char *byte)
 	return line;
 }
 
-static const char *find_zero(const struct source *source)
+/* Thirty-two characters at once, where the processor has registers of that width in them. */
+typedef unsigned char letters __attribute__((vector_size(32)));
+
+#if defined(__x86_64__) && defined(__gnu_linux__)
+#define WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define WIDE
+#endif
+
+/* What is among the characters of a text. */
+struct looked {
+	unsigned char high; /* bits of all of them */
+	bool zero;
+	size_t lines;
+};
+
+/* Blocks of thirty-two, no more than a count in a byte holds; how many characters. */
+WIDE static size_t look_wide(struct looked *looked, const char *at, size_t size)
 {
-	const char *zero = NULL;
+	letters c, high = {0}, zero = {0}, ends = {0};
+	size_t blocks = size / sizeof(c) < UINT8_MAX ? size / sizeof(c) : UINT8_MAX;
 
-	for (size_t at = 0; at < source->size && zero == NULL; at += PART) {
-		size_t part = source->size - at < PART ? source->size - at : PART;
-
-		zero = memchr(source->bytes + at, '\0', part);
-		mapped_seen(part);
+	for (size_t i = 0; i < blocks; i++) {
+		memcpy(&c, at + i * sizeof(c), sizeof(c));
+		high |= c;
+		zero |= (letters)(c == 0);
+		ends -= (letters)(c == '\n');
 	}
-	return zero;
+	for (size_t i = 0; i < sizeof(c); i++) {
+		looked->high |= high[i];
+		looked->zero |= zero[i] != 0;
+		looked->lines += ends[i];
+	}
+	return blocks * sizeof(c);
+}
+
+static struct looked look(const char *bytes, size_t size)
+{
+	struct looked looked = {0};
+	size_t at = 0, told = 0;
+
+	while (size - at >= sizeof(letters)) {
+		at += look_wide(&looked, bytes + at, size - at);
+		if (at - told >= PART) {
+			mapped_seen(at - told);
+			told = at;
+		}
+	}
+	for (; at < size; at++) {
+		looked.high |= (unsigned char)bytes[at];
+		looked.zero |= bytes[at] == '\0';
+		looked.lines += bytes[at] == '\n';
+	}
+	return looked;
 }
 
 /* Lines that end in a carriage return alone, as spreadsheets of another age write them. */
@@ -150,7 +193,7 @@ static bool settle_line_ends(struct source *source)
 	const size_t size = source->size;
 	char *text;
 
-	if (memchr(source->bytes, '\n', size) != NULL || memchr(source->bytes, '\r', size) == NULL)
+	if (source->lines > 0 || memchr(source->bytes, '\r', size) == NULL)
 		return true;
 	text = malloc(size);
 	if (text == NULL)
@@ -158,38 +201,44 @@ static bool settle_line_ends(struct source *source)
 	for (size_t at = 0; at < size; at++)
 		text[at] = source->bytes[at] == '\r' ? '\n' : source->bytes[at];
 	source_replace(source, text, size);
+	source->lines = look(text, size).lines;
 	return true;
 }
 
-static int settle_bytes(struct source *source, const char **name, char message[READ_MESSAGE_MAX])
+/* In UTF-16 or CP1252. */
+static bool settle_other(struct source *source, char order)
 {
 	const unsigned char *bytes = (const unsigned char *)source->bytes;
-	char order = utf16_order(bytes, source->size), *text;
-	const char *zero = find_zero(source);
+	char *text = malloc(2 * source->size + UTF8_MOST);
 	size_t used;
 
-	*name = "utf-8";
-	if (order == '\0' && zero != NULL)
-		return source_refuse(message, DT_E_FORMAT, source->file, line_of(source, zero),
-		                     "a zero byte: binary file of no kind that is known here, expected text");
-	if (order == '\0' && is_utf8(bytes, source->size))
-		return 0;
-	if (order != '\0' && source->size % 2 != 0)
-		return source_refuse(message, DT_E_FORMAT, source->file, 0,
-		                     "text in UTF-16 of an odd number of bytes: the file is cut");
-	text = malloc(2 * source->size + UTF8_MOST);
 	if (text == NULL)
-		return source_no_memory(message, source->file);
-	*name = order == 'l' ? "utf-16le" : order == 'b' ? "utf-16be" : "cp1252";
+		return false;
 	used = order != '\0' ? from_utf16(bytes, source->size, order == 'b', text)
 	                     : from_cp1252(bytes, source->size, text);
 	source_replace(source, text, used);
-	return 0;
+	source->lines = look(text, used).lines;
+	return true;
 }
 
 int encoding_settle(struct source *source, const char **name, char message[READ_MESSAGE_MAX])
 {
-	int error = settle_bytes(source, name, message);
+	const unsigned char *bytes = (const unsigned char *)source->bytes;
+	const char order = utf16_order(bytes, source->size);
+	const struct looked looked = look(source->bytes, source->size);
+	bool utf8;
 
-	return error || settle_line_ends(source) ? error : source_no_memory(message, source->file);
+	if (order == '\0' && looked.zero)
+		return source_refuse(message, DT_E_FORMAT, source->file,
+		                     line_of(source, memchr(bytes, '\0', source->size)),
+		                     "a zero byte: binary file of no kind that is known here, expected text");
+	if (order != '\0' && source->size % 2 != 0)
+		return source_refuse(message, DT_E_FORMAT, source->file, 0,
+		                     "text in UTF-16 of an odd number of bytes: the file is cut");
+	source->lines = looked.lines;
+	utf8 = order == '\0' && (looked.high < 0x80 || is_utf8(bytes, source->size));
+	*name = utf8 ? "utf-8" : order == 'l' ? "utf-16le" : order == 'b' ? "utf-16be" : "cp1252";
+	if ((utf8 || settle_other(source, order)) && settle_line_ends(source))
+		return 0;
+	return source_no_memory(message, source->file);
 }

@@ -402,7 +402,14 @@ static bool decode_fixed(const uint8_t *bytes, droptower_drop *drop)
 
 static void take_samples(struct cursor *cursor, int16_t *samples, int32_t count)
 {
-	for (int32_t i = 0; i < count; i++)
+	const size_t left = cursor->at < cursor->size ? (cursor->size - cursor->at) / sizeof(int16_t) : 0;
+	const int32_t whole = left < (size_t)count ? (int32_t)left : count;
+	const uint8_t *at = cursor->bytes + cursor->at;
+
+	for (int32_t i = 0; i < whole; i++)
+		samples[i] = (int16_t)(at[2 * i] << 8 | at[2 * i + 1]);
+	cursor->at += sizeof(int16_t) * (size_t)whole;
+	for (int32_t i = whole; i < count; i++)
 		samples[i] = (int16_t)lcm_codec_take(cursor, sizeof(int16_t));
 }
 

@@ -85,22 +85,14 @@ static int find_data(struct reading *reading)
 static int read_delimited_allocate(struct reading *reading)
 {
 	const struct columns *columns = &reading->columns;
-	const char *at = reading->source->bytes + reading->line.next;
-	const char *end = reading->source->bytes + reading->source->size, *counted = at;
-	size_t rows = 2; /* this one, and one without a line end */
+	const size_t rows =
+	        reading->source->lines - (size_t)reading->line.number + 2; /* this one, and one
+	                                                                      without a line end */
 	bool whole = true;
 
-	while ((at = memchr(at, '\n', (size_t)(end - at))) != NULL) {
-		rows++;
-		at++;
-		if (rows % RECORD_PART == 0) {
-			mapped_seen((size_t)(at - counted));
-			counted = at;
-		}
-	}
 	for (size_t i = 0; i < columns->count && whole; i++)
 		if (columns->column[i].kind == COLUMN_CHANNEL)
-			whole = record_add_channel(reading->record, columns->column[i].name, 0, rows) != NULL;
+			whole = record_add_room(reading->record, columns->column[i].name, 0, rows) != NULL;
 	if (columns->has_time) {
 		reading->time_s = mapped_array(rows, sizeof(*reading->time_s));
 		reading->row_line = mapped_array(rows, sizeof(*reading->row_line));

@@ -19,6 +19,7 @@ struct source {
 	const char *expected; /* of it, for its refusal */
 	char *bytes;          /* not terminated */
 	size_t size;
+	size_t lines; /* line ends, once encoding_settle has counted them */
 	void *mapped; /* what bytes lie in, when they must not be written to; else NULL */
 };
 
