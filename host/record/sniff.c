@@ -185,6 +185,7 @@ static void find_increasing(struct sniff_work *work, const struct sniff *sniff, 
 				continue;
 			}
 			times->can[i] &= rows == 0 || value >= before[i];
+			times->grows[i] |= rows > 0 && value > before[i];
 			before[i] = value;
 		}
 		rows++;

@@ -32,11 +32,17 @@ bool sniff_is_acceleration(struct piece name)
 	                                    (name.length == 2 && strchr("xyzXYZ", name.text[1]))));
 }
 
-static bool is_mass_name(struct piece name)
+/* Of a mass, or of a magnetic field, which is in gauss. */
+static bool is_of_other(struct piece name)
 {
-	return piece_has(name, "mass") || piece_has(name, "weight") || piece_has(name, "gewicht") ||
-	       piece_has(name, "load") || piece_has(name, "tare") || piece_has(name, "poids") ||
-	       piece_has(name, "masse");
+	const bool field =
+	        sniff_begins(name, "mag") &&
+	        (name.length == 3 || !sniff_is_letter(name.text[3]) ||
+	         (strchr("xyzXYZ", name.text[3]) && (name.length == 4 || !sniff_is_letter(name.text[4]))));
+
+	return field || piece_has(name, "magnet") || piece_has(name, "compass") || piece_has(name, "mass") ||
+	       piece_has(name, "weight") || piece_has(name, "gewicht") || piece_has(name, "load") ||
+	       piece_has(name, "tare") || piece_has(name, "poids") || piece_has(name, "masse");
 }
 
 /* The unit of a label like "t/ms" or "a/(m/s2)", a quantity over its unit (ISO 80000-1), and its stem; NULL
@@ -105,7 +111,7 @@ static const struct unit *trusted(const struct unit *unit, struct piece name, st
 		return NULL;
 	if (!gram)
 		return unit;
-	if (is_mass_name(name) || (strcmp(unit->name, "g") != 0 && !sniff_is_acceleration(name)))
+	if (is_of_other(name) || (strcmp(unit->name, "g") != 0 && !sniff_is_acceleration(name)))
 		return NULL;
 	return capital && !sniff_is_acceleration(name) ? NULL : unit;
 }
@@ -303,6 +309,7 @@ int sniff_settle_names(struct sniff *sniff, const struct piece *units, struct sn
                        bool has_rate, const char *file, char *message)
 {
 	struct columns *columns = &sniff->columns;
+	size_t frequency = columns->count;
 	int error;
 
 	for (size_t i = 0; i < columns->count; i++) {
@@ -321,6 +328,8 @@ int sniff_settle_names(struct sniff *sniff, const struct piece *units, struct sn
 			        sniff->name[i].text);
 		if (unit != NULL && unit->kind == UNIT_ACCELERATION)
 			take_channel(sniff, i, unit);
+		if (unit != NULL && unit_hertz(unit) > 0 && times->can[i] && times->grows[i])
+			frequency = i;
 		if (sniff_is_time(sniff->name[i]) && !has_rate)
 			times->can[i] = true; /* where it goes back is told when it is read */
 		if (times->can[i] && ((unit != NULL && unit->kind == UNIT_TIME) || times->unit[i] != NULL ||
@@ -334,6 +343,15 @@ int sniff_settle_names(struct sniff *sniff, const struct piece *units, struct sn
 		if (error)
 			return error;
 	}
+	if (!columns->has_time && frequency < columns->count)
+		return source_refuse(message, DT_E_FORMAT, file, 0,
+		                     "column %zu, \"%.*s\", is a frequency and increases from row to row: a "
+		                     "spectrum, expected a recording over time",
+		                     frequency + 1,
+		                     (int)(sniff->name[frequency].length < SNIFF_SHOWN
+		                                   ? sniff->name[frequency].length
+		                                   : SNIFF_SHOWN),
+		                     sniff->name[frequency].text);
 	return columns->has_time || has_rate ? 0 : refuse_no_time(sniff, file, message);
 }
 

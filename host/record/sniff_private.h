@@ -49,6 +49,7 @@ const char *sniff_separator_name(char separator);
 
 struct sniff_times {
 	bool can[COLUMNS_MAX];
+	bool grows[COLUMNS_MAX]; /* and is not one number all through */
 	const struct unit *unit[COLUMNS_MAX];
 	size_t count, first, second;
 };
