@@ -117,6 +117,13 @@ static void take_head(struct sniff_work *work, struct head *head, size_t columns
 		}
 }
 
+/* Whether a line that tells a rate says that not every sample was kept. */
+static bool is_thinned(struct piece line)
+{
+	return piece_has(line, "every") || piece_has(line, "decimat") || piece_has(line, "averag") ||
+	       piece_has(line, "downsampl");
+}
+
 /* Steps over the lines above the first row. */
 static int read_head(struct sniff_work *work, struct sniff *sniff, size_t columns, struct head *head)
 {
@@ -129,6 +136,11 @@ static int read_head(struct sniff_work *work, struct sniff *sniff, size_t column
 			return source_refuse(work->message, DT_E_FORMAT, work->source->file, line.number,
 			                     "\"%.*s\": a rate with a comma or point for thousands or for a "
 			                     "decimal sign, expected --columns with name:unit@RATE_HZ",
+			                     (int)(line.length < 60 ? line.length : 60), line.text);
+		if (rate_hz > 0 && is_thinned((struct piece){line.text, line.length}))
+			return source_refuse(work->message, DT_E_FORMAT, work->source->file, line.number,
+			                     "\"%.*s\": the rate may be that of the rows or not, expected "
+			                     "--columns with name:unit@RATE_HZ",
 			                     (int)(line.length < 60 ? line.length : 60), line.text);
 		if (sniff_tells_scale(&line, sniff->style))
 			return source_refuse(work->message, DT_E_FORMAT, work->source->file, line.number,

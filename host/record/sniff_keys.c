@@ -174,6 +174,8 @@ bool sniff_tells_scale(const struct source_line *line, struct cells_style style)
 	struct piece text = head_words(line), rest;
 	size_t length;
 
+	if (piece_has(text, "polarit") && (piece_has(text, "invert") || piece_has(text, "negativ")))
+		return true;
 	for (size_t at = 0; at < text.length && strchr(":=;,\t", text.text[at]) == NULL; at++) {
 		rest = (struct piece){text.text + at, text.length - at};
 		for (size_t i = at == 0 ? 0 : SCALE_ANYWHERE; i < SCALE_WORDS; i++) {
