@@ -21,4 +21,16 @@ void join_by_hand_feed_both(uint32_t first, uint32_t last);
 /* What join_feed says to the capture end. */
 int join_by_hand_feed_end(void);
 
+/* A message in segments of seven bytes, laid out by hand, but for segment `lost`. */
+int join_by_hand_feed_segments(const struct frame *whole, unsigned lost);
+
+/* Serves every gap the join tells, as the tower would; returns the blocks sent. */
+uint64_t join_by_hand_serve_gaps(uint32_t limit);
+void join_by_hand_check_next(unsigned sensor, uint32_t tick_ms, uint32_t limit, struct record_gap expected);
+
+/* The drop's record; its counters; its gaps, those of the blocks that are not held. */
+struct record join_by_hand_take(void);
+void join_by_hand_check_counters(const struct record *record, struct record_counters expected);
+void join_by_hand_check_gap_list(const struct record *record, bool held[2][HAND_TICKS_MAX]);
+
 #endif
