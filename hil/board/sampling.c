@@ -28,6 +28,7 @@ enum {
 };
 
 #define ADVREGEN (1u << 28)
+#define DEEPPWD (1u << 29)
 #define ADCAL (1u << 31)
 #define GAIN 32776 /* a count of the sum is 1/64 g, to what the front end gives at full scale */
 
@@ -242,6 +243,8 @@ static void write_control(struct pair *pair, uint32_t adc, uint32_t value)
 		board_fail("a converter is calibrated without its regulator, or while it is on");
 	if (value & ADEN && !(before & ADVREGEN))
 		board_fail("a converter is enabled without its regulator");
+	if (before & ADEN && (value & (ADVREGEN | DEEPPWD)) != ADVREGEN)
+		board_fail("a converter that is on loses its regulator");
 	if (value & ADSTART && adc == pair->base)
 		check_pair(pair);
 	after = (value & ~(ADCAL | ADSTP)) | (before & (ADEN | ADSTART));

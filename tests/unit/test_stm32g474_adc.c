@@ -317,6 +317,7 @@ static void not_ready(void **state)
 static void realigned(void **state)
 {
 	int16_t code[ADC_CODES];
+	int stop;
 
 	(void)state;
 	set_up();
@@ -329,7 +330,11 @@ static void realigned(void **state)
 	assert_int_equal(model_get(DMA1_CNDTR(0)), 50);
 	assert_int_equal(model_get(ADC1 + ADC_ISR) & ADC_ISR_OVR, 0);
 	assert_true(model_get(ADC1 + ADC_CR) & ADC_CR_ADSTART);
-	assert_true(model_find(ADC1 + ADC_CR, 16, 16, 0) < model_find(DMA1_CCR(0), 0xFFFFFFFF, 0, 0));
+	/* the regulator stays on, neither deep power-down nor anything else comes with it */
+	stop = model_find(ADC1 + ADC_CR, 0xFFFFFFFF, 1u << 28 | 1u << 4, 0);
+	assert_true(stop >= 0 && stop < model_find(DMA1_CCR(0), 0xFFFFFFFF, 0, 0));
+	assert_int_equal(model_count(ADC1 + ADC_CR), 2);
+	assert_true(model_find(ADC1 + ADC_CR, 0xFFFFFFFF, 1u << 28 | 1u << 2, 0) >= 0);
 	assert_true(model_find(DMA1_CCR(0), 0xFFFFFFFF, 0, 0) <
 	            model_find(DMA1_CNDTR(0), 0, 0, 0)); /* while off */
 	scan_yz(pair(MIDDLE + 2000, MIDDLE), pair(MIDDLE, MIDDLE), pair(20000, 20000));
@@ -341,6 +346,12 @@ static void realigned(void **state)
 		scan_yz(pair(MIDDLE, MIDDLE), pair(MIDDLE, MIDDLE), pair(20000, 20000));
 	assert_int_equal(adc_align(ADC_GROUP_YZ), 1);
 	assert_false(adc_read(ADC_GROUP_YZ, 0, code));
+	transfer(ADC_GROUP_X, pair(MIDDLE, MIDDLE));
+	model.writes = 0;
+	assert_int_equal(adc_align(ADC_GROUP_X), 1);
+	assert_true(model_find(DMA1_CCR(1), 0xFFFFFFFF, 0, 0) >= 0);
+	assert_int_equal(model_get(DMA1_CNDTR(1)), 7);
+	assert_int_equal(model_count(DMA1_CCR(0)), 0);
 	hardware.dead = 3;
 	assert_int_equal(adc_align(ADC_GROUP_YZ), DT_E_TIMEOUT);
 	assert_int_equal(model_get(DMA1_CCR(0)), 0);

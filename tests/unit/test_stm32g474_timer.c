@@ -257,6 +257,7 @@ static void keeper(void **state)
 	assert_int_equal(model_get(TIM5 + TIM_CCMR1) >> 10 & 3, 0);   /* every edge */
 	assert_int_equal(model_get(TIM5 + TIM_CCMR1) >> 12 & 15, 15); /* as long as the gates' filter */
 	assert_int_equal(model_get(TIM5 + TIM_CCER) & 0xBB, 0x31);    /* falling; the latch as it was */
+	assert_int_equal(model_get(TIM5 + TIM_SMCR) >> 8 & 15, 15);   /* the emergency stop's, too */
 	assert_false(timer_keeper(&time_us));
 	assert_int_equal(time_us, 7);
 	model_put(TIM5 + TIM_CNT, 500); /* both wrap at a time of their own */
