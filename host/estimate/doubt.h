@@ -29,6 +29,12 @@ void doubt_plateau(struct trace *trace, double noise_g);
 void doubt_channel(const struct trace *trace, const struct estimate_baseline *baseline, struct peak *peak,
                    struct estimate_pulse *pulse);
 
+/* After doubt_channel. What the chain leaves: noise that is gone at the record's end is a cable's, flagged
+ * "cable"; a zero there that is not the one before is "tail" and widens; a sample left out or repeated on a
+ * flank is "step". */
+void doubt_chain(struct trace *trace, const struct estimate_baseline *baseline, struct peak *peak,
+                 struct estimate_pulse *pulse);
+
 /* Of an axis of S2 as read, in its event: when a contact larger than the first begins; INFINITY: none does.
  */
 double doubt_slap_s(const struct trace *trace);

@@ -342,6 +342,7 @@ unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_chann
 		if (any)
 			axis_flag(channel[i / 2][i % 2]);
 		channel[i / 2][i % 2]->peak.how.flags |= shared;
+		channel[i / 2][i % 2]->pulse.flags |= shared;
 	}
 	for (unsigned i = 0; i < 2; i++) {
 		if (!axis_sure(channel[0][i]) || !axis_sure(channel[1][i]) ||

@@ -15,6 +15,7 @@
 #include "host/estimate/pulse.h"
 #include "host/estimate/quiet.h"
 #include "host/estimate/rebound.h"
+#include "host/estimate/spike.h"
 
 /* Around the trigger, what belongs to the impact that fired it: the product comes back for another. */
 #define EVENT_BEFORE_S 0.02
@@ -27,6 +28,7 @@ static int estimate_prepare(const struct desk *desk, size_t i, struct estimate_b
 
 	clean_find(trace, desk->scratch, baseline);
 	baseline_remove(trace, baseline);
+	spike_of_noise(trace, baseline);
 	trace->noise_g *= quiet_colour(trace, baseline);
 	if (options->iepe_time_constant_s > 0)
 		iepe_undo(trace, baseline->from_s, options->iepe_time_constant_s);
@@ -50,6 +52,7 @@ static void analyse_channel(const struct desk *desk, size_t i, struct estimate_c
 		work->peak.result.how.status = ESTIMATE_AMBIGUOUS;
 	pulse_measure(&work->trace, &work->peak, &out->baseline, desk->options->family, &out->pulse);
 	doubt_channel(&work->trace, &out->baseline, &work->peak, &out->pulse);
+	doubt_chain(&work->trace, &out->baseline, &work->peak, &out->pulse);
 	if (out->baseline.unsettled && out->pulse.status == ESTIMATE_OK)
 		out->pulse.status = ESTIMATE_AMBIGUOUS;
 	out->peak = work->peak.result;

@@ -45,8 +45,8 @@
  * doubt. */
 #define LEAN_SIGMAS 1.5
 
-/* No parabola tells a time better than to this part of a sample. */
-#define SHIFT_MIN 1e-2
+/* What no polynomial follows has a top that three samples tell to this part of a sample. */
+#define SHIFT_MIN 0.35
 
 enum {
 	SAMPLES_MIN = 3,
@@ -226,80 +226,6 @@ static double crest_doubt(const struct trace *trace, const struct peak *peak, co
 	return sharper > 1 ? hypot(doubt_s, sqrt(fmax(noise, 0)) * sharper) : doubt_s;
 }
 
-/* Mean of four samples at the top beyond the crest, in its sigmas. */
-#define CORNER_SIGMAS 1.7
-
-/* Samples whose mean tells a level of the top, and how many of the width's samples they are. */
-#define LEVEL_PART (1.0 / 9)
-
-/* A level is as high as the highest within so many standard deviations of their difference; a top that is so
- * much wider there than the crest's bend makes it is flat. */
-#define LEVEL_SIGMAS 2.0
-#define LEVEL_WIDER 1.6
-
-/* The time from the first to the last mean of n samples under the pulse that is within fall_g of the highest.
- */
-static double top_level(const struct trace *trace, const struct peak *peak, size_t n, double fall_g)
-{
-	size_t from = trace_index(trace, peak->start.peak_s - peak->start.half_width_s / 2);
-	size_t until = trace_index(trace, peak->start.peak_s + peak->start.half_width_s / 2), first = until,
-	       last = from;
-	double low = (double)n * fall_g, most = -INFINITY;
-
-	for (int pass = 0; pass < 2; pass++)
-		for (size_t k = from; k + n <= until && k + n <= trace->count; k++) {
-			double sum = 0;
-
-			for (size_t i = k; i < k + n; i++)
-				sum += trace_good(trace, i) ? peak->sign * trace->value_g[i] : -INFINITY;
-			if (pass == 0) {
-				most = fmax(most, sum);
-			} else if (sum > most - low) {
-				first = k < first ? k : first;
-				last = k;
-			}
-		}
-	return first < last ? (double)(last - first) / trace->rate_hz : 0;
-}
-
-/* How far the top is one level by the samples alone, where the crest is sharper than that: a hump that noise
- * lifted. */
-static double flat_doubt(const struct trace *trace, const struct peak *peak, const double d[3])
-{
-	size_t n = (size_t)fmax(LEVEL_PART * peak->width_s * trace->rate_hz, 1);
-	/* A summit between two samples shows less in their mean. */
-	double fall = LEVEL_SIGMAS * trace->noise_g * sqrt(2.0 / (double)n) +
-	              fabs(d[2]) / (8 * trace->rate_hz * trace->rate_hz);
-	double level = top_level(trace, peak, n, fall);
-	double bent = 2 * sqrt(2 * fall / fabs(d[2])) + 1 / trace->rate_hz;
-
-	return level > LEVEL_WIDER * bent ? level / 2 : 0;
-}
-
-/* Samples at the top that lie above or below the crest by more than noise: a corner no polynomial follows. */
-static double corner_doubt(const struct trace *trace, const struct peak *peak)
-{
-	size_t k = trace_index(trace, peak->result.time_s), n = 0;
-	double sum = 0, most = 0, d[3];
-
-	for (size_t i = k < 2 ? 0 : k - 2; i < k + 2 && i < trace->count; i++) {
-		double beyond;
-
-		if (!trace_usable(trace, i))
-			continue;
-		local_at(&peak->local, trace_time(trace, i), d);
-		beyond = peak->sign * (trace->value_g[i] - d[0]);
-		sum += beyond;
-		most = fmax(most, beyond);
-		n++;
-	}
-	if (n == 0)
-		return 0;
-	sum = fabs(sum) / (double)n;
-	sum = sum > CORNER_SIGMAS * trace->noise_g / sqrt((double)n) ? sum : 0;
-	return most > LIMIT_AGREE * trace->noise_g ? fmax(sum, most) : sum;
-}
-
 static bool take_crest(const struct trace *trace, double width_s, struct peak *peak)
 {
 	const struct trace *axes[1] = {trace};
@@ -326,22 +252,6 @@ static bool take_crest(const struct trace *trace, double width_s, struct peak *p
 	if (hole(trace, crest.time_s) > fmax(HOLE_MAX * peak->width_s, 1.5 / trace->rate_hz))
 		result->how.status = ESTIMATE_AMBIGUOUS;
 	return true;
-}
-
-/* What the samples at the top say against the polynomials that gave the value. */
-static void peak_doubt_top(const struct trace *trace, struct peak *peak)
-{
-	struct estimate_peak *result = &peak->result;
-	double corner, flat, d[3];
-
-	if (peak->model != PEAK_MODEL_LOCAL)
-		return;
-	local_at(&peak->local, result->time_s, d);
-	corner = corner_doubt(trace, peak);
-	flat = hypot(flat_doubt(trace, peak, d), corner > 0 ? 0.5 / trace->rate_hz : 0);
-	result->sigma_g = hypot(result->sigma_g, corner);
-	result->sigma_time_s = hypot(result->sigma_time_s, flat);
-	peak->doubt_s = hypot(peak->doubt_s, flat);
 }
 
 /* A value without any model: it says so in its uncertainty. */
@@ -518,7 +428,7 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 		return;
 	peak->sign = trace->value_g[peak->at] < 0 ? -1 : 1;
 	height = fabs(trace->value_g[peak->at]);
-	if (!(height > 0) || height < LIMIT_SIGNIFICANT * trace->noise_g) {
+	if (!(height > 0) || height < LIMIT_SIGNIFICANT * trace->tail * trace->noise_g) {
 		peak->result.how.status = ESTIMATE_NO_PEAK;
 		return;
 	}
@@ -527,13 +437,14 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 	peak->result.how.status = ESTIMATE_OK;
 	if (trace_any(trace, peak->span.from_s, peak->span.until_s, SAMPLE_LOST | SAMPLE_BAD))
 		peak->result.how.flags |= ESTIMATE_FLAG_GAPS;
-	if (trace_any(trace, peak->span.from_s, peak->span.until_s, SAMPLE_SPIKE))
+	if (trace->flags & RECORD_FLAG_SPIKE &&
+	    trace_any(trace, peak->span.from_s, peak->span.until_s, SAMPLE_SPIKE))
 		peak->result.how.flags |= ESTIMATE_FLAG_SPIKE;
 	if (has_rival(trace, peak))
 		peak->result.how.flags |= ESTIMATE_FLAG_RIVAL;
 	if (!peak_unclip(trace, options, peak))
 		peak_climb(trace, options, peak);
-	peak_doubt_top(trace, peak);
+	peak_top_doubt(trace, peak);
 	if (peak->result.how.status == ESTIMATE_OK && may_be_spike(trace, peak))
 		peak->result.how.status = ESTIMATE_AMBIGUOUS;
 	peak_flag_tolerance(peak, options);
@@ -544,7 +455,7 @@ void peak_narrow(const struct trace *trace, const struct estimate_options *optio
 	if (peak->model != PEAK_MODEL_LOCAL || peak->result.how.status != ESTIMATE_OK ||
 	    peak->result.how.flags & ESTIMATE_FLAG_WEAK || !take_crest(trace, BENT * peak->width_s, peak))
 		return;
-	peak_doubt_top(trace, peak);
+	peak_top_doubt(trace, peak);
 	peak_flag_tolerance(peak, options);
 }
 

@@ -4,6 +4,7 @@
 /*
  * What the parts of peak share: one channel's peak, its width measured, on its way through the methods.
  *   peak.c          the highest sample, the order of methods, the model at an instant
+ *   peak_top.c      what the samples at the top say against the value
  *   peak_clipped.c  samples at a limit or beyond the range: from the flanks
  *   peak_weak.c     an axis by the shape of its sensor's strongest one
  *   peak_driven.c   S1's by the oscillator that S2 drives (driven.h)
@@ -22,6 +23,9 @@ void peak_tried(struct estimate_how *how, const char *name);
 
 /* Flags the tolerance that is not met, or takes the flag away. */
 void peak_flag_tolerance(struct peak *peak, const struct estimate_options *options);
+
+/* What the samples at the top say against the curve that gave the value, into its bars. */
+void peak_top_doubt(const struct trace *trace, struct peak *peak);
 
 /* The family's fit into peak->shape; false when there is none. */
 bool peak_fit(const struct trace *trace, enum estimate_family family, struct peak *peak);

@@ -17,6 +17,15 @@ enum {
 #define ONE_BENDS 2.0
 #define WIDE_BENDS 4.0
 
+/* Deviation over mean magnitude: a Gaussian has 1.253, Laplace 1.41. Asked where samples of the quiet part
+ * reach so far, which a Gaussian's hardly do; it reaches so far. */
+#define TAIL_RATIO 1.33
+#define TAIL_ASKED 4.5
+#define TAIL_GAUSSIAN 3.3
+
+/* Of the quiet part's largest: a spike of the same noise stands off by no more. */
+#define TAIL_AGAIN 2.0
+
 /* |second difference| about sample k */
 static double spike_bend(const double *v)
 {
@@ -277,4 +286,62 @@ bool spike_mark(struct trace *trace, double noise_g)
 	if (marked)
 		trace->flags |= RECORD_FLAG_SPIKE;
 	return marked;
+}
+
+/* The largest of the samples in the quiet part, marked ones too, and of the others. */
+struct reach {
+	double most, most_good, ratio;
+};
+
+static struct reach spike_reach(const struct trace *trace, size_t from, size_t until)
+{
+	struct reach reach = {0, 0, 0};
+	double sum = 0, square = 0, n = 0;
+
+	for (size_t k = from; k < until; k++) {
+		double value = fabs(trace->value_g[k]);
+
+		if (trace->sample[k] & (SAMPLE_LOST | SAMPLE_BAD))
+			continue;
+		reach.most = fmax(reach.most, value);
+		if (!trace_good(trace, k))
+			continue;
+		reach.most_good = fmax(reach.most_good, value);
+		sum += value;
+		square += value * value;
+		n++;
+	}
+	reach.ratio = n > 0 && sum > 0 ? sqrt(square * n) / sum : 0;
+	return reach;
+}
+
+/* Whether some block of the quiet part, or a sample that was marked, reaches so far. */
+static bool reaches_far(const struct trace *trace, size_t from, size_t until)
+{
+	for (size_t i = from / TRACE_BLOCK; i < until / TRACE_BLOCK; i++)
+		if (fmax(trace->block[i].high_g, -trace->block[i].low_g) > TAIL_ASKED * trace->noise_g)
+			return true;
+	return trace->flags & RECORD_FLAG_SPIKE;
+}
+
+void spike_of_noise(struct trace *trace, const struct estimate_baseline *baseline)
+{
+	size_t from, until;
+	struct reach reach;
+
+	if (baseline->samples == 0 || baseline->doubtful || !(trace->noise_g > 0))
+		return;
+	from = trace_index(trace, baseline->from_s);
+	until = trace_index(trace, baseline->until_s);
+	if (!reaches_far(trace, from, until))
+		return;
+	reach = spike_reach(trace, from, until);
+	if (!(reach.ratio > TAIL_RATIO))
+		return;
+	trace->tail = fmax(1, reach.most_good / (TAIL_GAUSSIAN * trace->noise_g));
+	for (size_t k = 1; k + 1 < trace->count; k++)
+		if (trace->sample[k] & SAMPLE_SPIKE &&
+		    !(fabs(off_line(trace->value_g + k, 1, 1)) < TAIL_AGAIN * reach.most))
+			return;
+	trace->flags &= ~(unsigned)RECORD_FLAG_SPIKE;
 }

@@ -15,9 +15,15 @@
  * same. Beside missing samples only a single one is looked for, by a wider margin; so it is among the three
  * next to an end, where none is missing and it is about as high as anything in its block.
  */
+#include "host/estimate/estimate.h"
 #include "host/estimate/trace.h"
 
 /* True when something was marked. */
 bool spike_mark(struct trace *trace, double noise_g);
+
+/* After baseline_remove. Noise that reaches far by its nature (Laplace, Student) leaves samples that are
+ * marked: they stay left out, but are no defect of the sensor, and the flag is taken away, unless one stands
+ * off further than the quiet part's own. Sets trace->tail. */
+void spike_of_noise(struct trace *trace, const struct estimate_baseline *baseline);
 
 #endif
