@@ -643,7 +643,8 @@ static void near_the_end(void **state)
 		peak = find(&channel, 1);
 		assert_string_equal(peak.how.method, "parabola");
 		assert_int_equal(peak.how.status, at[i] < 4 || at[i] > 35 ? ESTIMATE_AMBIGUOUS : ESTIMATE_OK);
-		assert_true(isfinite(peak.sigma_g) && peak.sigma_time_s > 0.3e-3 && peak.sigma_time_s < 0.5e-3);
+		assert_true(isfinite(peak.sigma_g) && peak.sigma_time_s > 0.3e-3 &&
+		            peak.sigma_time_s < 0.5e-3);
 		/* How well without the noise nobody knows. */
 		peak = find(&channel, NAN);
 		assert_near(peak.time_s, (double)at[i] / 1000, 1e-9);
