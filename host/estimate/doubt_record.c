@@ -46,330 +46,311 @@ enum { SHAPE_SAMPLES = 12 };
 
 /* Where the contact that sample k belongs to has ended; last when it has not.
  */
-static size_t contact_end(const struct trace *trace, size_t k, double zero_g,
-                          double level_g) {
-  size_t rest = (size_t)(REST_S * trace->rate_hz) + 1, n = 0;
+static size_t contact_end(const struct trace *trace, size_t k, double zero_g, double level_g)
+{
+	size_t rest = (size_t)(REST_S * trace->rate_hz) + 1, n = 0;
 
-  for (; k < trace->last && n < rest; k++) {
-    n++;
-    if (trace_good(trace, k) && fabs(trace->value_g[k] - zero_g) > level_g)
-      n = 0;
-  }
-  return n < rest ? trace->last : k;
+	for (; k < trace->last && n < rest; k++) {
+		n++;
+		if (trace_good(trace, k) && fabs(trace->value_g[k] - zero_g) > level_g)
+			n = 0;
+	}
+	return n < rest ? trace->last : k;
 }
 
 /* The first of two samples side by side from k on that are off zero by as much.
  */
-static size_t contact_begin(const struct trace *trace, size_t k, double zero_g,
-                            double level_g) {
-  for (; k + 1 < trace->last; k++)
-    if (trace_good(trace, k) && trace_good(trace, k + 1) &&
-        fabs(trace->value_g[k] - zero_g) > level_g &&
-        fabs(trace->value_g[k + 1] - zero_g) > level_g)
-      return k;
-  return trace->last;
+static size_t contact_begin(const struct trace *trace, size_t k, double zero_g, double level_g)
+{
+	for (; k + 1 < trace->last; k++)
+		if (trace_good(trace, k) && trace_good(trace, k + 1) &&
+		    fabs(trace->value_g[k] - zero_g) > level_g &&
+		    fabs(trace->value_g[k + 1] - zero_g) > level_g)
+			return k;
+	return trace->last;
 }
 
 /* The largest of two samples side by side in [k, until). */
-static double contact_height(const struct trace *trace, size_t k, size_t until,
-                             double zero_g) {
-  double most = 0;
+static double contact_height(const struct trace *trace, size_t k, size_t until, double zero_g)
+{
+	double most = 0;
 
-  for (; k + 1 < until; k++)
-    if (trace_good(trace, k) && trace_good(trace, k + 1))
-      most = fmax(most, fmin(fabs(trace->value_g[k] - zero_g),
-                             fabs(trace->value_g[k + 1] - zero_g)));
-  return most;
+	for (; k + 1 < until; k++)
+		if (trace_good(trace, k) && trace_good(trace, k + 1))
+			most = fmax(most, fmin(fabs(trace->value_g[k] - zero_g),
+			                       fabs(trace->value_g[k + 1] - zero_g)));
+	return most;
 }
 
-double doubt_slap_s(const struct trace *trace) {
-  double zero, most;
-  size_t first, end, again;
+double doubt_slap_s(const struct trace *trace)
+{
+	double zero, most;
+	size_t first, end, again;
 
-  if (trace->last <= trace->first + 1 || trace->first == 0)
-    return INFINITY;
-  zero = quiet_glance(trace, 0, trace->first, NULL);
-  most = contact_height(trace, trace->first, trace->last, zero);
-  first = contact_begin(trace, trace->first, zero, LIMIT_AGAIN * most);
-  end = contact_end(trace, first, zero, LIMIT_EDGE * most);
-  again = contact_begin(trace, end, zero, LIMIT_AGAIN * most);
-  if (again >= trace->last || !(contact_height(trace, end, trace->last, zero) >
-                                contact_height(trace, first, end, zero)))
-    return INFINITY;
-  return trace_time(trace, again) - FOOT_S;
+	if (trace->last <= trace->first + 1 || trace->first == 0)
+		return INFINITY;
+	zero = quiet_glance(trace, 0, trace->first, NULL);
+	most = contact_height(trace, trace->first, trace->last, zero);
+	first = contact_begin(trace, trace->first, zero, LIMIT_AGAIN * most);
+	end = contact_end(trace, first, zero, LIMIT_EDGE * most);
+	again = contact_begin(trace, end, zero, LIMIT_AGAIN * most);
+	if (again >= trace->last ||
+	    !(contact_height(trace, end, trace->last, zero) > contact_height(trace, first, end, zero)))
+		return INFINITY;
+	return trace_time(trace, again) - FOOT_S;
 }
 
 /* Whether an axis stands so far out of its noise that its sign and height mean
  * something. */
-static bool axis_sure(const struct estimate_channel *channel) {
-  return channel->peak.how.status == ESTIMATE_OK &&
-         !(channel->peak.how.flags & ESTIMATE_FLAG_WEAK) &&
-         fabs(channel->peak.value_g) > AXIS_SIGMAS * channel->baseline.noise_g;
+static bool axis_sure(const struct estimate_channel *channel)
+{
+	return channel->peak.how.status == ESTIMATE_OK && !(channel->peak.how.flags & ESTIMATE_FLAG_WEAK) &&
+	       fabs(channel->peak.value_g) > AXIS_SIGMAS * channel->baseline.noise_g;
 }
 
 /* The direction that a trace first goes in, by half of its peak; 0 where it has
  * none. */
-static int axis_sign(const struct trace *trace,
-                     const struct estimate_channel *channel) {
-  size_t k = trace_reaches(trace, trace->first, trace->last,
-                           fabs(channel->peak.value_g) / 2);
+static int axis_sign(const struct trace *trace, const struct estimate_channel *channel)
+{
+	size_t k = trace_reaches(trace, trace->first, trace->last, fabs(channel->peak.value_g) / 2);
 
-  return k == trace->last ? 0 : trace->value_g[k] < 0 ? -1 : 1;
+	return k == trace->last ? 0 : trace->value_g[k] < 0 ? -1 : 1;
 }
 
-static void axis_flag(struct estimate_channel *channel) {
-  channel->peak.how.flags |= ESTIMATE_FLAG_AXES;
-  channel->pulse.flags |= ESTIMATE_FLAG_AXES;
+static void axis_flag(struct estimate_channel *channel)
+{
+	channel->peak.how.flags |= ESTIMATE_FLAG_AXES;
+	channel->pulse.flags |= ESTIMATE_FLAG_AXES;
 }
 
 /* X and Y of one sensor against the other's, whose Y shows nothing of what it
  * should by far. */
-static bool axis_dead(struct estimate_channel *const alive[2],
-                      struct estimate_channel *const other[2]) {
-  return axis_sure(alive[0]) && axis_sure(alive[1]) && axis_sure(other[0]) &&
-         other[1]->peak.how.status == ESTIMATE_NO_PEAK &&
-         fabs(alive[1]->peak.value_g / alive[0]->peak.value_g *
-              other[0]->peak.value_g) >
-             AXIS_SIGMAS * other[1]->baseline.noise_g;
+static bool axis_dead(struct estimate_channel *const alive[2], struct estimate_channel *const other[2])
+{
+	return axis_sure(alive[0]) && axis_sure(alive[1]) && axis_sure(other[0]) &&
+	       other[1]->peak.how.status == ESTIMATE_NO_PEAK &&
+	       fabs(alive[1]->peak.value_g / alive[0]->peak.value_g * other[0]->peak.value_g) >
+	               AXIS_SIGMAS * other[1]->baseline.noise_g;
 }
 
 /* Exchanged X and Y explain what S1 and S2 read better than what they are
  * called. */
-static bool axis_exchanged(struct estimate_channel *const channel[2][2]) {
-  double s1 =
-      log(fabs(channel[0][1]->peak.value_g / channel[0][0]->peak.value_g));
-  double s2 =
-      log(fabs(channel[1][1]->peak.value_g / channel[1][0]->peak.value_g));
+static bool axis_exchanged(struct estimate_channel *const channel[2][2])
+{
+	double s1 = log(fabs(channel[0][1]->peak.value_g / channel[0][0]->peak.value_g));
+	double s2 = log(fabs(channel[1][1]->peak.value_g / channel[1][0]->peak.value_g));
 
-  for (unsigned i = 0; i < 4; i++)
-    if (!axis_sure(channel[i / 2][i % 2]))
-      return false;
-  return fabs(s1 - s2) > log(RATIO_APART) && fabs(s1 + s2) < fabs(s1 - s2) / 2;
+	for (unsigned i = 0; i < 4; i++)
+		if (!axis_sure(channel[i / 2][i % 2]))
+			return false;
+	return fabs(s1 - s2) > log(RATIO_APART) && fabs(s1 + s2) < fabs(s1 - s2) / 2;
 }
 
 /* X and Y of the case begin and end together: one is late otherwise, or behind
  * a filter of its own. */
-static bool axis_late(struct estimate_channel *const xy[2]) {
-  const struct estimate_pulse *x = &xy[0]->pulse, *y = &xy[1]->pulse;
-  double width = fmax(x->duration_s, y->duration_s);
-  double chance = LIMIT_SIGNIFICANT *
-                  hypot(x->sigma_duration_s, y->sigma_duration_s) / sqrt(2.0);
+static bool axis_late(struct estimate_channel *const xy[2])
+{
+	const struct estimate_pulse *x = &xy[0]->pulse, *y = &xy[1]->pulse;
+	double width = fmax(x->duration_s, y->duration_s);
+	double chance = LIMIT_SIGNIFICANT * hypot(x->sigma_duration_s, y->sigma_duration_s) / sqrt(2.0);
 
-  return axis_sure(xy[0]) && axis_sure(xy[1]) &&
-         (fabs(x->start_s - y->start_s) > BEGIN_APART * width + chance ||
-          fabs(x->end_s - y->end_s) > END_APART * width + chance);
+	return axis_sure(xy[0]) && axis_sure(xy[1]) &&
+	       (fabs(x->start_s - y->start_s) > BEGIN_APART * width + chance ||
+	        fabs(x->end_s - y->end_s) > END_APART * width + chance);
 }
 
 /* What the stronger axis of the case reads beyond its part of the other, which
  * sees the same pulse: a little earlier or later, as filters of their own let
  * it. */
 struct shapes {
-  const struct trace *trace[2]; /* the stronger one first */
-  size_t from, until;           /* of its samples */
-  double part,
-      rate_part; /* of the other, and of what it rises by in a sample */
+	const struct trace *trace[2]; /* the stronger one first */
+	size_t from, until;           /* of its samples */
+	double part, rate_part;       /* of the other, and of what it rises by in a sample */
 };
 
 /* The other axis at sample k and what it rises by there; false where it is
  * missing. */
-static bool shapes_other(const struct shapes *shapes, size_t k,
-                         double other[2]) {
-  const struct trace *trace = shapes->trace[1];
-  double time_s = trace_time(shapes->trace[0], k), step_s = 1 / trace->rate_hz,
-         before, behind;
+static bool shapes_other(const struct shapes *shapes, size_t k, double other[2])
+{
+	const struct trace *trace = shapes->trace[1];
+	double time_s = trace_time(shapes->trace[0], k), step_s = 1 / trace->rate_hz, before, behind;
 
-  if (!trace_usable(shapes->trace[0], k) ||
-      !trace_at(trace, time_s, &other[0]) ||
-      !trace_at(trace, time_s - step_s, &before) ||
-      !trace_at(trace, time_s + step_s, &behind))
-    return false;
-  other[1] = (behind - before) / 2;
-  return true;
+	if (!trace_usable(shapes->trace[0], k) || !trace_at(trace, time_s, &other[0]) ||
+	    !trace_at(trace, time_s - step_s, &before) || !trace_at(trace, time_s + step_s, &behind))
+		return false;
+	other[1] = (behind - before) / 2;
+	return true;
 }
 
 /* Of sample k; NAN where either axis is missing. */
-static double shapes_beyond(const struct shapes *shapes, size_t k) {
-  double other[2];
+static double shapes_beyond(const struct shapes *shapes, size_t k)
+{
+	double other[2];
 
-  if (!shapes_other(shapes, k, other))
-    return NAN;
-  return shapes->trace[0]->value_g[k] - shapes->part * other[0] -
-         shapes->rate_part * other[1];
+	if (!shapes_other(shapes, k, other))
+		return NAN;
+	return shapes->trace[0]->value_g[k] - shapes->part * other[0] - shapes->rate_part * other[1];
 }
 
 /* The parts by least squares; how many samples they are of, 0 where they tell
  * none. */
-static double shapes_fit(struct shapes *shapes) {
-  double n = 0, square[3] = {0, 0, 0}, product[2] = {0, 0}, determinant;
+static double shapes_fit(struct shapes *shapes)
+{
+	double n = 0, square[3] = {0, 0, 0}, product[2] = {0, 0}, determinant;
 
-  for (size_t k = shapes->from; k < shapes->until; k++) {
-    double other[2], value = shapes->trace[0]->value_g[k];
+	for (size_t k = shapes->from; k < shapes->until; k++) {
+		double other[2], value = shapes->trace[0]->value_g[k];
 
-    if (!shapes_other(shapes, k, other))
-      continue;
-    square[0] += other[0] * other[0];
-    square[1] += other[0] * other[1];
-    square[2] += other[1] * other[1];
-    product[0] += value * other[0];
-    product[1] += value * other[1];
-    n++;
-  }
-  determinant = square[0] * square[2] - square[1] * square[1];
-  if (n < SHAPE_SAMPLES || !(determinant > 0))
-    return 0;
-  shapes->part =
-      (product[0] * square[2] - product[1] * square[1]) / determinant;
-  shapes->rate_part =
-      (product[1] * square[0] - product[0] * square[1]) / determinant;
-  return n;
+		if (!shapes_other(shapes, k, other))
+			continue;
+		square[0] += other[0] * other[0];
+		square[1] += other[0] * other[1];
+		square[2] += other[1] * other[1];
+		product[0] += value * other[0];
+		product[1] += value * other[1];
+		n++;
+	}
+	determinant = square[0] * square[2] - square[1] * square[1];
+	if (n < SHAPE_SAMPLES || !(determinant > 0))
+		return 0;
+	shapes->part = (product[0] * square[2] - product[1] * square[1]) / determinant;
+	shapes->rate_part = (product[1] * square[0] - product[0] * square[1]) / determinant;
+	return n;
 }
 
-static bool shapes_differ(struct shapes *shapes, double peak_g) {
-  double rest = 0, n = shapes_fit(shapes), noise, beyond;
+static bool shapes_differ(struct shapes *shapes, double peak_g)
+{
+	double rest = 0, n = shapes_fit(shapes), noise, beyond;
 
-  if (!(n > 0))
-    return false;
-  for (size_t k = shapes->from; k < shapes->until; k++) {
-    beyond = shapes_beyond(shapes, k);
-    rest += isnan(beyond) ? 0 : beyond * beyond / n;
-  }
-  noise =
-      hypot(shapes->trace[0]->noise_g,
-            hypot(shapes->part, shapes->rate_part) * shapes->trace[1]->noise_g);
-  return rest > pow(SHAPE_APART * peak_g, 2) +
-                    noise * noise * (1 + LIMIT_CHI * sqrt(2 / n));
+	if (!(n > 0))
+		return false;
+	for (size_t k = shapes->from; k < shapes->until; k++) {
+		beyond = shapes_beyond(shapes, k);
+		rest += isnan(beyond) ? 0 : beyond * beyond / n;
+	}
+	noise = hypot(shapes->trace[0]->noise_g,
+	              hypot(shapes->part, shapes->rate_part) * shapes->trace[1]->noise_g);
+	return rest > pow(SHAPE_APART * peak_g, 2) + noise * noise * (1 + LIMIT_CHI * sqrt(2 / n));
 }
 
 /* One axis of the case shows another pulse than the other: a limit, a gain, a
  * filter or a hold of its own. */
-static bool axis_unlike(const struct trace *const trace[2],
-                        struct estimate_channel *const xy[2]) {
-  unsigned strong = fabs(xy[1]->peak.value_g) / trace[1]->noise_g >
-                    fabs(xy[0]->peak.value_g) / trace[0]->noise_g;
-  struct shapes shapes = {.trace = {trace[strong], trace[1 - strong]}};
+static bool axis_unlike(const struct trace *const trace[2], struct estimate_channel *const xy[2])
+{
+	unsigned strong =
+	        fabs(xy[1]->peak.value_g) / trace[1]->noise_g > fabs(xy[0]->peak.value_g) / trace[0]->noise_g;
+	struct shapes shapes = {.trace = {trace[strong], trace[1 - strong]}};
 
-  if (!axis_sure(xy[0]) || !axis_sure(xy[1]))
-    return false;
-  shapes.from = trace_index(trace[strong], xy[strong]->pulse.start_s);
-  shapes.until = trace_index(trace[strong], xy[strong]->pulse.end_s);
-  return shapes_differ(&shapes, fabs(xy[strong]->peak.value_g));
+	if (!axis_sure(xy[0]) || !axis_sure(xy[1]))
+		return false;
+	shapes.from = trace_index(trace[strong], xy[strong]->pulse.start_s);
+	shapes.until = trace_index(trace[strong], xy[strong]->pulse.end_s);
+	return shapes_differ(&shapes, fabs(xy[strong]->peak.value_g));
 }
 
 /* The plate before the case that shakes it: the sensors are exchanged, or their
  * names are. */
-static bool axis_leads(const struct estimate_channel *s1,
-                       const struct estimate_channel *s2) {
-  double width = fmin(s1->pulse.duration_s, s2->pulse.duration_s);
+static bool axis_leads(const struct estimate_channel *s1, const struct estimate_channel *s2)
+{
+	double width = fmin(s1->pulse.duration_s, s2->pulse.duration_s);
 
-  return axis_sure(s1) && axis_sure(s2) &&
-         s1->pulse.start_s < s2->pulse.start_s &&
-         s2->peak.time_s - s1->peak.time_s > LEAD_APART * width;
+	return axis_sure(s1) && axis_sure(s2) && s1->pulse.start_s < s2->pulse.start_s &&
+	       s2->peak.time_s - s1->peak.time_s > LEAD_APART * width;
 }
 
 /* A sensor is loose on all of its axes. */
-static void loose_flag(struct estimate_channel *const xy[2]) {
-  unsigned rough =
-      (xy[0]->peak.how.flags | xy[1]->peak.how.flags) & ESTIMATE_FLAG_ROUGH;
+static void loose_flag(struct estimate_channel *const xy[2])
+{
+	unsigned rough = (xy[0]->peak.how.flags | xy[1]->peak.how.flags) & ESTIMATE_FLAG_ROUGH;
 
-  for (unsigned i = 0; i < 2; i++) {
-    xy[i]->peak.how.flags |= rough;
-    xy[i]->pulse.flags |= rough;
-  }
+	for (unsigned i = 0; i < 2; i++) {
+		xy[i]->peak.how.flags |= rough;
+		xy[i]->pulse.flags |= rough;
+	}
 }
 
 /* By what differs beyond chance from what the strong axis says. */
-static void share_widen(double *sigma, double value, double strong,
-                        double strong_sigma) {
-  double apart = fabs(value - strong);
+static void share_widen(double *sigma, double value, double strong, double strong_sigma)
+{
+	double apart = fabs(value - strong);
 
-  if (apart > SHARE_CHANCE * hypot(*sigma, strong_sigma))
-    *sigma = hypot(*sigma, apart);
+	if (apart > SHARE_CHANCE * hypot(*sigma, strong_sigma))
+		*sigma = hypot(*sigma, apart);
 }
 
-static void share_near_noise(const struct peak *strong, struct peak *peak,
-                             const struct estimate_pulse *whole,
-                             struct estimate_pulse *pulse) {
-  double part = peak->result.value_g / strong->result.value_g;
+static void share_near_noise(const struct peak *strong, struct peak *peak, const struct estimate_pulse *whole,
+                             struct estimate_pulse *pulse)
+{
+	double part = peak->result.value_g / strong->result.value_g;
 
-  if (fabs(peak->result.time_s - strong->result.time_s) <
-      SHARE_TIME * whole->duration_s)
-    share_widen(&peak->result.sigma_time_s, peak->result.time_s,
-                strong->result.time_s, strong->result.sigma_time_s);
-  share_widen(&pulse->sigma_duration_s, pulse->duration_s, whole->duration_s,
-              whole->sigma_duration_s);
-  share_widen(&pulse->sigma_velocity_m_s, pulse->velocity_change_m_s,
-              part * whole->velocity_change_m_s,
-              hypot(part * whole->sigma_velocity_m_s,
-                    peak->result.sigma_g / strong->result.value_g *
-                        whole->velocity_change_m_s));
-  share_widen(&pulse->sigma_contact_s, pulse->contact_time_s,
-              whole->contact_time_s, whole->sigma_contact_s);
-  share_widen(&pulse->sigma_fitted_velocity_m_s, pulse->fitted_velocity_m_s,
-              part * whole->velocity_change_m_s,
-              hypot(part * whole->sigma_velocity_m_s,
-                    peak->result.sigma_g / strong->result.value_g *
-                        whole->velocity_change_m_s));
+	if (fabs(peak->result.time_s - strong->result.time_s) < SHARE_TIME * whole->duration_s)
+		share_widen(&peak->result.sigma_time_s, peak->result.time_s, strong->result.time_s,
+		            strong->result.sigma_time_s);
+	share_widen(&pulse->sigma_duration_s, pulse->duration_s, whole->duration_s, whole->sigma_duration_s);
+	share_widen(&pulse->sigma_velocity_m_s, pulse->velocity_change_m_s, part * whole->velocity_change_m_s,
+	            hypot(part * whole->sigma_velocity_m_s,
+	                  peak->result.sigma_g / strong->result.value_g * whole->velocity_change_m_s));
+	share_widen(&pulse->sigma_contact_s, pulse->contact_time_s, whole->contact_time_s,
+	            whole->sigma_contact_s);
+	share_widen(&pulse->sigma_fitted_velocity_m_s, pulse->fitted_velocity_m_s,
+	            part * whole->velocity_change_m_s,
+	            hypot(part * whole->sigma_velocity_m_s,
+	                  peak->result.sigma_g / strong->result.value_g * whole->velocity_change_m_s));
 }
 
 void doubt_share(const struct trace *const trace[2], struct peak *const peak[2],
-                 struct estimate_pulse *const pulse[2]) {
-  const struct peak *strong = peak[0];
-  double clear = fabs(peak[1]->result.value_g) / trace[1]->noise_g;
+                 struct estimate_pulse *const pulse[2])
+{
+	const struct peak *strong = peak[0];
+	double clear = fabs(peak[1]->result.value_g) / trace[1]->noise_g;
 
-  if (strong->result.how.status != ESTIMATE_OK ||
-      !(clear < fabs(strong->result.value_g) / trace[0]->noise_g) ||
-      peak[1]->result.how.flags & ESTIMATE_FLAG_WEAK)
-    return;
-  peak[1]->result.how.flags |= strong->result.how.flags & ESTIMATE_FLAG_FLAT;
-  pulse[1]->flags |= strong->result.how.flags & ESTIMATE_FLAG_FLAT;
-  if (strong->doubt_s > peak[1]->doubt_s) {
-    peak[1]->result.sigma_time_s =
-        hypot(peak[1]->result.sigma_time_s, strong->doubt_s);
-    peak[1]->doubt_s = strong->doubt_s;
-  }
-  if (isnan(pulse[0]->contact_time_s)) {
-    pulse[1]->contact.flags |= ESTIMATE_FLAG_MODEL;
-    if (fabs(peak[1]->plain.value_g) > 0) {
-      peak[1]->result.sigma_g =
-          hypot(peak[1]->plain.sigma_g,
-                peak[1]->result.value_g - peak[1]->plain.value_g);
-      peak[1]->result.sigma_time_s =
-          hypot(peak[1]->plain.sigma_time_s,
-                peak[1]->result.time_s - peak[1]->plain.time_s);
-    }
-  }
-  if (clear < SHARE_NOISE)
-    share_near_noise(strong, peak[1], pulse[0], pulse[1]);
+	if (strong->result.how.status != ESTIMATE_OK ||
+	    !(clear < fabs(strong->result.value_g) / trace[0]->noise_g) ||
+	    peak[1]->result.how.flags & ESTIMATE_FLAG_WEAK)
+		return;
+	peak[1]->result.how.flags |= strong->result.how.flags & ESTIMATE_FLAG_FLAT;
+	pulse[1]->flags |= strong->result.how.flags & ESTIMATE_FLAG_FLAT;
+	if (strong->doubt_s > peak[1]->doubt_s) {
+		peak[1]->result.sigma_time_s = hypot(peak[1]->result.sigma_time_s, strong->doubt_s);
+		peak[1]->doubt_s = strong->doubt_s;
+	}
+	if (isnan(pulse[0]->contact_time_s)) {
+		pulse[1]->contact.flags |= ESTIMATE_FLAG_MODEL;
+		if (fabs(peak[1]->plain.value_g) > 0) {
+			peak[1]->result.sigma_g = hypot(peak[1]->plain.sigma_g,
+			                                peak[1]->result.value_g - peak[1]->plain.value_g);
+			peak[1]->result.sigma_time_s = hypot(peak[1]->plain.sigma_time_s,
+			                                     peak[1]->result.time_s - peak[1]->plain.time_s);
+		}
+	}
+	if (clear < SHARE_NOISE)
+		share_near_noise(strong, peak[1], pulse[0], pulse[1]);
 }
 
-unsigned doubt_axes(const struct trace *const trace[2][2],
-                    struct estimate_channel *const channel[2][2]) {
-  struct estimate_channel *const *s1 = channel[0], *const *s2 = channel[1];
-  bool any = axis_exchanged(channel) || axis_dead(s1, s2) ||
-             axis_dead(s2, s1) || axis_late(s2) || axis_unlike(trace[1], s2) ||
-             (axis_leads(s1[0], s2[0]) && axis_leads(s1[1], s2[1]));
-  /* What shifts zero on both axes of the case is in a supply that the plate's
-   * have too. */
-  unsigned shared =
-      s2[0]->peak.how.flags & s2[1]->peak.how.flags & ESTIMATE_FLAG_TAIL;
+unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2])
+{
+	struct estimate_channel *const *s1 = channel[0], *const *s2 = channel[1];
+	bool any = axis_exchanged(channel) || axis_dead(s1, s2) || axis_dead(s2, s1) || axis_late(s2) ||
+	           axis_unlike(trace[1], s2) || (axis_leads(s1[0], s2[0]) && axis_leads(s1[1], s2[1]));
+	/* What shifts zero on both axes of the case is in a supply that the plate's
+	 * have too. */
+	unsigned shared = s2[0]->peak.how.flags & s2[1]->peak.how.flags & ESTIMATE_FLAG_TAIL;
 
-  loose_flag(s1);
-  loose_flag(s2);
-  for (unsigned i = 0; i < 4; i++) {
-    if (any)
-      axis_flag(channel[i / 2][i % 2]);
-    channel[i / 2][i % 2]->peak.how.flags |= shared;
-    channel[i / 2][i % 2]->pulse.flags |= shared;
-  }
-  for (unsigned i = 0; i < 2; i++) {
-    if (!axis_sure(channel[0][i]) || !axis_sure(channel[1][i]) ||
-        axis_sign(trace[0][i], channel[0][i]) *
-                axis_sign(trace[1][i], channel[1][i]) >=
-            0)
-      continue;
-    axis_flag(channel[0][i]);
-    axis_flag(channel[1][i]);
-    any = true;
-  }
-  return shared | (any ? ESTIMATE_FLAG_AXES : 0u);
+	loose_flag(s1);
+	loose_flag(s2);
+	for (unsigned i = 0; i < 4; i++) {
+		if (any)
+			axis_flag(channel[i / 2][i % 2]);
+		channel[i / 2][i % 2]->peak.how.flags |= shared;
+		channel[i / 2][i % 2]->pulse.flags |= shared;
+	}
+	for (unsigned i = 0; i < 2; i++) {
+		if (!axis_sure(channel[0][i]) || !axis_sure(channel[1][i]) ||
+		    axis_sign(trace[0][i], channel[0][i]) * axis_sign(trace[1][i], channel[1][i]) >= 0)
+			continue;
+		axis_flag(channel[0][i]);
+		axis_flag(channel[1][i]);
+		any = true;
+	}
+	return shared | (any ? ESTIMATE_FLAG_AXES : 0u);
 }

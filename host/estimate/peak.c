@@ -428,7 +428,7 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 		return;
 	peak->sign = trace->value_g[peak->at] < 0 ? -1 : 1;
 	height = fabs(trace->value_g[peak->at]);
-	if (!(height > 0) || height < LIMIT_SIGNIFICANT * trace->tail * trace->noise_g) {
+	if (!(height > 0) || height < LIMIT_SIGNIFICANT * trace->noise_g) {
 		peak->result.how.status = ESTIMATE_NO_PEAK;
 		return;
 	}

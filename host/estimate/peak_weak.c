@@ -17,7 +17,7 @@ bool peak_is_weak(const struct trace *trace, const struct peak *peak)
 	if (peak->result.how.status == ESTIMATE_NO_PEAK)
 		return true;
 	return (peak->result.how.status == ESTIMATE_OK || peak->result.how.status == ESTIMATE_AMBIGUOUS) &&
-	       fabs(trace->value_g[peak->at]) < PEAK_WEAK_SIGMAS * trace->tail * trace->noise_g;
+	       fabs(trace->value_g[peak->at]) < PEAK_WEAK_SIGMAS * trace->noise_g;
 }
 
 /* Sums of one amplitude: the strong axis' samples, between them by straight lines, as the shape. */
@@ -64,7 +64,7 @@ bool peak_weak(const struct trace *trace, const struct estimate_options *options
 	struct amplitude amplitude;
 
 	if (from->how.status != ESTIMATE_OK || strong->model == PEAK_MODEL_NONE || !(trace->noise_g > 0) ||
-	    fabs(from->value_g) < STRONG_OVER_WEAK * PEAK_WEAK_SIGMAS * trace->tail * trace->noise_g ||
+	    fabs(from->value_g) < STRONG_OVER_WEAK * PEAK_WEAK_SIGMAS * trace->noise_g ||
 	    !fit_amplitude(trace, strong_trace, strong, &amplitude) ||
 	    fabs(amplitude.value) < WEAK_SIGNIFICANT * amplitude.sigma)
 		return false;

@@ -18,10 +18,9 @@ enum {
 #define WIDE_BENDS 4.0
 
 /* Deviation over mean magnitude: a Gaussian has 1.253, Laplace 1.41. Asked where samples of the quiet part
- * reach so far, which a Gaussian's hardly do; it reaches so far. */
+ * reach so far, which a Gaussian's hardly do. */
 #define TAIL_RATIO 1.33
 #define TAIL_ASKED 4.5
-#define TAIL_GAUSSIAN 3.3
 
 /* Of the quiet part's largest: a spike of the same noise stands off by no more. */
 #define TAIL_AGAIN 2.0
@@ -288,14 +287,14 @@ bool spike_mark(struct trace *trace, double noise_g)
 	return marked;
 }
 
-/* The largest of the samples in the quiet part, marked ones too, and of the others. */
+/* The largest of the samples in the quiet part, marked ones too; how far those that are not reach. */
 struct reach {
-	double most, most_good, ratio;
+	double most, ratio;
 };
 
 static struct reach spike_reach(const struct trace *trace, size_t from, size_t until)
 {
-	struct reach reach = {0, 0, 0};
+	struct reach reach = {0, 0};
 	double sum = 0, square = 0, n = 0;
 
 	for (size_t k = from; k < until; k++) {
@@ -306,7 +305,6 @@ static struct reach spike_reach(const struct trace *trace, size_t from, size_t u
 		reach.most = fmax(reach.most, value);
 		if (!trace_good(trace, k))
 			continue;
-		reach.most_good = fmax(reach.most_good, value);
 		sum += value;
 		square += value * value;
 		n++;
@@ -338,7 +336,6 @@ void spike_of_noise(struct trace *trace, const struct estimate_baseline *baselin
 	reach = spike_reach(trace, from, until);
 	if (!(reach.ratio > TAIL_RATIO))
 		return;
-	trace->tail = fmax(1, reach.most_good / (TAIL_GAUSSIAN * trace->noise_g));
 	for (size_t k = 1; k + 1 < trace->count; k++)
 		if (trace->sample[k] & SAMPLE_SPIKE &&
 		    !(fabs(off_line(trace->value_g + k, 1, 1)) < TAIL_AGAIN * reach.most))

@@ -154,7 +154,6 @@ void trace_lay(struct trace *trace, const struct channel *channel, double from_s
 	                        .start_s = timed ? channel->start_s : 0,
 	                        .count = timed ? channel->count : 0,
 	                        .noise_g = NAN,
-	                        .tail = 1,
 	                        .hum_hz = NAN,
 	                        .flags = channel->flags,
 	                        .range_g = channel->range_g,

@@ -39,7 +39,6 @@ struct trace {
 	uint8_t *sample;    /* [count], SAMPLE_* and TRACE_LIMIT */
 	size_t first, last; /* the event is looked for in [first, last) */
 	double noise_g;     /* per sample, before any filter; NAN while unknown */
-	double tail;        /* how much further noise reaches than a Gaussian's; 1 where it does not */
 	double hum_hz;  /* of the strongest hum that was taken off, a little of which may be left; NAN if none
 	                 */
 	unsigned flags; /* RECORD_FLAG_* */
