@@ -11,41 +11,35 @@
 /* Before a second contact its foot. */
 #define FOOT_S 1e-3
 
-/* Of a width: S1's peaks before S2's, on both axes. Two sensors on one box have
- * up to 0.16 on one, as it turns. */
+/* Of a width: S1's peaks before S2's, on both axes. Two sensors on one box have up to 0.16 on one, as it
+ * turns. */
 #define LEAD_APART 0.25
 
-/* Both sensors see one shock: what Y reads of X differs by more between them
- * only where something is wrong.
+/* Both sensors see one shock: what Y reads of X differs by more between them only where something is wrong.
  */
 #define RATIO_APART 1.6
 
-/* X's and Y's 10 % points on the case are apart by more than these parts of the
- * width. On our own tower they begin within 0.002 of it and end within 0.06, as
- * it turns. */
+/* X's and Y's 10 % points on the case are apart by more than these parts of the width. On our own tower they
+ * begin within 0.002 of it and end within 0.06, as it turns. */
 #define BEGIN_APART 0.025
 #define END_APART 0.15
 
-/* What X reads beyond its part of Y under one pulse of the case, root mean
- * square, as part of its peak. On our own tower 0.016 at 35 degrees, 0.023
- * at 40. */
+/* What X reads beyond its part of Y under one pulse of the case, root mean square, as part of its peak. On
+ * our own tower 0.016 at 35 degrees, 0.023 at 40. */
 #define SHAPE_APART 0.032
 enum { SHAPE_SAMPLES = 12 };
 
-/* An axis that stands out of its noise by less has width, time and area by its
- * sensor's strongest one too. */
+/* An axis that stands out of its noise by less has width, time and area by its sensor's strongest one too. */
 #define SHARE_NOISE 40.0
 #define SHARE_CHANCE 3.0
 
 /* Axes that peak further apart than this part of the width do so. */
 #define SHARE_TIME 0.1
 
-/* Of an axis whose sign and height mean something; half of it is what the sign
- * is taken by. */
+/* Of an axis whose sign and height mean something; half of it is what the sign is taken by. */
 #define AXIS_SIGMAS 20.0
 
-/* Where the contact that sample k belongs to has ended; last when it has not.
- */
+/* Where the contact that sample k belongs to has ended; last when it has not. */
 static size_t contact_end(const struct trace *trace, size_t k, double zero_g, double level_g)
 {
 	size_t rest = (size_t)(REST_S * trace->rate_hz) + 1, n = 0;
@@ -58,8 +52,7 @@ static size_t contact_end(const struct trace *trace, size_t k, double zero_g, do
 	return n < rest ? trace->last : k;
 }
 
-/* The first of two samples side by side from k on that are off zero by as much.
- */
+/* The first of two samples side by side from k on that are off zero by as much. */
 static size_t contact_begin(const struct trace *trace, size_t k, double zero_g, double level_g)
 {
 	for (; k + 1 < trace->last; k++)
@@ -100,16 +93,14 @@ double doubt_slap_s(const struct trace *trace)
 	return trace_time(trace, again) - FOOT_S;
 }
 
-/* Whether an axis stands so far out of its noise that its sign and height mean
- * something. */
+/* Whether an axis stands so far out of its noise that its sign and height mean something. */
 static bool axis_sure(const struct estimate_channel *channel)
 {
 	return channel->peak.how.status == ESTIMATE_OK && !(channel->peak.how.flags & ESTIMATE_FLAG_WEAK) &&
 	       fabs(channel->peak.value_g) > AXIS_SIGMAS * channel->baseline.noise_g;
 }
 
-/* The direction that a trace first goes in, by half of its peak; 0 where it has
- * none. */
+/* The direction that a trace first goes in, by half of its peak; 0 where it has none. */
 static int axis_sign(const struct trace *trace, const struct estimate_channel *channel)
 {
 	size_t k = trace_reaches(trace, trace->first, trace->last, fabs(channel->peak.value_g) / 2);
@@ -123,8 +114,7 @@ static void axis_flag(struct estimate_channel *channel)
 	channel->pulse.flags |= ESTIMATE_FLAG_AXES;
 }
 
-/* X and Y of one sensor against the other's, whose Y shows nothing of what it
- * should by far. */
+/* X and Y of one sensor against the other's, whose Y shows nothing of what it should by far. */
 static bool axis_dead(struct estimate_channel *const alive[2], struct estimate_channel *const other[2])
 {
 	return axis_sure(alive[0]) && axis_sure(alive[1]) && axis_sure(other[0]) &&
@@ -133,8 +123,7 @@ static bool axis_dead(struct estimate_channel *const alive[2], struct estimate_c
 	               AXIS_SIGMAS * other[1]->baseline.noise_g;
 }
 
-/* Exchanged X and Y explain what S1 and S2 read better than what they are
- * called. */
+/* Exchanged X and Y explain what S1 and S2 read better than what they are called. */
 static bool axis_exchanged(struct estimate_channel *const channel[2][2])
 {
 	double s1 = log(fabs(channel[0][1]->peak.value_g / channel[0][0]->peak.value_g));
@@ -146,8 +135,7 @@ static bool axis_exchanged(struct estimate_channel *const channel[2][2])
 	return fabs(s1 - s2) > log(RATIO_APART) && fabs(s1 + s2) < fabs(s1 - s2) / 2;
 }
 
-/* X and Y of the case begin and end together: one is late otherwise, or behind
- * a filter of its own. */
+/* X and Y of the case begin and end together: one is late otherwise, or behind a filter of its own. */
 static bool axis_late(struct estimate_channel *const xy[2])
 {
 	const struct estimate_pulse *x = &xy[0]->pulse, *y = &xy[1]->pulse;
@@ -159,17 +147,15 @@ static bool axis_late(struct estimate_channel *const xy[2])
 	        fabs(x->end_s - y->end_s) > END_APART * width + chance);
 }
 
-/* What the stronger axis of the case reads beyond its part of the other, which
- * sees the same pulse: a little earlier or later, as filters of their own let
- * it. */
+/* What the stronger axis of the case reads beyond its part of the other, which sees the same pulse: a little
+ * earlier or later, as filters of their own let it. */
 struct shapes {
 	const struct trace *trace[2]; /* the stronger one first */
 	size_t from, until;           /* of its samples */
 	double part, rate_part;       /* of the other, and of what it rises by in a sample */
 };
 
-/* The other axis at sample k and what it rises by there; false where it is
- * missing. */
+/* The other axis at sample k and what it rises by there; false where it is missing. */
 static bool shapes_other(const struct shapes *shapes, size_t k, double other[2])
 {
 	const struct trace *trace = shapes->trace[1];
@@ -192,8 +178,7 @@ static double shapes_beyond(const struct shapes *shapes, size_t k)
 	return shapes->trace[0]->value_g[k] - shapes->part * other[0] - shapes->rate_part * other[1];
 }
 
-/* The parts by least squares; how many samples they are of, 0 where they tell
- * none. */
+/* The parts by least squares; how many samples they are of, 0 where they tell none. */
 static double shapes_fit(struct shapes *shapes)
 {
 	double n = 0, square[3] = {0, 0, 0}, product[2] = {0, 0}, determinant;
@@ -233,8 +218,7 @@ static bool shapes_differ(struct shapes *shapes, double peak_g)
 	return rest > pow(SHAPE_APART * peak_g, 2) + noise * noise * (1 + LIMIT_CHI * sqrt(2 / n));
 }
 
-/* One axis of the case shows another pulse than the other: a limit, a gain, a
- * filter or a hold of its own. */
+/* One axis of the case shows another pulse than the other: a limit, a gain, a filter or a hold of its own. */
 static bool axis_unlike(const struct trace *const trace[2], struct estimate_channel *const xy[2])
 {
 	unsigned strong =
@@ -248,8 +232,7 @@ static bool axis_unlike(const struct trace *const trace[2], struct estimate_chan
 	return shapes_differ(&shapes, fabs(xy[strong]->peak.value_g));
 }
 
-/* The plate before the case that shakes it: the sensors are exchanged, or their
- * names are. */
+/* The plate before the case that shakes it: the sensors are exchanged, or their names are. */
 static bool axis_leads(const struct estimate_channel *s1, const struct estimate_channel *s2)
 {
 	double width = fmin(s1->pulse.duration_s, s2->pulse.duration_s);
@@ -332,8 +315,7 @@ unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_chann
 	struct estimate_channel *const *s1 = channel[0], *const *s2 = channel[1];
 	bool any = axis_exchanged(channel) || axis_dead(s1, s2) || axis_dead(s2, s1) || axis_late(s2) ||
 	           axis_unlike(trace[1], s2) || (axis_leads(s1[0], s2[0]) && axis_leads(s1[1], s2[1]));
-	/* What shifts zero on both axes of the case is in a supply that the plate's
-	 * have too. */
+	/* What shifts zero on both axes of the case is in a supply that the plate's have too. */
 	unsigned shared = s2[0]->peak.how.flags & s2[1]->peak.how.flags & ESTIMATE_FLAG_TAIL;
 
 	loose_flag(s1);
