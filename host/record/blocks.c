@@ -238,11 +238,12 @@ uint64_t blocks_size(const struct blocks *blocks)
 	return blocks->size;
 }
 
-/* Lines that are no frame, in its place. */
+/* Lines that are no frame, in its place, of which the first begins as one, so that it is known as a log
+ * still. */
 static void fill(struct blocks *blocks, const struct block *block, size_t number)
 {
 	char line[FILLER_BYTES];
-	int length = snprintf(line, sizeof(line), "\n(block %zu at %llu damaged\n", number,
+	int length = snprintf(line, sizeof(line), "\n(0 block %zu at %llu damaged\n", number,
 	                      (unsigned long long)block->place);
 
 	memset(blocks->bytes, '\n', block->size);
