@@ -30,6 +30,7 @@ def wait_for(condition, what):
 
 
 STALLED = "nothing was heard of the tower"
+PAST = (STALLED, "nothing was captured")  # troubles that the next ARM takes back
 
 
 class Stream(threading.Thread):
@@ -196,7 +197,8 @@ class Console:
     def is_ready(state):
         tower = state["tower"]
         return (tower["state"] == "READY" and tower["phase"] == "idle" and
-                (not tower["trouble"] or STALLED in tower["trouble"]) and all(c["green"] for c in state["checks"]))
+                (not tower["trouble"] or any(past in tower["trouble"] for past in PAST)) and
+                all(c["green"] for c in state["checks"]))
 
     def arm(self):
         answer = self.post("/api/arm")
