@@ -85,9 +85,8 @@ static int find_data(struct reading *reading)
 static int read_delimited_allocate(struct reading *reading)
 {
 	const struct columns *columns = &reading->columns;
-	const size_t rows =
-	        reading->source->lines - (size_t)reading->line.number + 2; /* this one, and one
-	                                                                      without a line end */
+	/* this one, and one without a line end */
+	const size_t rows = reading->source->lines - (size_t)reading->line.number + 2;
 	bool whole = true;
 
 	for (size_t i = 0; i < columns->count && whole; i++)
