@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/cells.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <string.h>
 #include <strings.h>
@@ -27,11 +28,19 @@ bool piece_has(struct piece piece, const char *word)
 	return false;
 }
 
+bool piece_has_letter(struct piece piece)
+{
+	for (size_t i = 0; i < piece.length; i++)
+		if (isalpha((unsigned char)piece.text[i]) || (unsigned char)piece.text[i] >= 0x80)
+			return true;
+	return false;
+}
+
 /* ---- a line to cells ---- */
 
 static char decimal_of(const char *text, size_t length)
 {
-	bool separated = memchr(text, ';', length) || memchr(text, '\t', length);
+	bool separated = memchr(text, ';', length) || memchr(text, '\t', length) || memchr(text, '|', length);
 
 	if (!separated || memchr(text, '.', length))
 		return '.';
@@ -56,7 +65,7 @@ static size_t cell_end(char separator, char decimal, const char *text, size_t le
 
 		if (separator == ' ' ? cells_is_blank(c)
 		    : separator      ? c == separator
-		                     : cells_is_blank(c) || c == ';' || (c == ',' && decimal != ','))
+		                : cells_is_blank(c) || c == ';' || c == '|' || (c == ',' && decimal != ','))
 			break;
 	}
 	return at;
@@ -76,10 +85,24 @@ static struct piece cells_trim(struct piece cell)
 	return cell;
 }
 
+/* A table with bars at both edges has no cells outside them. Returns where the line begins. */
+static size_t skip_bars(struct cells_style style, const char *text, size_t *length)
+{
+	size_t at = skip_blanks(text, *length, 0), end = *length;
+
+	while (end > at && cells_is_blank(text[end - 1]))
+		end--;
+	if ((style.separator && style.separator != '|') || end < at + 2 || text[at] != '|' ||
+	    text[end - 1] != '|')
+		return 0;
+	*length = end - 1;
+	return at + 1;
+}
+
 void cells_split(struct cells_style style, const char *text, size_t length, struct cells *cells)
 {
 	bool more = true; /* a separator announced another cell */
-	size_t at = 0;
+	size_t at = skip_bars(style, text, &length);
 
 	cells->count = 0;
 	cells->decimal = style.decimal ? style.decimal : decimal_of(text, length);
@@ -101,18 +124,42 @@ void cells_split(struct cells_style style, const char *text, size_t length, stru
 		cells->count++;
 		if (style.separator != '\t')
 			end = skip_blanks(text, length, end);
-		more = end < length && (style.separator ? text[end] == style.separator
-		                                        : text[end] == ';' || text[end] == ',');
+		more = end < length &&
+		       (style.separator ? text[end] == style.separator : strchr(";,|", text[end]) != NULL);
 		at = end + more;
 	}
 }
 
 /* ---- numbers ---- */
 
+/* Where the exponent of a number begins; its length if it has none. */
+static size_t exponent_at(struct piece cell)
+{
+	size_t at = 0;
+
+	while (at < cell.length && !strchr("eEdD", cell.text[at]))
+		at++;
+	return at;
+}
+
+/* "1.25D+02" as Fortran writes it: always with a sign. */
+static bool is_fortran_number(struct piece cell, char decimal, double *value)
+{
+	const size_t at = exponent_at(cell);
+	char text[64];
+
+	if (at + 2 >= cell.length || cell.length > sizeof(text) || !strchr("+-", cell.text[at + 1]))
+		return false;
+	memcpy(text, cell.text, cell.length);
+	text[at] = 'e';
+	return number_parse(text, cell.length, decimal, value);
+}
+
 bool cells_number(const struct cells *cells, size_t i, double *value)
 {
 	return i < cells->count && i < CELLS_MAX &&
-	       number_parse(cells->cell[i].text, cells->cell[i].length, cells->decimal, value);
+	       (number_parse(cells->cell[i].text, cells->cell[i].length, cells->decimal, value) ||
+	        is_fortran_number(cells->cell[i], cells->decimal, value));
 }
 
 /* Bytes of a sign that may part groups of three digits; 0 for another. */
@@ -198,19 +245,18 @@ bool cells_could_be_thousands(struct piece cell)
 
 double cells_last_digit(const struct cells *cells, size_t i, int *digits)
 {
-	struct piece cell = cells->cell[i];
+	const struct piece cell = cells->cell[i];
+	const size_t end = exponent_at(cell);
 	bool point = false;
 	int places = 0;
 	double exponent = 0;
 
 	*digits = 0;
-	for (size_t k = 0; k < cell.length; k++) {
+	if (end < cell.length)
+		(void)number_parse(cell.text + end + 1, cell.length - end - 1, '.', &exponent);
+	for (size_t k = 0; k < end; k++) {
 		char c = cell.text[k];
 
-		if (c == 'e' || c == 'E') {
-			(void)number_parse(cell.text + k + 1, cell.length - k - 1, '.', &exponent);
-			break;
-		}
 		if (is_digit(c)) {
 			places += point;
 			*digits += *digits > 0 || c != '0';
@@ -223,10 +269,10 @@ double cells_last_digit(const struct cells *cells, size_t i, int *digits)
 
 size_t cells_tail(struct piece cell, char decimal)
 {
-	for (size_t k = 0; k < cell.length; k++)
-		if (cell.text[k] == decimal || cell.text[k] == 'e' || cell.text[k] == 'E')
-			return cell.length - k;
-	return 0;
+	const size_t end = exponent_at(cell);
+	const char *sign = memchr(cell.text, decimal, end);
+
+	return cell.length - (sign ? (size_t)(sign - cell.text) : end);
 }
 
 /* ---- names ---- */

@@ -2,9 +2,10 @@
 #ifndef DT_HOST_RECORD_CELLS_H
 #define DT_HOST_RECORD_CELLS_H
 /*
- * A line of delimited text as cells. Separators are runs of blanks and tabs, single commas, single
- * semicolons, in any mix; a comma between two digits is a decimal one where a semicolon or tab separates and
- * no point is there. A style that names its separator and decimal sign knows better.
+ * A line of delimited text as cells. Separators are runs of blanks and tabs, single commas,
+ * semicolons and bars, in any mix; bars at both edges of a line are its frame; a comma between two digits is
+ * a decimal one where a semicolon or tab separates and no point is there. A style that names its separator
+ * and decimal sign knows better.
  *
  * Cells are borrowed from the line. Any context, no state.
  */
@@ -23,6 +24,9 @@ struct piece {
 
 /* Whether the word is anywhere in it, in capitals or not. */
 bool piece_has(struct piece piece, const char *word);
+
+/* Whether it says anything: a line of signs alone is drawn. */
+bool piece_has_letter(struct piece piece);
 
 struct cells_style {
 	char separator; /* 0 = any; ' ' = runs of blanks and tabs */

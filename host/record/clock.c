@@ -2,6 +2,8 @@
 #include "host/record/clock.h"
 
 #include <stddef.h>
+#include <string.h>
+#include <strings.h>
 #include <time.h>
 
 static const int64_t NS = 1000000000;
@@ -72,54 +74,105 @@ static bool clock_zone(struct scan *scan, int64_t *ns)
 	return true;
 }
 
-/* "2026-11-24" or "24.11.2026", and what parts it from the time of day. */
-static bool clock_date(struct scan *scan, int64_t *year, int64_t *month, int64_t *day)
+static bool clock_month_name(struct scan *scan, int64_t *month)
 {
-	bool found = scan->at[4] == '-'
-	                     ? clock_number(scan, 4, 4, 9999, year) && clock_sign(scan, "-") &&
-	                               clock_number(scan, 2, 2, 12, month) && clock_sign(scan, "-") &&
-	                               clock_number(scan, 2, 2, 31, day)
-	                     : clock_number(scan, 2, 2, 31, day) && clock_sign(scan, ".") &&
-	                               clock_number(scan, 2, 2, 12, month) && clock_sign(scan, ".") &&
-	                               clock_number(scan, 4, 4, 9999, year);
+	static const char names[] = "JanFebMarAprMayJunJulAugSepOctNovDec";
 
-	return found && clock_sign(scan, "T ") && *month >= 1 && *day >= 1;
+	for (*month = 1; *month <= 12 && scan->end - scan->at >= 3; ++*month)
+		if (strncasecmp(scan->at, names + 3 * (*month - 1), 3) == 0) {
+			scan->at += 3;
+			return true;
+		}
+	return false;
+}
+
+/* Three parts with one sign between them: "2026-11-24", "24.11.2026", "24-Nov-2026", "11/24/2026". Before a
+ * year the day comes first, before a slash the month, unless only the other way there is such a month. */
+static bool clock_date(struct scan *scan, struct tm *date)
+{
+	char sign[] = "?";
+	int64_t part[3];
+	bool named, swapped;
+
+	if (!clock_number(scan, 1, 4, 9999, &part[0]) || scan->at == scan->end || !strchr("-./", *scan->at))
+		return false;
+	sign[0] = *scan->at++;
+	named = clock_month_name(scan, &part[1]);
+	if ((!named && !clock_number(scan, 1, 2, 31, &part[1])) || !clock_sign(scan, sign) ||
+	    !clock_number(scan, 1, 4, 9999, &part[2]))
+		return false;
+	swapped = !named && part[0] <= 31 && (part[1] > 12 || (sign[0] == '/' && part[0] <= 12));
+	date->tm_year = (int)(part[0] > 31 ? part[0] : part[2]) - 1900;
+	date->tm_mon = (int)(swapped ? part[0] : part[1]) - 1;
+	date->tm_mday = (int)(part[0] > 31 ? part[2] : swapped ? part[1] : part[0]);
+	return date->tm_year > 0 && date->tm_mon >= 0 && date->tm_mon < 12 && date->tm_mday >= 1 &&
+	       date->tm_mday <= 31;
+}
+
+/* "PM": *hour of twelve becomes one of 24. */
+static bool clock_half(struct scan *scan, int64_t *hour)
+{
+	struct scan half = *scan;
+	bool afternoon;
+
+	(void)clock_sign(&half, " ");
+	afternoon = clock_sign(&half, "pP");
+	if (!afternoon && !clock_sign(&half, "aA"))
+		return true;
+	if (!clock_sign(&half, "mM") || *hour < 1 || *hour > 12)
+		return false;
+	*hour = *hour % 12 + (afternoon ? 12 : 0);
+	*scan = half;
+	return true;
+}
+
+/* "13:04:05.1", "1:04:05.1 PM", and "04:05.1", which has no hour: without a fraction it may be hours and
+ * minutes. */
+static bool clock_of_day(struct scan *scan, int64_t *ns, int *digits)
+{
+	int64_t hour, minute, second, part = 0;
+	bool whole;
+
+	if (!clock_number(scan, 1, 2, 59, &hour) || !clock_sign(scan, ":") ||
+	    !clock_number(scan, 2, 2, 60, &minute))
+		return false;
+	whole = clock_sign(scan, ":");
+	if (!whole) {
+		second = minute;
+		minute = hour;
+		hour = 0;
+	} else if (!clock_number(scan, 2, 2, 60, &second)) {
+		return false;
+	}
+	if (!clock_fraction(scan, &part, digits) || (!whole && *digits == 0) ||
+	    (whole && !clock_half(scan, &hour)))
+		return false;
+	*ns = ((hour * 60 + minute) * 60 + second) * NS + part;
+	return hour < 24 && minute < 60;
 }
 
 bool clock_parse(struct piece text, int64_t *ns, int *digits)
 {
 	struct scan scan = {text.text, text.text + text.length};
-	int64_t year, month, day, hour, minute, second, found = 0;
-	bool dated = text.length > 10 && (text.text[4] == '-' || text.text[2] == '.');
+	const char *colon = memchr(text.text, ':', text.length);
+	struct tm date = {.tm_year = 0};
+	int64_t found;
+	bool dated = false;
 
-	if (dated) {
-		if (!clock_date(&scan, &year, &month, &day))
-			return false;
-		found = timegm(&(struct tm){
-		                .tm_year = (int)year - 1900, .tm_mon = (int)month - 1, .tm_mday = (int)day}) *
-		        NS;
-	}
-	if (!clock_number(&scan, 1, 2, 23, &hour) || !clock_sign(&scan, ":") ||
-	    !clock_number(&scan, 2, 2, 59, &minute) || !clock_sign(&scan, ":") ||
-	    !clock_number(&scan, 2, 2, 60, &second))
-		return false;
-	found += ((hour * 60 + minute) * 60 + second) * NS;
-	if (!clock_fraction(&scan, &found, digits) || (dated && !clock_zone(&scan, &found)) ||
+	for (const char *at = text.text; colon && at < colon; at++)
+		dated |= strchr("-./", *at) != NULL;
+	if (colon == NULL || (dated && (!clock_date(&scan, &date) || !clock_sign(&scan, "T "))) ||
+	    !clock_of_day(&scan, &found, digits) || (dated && !clock_zone(&scan, &found)) ||
 	    scan.at != scan.end)
 		return false;
-	*ns = found;
+	*ns = found + (dated ? timegm(&date) * NS : 0);
 	return true;
 }
 
 bool clock_is_date(struct piece text)
 {
 	struct scan scan = {text.text, text.text + text.length};
-	int64_t part[3];
-	bool year;
+	struct tm date = {.tm_year = 0};
 
-	for (int i = 0; i < 3; i++)
-		if ((i > 0 && !clock_sign(&scan, "-./")) || !clock_number(&scan, 1, 4, 9999, &part[i]))
-			return false;
-	year = part[0] > 1900 || part[2] > 1900;
-	return year && scan.at == scan.end;
+	return clock_date(&scan, &date) && scan.at == scan.end;
 }

@@ -25,7 +25,7 @@ static bool header_has_name(const struct cells *cells)
 	double value;
 
 	for (size_t i = 0; i < cells->count && i < CELLS_MAX; i++)
-		if (cells->cell[i].length > 0 && !cells_number(cells, i, &value))
+		if (piece_has_letter(cells->cell[i]) && !cells_number(cells, i, &value))
 			return true;
 	return false;
 }

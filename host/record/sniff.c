@@ -25,14 +25,6 @@ static bool is_of_ours(const struct source *source)
 	return memmem(tail, (size_t)(source->bytes + source->size - tail), "# sha256 ", 9) != NULL;
 }
 
-static bool has_letter(const struct source_line *line)
-{
-	for (size_t i = 0; i < line->length; i++)
-		if (sniff_is_letter(line->text[i]))
-			return true;
-	return false;
-}
-
 /* Lines with words behind the last row are a footer; others are rows that something is wrong with, and so is
  * one that begins with a number and has no end: "0.1,1.5e". */
 static void find_footer(struct sniff_work *work, struct sniff *sniff)
@@ -53,7 +45,8 @@ static void find_footer(struct sniff_work *work, struct sniff *sniff)
 		if (sniff_is_idle(&line))
 			continue;
 		sniff_split(sniff->style, &line, &work->cells);
-		if (sniff_is_row(work, &work->cells) || !has_letter(&line) ||
+		if (sniff_is_row(work, &work->cells) ||
+		    !piece_has_letter((struct piece){line.text, line.length}) ||
 		    (sniff->footer_lines == 0 && bytes[work->source->size - 1] != '\n' &&
 		     sniff_kind(&work->cells, 0) == CELL_NUMBER))
 			return;
@@ -90,6 +83,8 @@ static void take_head(struct sniff_work *work, struct head *head, size_t columns
 	struct cells *cells = &work->other;
 	bool fits;
 
+	if (!piece_has_letter((struct piece){line.text, line.length})) /* "|---|---|" */
+		return;
 	while (line.length > 0 && strchr("#% ", line.text[0])) {
 		line.text++;
 		line.length--;

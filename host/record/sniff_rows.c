@@ -33,7 +33,7 @@ enum cell_kind sniff_kind(const struct cells *cells, size_t i)
 		return CELL_NUMBER;
 	if (is_word(cell, none, sizeof(none) / sizeof(none[0])))
 		return CELL_NO_NUMBER;
-	if (cell.length >= 7 && clock_parse(cell, &ns, &digits))
+	if (cell.length >= 6 && clock_parse(cell, &ns, &digits))
 		return CELL_CLOCK;
 	return cell.length >= 8 && clock_is_date(cell) ? CELL_DATE : CELL_TEXT;
 }
