@@ -7,7 +7,7 @@ import { createHash } from "node:crypto";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { crc32, deflateSync } from "node:zlib";
-import { Desk, browse } from "./desk.mjs";
+import { Desk, SOON, UNDER_WAY, browse } from "./desk.mjs";
 import { look } from "./looks.mjs";
 import { build, droptower, makeFolder, serve, stop, stopAll } from "./programs.mjs";
 import { note } from "./tap.mjs";
@@ -81,7 +81,8 @@ async function inView(flagged) {
 	for (const screen of SCREENS) {
 		await desk.page.setViewportSize(screen);
 		await desk.page.waitForFunction(() => document.querySelector("#chart-x canvas"));
-		await wait(300); // the charts are drawn anew
+		for (let looks = 0; looks < 100 && (await desk.page.evaluate(hidden, wanted)).length; looks++)
+			await wait(100); // until the charts are drawn anew
 		assert.equal(await desk.page.evaluate(() => scrollY), 0);
 		assert.deepEqual(await desk.page.evaluate(hidden, wanted), [], `at ${screen.width} x ${screen.height}`);
 		assert.deepEqual(await desk.page.evaluate(small), [], "targets below 72 px");
@@ -266,7 +267,7 @@ async function byFoot() {
 		assert.equal(await page.inputValue("#serial"), "ARK-007");
 		assert.notEqual(await desk.data("state"), "ARMED");
 		await page.keyboard.down(FOOT);
-		await desk.until({ step: "release", state: "ARMED" }, 15000);
+		await desk.until({ step: "release", state: "ARMED" }, SOON.timeout);
 		for (let i = 0; i < 5; i++)
 			await page.keyboard.down(FOOT); // the switch is still down, and repeats itself
 		await page.waitForSelector("#release:enabled");
@@ -282,7 +283,7 @@ async function byFoot() {
 			await wait(600);
 			desk.forgive("release");
 		}
-		await desk.until({ step: ["moving", "wait", "decide"] }, 4000);
+		await desk.until({ step: UNDER_WAY }, SOON.timeout);
 	});
 	await desk.result(`${SERIES}/6`);
 	await page.locator("#accept:enabled").waitFor();

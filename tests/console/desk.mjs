@@ -8,8 +8,9 @@ import { join } from "node:path";
 import { chromium, pictures } from "./programs.mjs";
 import { note } from "./tap.mjs";
 
-const WAIT_MS = 300000; // what takes longer hangs, on a busy machine too
-const SOON = { timeout: 15000 };
+export const WAIT_MS = 300000; // what takes longer hangs, on a busy machine too
+export const SOON = { timeout: 15000 };
+export const UNDER_WAY = ["moving", "wait", "decide"]; // the steps behind a RELEASE
 const PROMISED = "droptower-test";
 
 const CRASHED = 3; // exit status
@@ -208,24 +209,23 @@ export class Desk {
 	}
 
 	/* Once it can be: not while horn and lamp warn. A tower that lags behind refuses a press, which is then made again. */
-	async pressRelease(underWay) {
+	async pressRelease() {
 		for (let presses = 0; presses < 8; presses++) {
 			await this.click("#release", SOON);
-			await this.until({ step: [...underWay, "arm", "checks"] }, 1000).catch(() => {});
+			await this.until({ step: [...UNDER_WAY, "arm", "checks"] }, 1000).catch(() => {});
 			if (await this.data("step") !== "release")
 				break;
 			this.forgive("release");
 		}
-		await this.until({ step: underWay }, SOON.timeout);
+		await this.until({ step: UNDER_WAY }, SOON.timeout);
 	}
 
 	async release() {
-		const underWay = ["moving", "wait", "decide"];
 		await this.again(async (tries) => {
-			if (tries > 1 && underWay.includes(await this.data("step")))
+			if (tries > 1 && UNDER_WAY.includes(await this.data("step")))
 				return; // it was only slow to show
 			await this.arm();
-			await this.pressRelease(underWay);
+			await this.pressRelease();
 		});
 	}
 

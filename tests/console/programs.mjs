@@ -8,8 +8,7 @@ import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { promisify } from "node:util";
 
-const STOP_MS = 5000;
-const READY_MS = 30000;
+const HANG_MS = 300000; // what takes longer hangs, on a busy machine too
 
 const running = new Set();
 const folders = [];
@@ -42,7 +41,7 @@ export function start(program, args) {
 
 // Waits until the child has said what fits the pattern.
 async function said(child, pattern) {
-	for (const end = Date.now() + READY_MS; Date.now() < end;) {
+	for (const end = Date.now() + HANG_MS; Date.now() < end;) {
 		const match = child.said.match(pattern);
 		if (match)
 			return match;
@@ -62,7 +61,7 @@ export async function serve(program, args) {
 
 // Ends it in order; returns its exit status, or the signal that was needed or killed it.
 export async function stop(child, signal = "SIGTERM") {
-	const late = setTimeout(() => child.kill("SIGKILL"), STOP_MS);
+	const late = setTimeout(() => child.kill("SIGKILL"), HANG_MS);
 	child.kill(signal);
 	const status = await child.over;
 	clearTimeout(late);

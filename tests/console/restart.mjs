@@ -52,7 +52,7 @@ async function killed() {
 
 async function startedAgain() {
 	await startConsole(port);
-	await desk.until({ connected: "yes" }, 20000);
+	await desk.until({ connected: "yes" });
 	assert.ok(!await desk.page.locator("#connection").isVisible());
 	desk.allowed.length = 0;
 }
@@ -66,7 +66,7 @@ async function nothingLost() {
 	await desk.page.selectOption("#continue-series", SERIES);
 	await desk.picture("15-whose-drop");
 	await desk.click("#continue-go");
-	await desk.until({ phase: "idle", state: ["SAFE", "READY"] }, 30000);
+	await desk.until({ phase: "idle", state: ["SAFE", "READY"] });
 	await desk.page.waitForSelector('#series-table tr[data-state="recorded"][data-decision="open"]');
 	const rows = await drops();
 	note(rows.map((drop) => `${drop.number} ${drop.state} ${drop.decision} "${drop.note}" [${drop.flags}]`).join("; "));

@@ -97,7 +97,7 @@ class Console:
                                         stderr=subprocess.PIPE, **more)
         atexit.register(self.process.kill)  # whatever becomes of the test
         self.holding, self.streams = None, []
-        ready, _, _ = select.select([self.process.stdout], [], [], 20)
+        ready, _, _ = select.select([self.process.stdout], [], [], PATIENCE_S)
         line = self.process.stdout.readline().decode().strip() if ready else ""
         if not line.startswith("http://127.0.0.1:") or "/#token=" not in line:
             self.process.kill()
@@ -262,14 +262,14 @@ class Console:
         self.process.wait()
         self.close_pipes()
 
-    def stop(self, expect=0, seconds=30):
+    def stop(self, expect=0):
         self.let_go()
         for stream in self.streams:
             stream.close()
         if self.process.poll() is None:
             self.process.terminate()
         try:
-            code = self.process.wait(seconds)
+            code = self.process.wait(PATIENCE_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
