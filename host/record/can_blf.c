@@ -310,5 +310,5 @@ int can_blf(struct can_text *text, char message[READ_MESSAGE_MAX])
 		        blf.others, blf.last_type);
 	return source_refuse(message, DT_E_EMPTY, source->file, 0,
 	                     "a CAN log of Vector (BLF) without a CAN frame%s",
-	                     text->bytes > 0 ? ", cut or damaged" : "");
+	                     text->corrupt > 0 ? ", cut or damaged" : "");
 }

@@ -16,7 +16,7 @@
 struct can_text {
 	const struct source *source;
 	FILE *out;
-	size_t frames, bytes; /* written; beyond CAN_TEXT_MOST counted only */
+	size_t frames, corrupt; /* lines written */
 };
 
 void can_text_put(struct can_text *text, const struct frame *frame, unsigned channel);

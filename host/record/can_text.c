@@ -1,36 +1,33 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/can_text.h"
 
-#include <stdlib.h>
+#include <errno.h>
+#include <string.h>
+#include <sys/mman.h>
 
-#include "common/base/text.h"
+#include "common/base/process.h"
 #include "common/link/candump.h"
+#include "host/base/mapped.h"
 #include "host/record/can_formats.h"
 
 enum { HEAD_BYTES = 512 };
-static const size_t CAN_TEXT_MOST = (size_t)2 << 30;
-
-static void put_line(struct can_text *text, const char *line, size_t length)
-{
-	text->bytes += length;
-	if (text->bytes <= CAN_TEXT_MOST)
-		fwrite(line, 1, length, text->out);
-}
 
 void can_text_put(struct can_text *text, const struct frame *frame, unsigned channel)
 {
 	char line[CANDUMP_LINE_MAX], name[16];
+	size_t length;
 
 	snprintf(name, sizeof(name), "can%u", channel % 1000);
-	put_line(text, line, candump_format(line, frame, name));
+	length = candump_format(line, frame, name);
+	fwrite(line, 1, length, text->out);
+	mapped_seen(length); /* of the source, nearly */
 	text->frames++;
 }
 
 void can_text_corrupt(struct can_text *text, unsigned long long at)
 {
-	char line[64];
-
-	put_line(text, line, (size_t)snprintf(line, sizeof(line), "(no frame at %llu\n", at));
+	fprintf(text->out, "(no frame at %llu\n", at);
+	text->corrupt++;
 }
 
 static const struct {
@@ -57,21 +54,21 @@ int can_text(struct source *source, char message[READ_MESSAGE_MAX])
 {
 	struct can_text text = {.source = source};
 	size_t format = format_of(source->bytes, source->size);
-	struct text made;
-	int error;
+	int error, fd;
 
 	if (format == FORMATS)
 		return 0;
-	if (text_open(&made) != 0)
-		return source_no_memory(message, source->file);
-	text.out = made.out;
+	fd = process_scratch();
+	if (fd < 0)
+		fd = memfd_create("log", MFD_CLOEXEC);
+	text.out = fd >= 0 ? fdopen(fd, "w") : NULL;
+	if (text.out == NULL)
+		return source_refuse(message, DT_E_SYSTEM, source->file, 0, "%s", strerror(errno));
 	error = formats[format].text(&text, message);
-	if (!error && text.bytes > CAN_TEXT_MOST)
-		error = source_refuse(
-		        message, DT_E_RANGE, source->file, 0,
-		        "a CAN log of more than 2 GiB as candump text: cut it, or save it as such");
-	if (text_close(&made, error) != 0)
-		return error ? error : source_no_memory(message, source->file);
-	source_replace(source, made.bytes, made.size);
-	return 0;
+	if (!error && fflush(text.out) != 0)
+		error = source_refuse(message, DT_E_SYSTEM, source->file, 0, "%s", strerror(errno));
+	if (!error)
+		error = source_remake(source, fd, message);
+	fclose(text.out);
+	return error;
 }

@@ -2,8 +2,8 @@
 #ifndef DT_HOST_RECORD_CAN_TEXT_H
 #define DT_HOST_RECORD_CAN_TEXT_H
 /*
- * CAN logs of other programs as candump text, in memory, before anything else looks at them: all that is done
- * with candump text is done with them.
+ * CAN logs of other programs as candump text, in a file on the disk, before anything else looks at them: all
+ * that is done with candump text is done with them.
  *
  *     ASC      Vector's text (can_asc.c), logs of CANoe, python-can and log2asc
  *     pcapng   and pcap, of SocketCAN (can_pcap.c)

@@ -1,14 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "host/record/encoding.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #include "host/base/mapped.h"
 
 enum {
 	LOOKED_AT = 4096,
-	UTF8_MOST = 4,
 	REPLACEMENT = 0xFFFD,
 	PART = 1 << 20, /* bytes of a pass, then mapped_seen is told */
 };
@@ -62,6 +60,8 @@ static size_t from_utf16(const unsigned char *bytes, size_t size, bool big, char
 			c = REPLACEMENT;
 		}
 		used += put_utf8(to + used, c);
+		if (at % PART < 2)
+			mapped_seen(2 * PART);
 	}
 	return used;
 }
@@ -70,8 +70,11 @@ static size_t from_cp1252(const unsigned char *bytes, size_t size, char *to)
 {
 	size_t used = 0;
 
-	for (size_t at = 0; at < size; at++) /* what is between stands in no unit */
+	for (size_t at = 0; at < size; at++) { /* what is between stands in no unit */
 		used += put_utf8(to + used, bytes[at] >= 0x80 && bytes[at] < 0xA0 ? '?' : bytes[at]);
+		if (at % PART == 0)
+			mapped_seen(2 * PART);
+	}
 	return used;
 }
 
@@ -195,21 +198,39 @@ static bool settle_line_ends(struct source *source)
 
 	if (source->lines > 0 || memchr(source->bytes, '\r', size) == NULL)
 		return true;
-	text = malloc(size);
+	text = mapped_array(size, 1);
 	if (text == NULL)
 		return false;
-	for (size_t at = 0; at < size; at++)
+	for (size_t at = 0; at < size; at++) {
 		text[at] = source->bytes[at] == '\r' ? '\n' : source->bytes[at];
+		if (at % PART == PART - 1)
+			mapped_seen(2 * PART);
+	}
 	source_replace(source, text, size);
 	source->lines = look(text, size).lines;
 	return true;
+}
+
+/* Bytes in UTF-8, or somewhat more. */
+static size_t room_for(const struct source *source, char order)
+{
+	size_t high = 0;
+
+	if (order != '\0')
+		return source->size / 2 * 3;
+	for (size_t at = 0; at < source->size; at++) {
+		high += (unsigned char)source->bytes[at] >= 0x80;
+		if (at % PART == 0)
+			mapped_seen(PART);
+	}
+	return source->size + high;
 }
 
 /* In UTF-16 or CP1252. */
 static bool settle_other(struct source *source, char order)
 {
 	const unsigned char *bytes = (const unsigned char *)source->bytes;
-	char *text = malloc(2 * source->size + UTF8_MOST);
+	char *text = mapped_array(room_for(source, order), 1);
 	size_t used;
 
 	if (text == NULL)

@@ -64,10 +64,12 @@ static int helper_run(const struct helper *helper, const char *verb, const char 
 int helper_read(const struct helper *helper, const struct source *source, struct process_streams *streams,
                 char message[READ_MESSAGE_MAX])
 {
+	char path[SOURCE_PATH_MAX];
 	int error = 0;
 
 	/* in memory where the disk has no room */
-	if (source->mapped == NULL || process_streams_open_file(streams, source->file) != 0)
+	if (source->mapped == NULL ||
+	    process_streams_open_file(streams, source_path(path, source->descriptor)) != 0)
 		error = process_streams_open(streams, source->bytes, source->size);
 	if (error != 0)
 		return source_refuse(message, DT_E_SYSTEM, source->file, 0, "%s", strerror(error));

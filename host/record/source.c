@@ -108,6 +108,7 @@ static bool source_map(struct source *source, int descriptor, const struct stat 
 		return false;
 	source->size = (size_t)stat->st_size;
 	source->mapped = source->bytes = mapped_file(descriptor, source->size);
+	source->descriptor = descriptor;
 	return source->mapped != NULL;
 }
 
@@ -135,9 +136,10 @@ int source_load(struct source *source, const char *file, const char *expected, c
 		return refuse_system(message, &loaded);
 	if (fstat(descriptor, &stat) != 0)
 		stat = (struct stat){0};
-	if (!source_map(&loaded, descriptor, &stat))
+	if (!source_map(&loaded, descriptor, &stat)) {
 		error = source_copy(&loaded, descriptor, &stat, message);
-	close(descriptor);
+		close(descriptor);
+	}
 	if (!error)
 		source_skip_mark(&loaded);
 	if (error) {
@@ -150,9 +152,32 @@ int source_load(struct source *source, const char *file, const char *expected, c
 
 void source_free(struct source *source)
 {
+	if (source->mapped != NULL)
+		close(source->descriptor);
 	mapped_free(source->mapped != NULL ? source->mapped : source->bytes);
 	source->mapped = source->bytes = NULL;
 	source->size = 0;
+}
+
+const char *source_path(char path[SOURCE_PATH_MAX], int descriptor)
+{
+	snprintf(path, SOURCE_PATH_MAX, "/proc/self/fd/%d", descriptor);
+	return path;
+}
+
+int source_remake(struct source *source, int fd, char message[READ_MESSAGE_MAX])
+{
+	struct source made;
+	char path[SOURCE_PATH_MAX];
+	int error = source_load(&made, source_path(path, fd), source->expected, message);
+
+	if (error)
+		return source_refuse(message, error, source->file, 0, "%s, expected %s", error_text(error),
+		                     source->expected);
+	made.file = source->file;
+	source_free(source);
+	*source = made;
+	return 0;
 }
 
 bool source_is_binary(const char *head, size_t length)

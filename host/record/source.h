@@ -19,8 +19,9 @@ struct source {
 	const char *expected; /* of it, for its refusal */
 	char *bytes;          /* not terminated */
 	size_t size;
-	size_t lines; /* line ends, once encoding_settle has counted them */
-	void *mapped; /* what bytes lie in, when they must not be written to; else NULL */
+	size_t lines;   /* line ends, once encoding_settle has counted them */
+	void *mapped;   /* what bytes lie in, when they must not be written to; else NULL */
+	int descriptor; /* of what is mapped: a file of that name, or what was made of it */
 };
 
 struct source_line {
@@ -38,7 +39,15 @@ void source_free(struct source *source);
 /* Whether a zero byte is among the first 64, as in no text: a magic of letters alone may be a word. */
 bool source_is_binary(const char *head, size_t length);
 
-/* Other bytes in place of its own, from malloc. */
+/* The name by which another process can open it. */
+enum { SOURCE_PATH_MAX = 32 };
+const char *source_path(char path[SOURCE_PATH_MAX], int descriptor);
+
+/* What a file holds that was made of it, in place of its bytes. 0, or an error told in message: it is as it
+ * was, then. */
+DT_MUST_USE int source_remake(struct source *source, int fd, char message[READ_MESSAGE_MAX]);
+
+/* Other bytes in place of its own, from mapped_array. */
 void source_replace(struct source *source, char *bytes, size_t size);
 
 /* Steps from line to line; start with a zeroed *line. */

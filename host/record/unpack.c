@@ -2,8 +2,6 @@
 #include "host/record/unpack.h"
 
 #include <errno.h>
-#include <fcntl.h>
-#include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -30,75 +28,61 @@ const char *unpack_program(const char *head, size_t length)
 	return NULL;
 }
 
-static int refuse_status(const struct source *packed, const char *program, int status, int err, char *message)
+static int refuse_status(const struct source *packed, int status, int err, char *message)
 {
 	char text[200] = "";
 	ssize_t length = pread(err, text, sizeof(text) - 1, 0);
 
 	text[length > 0 ? length : 0] = '\0';
 	text[strcspn(text, "\n")] = '\0';
-	if (status == 127)
-		return source_refuse(message, DT_E_UNKNOWN, packed->file, 0,
-		                     "compressed by %s, which is not installed here", program);
-	return source_refuse(message, DT_E_FORMAT, packed->file, 0,
-	                     "compressed file damaged or cut, nothing of it is used: %s (exit %d)", text,
-	                     status);
+	return source_refuse(
+	        message, DT_E_FORMAT, packed->file, 0,
+	        "compressed file damaged or cut, or no room for it, nothing of it is used: %s (exit %d)",
+	        text, status);
 }
 
-/* Reads what the program gives while it works. */
-static int unpack_run(struct source *unpacked, const struct source *packed, const char *program,
-                      const struct process_streams *streams, char *message)
+/* Both ends on the disk, if the packed file is mapped: neither fits into memory for certain. In memory where
+ * that has no room. */
+static int open_streams(struct process_streams *streams, const struct source *packed)
 {
-	const char *const words[] = {program, "-dc", NULL};
-	struct process process = {.words = words, .fd = {streams->fd[0], 0, streams->fd[2]}};
-	char path[32];
-	pid_t pid;
-	int ends[2], error, status;
+	char path[SOURCE_PATH_MAX];
+	int error, scratch;
 
-	if (pipe2(ends, O_CLOEXEC) != 0)
-		return source_refuse(message, DT_E_SYSTEM, packed->file, 0, "%s", strerror(errno));
-	process.fd[1] = ends[1];
-	error = process_start(&process, &pid);
-	close(ends[1]);
-	if (error != 0) {
-		close(ends[0]);
-		return error == ENOENT ? refuse_status(packed, program, 127, streams->fd[2], message)
-		                       : source_refuse(message, DT_E_SYSTEM, packed->file, 0, "%s: %s",
-		                                       program, strerror(error));
-	}
-	snprintf(path, sizeof(path), "/proc/self/fd/%d", ends[0]);
-	error = source_load(unpacked, path, packed->expected, message);
-	close(ends[0]);
-	status = process_wait(pid);
-	if (status == 0 && error == 0)
+	if (packed->mapped != NULL &&
+	    process_streams_open_file(streams, source_path(path, packed->descriptor)) == 0)
 		return 0;
-	if (error == 0)
-		source_free(unpacked);
-	if (status != 0 && error != DT_E_RANGE && error != DT_E_MEMORY)
-		return refuse_status(packed, program, status, streams->fd[2], message);
-	return source_refuse(message, error, packed->file, 0, "%s",
-	                     error == DT_E_RANGE ? "unpacks to more than 2 GiB, or to nothing"
-	                                         : error_text(error));
+	error = process_streams_open(streams, packed->bytes, packed->size);
+	scratch = error == 0 ? process_scratch() : -1;
+	if (scratch >= 0) {
+		close(streams->fd[1]);
+		streams->fd[1] = scratch;
+	}
+	return error;
 }
 
 int unpack(struct source *source, char message[READ_MESSAGE_MAX])
 {
 	const char *program = unpack_program(source->bytes, source->size);
+	const char *const words[] = {program, "-dc", NULL};
 	struct process_streams streams;
-	struct source unpacked = {0};
-	int error;
+	int error, status;
 
 	if (program == NULL)
 		return 0;
-	error = process_streams_open(&streams, source->bytes, source->size);
+	error = open_streams(&streams, source);
 	if (error != 0)
 		return source_refuse(message, DT_E_SYSTEM, source->file, 0, "%s", strerror(error));
-	error = unpack_run(&unpacked, source, program, &streams, message);
+	status = process_filter(words, &streams);
+	if (status == -ENOENT)
+		error = source_refuse(message, DT_E_UNKNOWN, source->file, 0,
+		                      "compressed by %s, which is not installed here", program);
+	else if (status < 0)
+		error = source_refuse(message, DT_E_SYSTEM, source->file, 0, "%s: %s", program,
+		                      strerror(-status));
+	else if (status > 0)
+		error = refuse_status(source, status, streams.fd[2], message);
+	else
+		error = source_remake(source, streams.fd[1], message);
 	process_streams_close(&streams);
-	if (error != 0)
-		return error;
-	unpacked.file = source->file;
-	source_free(source);
-	*source = unpacked;
-	return 0;
+	return error;
 }
