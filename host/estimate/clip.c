@@ -7,7 +7,6 @@
 
 enum {
 	EQUAL_EXTREMES = 3,
-	WALL_STEPS = 8,  /* that level samples of a round top do not fall at once */
 	EQUAL_APART = 3, /* noise may keep samples between them below the limit */
 };
 
@@ -18,16 +17,25 @@ enum {
 /* Of a step: numbers that are no nearer to whole ones have none. */
 #define STEP_WHOLE 1e-3
 
-double clip_step(const struct trace *trace)
+static double clip_least_rise(const struct trace *trace, size_t until)
 {
 	double least = INFINITY;
 
-	for (size_t k = 1; k < trace->count && k < CLIP_WINDOW; k++) {
+	for (size_t k = 1; k < until; k++) {
 		double rise = fabs(trace->value_g[k] - trace->value_g[k - 1]);
 
 		if (trace_good(trace, k) && trace_good(trace, k - 1) && rise > 0)
 			least = fmin(least, rise);
 	}
+	return least;
+}
+
+double clip_step(const struct trace *trace)
+{
+	double least = clip_least_rise(trace, trace->count < CLIP_WINDOW ? trace->count : CLIP_WINDOW);
+
+	if (!isfinite(least)) /* level so long */
+		least = clip_least_rise(trace, trace->count);
 	return isfinite(least) ? least : 0;
 }
 
@@ -48,35 +56,74 @@ static bool trembles(const struct trace *trace, double steps)
 
 static bool clip_whole(double steps)
 {
-	return fabs(steps - round(steps)) < STEP_WHOLE;
+	return fabs(steps) < 1 / LIMIT_SMALL && fabs(steps - round(steps)) < STEP_WHOLE;
 }
 
-/* Whether they are coarse numbers and do not end in a wall on either side: a round top may be so level. */
-static bool clip_level(const struct trace *trace, size_t first, size_t last)
+double clip_resolution(const struct trace *trace, double noise_g)
+{
+	double step = clip_step(trace);
+
+	if (!(noise_g < step / 2))
+		return 0;
+	for (size_t k = trace->first + 1; k < trace->last; k++)
+		if (trace_good(trace, k) && trace_good(trace, k - 1) &&
+		    !clip_whole((trace->value_g[k] - trace->value_g[k - 1]) / step))
+			return 0;
+	return step;
+}
+
+/* Whether those beside a group, and it, are whole steps apart. */
+static bool clip_coarse(const struct trace *trace, size_t first, size_t last)
 {
 	const double *v = trace->value_g;
-	double step = clip_step(trace), before, after;
+	double step = clip_step(trace);
 
-	if (first < 2 || last + 1 >= trace->count)
-		return false;
-	before = fabs(v[first] - v[first - 1]) / step;
-	after = fabs(v[last] - v[last + 1]) / step;
-	return fmin(before, after) <= WALL_STEPS && clip_whole(before) && clip_whole(after) &&
-	       clip_whole((v[first] - v[first - 2]) / step);
+	return first >= 2 && last + 1 < trace->count && clip_whole((v[first] - v[first - 1]) / step) &&
+	       clip_whole((v[first] - v[last + 1]) / step) && clip_whole((v[first] - v[first - 2]) / step);
+}
+
+/* The samples to either side that foretell: the next, and some further out than half of what they are about.
+ */
+static size_t clip_aside(size_t first, size_t last)
+{
+	return 2 + (last - first) / 4;
+}
+
+/* Whether they foretell more than the equal ones show: a parabola through them, about their middle. */
+static bool clip_foretold(const struct trace *trace, size_t first, size_t last, double noise_g)
+{
+	const double *v = trace->value_g;
+	size_t aside = clip_aside(first, last);
+	double half = (double)(last - first) / 2, square = (half + 1) * (half + 1);
+	double reach = square / ((half + (double)aside) * (half + (double)aside) - square);
+	double near = (v[first - 1] + v[last + 1]) / 2, far = (v[first - aside] + v[last + aside]) / 2;
+	double beyond = near + reach * (near - far) - v[first];
+	double spread = sqrt(((1 + reach) * (1 + reach) + reach * reach) / 2 + 0.5);
+
+	return beyond * (v[first] - near) > 0 &&
+	       fabs(beyond) > LIMIT_AGREE * spread * hypot(noise_g, clip_step(trace) / sqrt(12.0)) +
+	                              LIMIT_EDGE * fabs(v[first] - near);
 }
 
 /* Whether n equal extremes make a limit: one at the known range, others where chance cannot make them equal,
- * or has done so before. */
-static bool enough(const struct trace *trace, size_t first, size_t last, size_t n)
+ * or where those beside foretell more once noise is known. */
+static bool enough(const struct trace *trace, size_t first, size_t last, size_t n, double noise_g)
 {
 	double extreme = fabs(trace->value_g[first]);
+	size_t aside = clip_aside(first, last);
 
 	if (trace->range_g > 0 && fabs(extreme - trace->range_g) <= 1e-9 * trace->range_g)
 		return true;
-	if (n < EQUAL_EXTREMES)
-		return n == EQUAL_EXTREMES - 1 && trembles(trace, TREMBLE_STEPS);
-	return trembles(trace, TREMBLE_THREE) || trace->twins < trace->count ||
-	       !clip_level(trace, first, last);
+	if (trembles(trace, n < EQUAL_EXTREMES ? TREMBLE_STEPS : TREMBLE_THREE))
+		return n >= EQUAL_EXTREMES - 1;
+	if (n >= EQUAL_EXTREMES && !clip_coarse(trace, first, last))
+		return true;
+	if (!isfinite(noise_g) || (n < EQUAL_EXTREMES && (n < 2 || last - first > 1)))
+		return false;
+	if (first >= aside && last + aside < trace->count && trace_good(trace, first - aside) &&
+	    trace_good(trace, first - 1) && trace_good(trace, last + 1) && trace_good(trace, last + aside))
+		return clip_foretold(trace, first, last, noise_g);
+	return n >= EQUAL_EXTREMES;
 }
 
 static bool at_extreme(const struct trace *trace, size_t k, double extreme_g)
@@ -98,7 +145,7 @@ static size_t next_extreme(const struct trace *trace, size_t k, double extreme_g
 	return trace->count;
 }
 
-static void mark_groups(struct trace *trace, double extreme_g)
+static void mark_groups(struct trace *trace, double extreme_g, double noise_g)
 {
 	size_t k = next_extreme(trace, 0, extreme_g);
 
@@ -110,15 +157,8 @@ static void mark_groups(struct trace *trace, double extreme_g)
 			last = k;
 			n++;
 		}
-		if (2 * n <= last - first)
+		if (2 * n <= last - first || !enough(trace, first, last, n, noise_g))
 			continue;
-		if (!enough(trace, first, last, n)) {
-			if (n >= EQUAL_EXTREMES || (n == 2 && last - first == 1)) {
-				trace->twins = first;
-				trace->twins_last = last;
-			}
-			continue;
-		}
 		trace->flags |= RECORD_FLAG_CLIPPED;
 		for (size_t i = first; i <= last; i++)
 			if (at_extreme(trace, i, extreme_g))
@@ -126,11 +166,10 @@ static void mark_groups(struct trace *trace, double extreme_g)
 	}
 }
 
-void clip_mark(struct trace *trace)
+void clip_mark(struct trace *trace, double noise_g)
 {
 	double low = INFINITY, high = -INFINITY;
 
-	trace->twins = trace->count;
 	for (size_t i = 0; i < trace_blocks(trace); i++) {
 		low = trace->block[i].low_g < low ? trace->block[i].low_g : low;
 		high = trace->block[i].high_g > high ? trace->block[i].high_g : high;
@@ -138,48 +177,7 @@ void clip_mark(struct trace *trace)
 	if (!(high > low))
 		return;
 	if (high >= -low / 2)
-		mark_groups(trace, high);
+		mark_groups(trace, high, noise_g);
 	if (-low >= high / 2)
-		mark_groups(trace, low);
-}
-
-/* The samples to either side that foretell: the next, and some further out than half of what they are about.
- */
-static size_t clip_aside(size_t first, size_t last)
-{
-	return 2 + (last - first) / 4;
-}
-
-/* Whether they foretell more than the equal ones show: a parabola through them, about their middle. */
-static bool clip_foretold(const struct trace *trace, size_t first, size_t last, double noise_g)
-{
-	const double *v = trace->value_g;
-	size_t aside = clip_aside(first, last);
-	double half = (double)(last - first) / 2, square = (half + 1) * (half + 1);
-	double reach = square / ((half + (double)aside) * (half + (double)aside) - square);
-	double near = (v[first - 1] + v[last + 1]) / 2, far = (v[first - aside] + v[last + aside]) / 2;
-	double beyond = near + reach * (near - far) - v[first];
-	double spread = sqrt(((1 + reach) * (1 + reach) + reach * reach) / 2 + 0.5);
-	double noise = hypot(noise_g, clip_step(trace) / sqrt(12.0));
-
-	return beyond * (v[first] - near) > 0 && fabs(beyond) > LIMIT_AGREE * spread * noise;
-}
-
-void clip_judge_twins(struct trace *trace, double noise_g)
-{
-	size_t first = trace->twins, last = trace->twins_last;
-	size_t aside = clip_aside(first, last);
-	bool limit = last - first >= EQUAL_EXTREMES - 1;
-
-	if (first == trace->count || trace->sample[first] & TRACE_LIMIT)
-		return;
-	if (first >= aside && last + aside < trace->count && trace_good(trace, first - aside) &&
-	    trace_good(trace, first - 1) && trace_good(trace, last + 1) && trace_good(trace, last + aside))
-		limit = clip_foretold(trace, first, last, noise_g);
-	if (!limit)
-		return;
-	trace->flags |= RECORD_FLAG_CLIPPED;
-	for (size_t k = first; k <= last; k++)
-		if (at_extreme(trace, k, trace->value_g[first]))
-			trace->sample[k] |= SAMPLE_CLIPPED | TRACE_LIMIT;
+		mark_groups(trace, low, noise_g);
 }

@@ -46,9 +46,6 @@ enum {
 /* What a width of n samples is off, times n squared: kinks between the samples. */
 #define WIDTH_BIAS 1.4
 
-/* How far from whole numbers of steps readings may be that a drift was taken off. */
-#define WHOLE_STEPS 0.02
-
 /* The samples of a flat top, both included. */
 struct plateau {
 	size_t from, until;
@@ -112,6 +109,7 @@ static struct tremble plateau_tremble(const struct trace *trace, const struct pl
 
 	for (size_t k = top->from; k <= top->until; k++)
 		mean += trace->value_g[k] / n;
+	tremble.square = n * trace->step_g * trace->step_g / 12; /* that rounding hides */
 	for (size_t k = top->from; k <= top->until; k++) {
 		double off = trace->value_g[k] - mean;
 
@@ -178,7 +176,7 @@ static double plateau_noise(const struct trace *trace, double noise_g)
 	size_t from, until;
 
 	quiet_find(trace, &from, &until);
-	return fmin(noise_g, quiet_noise(trace, from, until));
+	return fmin(noise_g, hypot(quiet_noise(trace, from, until), trace->step_g / sqrt(12.0)));
 }
 
 void doubt_plateau(struct trace *trace, double noise_g)
@@ -341,8 +339,10 @@ static void after_find(const struct trace *trace, const struct estimate_baseline
 		if (!doubt_mean(trace, k, after->samples, mean))
 			break;
 		*mean *= peak->sign;
-		if (after->n > 0 && *mean > fmax(mean[-1], 0) + again)
+		if (after->n > 0 && *mean > fmax(mean[-1], 0) + again) {
+			after->n--; /* it may have begun there */
 			break;
+		}
 	}
 }
 
@@ -448,28 +448,6 @@ static void doubt_endless(const struct trace *trace, struct peak *peak)
 	}
 }
 
-/* The step that all readings of the pulse are multiples of, where noise does not spread them over several; 0:
- * none. */
-static double doubt_resolution(const struct trace *trace, const struct estimate_pulse *pulse)
-{
-	size_t from = trace_index(trace, pulse->start_s), until = trace_index(trace, pulse->end_s);
-	double step_g = INFINITY;
-
-	for (size_t k = from + 1; k <= until && k < trace->count; k++) {
-		double rise = fabs(trace->value_g[k] - trace->value_g[k - 1]);
-
-		if (rise > 0)
-			step_g = fmin(step_g, rise);
-	}
-	for (size_t k = from + 1; k <= until && k < trace->count; k++) {
-		double steps = fabs(trace->value_g[k] - trace->value_g[k - 1]) / step_g;
-
-		if (!(fabs(steps - round(steps)) < WHOLE_STEPS))
-			return 0;
-	}
-	return isfinite(step_g) && trace->noise_g < step_g / 2 ? step_g : 0;
-}
-
 static void doubt_flag(struct peak *peak, struct estimate_pulse *pulse, unsigned flag)
 {
 	peak->result.how.flags |= flag;
@@ -497,6 +475,6 @@ void doubt_channel(const struct trace *trace, const struct estimate_baseline *ba
 	if (samples < WIDTH_SAMPLES)
 		pulse->sigma_duration_s =
 		        hypot(pulse->sigma_duration_s, WIDTH_BIAS / (samples * samples) * pulse->duration_s);
-	peak->result.sigma_g = hypot(peak->result.sigma_g, doubt_resolution(trace, pulse) / sqrt(12.0));
+	peak->result.sigma_g = hypot(peak->result.sigma_g, trace->step_g / sqrt(12.0));
 	doubt_after(trace, baseline, peak, pulse);
 }

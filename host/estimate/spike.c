@@ -17,13 +17,15 @@ enum {
 #define ONE_BENDS 2.0
 #define WIDE_BENDS 4.0
 
-/* Deviation over mean magnitude: a Gaussian has 1.253, Laplace 1.41. Asked where samples of the quiet part
- * reach so far, which a Gaussian's hardly do. */
-#define TAIL_RATIO 1.33
+/* Deviation over mean magnitude: a Gaussian's, and its standard deviation times the root of how many samples;
+ * Laplace has 1.41, Student's with five degrees of freedom 1.36. Asked where samples of the quiet part reach
+ * so far, which a Gaussian's hardly do. */
+#define TAIL_RATIO 1.2533
+#define TAIL_SPREAD 0.334
 #define TAIL_ASKED 4.5
 
 /* Of the quiet part's largest: a spike of the same noise stands off by no more. */
-#define TAIL_AGAIN 2.0
+#define TAIL_AGAIN 3.0
 
 /* |second difference| about sample k */
 static double spike_bend(const double *v)
@@ -289,13 +291,13 @@ bool spike_mark(struct trace *trace, double noise_g)
 
 /* The largest of the samples in the quiet part, marked ones too; how far those that are not reach. */
 struct reach {
-	double most, ratio;
+	double most, ratio, count;
 };
 
 static struct reach spike_reach(const struct trace *trace, size_t from, size_t until)
 {
-	struct reach reach = {0, 0};
-	double sum = 0, square = 0, n = 0;
+	struct reach reach = {0, 0, 0};
+	double sum = 0, square = 0;
 
 	for (size_t k = from; k < until; k++) {
 		double value = fabs(trace->value_g[k]);
@@ -307,9 +309,9 @@ static struct reach spike_reach(const struct trace *trace, size_t from, size_t u
 			continue;
 		sum += value;
 		square += value * value;
-		n++;
+		reach.count++;
 	}
-	reach.ratio = n > 0 && sum > 0 ? sqrt(square * n) / sum : 0;
+	reach.ratio = sum > 0 ? sqrt(square * reach.count) / sum : 0;
 	return reach;
 }
 
@@ -334,7 +336,7 @@ void spike_of_noise(struct trace *trace, const struct estimate_baseline *baselin
 	if (!reaches_far(trace, from, until))
 		return;
 	reach = spike_reach(trace, from, until);
-	if (!(reach.ratio > TAIL_RATIO))
+	if (!(reach.ratio > TAIL_RATIO + LIMIT_AGREE * TAIL_SPREAD / sqrt(reach.count)))
 		return;
 	for (size_t k = 1; k + 1 < trace->count; k++)
 		if (trace->sample[k] & SAMPLE_SPIKE &&

@@ -129,7 +129,7 @@ void trace_marked(struct trace *trace)
 	for (size_t k = 0; k < trace->count; k += TRACE_BLOCK)
 		if (trace->count - k < TRACE_BLOCK || marks_of(trace->sample + k) & bad)
 			trace_look(trace, k, trace->value_g + k);
-	clip_mark(trace);
+	clip_mark(trace, NAN);
 }
 
 /* Without a rate no sample has a time. */
@@ -162,7 +162,7 @@ void trace_lay(struct trace *trace, const struct channel *channel, double from_s
 	trace->block = (struct trace_block *)(void *)(trace->value_g + trace->count);
 	trace->sample = (uint8_t *)(trace->block + trace_blocks(trace));
 	copy(trace, channel);
-	clip_mark(trace);
+	clip_mark(trace, NAN);
 	trace->first = trace_index(trace, from_s);
 	trace->last = trace_index(trace, until_s);
 }

@@ -43,8 +43,7 @@ struct trace {
 	                 */
 	unsigned flags; /* RECORD_FLAG_* */
 	double range_g; /* the channel's */
-	size_t twins;   /* the first of a few extremes that are equal, perhaps by chance; count if none */
-	size_t twins_last;
+	double step_g;  /* that readings are whole numbers of, where noise does not spread them; 0: finer */
 	struct trace_block *block; /* [trace_blocks] */
 	void *memory;              /* of trace_open */
 };

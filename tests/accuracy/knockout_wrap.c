@@ -8,7 +8,6 @@
 #include "host/estimate/bell.h"
 #include "host/estimate/bridge.h"
 #include "host/estimate/bump.h"
-#include "host/estimate/clip.h"
 #include "host/estimate/crest.h"
 #include "host/estimate/driven.h"
 #include "host/estimate/dropout.h"
@@ -53,7 +52,6 @@ const struct knockout knockouts[] = {
         {"zero again after spikes", "baseline.c:baseline_holds"},
         {"high-pass undone", "iepe.c iepe.h"},
         {"clipped: from the flanks", "peak_clipped.c"},
-        {"clipped: pair of extremes", "clip.c:clip_judge_twins"},
         {"polynomials", "crest.c crest.h local.c local.h"},
         {"weak axes", "peak_weak.c"},
         {"curve between samples", "guide.c guide.h"},
@@ -90,7 +88,6 @@ WRAP(void, iepe_undo, (struct trace * t, double from_s, double tau_s), (t, from_
      "high-pass undone", )
 WRAP(bool, peak_unclip, (const struct trace *t, const struct estimate_options *o, struct peak *p), (t, o, p),
      "clipped: from the flanks", false)
-WRAP(void, clip_judge_twins, (struct trace * t, double noise_g), (t, noise_g), "clipped: pair of extremes", )
 WRAP(bool, crest_fit,
      (struct crest * c, const struct trace *const axes[], unsigned n, double near_s, double width_s,
       const struct local_span *s),
