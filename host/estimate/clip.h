@@ -16,8 +16,8 @@ enum { CLIP_WINDOW = 256 }; /* samples the step of the numbers is looked for in,
 /* The step of the numbers that samples come in, in g: the least rise; 0 where none rises. */
 double clip_step(const struct trace *trace);
 
-/* The same where it is more than twice the noise and all of the event comes in it: readings that do not average
- * out. 0 elsewhere. */
+/* The same where it is more than twice the noise and all of the event comes in it: readings that do not
+ * average out. 0 elsewhere. */
 double clip_resolution(const struct trace *trace, double noise_g);
 
 void clip_mark(struct trace *trace, double noise_g);
