@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 #
 # The board, a Nucleo-G474RE: $(BUILD)/firmware-stm32g474/firmware.elf and .bin. On the host the drivers, without
-# port.c and start.c, are a library for their tests, which bring a register model.
+# port.c and start.c, are a library for their tests, which bring a register model. The image is the same in whatever folder.
 
 PACKAGES_TEST += gcc-arm-none-eabi
 
@@ -13,7 +13,7 @@ STM32G474_CC = arm-none-eabi-gcc
 STM32G474_CPU = -mcpu=cortex-m4 -mthumb -mfloat-abi=soft
 STM32G474_CFLAGS = -std=c11 -O2 -g $(WARNINGS) $(STM32G474_CPU) -ffreestanding -nostdinc \
 	-isystem $(shell $(STM32G474_CC) -print-file-name=include) -fno-common -ffunction-sections -fdata-sections \
-	-fno-tree-loop-distribute-patterns -Wstack-usage=512 -fcallgraph-info=su
+	-fno-tree-loop-distribute-patterns -Wstack-usage=512 -fcallgraph-info=su -fdebug-prefix-map=$(CURDIR)=.
 
 .PHONY: stm32g474
 stm32g474: $(STM32G474)/firmware.bin ## build the firmware for the board and print its size
