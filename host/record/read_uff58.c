@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "common/base/number.h"
+#include "host/base/mapped.h"
 #include "host/record/drop.h"
 #include "host/record/fields.h"
 #include "host/record/seal.h"
@@ -93,6 +94,8 @@ static void settle_samples(struct channel *channel, double factor)
 	for (size_t k = 0; k < channel->count; k++) {
 		channel->value_g[k] *= factor;
 		channel->sample[k] = isfinite(channel->value_g[k]) ? 0 : SAMPLE_BAD;
+		if (k % RECORD_PART == 0)
+			mapped_seen(RECORD_PART * (sizeof(double) + 1));
 	}
 }
 
@@ -141,7 +144,7 @@ static int read_uff58_channel(struct reading *reading, const struct uff58_head *
 		return UFF58_REFUSE(&reading->text, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
 	channel->start_s = head->start * unit_s;
 	if (!head->even)
-		time_s = malloc(head->count * sizeof(*time_s));
+		time_s = mapped_array(head->count, sizeof(*time_s));
 	if (!head->even && !time_s)
 		return UFF58_REFUSE(&reading->text, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
 	line = reading->text.line.number + 1;
@@ -151,11 +154,14 @@ static int read_uff58_channel(struct reading *reading, const struct uff58_head *
 	                       : uff58_read_data(&reading->text, head, channel->value_g, time_s);
 	if (!error)
 		settle_samples(channel, unit_factor_g(head->unit));
-	for (size_t k = 0; !error && time_s && k < head->count; k++)
+	for (size_t k = 0; !error && time_s && k < head->count; k++) {
 		time_s[k] *= unit_s;
+		if (k % RECORD_PART == 0)
+			mapped_seen(RECORD_PART * sizeof(double));
+	}
 	if (!error && time_s)
 		error = settle_times(reading, head, line, channel, time_s);
-	free(time_s);
+	mapped_free(time_s);
 	return error;
 }
 
@@ -236,13 +242,16 @@ static uint64_t read_uff58_line_of(const struct reading *reading, const struct c
 /* A field that is no number is no good sample, whatever its mask says. */
 static int check_good(const struct reading *reading, const struct channel *channel)
 {
-	for (size_t k = 0; k < channel->count; k++)
+	for (size_t k = 0; k < channel->count; k++) {
+		if (k % RECORD_PART == 0)
+			mapped_seen(RECORD_PART * (sizeof(double) + 1));
 		if (!isfinite(channel->value_g[k]) && !(channel->sample[k] & (SAMPLE_LOST | SAMPLE_BAD)))
 			return source_refuse(reading->text.message, DT_E_FORMAT, reading->text.source->file,
 			                     read_uff58_line_of(reading, channel, k),
 			                     "sample %zu of %s is no number and its mask calls it good, "
 			                     "expected a number",
 			                     k + 1, channel->name);
+	}
 	return 0;
 }
 
@@ -287,7 +296,7 @@ static int read_mask(struct reading *reading, const struct uff58_head *head)
 		return UFF58_REFUSE(&reading->text, DT_E_FORMAT,
 		                    "mask of \"%.32s\", expected it behind its channel, as long",
 		                    head->id[0]);
-	mask = malloc(head->count * sizeof(*mask));
+	mask = mapped_array(head->count, sizeof(*mask));
 	if (!mask)
 		return UFF58_REFUSE(&reading->text, DT_E_MEMORY, "%s", error_text(DT_E_MEMORY));
 	error = uff58_read_data(&reading->text, head, mask, NULL);
@@ -300,8 +309,10 @@ static int read_mask(struct reading *reading, const struct uff58_head *head)
 			channel->sample[k] = (uint8_t)mask[k];
 		if (channel->sample[k] & (SAMPLE_LOST | SAMPLE_BAD))
 			channel->value_g[k] = NAN;
+		if (k % RECORD_PART == 0)
+			mapped_seen(RECORD_PART * (2 * sizeof(double) + 1));
 	}
-	free(mask);
+	mapped_free(mask);
 	if (!error)
 		error = check_good(reading, channel);
 	for (int line = 2; line < UFF58_ID_LINES && !error; line++)

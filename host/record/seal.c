@@ -3,9 +3,15 @@
 
 #include <string.h>
 
+#include "host/base/mapped.h"
 #include "host/record/digest.h"
 
-enum { WORD = sizeof(SEAL_WORD) - 1, DIGITS = DIGEST_CHARS - 1, BLANK = WORD + DIGITS };
+enum {
+	WORD = sizeof(SEAL_WORD) - 1,
+	DIGITS = DIGEST_CHARS - 1,
+	BLANK = WORD + DIGITS,
+	PART = 1 << 20, /* bytes of a pass, then mapped_seen is told */
+};
 
 int seal_fill(char *bytes, size_t size)
 {
@@ -25,10 +31,15 @@ int seal_fill(char *bytes, size_t size)
 static const char *next_seal(const struct source *source, size_t *at)
 {
 	while (*at < source->size) {
-		const char *word = memmem(source->bytes + *at, source->size - *at, SEAL_WORD, WORD);
-		size_t place = word != NULL ? (size_t)(word - source->bytes) : source->size, digits = 0;
+		size_t left = source->size - *at, part = left < PART ? left : PART, digits = 0;
+		const char *word = memmem(source->bytes + *at, part, SEAL_WORD, WORD);
 
-		*at = place + WORD;
+		mapped_seen(part);
+		if (word == NULL) {
+			*at += part == left ? left : part - (WORD - 1);
+			continue;
+		}
+		*at = (size_t)(word - source->bytes) + WORD;
 		while (digits < DIGITS && *at + digits < source->size &&
 		       memchr("0123456789abcdef", source->bytes[*at + digits], 16) != NULL)
 			digits++;
@@ -36,6 +47,16 @@ static const char *next_seal(const struct source *source, size_t *at)
 			return source->bytes + *at;
 	}
 	return NULL;
+}
+
+static void take_bytes(struct sha256_ctx *context, const char *bytes, size_t size)
+{
+	for (size_t at = 0; at < size; at += PART) {
+		size_t part = size - at < PART ? size - at : PART;
+
+		sha256_update(context, part, (const uint8_t *)bytes + at);
+		mapped_seen(part);
+	}
 }
 
 int seal_check(const struct source *source, char message[READ_MESSAGE_MAX])
@@ -50,9 +71,9 @@ int seal_check(const struct source *source, char message[READ_MESSAGE_MAX])
 		return 0;
 	behind = (size_t)(seal - source->bytes) + DIGITS;
 	sha256_init(&context);
-	sha256_update(&context, (size_t)(seal - source->bytes), (const uint8_t *)source->bytes);
+	take_bytes(&context, source->bytes, (size_t)(seal - source->bytes));
 	sha256_update(&context, DIGITS, (const uint8_t *)blank + WORD);
-	sha256_update(&context, source->size - behind, (const uint8_t *)source->bytes + behind);
+	take_bytes(&context, source->bytes + behind, source->size - behind);
 	digest_end(&context, found);
 	if (memcmp(found, seal, DIGITS) == 0)
 		return 1;
