@@ -17,26 +17,35 @@ enum {
 /* Of a step: numbers that are no nearer to whole ones have none. */
 #define STEP_WHOLE 1e-3
 
-static double clip_least_rise(const struct trace *trace, size_t until)
+/* The largest that both are whole numbers of, to rounding. */
+static double clip_common(double a, double b)
 {
-	double least = INFINITY;
+	double least = STEP_WHOLE * fmin(a, b);
 
-	for (size_t k = 1; k < until; k++) {
-		double rise = fabs(trace->value_g[k] - trace->value_g[k - 1]);
+	while (b > least) {
+		double rest = fabs(remainder(a, b));
 
-		if (trace_good(trace, k) && trace_good(trace, k - 1) && rise > 0)
-			least = fmin(least, rise);
+		a = b;
+		b = rest;
 	}
-	return least;
+	return a;
 }
 
 double clip_step(const struct trace *trace)
 {
-	double least = clip_least_rise(trace, trace->count < CLIP_WINDOW ? trace->count : CLIP_WINDOW);
+	double least = INFINITY, common = 0;
 
-	if (!isfinite(least)) /* level so long */
-		least = clip_least_rise(trace, trace->count);
-	return isfinite(least) ? least : 0;
+	for (size_t k = 1; k < trace->count && (k < CLIP_WINDOW || !isfinite(least)); k++) {
+		double rise = fabs(trace->value_g[k] - trace->value_g[k - 1]);
+
+		if (!trace_good(trace, k) || !trace_good(trace, k - 1) || !(rise > 0))
+			continue;
+		if (k < CLIP_WINDOW)
+			least = fmin(least, rise);
+		else /* the beginning is level */
+			common = common > 0 ? clip_common(rise, common) : rise;
+	}
+	return isfinite(least) ? least : common;
 }
 
 /* Whether samples tremble by many steps of the numbers they come in. */

@@ -161,7 +161,7 @@ static bool flanks_meet(const struct trace *trace, const struct peak *peak, doub
 void peak_top_doubt(const struct trace *trace, struct peak *peak)
 {
 	struct estimate_peak *result = &peak->result;
-	double corner, flat, above, aside, d[3];
+	double corner, flat, above, aside, level, d[3];
 
 	if (peak->model == PEAK_MODEL_SHAPE)
 		return;
@@ -169,8 +169,12 @@ void peak_top_doubt(const struct trace *trace, struct peak *peak)
 		result->sigma_g = hypot(result->sigma_g, above / 2);
 		result->sigma_time_s = hypot(result->sigma_time_s, aside);
 	}
-	if (peak->model != PEAK_MODEL_LOCAL)
+	if (peak->model != PEAK_MODEL_LOCAL) {
+		/* No polynomial follows: any sample that is as high may be the peak. */
+		level = top_level(trace, peak, 1, LEVEL_SIGMAS * sqrt(2.0) * trace->noise_g);
+		result->sigma_time_s = hypot(result->sigma_time_s, level / 2);
 		return;
+	}
 	local_at(&peak->local, result->time_s, d);
 	corner = corner_doubt(trace, peak);
 	flat = hypot(flat_doubt(trace, peak, d), corner > 0 ? 0.5 / trace->rate_hz : 0);
