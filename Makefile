@@ -21,7 +21,8 @@ WARNINGS = -Wall -Wextra -Werror -Wconversion -Wshadow -Wstrict-prototypes -Wmis
 	-Wundef -Wcast-qual -Wwrite-strings -Wvla -Wpointer-arith -Wimplicit-fallthrough
 # Lines and names are all that a sanitizer's report needs.
 DEBUG = $(if $(SANITIZE),-g1,-g)
-CFLAGS = -std=c11 -O2 $(DEBUG) -ffp-contract=off -fno-common $(WARNINGS)
+OPTIMIZED = -O2
+CFLAGS = -std=c11 $(OPTIMIZED) $(DEBUG) -ffp-contract=off -fno-common $(WARNINGS)
 ifdef SANITIZE
 CFLAGS += -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
 LDFLAGS += -fsanitize=address,undefined
@@ -169,12 +170,15 @@ drop: ## set up, build, and run one simulated drop end to end (SCENE= ANGLE= OUT
 
 test: ## set up, build, and run every test; the last line counts them
 	@$(MAKE) --no-print-directory setup-test
-	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) all tests
-	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD)/sanitize CC=clang SANITIZE=1 all tests
+	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) all tests sanitized
 	@tests/run $(BUILD) $(BUILD)/sanitize
 
-.PHONY: tests
+.PHONY: tests sanitized
 tests: $(UNITS) $(TOOLS)
+
+# With the plain build's jobs: where one waits for a download or a link, the other compiles.
+sanitized: ## the whole of it again with clang and sanitizers, in build/sanitize
+	@$(MAKE) --no-print-directory BUILD=$(BUILD)/sanitize CC=clang SANITIZE=1 all tests
 
 # ---- more ---------------------------------------------------------------------------------------------
 
