@@ -7,9 +7,11 @@
 UNITS_ALONE = $(addprefix $(BUILD)/tests/,test_promises test_port_faults test_link_faults test_multibody)
 UNITS_TOGETHER = $(filter-out $(UNITS_ALONE),$(UNITS))
 DISPATCH_O = $(BUILD)/obj/tests/dispatch/dispatch.o
-# They are compiled twice, a third and a fourth of it for the optimizer, and few run for a second. Those alone repeat the
-# firmware's own steps by the million.
-$(UNITS_TOGETHER:$(BUILD)/tests/%=$(BUILD)/obj/tests/unit/%.o): OPTIMIZED = -O0
+# They are compiled twice, two thirds of it for the optimizer, and few run for a second: it is left out but where a test
+# itself computes for longer than that, or repeats the firmware's steps by the million.
+COMPUTING = $(UNITS_ALONE) $(addprefix $(BUILD)/tests/,test_doubt test_log_file test_planar)
+$(patsubst $(BUILD)/tests/%,$(BUILD)/obj/tests/unit/%.o,$(filter-out $(COMPUTING),$(UNITS))) \
+	$(call obj,$(wildcard tests/fault/canary_*.c)): OPTIMIZED = -O0
 UNIT_LIBRARIES = $(foreach l,console host hil firmware link common,$(call lib,$l))
 ALL_O += $(DISPATCH_O)
 

@@ -91,7 +91,6 @@ CANARY_C = $(wildcard tests/fault/canary_*.c)
 CANARIES = $(CANARY_C:tests/fault/%.c=$(BUILD)/tests/%)
 
 $(call obj,$(CANARY_C)): CPPFLAGS += $(LINUX)
-$(call obj,$(CANARY_C)): OPTIMIZED = -O0
 $(CANARIES): $(BUILD)/tests/%: $(BUILD)/obj/tests/fault/%.o
 	$(call say,LINK,$@)
 	$(Q)mkdir -p $(@D) && $(CC) $(LDFLAGS) $< -lcmocka -o $@
