@@ -24,17 +24,27 @@ double drop_range_g(const struct record *record)
 	       (double)WIRE_COUNTS_PER_G;
 }
 
+int drop_open_unheld(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_ms)
+{
+	uint32_t ticks = last_tick_ms - first_tick_ms + 1;
+
+	if (ticks == 0 || ticks > DROP_TICKS_MAX)
+		return DT_E_RANGE;
+	record_init(record);
+	record->is_drop = true;
+	record->first_tick_ms = first_tick_ms;
+	record->last_tick_ms = last_tick_ms;
+	return 0;
+}
+
 int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_ms)
 {
 	uint32_t ticks = last_tick_ms - first_tick_ms + 1;
 	struct record drop;
+	int error = drop_open_unheld(&drop, first_tick_ms, last_tick_ms);
 
-	if (ticks == 0 || ticks > DROP_TICKS_MAX)
-		return DT_E_RANGE;
-	record_init(&drop);
-	drop.is_drop = true;
-	drop.first_tick_ms = first_tick_ms;
-	drop.last_tick_ms = last_tick_ms;
+	if (error)
+		return error;
 	for (unsigned i = 0; i < DROP_CHANNELS; i++) {
 		uint32_t per_tick = i % 3 == 0 ? WIRE_X_PER_TICK : WIRE_YZ_PER_TICK;
 		struct channel *channel = record_add_channel(&drop, channel_names[i], 1000.0 * per_tick,
@@ -213,11 +223,31 @@ static void set_range(struct record *record)
 	}
 }
 
+/* What follows from all that was filled in, held being the blocks that are there. */
+static void judge(struct record *record, uint32_t held)
+{
+	struct frame end;
+
+	if (record->counters.blocks > held)
+		record->counters.blocks = held; /* of a file that ends before the last of them */
+	drop_capture_end(record, &end);
+	record->seal_agrees = record->seal_known && wire_check_capture_end(&end) == 0;
+	if (!record->crc_known || record->parameters_held != RECORD_PARAMETERS_ALL)
+		record->parameters_held = 0; /* nothing proves a part of the set */
+	record->parameters_known = parameters_agree(record);
+}
+
+void drop_close_unheld(struct record *record, uint32_t held)
+{
+	record->crc_agrees &= record->crc_known && held == WIRE_SENSORS * drop_ticks(record);
+	judge(record, held);
+	record_finish(record);
+}
+
 int drop_close(struct record *record)
 {
 	uint32_t ticks = drop_ticks(record), held = 0;
 	bool before = false;
-	struct frame end;
 
 	/* at worst every second tick of both sensors */
 	record->gaps = calloc((size_t)ticks + WIRE_SENSORS, sizeof(*record->gaps));
@@ -239,16 +269,10 @@ int drop_close(struct record *record)
 			held += !lost;
 		}
 	}
-	if (record->counters.blocks > held)
-		record->counters.blocks = held; /* of a file that ends before the last of them */
 	record->crc_agrees = record->crc_known && record->gap_count == 0 &&
 	                     (record->crc_agrees || samples_crc32(record) == record->crc32);
 	drop_set_axes(record);
-	drop_capture_end(record, &end);
-	record->seal_agrees = record->seal_known && wire_check_capture_end(&end) == 0;
-	if (!record->crc_known || record->parameters_held != RECORD_PARAMETERS_ALL)
-		record->parameters_held = 0; /* nothing proves a part of the set */
-	record->parameters_known = parameters_agree(record);
+	judge(record, held);
 	set_range(record);
 	record_finish(record);
 	return 0;

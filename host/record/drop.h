@@ -45,6 +45,11 @@ void drop_capture_end(const struct record *record, struct frame *frame);
  * compared the bytes that the samples are of. On DT_E_MEMORY the record is freed. */
 DT_MUST_USE int drop_close(struct record *record);
 
+/* Instead of drop_open to drop_close where nobody wants samples and gaps: a record without channels, of which
+ * the blocks are counted and crc_agrees is of the bytes. DT_E_RANGE. */
+DT_MUST_USE int drop_open_unheld(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_ms);
+void drop_close_unheld(struct record *record, uint32_t held);
+
 /* Whether the channels are those of a drop of its ticks, whole blocks of them, with its range or, as
  * files had it before that was worked out, the tower's own, which drop_close puts right: 0, DT_E_RANGE for
  * the ticks, DT_E_FORMAT for the channels, DT_E_MEMORY. */

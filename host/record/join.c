@@ -74,7 +74,8 @@ static void tell_loss(struct join *join, enum join_loss what)
 
 void join_forget_run(struct join *join)
 {
-	memset(join->ring, 0, sizeof(join->ring));
+	if (join->any) /* else it is empty */
+		memset(join->ring, 0, sizeof(join->ring));
 	join->any = false;
 	join->any_live[0] = join->any_live[1] = false;
 	join->end_seen = false;

@@ -36,6 +36,9 @@ void lcm_codec_free_drop(droptower_drop *drop);
 /* And back; *record is initialised by the call. crc_agrees is not believed but computed. */
 DT_MUST_USE int lcm_codec_record(const droptower_drop *drop, struct record *record);
 
+/* The same without channels, samples and gaps, for who only wants to know of the drop. */
+DT_MUST_USE int lcm_codec_outline(const droptower_drop *drop, struct record *record);
+
 /* The generated decoders believe the counts in a message, and that there is memory; these check both. A
  * decoded drop is freed with lcm_codec_free_drop. One that is cut has lost its end: the ticks that are not
  * whole are gaps of it; DT_E_FORMAT where none is. */

@@ -90,7 +90,7 @@ static void log_walk_hold(struct log_walk *walk, const struct log_capture *captu
 	walk->corrupt = 0;
 }
 
-static bool is_wanted(const struct log_walk *walk)
+bool log_walk_wants(const struct log_walk *walk)
 {
 	return walk->visitor->wanted == LOG_EVERY || walk->visitor->wanted == walk->number + 1;
 }
@@ -102,7 +102,7 @@ static int log_walk_take(struct log_walk *walk, struct log_capture *capture, str
 	int error = DT_E_EMPTY;
 
 	*has_record = false;
-	if (is_wanted(walk))
+	if (log_walk_wants(walk))
 		error = join_take(walk->join, record);
 	if (error == 0) {
 		log_capture_of_record(record, capture);
@@ -381,7 +381,7 @@ void log_walk_frame(struct log_walk *walk, const struct frame *frame)
 void log_walk_drop(struct log_walk *walk, struct record *record)
 {
 	struct log_capture capture = {.from = walk->at, .to = walk->next, .time_us = walk->time_us};
-	bool wanted = is_wanted(walk);
+	bool wanted = log_walk_wants(walk);
 
 	log_capture_of_record(record, &capture);
 	record->time_s = log_capture_time_s(&capture);

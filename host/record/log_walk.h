@@ -120,8 +120,11 @@ struct log_walk {
 	struct wire_sdo request;
 };
 
+/* Whether the next capture is to come with its record. */
+bool log_walk_wants(const struct log_walk *walk);
 void log_walk_frame(struct log_walk *walk, const struct frame *frame);
-void log_walk_drop(struct log_walk *walk, struct record *record); /* which belongs to it from here on */
+/* The record belongs to it from here on, and needs its samples only if log_walk_wants. */
+void log_walk_drop(struct log_walk *walk, struct record *record);
 /* Behind a drop that log_walk_drop was given: its message is what was sealed. It ends where the seal does. */
 void log_walk_sealed(struct log_walk *walk);
 /* A value of fields.h that any record can have, of the same drop. DT_E_FORMAT: none; DT_E_RANGE: not as it

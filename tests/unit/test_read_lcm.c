@@ -15,6 +15,7 @@
 #include "host/record/join.h"
 #include "host/record/lcm_codec.h"
 #include "host/record/lcm_log.h"
+#include "host/record/log_walk.h"
 #include "host/record/read.h"
 #include "host/record/write.h"
 #include "tests/unit/drop_by_hand.h"
@@ -142,6 +143,36 @@ static void test_a_status(void **state)
 	assert_int_equal(lcm_codec_state(&frame, &message), DT_E_UNKNOWN);
 }
 
+/* What is said of a drop without its samples is what its record says. */
+static void check_outline(const droptower_drop *message, const struct record *record)
+{
+	struct log_capture of_record = {.number = 1}, of_outline = {.number = 2};
+	struct record outline;
+
+	assert_int_equal(lcm_codec_outline(message, &outline), 0);
+	assert_int_equal(outline.channel_count, 0);
+	assert_int_equal(outline.gap_count, 0);
+	assert_int_equal(outline.flags & RECORD_FLAG_ALTERED, record->flags & RECORD_FLAG_ALTERED);
+	log_capture_of_record(record, &of_record);
+	log_capture_of_record(&outline, &of_outline);
+	assert_true(log_capture_equal(&of_record, &of_outline));
+	assert_int_equal(of_record.counters.corrupt, of_outline.counters.corrupt);
+	record_free(&outline);
+}
+
+static void check_outline_of_cut(const uint8_t *bytes, size_t size)
+{
+	droptower_drop message;
+	struct record record;
+
+	if (lcm_codec_decode_drop(bytes, size, true, &message) != 0)
+		return;
+	assert_int_equal(lcm_codec_record(&message, &record), 0);
+	check_outline(&message, &record);
+	record_free(&record);
+	lcm_codec_free_drop(&message);
+}
+
 static void test_a_drop_there_and_back(void **state)
 {
 	droptower_drop message, decoded, refused;
@@ -172,9 +203,12 @@ static void test_a_drop_there_and_back(void **state)
 		assert_int_equal(lcm_codec_decode_drop(bytes, (size_t)size, false, &decoded), 0);
 		assert_int_equal(lcm_codec_record(&decoded, &again), 0);
 		hand_check_equal(&again, &record);
-		for (int cut = 0; cut < size; cut++) /* every truncation is refused */
+		check_outline(&decoded, &record);
+		for (int cut = 0; cut < size; cut++) { /* every truncation is refused */
 			assert_int_equal(lcm_codec_decode_drop(bytes, (size_t)cut, false, &refused),
 			                 DT_E_FORMAT);
+			check_outline_of_cut(bytes, (size_t)cut);
+		}
 		lcm_codec_free_drop(&decoded);
 		lcm_codec_free_drop(&message);
 		free(bytes);
@@ -203,9 +237,10 @@ static void test_drops_that_do_not_fit(void **state)
 	record = make_record(false);
 	assert_int_equal(lcm_codec_drop(&record, 0, &message), 0);
 	record_free(&record);
-#define REFUSE(field, value) \
-	bad = message;       \
-	bad.field = value;   \
+#define REFUSE(field, value)                                            \
+	bad = message;                                                  \
+	bad.field = value;                                              \
+	assert_int_equal(lcm_codec_outline(&bad, &record), DT_E_RANGE); \
 	assert_int_equal(lcm_codec_record(&bad, &record), DT_E_RANGE)
 	REFUSE(drop_id, 70000);
 	REFUSE(marks, -1);
@@ -232,11 +267,19 @@ static void test_drops_that_do_not_fit(void **state)
 	message.crc_agrees = 0; /* not believed, computed */
 	assert_int_equal(lcm_codec_record(&message, &record), 0);
 	assert_true(record.crc_agrees);
+	check_outline(&message, &record);
 	record_free(&record);
 	message.s2_y[17] ^= 1;
 	message.crc_agrees = 1;
 	assert_int_equal(lcm_codec_record(&message, &record), 0);
 	assert_int_equal(record.flags, RECORD_FLAG_INCOMPLETE);
+	check_outline(&message, &record);
+	record_free(&record);
+	message.seal ^= 1;
+	message.blocks = 7; /* fewer than are there */
+	assert_int_equal(lcm_codec_record(&message, &record), 0);
+	assert_true(record.flags & RECORD_FLAG_ALTERED);
+	check_outline(&message, &record);
 	record_free(&record);
 	lcm_codec_free_drop(&message);
 	record_init(&foreign);
@@ -284,6 +327,63 @@ static void test_a_written_log(void **state)
 	assert_null(strchr(message, '\n'));
 	free(bytes);
 	record_free(&record);
+	hand_unlink(file);
+}
+
+struct seen {
+	unsigned drops;
+	struct log_capture last;
+};
+
+static int see(void *context, const struct log_capture *capture, struct record *unwanted)
+{
+	struct seen *seen = context;
+
+	assert_null(unwanted);
+	seen->drops++;
+	seen->last = *capture;
+	return 0;
+}
+
+static void unlink_listed(char *file)
+{
+	char index[200];
+
+	snprintf(index, sizeof(index), "%s.index", file);
+	unlink(index);
+	hand_unlink(file);
+}
+
+/* A list is of what the tower's own checksums prove; the file's is for who reads the samples. */
+static void test_a_list_does_without_the_seal(void **state)
+{
+	char message[READ_MESSAGE_MAX] = "", *file = hand_file(".lcm", "", 0), *bytes, *altered;
+	struct seen seen = {0};
+	struct log_visitor visitor = {.context = &seen, .capture = see};
+	struct record record;
+	size_t size;
+
+	(void)state;
+	hand_fill(&drop, 1000, 50, 4);
+	record = make_record(false);
+	assert_int_equal(write_record(&record, file, message), 0);
+	bytes = hand_read(file, &size);
+	bytes[size - 1] ^= 1; /* of the seal's digits */
+	altered = hand_file(".lcm", bytes, size);
+	assert_int_equal(read_list(altered, &visitor, message), 0);
+	assert_int_equal(seen.drops, 1);
+	assert_true(seen.last.crc_agrees);
+	assert_int_equal(seen.last.to, size);
+	assert_int_equal(read_nth(&record, altered, NULL, 1, message), DT_E_CORRUPT);
+	bytes[size - 1000] ^= 1; /* of a sample */
+	unlink_listed(altered);
+	altered = hand_file(".lcm", bytes, size);
+	assert_int_equal(read_list(altered, &visitor, message), 0);
+	assert_int_equal(seen.drops, 2);
+	assert_false(seen.last.crc_agrees);
+	free(bytes);
+	record_free(&record);
+	unlink_listed(altered);
 	hand_unlink(file);
 }
 
@@ -573,6 +673,7 @@ int main(void)
 	        cmocka_unit_test(test_a_drop_there_and_back),
 	        cmocka_unit_test(test_drops_that_do_not_fit),
 	        cmocka_unit_test(test_a_written_log),
+	        cmocka_unit_test(test_a_list_does_without_the_seal),
 	        cmocka_unit_test(test_an_altered_drop_is_no_log_of_frames),
 	        cmocka_unit_test(test_a_log_cut_in_its_drop),
 	        cmocka_unit_test(test_blocks_without_a_drop),
