@@ -8,6 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
 enum { LENGTH_MAX = 63 }; /* twice the digits of a double */
 
 bool number_read(const char *text, double min, double max, double *value)
@@ -179,10 +183,55 @@ static const char *take_exponent(const char *at, const char *end, int *exponent)
 	return at;
 }
 
-size_t number_scan(const char *text, const char *end, char decimal, struct number_scan *number)
+#if defined(__x86_64__)
+
+enum { REGISTER = 16 };
+
+/* Up to fifteen digits with a decimal sign among them, or sixteen behind "0.", which most numbers are, all at
+ * once: the sign is taken out, and pairs become pairs of pairs. A third of the time of eight by eight. 0 for
+ * another number.
+ */
+__attribute__((target("sse4.1"))) static size_t scan_short(const char *text, char decimal,
+                                                           struct number_scan *number)
 {
-	const bool sign = text < end && (*text == '-' || *text == '+');
-	const char *const start = text + sign, *first = skip_zeros(start, end), *at;
+	const __m128i place = _mm_setr_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+	const unsigned left_out = text[0] == '0' && text[1] == decimal ? 2 : 0;
+	const char *const at = text + left_out;
+	__m128i digit = _mm_xor_si128(_mm_loadu_si128((const __m128i *)(const void *)at), _mm_set1_epi8('0'));
+	const __m128i is_digit = _mm_cmpeq_epi8(_mm_min_epu8(digit, _mm_set1_epi8(9)), digit);
+	const unsigned others = ~(unsigned)_mm_movemask_epi8(is_digit); /* above the sixteen, too */
+	const unsigned before = (unsigned)__builtin_ctz(others);
+	unsigned behind = left_out > 0 ? before : 0, count = before, end = before;
+
+	if (left_out == 0 && before < REGISTER && at[before] == decimal) {
+		const __m128i whole = _mm_cmpgt_epi8(_mm_set1_epi8((char)before), place);
+
+		behind = (unsigned)__builtin_ctz(others >> (before + 1));
+		count += behind;
+		end = count + 1;
+		digit = _mm_blendv_epi8(_mm_srli_si128(digit, 1), digit, whole);
+	}
+	if (count == 0 || (unsigned char)(at[end] - '0') < 10 || (at[end] | 0x20) == 'e' ||
+	    (left_out == 0 && before == REGISTER))
+		return 0;
+	/* to the register's end, zeros before them */
+	digit = _mm_shuffle_epi8(digit, _mm_add_epi8(place, _mm_set1_epi8((char)(count - REGISTER))));
+	digit = _mm_maddubs_epi16(digit, _mm_set1_epi16(1 << 8 | 10));
+	digit = _mm_madd_epi16(digit, _mm_set1_epi32(1 << 16 | 100));
+	digit = _mm_packus_epi32(digit, digit);
+	digit = _mm_madd_epi16(digit, _mm_set1_epi32(1 << 16 | 10000));
+	number->digits = (uint64_t)(uint32_t)_mm_cvtsi128_si32(digit) * 100000000 +
+	                 (uint32_t)_mm_extract_epi32(digit, 1);
+	number->exponent = -(int)behind;
+	return scaled(number->digits, number->exponent, &number->value) ? left_out + end : 0;
+}
+
+#endif
+
+/* Any that is no longer than a uint64_t. */
+static size_t scan_long(const char *start, const char *end, char decimal, struct number_scan *number)
+{
+	const char *const first = skip_zeros(start, end), *at;
 	ptrdiff_t held, seen;
 
 	number->digits = 0;
@@ -210,11 +259,26 @@ size_t number_scan(const char *text, const char *end, char decimal, struct numbe
 		if (at == NULL)
 			return 0;
 	}
-	if (!scaled(number->digits, number->exponent, &number->value))
+	return scaled(number->digits, number->exponent, &number->value) ? (size_t)(at - start) : 0;
+}
+
+size_t number_scan(const char *text, const char *end, char decimal, struct number_scan *number)
+{
+	const bool sign = text < end && (*text == '-' || *text == '+');
+	size_t length = 0;
+
+#if defined(__x86_64__)
+	/* a sign, "0." and the character that ends the number */
+	if (end - text >= REGISTER + 4 && __builtin_cpu_supports("sse4.1"))
+		length = scan_short(text + sign, decimal, number);
+#endif
+	if (length == 0)
+		length = scan_long(text + sign, end, decimal, number);
+	if (length == 0)
 		return 0;
 	if (*text == '-')
 		number->value = -number->value;
-	return (size_t)(at - text);
+	return length + sign;
 }
 
 bool number_parse(const char *text, size_t length, char decimal, double *value)

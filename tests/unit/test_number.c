@@ -90,6 +90,48 @@ static void check_read(const char *text)
 		fail_msg("'%s' is read as %d %a, expected %d %a", text, read, value, is, expected);
 }
 
+/* What stands behind a number, far or near, changes nothing of it: sixteen characters are looked at where
+ * there are as many, and one after the other where there are not. */
+static void check_beside(const char *number, const char *behind, char decimal)
+{
+	char text[80];
+	struct number_scan near = {.value = 7}, far = {.value = 7};
+	size_t size = (size_t)snprintf(text, sizeof(text), "%s%s", number, behind), length;
+
+	length = number_scan(text, text + size, decimal, &near);
+	memset(text + size, '7', sizeof(text) - size);
+	text[size] = ';'; /* which ends any */
+	assert_int_equal(number_scan(text, text + sizeof(text), decimal, &far), length);
+	if (length == 0)
+		return;
+	assert_int_equal(near.digits, far.digits);
+	assert_int_equal(near.exponent, far.exponent);
+	assert_memory_equal(&near.value, &far.value, sizeof(near.value));
+}
+
+static void beside_others(void **state)
+{
+	static const char *const behind[] = {"",   ",", "\n", "e", "e5",   "E-3", ".",
+	                                     "..", "-", "/",  ":", "\200", " "};
+	static const char letters[] = "0123456789.,-+e";
+	struct synth_random random = {5};
+
+	(void)state;
+	for (int i = 0; i < 200000; i++) {
+		char number[24];
+		unsigned size = (unsigned)(22 * synth_uniform(&random));
+
+		/* mostly digits, with the sign anywhere */
+		for (unsigned k = 0; k < size; k++)
+			number[k] = letters[(unsigned)((synth_uniform(&random) < 0.9 ? 10 : 15) *
+			                               synth_uniform(&random))];
+		if (size > 2 && i % 2 == 0)
+			number[(unsigned)((size - 1) * synth_uniform(&random))] = i % 4 == 0 ? '.' : ',';
+		number[size] = '\0';
+		check_beside(number, behind[i % 13], i % 3 == 0 ? ',' : '.');
+	}
+}
+
 static void reads(void **state)
 {
 	static const char *const text[] = {"0",
@@ -167,6 +209,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(edges),
 	        cmocka_unit_test(any),
+	        cmocka_unit_test(beside_others),
 	        cmocka_unit_test(reads),
 	};
 
