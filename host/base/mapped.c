@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +13,7 @@
 
 #include "common/base/process.h"
 
-enum { EXIT_INPUT = 3 };
+enum { EXIT_INPUT = 3, STAY_STEP = 64 };
 
 /* Those there are. */
 struct region {
@@ -22,6 +23,17 @@ struct region {
 };
 
 static struct region *regions;
+
+/* Memory that stays, and what of it is taken: in the order of places. */
+enum { STAY_ARRAYS = MAPPED_STAY / MAPPED_LEAST };
+static struct {
+	char *at;
+	unsigned arrays;
+	struct {
+		size_t from, until;
+	} array[STAY_ARRAYS];
+} stay;
+
 static pthread_mutex_t regions_lock = PTHREAD_MUTEX_INITIALIZER;
 static _Thread_local size_t seen;
 
@@ -66,6 +78,67 @@ char *mapped_file(int descriptor, size_t size)
 	return add_region(descriptor, size, PROT_READ, MAP_PRIVATE);
 }
 
+/* Room for all of them, in pages of 2 MiB where the system has them: each of 4 KiB costs it as much as to go
+ * through what it holds. NULL without memory. */
+static char *stay_begin(void)
+{
+	const size_t page = (size_t)2 << 20;
+	char *at = mmap(NULL, MAPPED_STAY + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+
+	if (at == MAP_FAILED)
+		return NULL;
+	at += (page - (uintptr_t)at % page) % page;
+	(void)madvise(at, MAPPED_STAY, MADV_HUGEPAGE);
+	return at;
+}
+
+/* The first gap that is large enough. */
+static void *stay_take(size_t bytes)
+{
+	size_t from = 0;
+	unsigned i = 0;
+
+	if (stay.at == NULL || stay.arrays == STAY_ARRAYS)
+		return NULL;
+	for (; i < stay.arrays && stay.array[i].from - from < bytes; i++)
+		from = stay.array[i].until;
+	if (bytes > MAPPED_STAY - from)
+		return NULL;
+	memmove(&stay.array[i + 1], &stay.array[i], (stay.arrays++ - i) * sizeof(stay.array[0]));
+	stay.array[i].from = from;
+	stay.array[i].until = from + bytes;
+	return stay.at + from;
+}
+
+static void *array_that_stays(size_t bytes)
+{
+	void *array;
+
+	bytes += -bytes % STAY_STEP;
+	pthread_mutex_lock(&regions_lock);
+	if (stay.at == NULL && bytes <= MAPPED_STAY)
+		stay.at = stay_begin();
+	array = stay_take(bytes);
+	pthread_mutex_unlock(&regions_lock);
+	return array;
+}
+
+/* Whether the array was one of them. */
+static bool stay_free(const void *array)
+{
+	unsigned i = 0;
+	bool is;
+
+	pthread_mutex_lock(&regions_lock);
+	while (i < stay.arrays && stay.at + stay.array[i].from != array)
+		i++;
+	is = i < stay.arrays;
+	if (is)
+		memmove(&stay.array[i], &stay.array[i + 1], (--stay.arrays - i) * sizeof(stay.array[0]));
+	pthread_mutex_unlock(&regions_lock);
+	return is;
+}
+
 static void *array_on_disk(size_t bytes)
 {
 	int descriptor = process_scratch();
@@ -86,8 +159,17 @@ void *mapped_array(size_t count, size_t size)
 	if (count > SIZE_MAX / 2 / size)
 		return NULL;
 	if (count * size >= MAPPED_LEAST)
+		array = array_that_stays(count * size);
+	if (array == NULL && count * size >= MAPPED_LEAST)
 		array = array_on_disk(count * size);
-	return array != NULL ? array : calloc(count > 0 ? count : 1, size);
+	return array != NULL ? array : malloc(count > 0 ? count * size : 1);
+}
+
+void *mapped_work(size_t bytes)
+{
+	void *work = bytes >= MAPPED_LEAST ? array_that_stays(bytes) : NULL;
+
+	return work != NULL ? work : malloc(bytes);
 }
 
 void *mapped_array_resize(void *array, size_t held, size_t count, size_t size)
@@ -122,8 +204,11 @@ static struct region *take_region(const void *memory)
 
 void mapped_free(void *memory)
 {
-	struct region *region = take_region(memory);
+	struct region *region;
 
+	if (stay_free(memory))
+		return;
+	region = take_region(memory);
 	if (region == NULL) {
 		free(memory);
 		return;

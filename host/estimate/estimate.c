@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "common/units.h"
+#include "host/base/mapped.h"
 #include "host/estimate/cfc.h"
 #include "host/estimate/clean.h"
 #include "host/estimate/doubt.h"
@@ -252,7 +253,7 @@ static void *lay_out(struct desk *desk)
 
 	for (size_t i = 0; i < record->channel_count; i++)
 		bytes += trace_bytes(&record->channels[i]);
-	memory = malloc(bytes);
+	memory = mapped_work(bytes);
 	if (!memory)
 		return NULL;
 	desk->scratch = (double *)(void *)memory;
@@ -284,7 +285,7 @@ int estimate_record(const struct record *record, const struct estimate_options *
 		samples = lay_out(&desk);
 	if (samples)
 		status = estimate_analyse(&desk, &found);
-	free(samples);
+	mapped_free(samples);
 	free(desk.work);
 	if (status) {
 		free(found.channels);

@@ -18,7 +18,7 @@
 #include "common/base/process.h"
 #include "host/base/mapped.h"
 
-enum { COUNT = 3 * MAPPED_LEAST / 8, PAGE = 4096 };
+enum { COUNT = 2 * MAPPED_LEAST / 8, PAGE = 4096, HELD_ARRAYS = MAPPED_STAY / (8 * COUNT) };
 
 static long resident_kb(void)
 {
@@ -35,10 +35,8 @@ static long resident_kb(void)
 
 static void fill(uint64_t *array)
 {
-	for (size_t k = 0; k < COUNT; k++) {
-		assert_int_equal(array[k], 0);
+	for (size_t k = 0; k < COUNT; k++)
 		array[k] = k * k + 1;
-	}
 }
 
 static void hold(const uint64_t *array)
@@ -47,12 +45,69 @@ static void hold(const uint64_t *array)
 		assert_int_equal(array[k], k * k + 1);
 }
 
-static void test_array_leaves_and_comes_back(void **state)
+/* The first stay; with what they leave when they are freed others stay. */
+static void test_the_first_stay(void **state)
 {
-	uint64_t *array = mapped_array(COUNT, sizeof(*array));
+	uint64_t *array[HELD_ARRAYS + 1];
 	long held_kb;
 
 	(void)state;
+	for (int round = 0; round < 2; round++) {
+		for (int i = 0; i <= HELD_ARRAYS; i++) {
+			array[i] = mapped_array(COUNT, sizeof(*array[i]));
+			assert_non_null(array[i]);
+			fill(array[i]);
+		}
+		held_kb = resident_kb();
+		mapped_seen(MAPPED_STEP);
+		assert_in_range(held_kb - resident_kb(), COUNT * 8 / 1024 / 2, COUNT * 8 / 1024 * 3 / 2);
+		for (int i = 0; i <= HELD_ARRAYS; i++) {
+			hold(array[i]);
+			mapped_free(array[i]);
+		}
+	}
+}
+
+/* Work lies where an array was, and beside the others. */
+static void test_gaps_are_filled(void **state)
+{
+	uint64_t *array[3], *work;
+
+	(void)state;
+	for (int i = 0; i < 3; i++) {
+		array[i] = mapped_array(COUNT, sizeof(*array[i]));
+		assert_non_null(array[i]);
+		fill(array[i]);
+	}
+	mapped_free(array[1]);
+	work = mapped_work(COUNT * sizeof(*work));
+	assert_ptr_equal(work, array[1]);
+	fill(work);
+	mapped_free(array[0]);
+	array[1] = mapped_array(COUNT + 1, sizeof(*array[1])); /* larger than that gap */
+	fill(array[1]);
+	assert_true(array[1] > array[2]);
+	array[0] = mapped_array(COUNT - 8, sizeof(*array[0]));
+	memset(array[0], 0, (COUNT - 8) * sizeof(*array[0]));
+	hold(work);
+	hold(array[1]);
+	hold(array[2]);
+	mapped_free(work);
+	for (int i = 0; i < 3; i++)
+		mapped_free(array[i]);
+	work = mapped_work(8);
+	*work = 1;
+	mapped_free(work);
+}
+
+static void test_array_leaves_and_comes_back(void **state)
+{
+	uint64_t *first = mapped_array(MAPPED_STAY / 8, sizeof(*first)), *array;
+	long held_kb;
+
+	(void)state;
+	assert_non_null(first);
+	array = mapped_array(COUNT, sizeof(*array));
 	assert_non_null(array);
 	fill(array);
 	held_kb = resident_kb();
@@ -62,19 +117,21 @@ static void test_array_leaves_and_comes_back(void **state)
 	array = mapped_array_resize(array, COUNT, 2 * COUNT, sizeof(*array));
 	assert_non_null(array);
 	hold(array);
-	assert_int_equal(array[2 * COUNT - 1], 0);
+	array[2 * COUNT - 1] = 1;
 	array = mapped_array_resize(array, 2 * COUNT, 5, sizeof(*array));
 	assert_int_equal(array[4], 17);
 	mapped_free(array);
+	mapped_free(first);
 	mapped_free(NULL);
 }
 
 /* Without a place for the file it is memory, which nothing leaves. */
 static void test_no_room(void **state)
 {
-	uint64_t *array;
+	uint64_t *array, *first = mapped_array(MAPPED_STAY / 8, sizeof(*first));
 
 	(void)state;
+	assert_non_null(first);
 	setenv("TMPDIR", "/nowhere", 1);
 	array = mapped_array(COUNT, sizeof(*array));
 	unsetenv("TMPDIR");
@@ -83,6 +140,7 @@ static void test_no_room(void **state)
 	mapped_seen(MAPPED_STEP);
 	hold(array);
 	mapped_free(array);
+	mapped_free(first);
 	assert_null(mapped_array(SIZE_MAX / 4, 8));
 }
 
@@ -117,6 +175,8 @@ static void test_file_that_becomes_shorter(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+	        cmocka_unit_test(test_the_first_stay),
+	        cmocka_unit_test(test_gaps_are_filled),
 	        cmocka_unit_test(test_array_leaves_and_comes_back),
 	        cmocka_unit_test(test_no_room),
 	        cmocka_unit_test(test_file_that_becomes_shorter),
