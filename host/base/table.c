@@ -144,8 +144,12 @@ static void csv_words(FILE *out, const char *words)
 	fputs(quote, out);
 	if (words[0] != '\0' && strchr("=+-@\t\r", words[0]) != NULL)
 		fputc('\'', out);
-	for (; *words != '\0'; words++)
-		fprintf(out, *words == '"' ? "\"\"" : "%c", *words);
+	for (size_t length; *words != '\0'; words += length) {
+		length = strcspn(words + 1, "\"") + 1; /* a quote that begins them comes twice */
+		if (*words == '"')
+			fputc('"', out);
+		fwrite(words, 1, length, out);
+	}
 	fputs(quote, out);
 }
 

@@ -70,9 +70,43 @@ uint8_t drop_mark(const struct channel *channel, double value_g)
 	return fabs(value_g) > channel->range_g ? SAMPLE_CLIPPED : 0;
 }
 
+/* Eight samples side by side, which the compiler does not make of a loop: a quarter of the instructions. */
+enum { TOGETHER = 8 };
+typedef int16_t eight_counts __attribute__((vector_size(TOGETHER * sizeof(int16_t))));
+typedef uint8_t eight_marks __attribute__((vector_size(TOGETHER)));
+typedef int64_t eight_masks __attribute__((vector_size(TOGETHER * sizeof(int64_t))));
+typedef double eight_values __attribute__((vector_size(TOGETHER * sizeof(double))));
+
+static inline void put_eight(struct channel *channel, size_t at, const int16_t *counts, int16_t most)
+{
+	static const eight_values nan = {NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+	const int16_t not_taken = WIRE_SAMPLE_NOT_TAKEN, bad = SAMPLE_BAD, beyond = SAMPLE_CLIPPED,
+	              least = -most;
+	eight_counts count, none, clipped;
+	eight_masks value, hidden;
+	eight_marks marks;
+
+	memcpy(&count, counts, sizeof(count));
+	none = count == not_taken;
+	clipped = (count > most) | (count < least);
+	marks = __builtin_convertvector((none & bad) | (clipped & ~none & beyond), eight_marks);
+	value = (eight_masks)(__builtin_convertvector(count, eight_values) / WIRE_COUNTS_PER_G);
+	hidden = __builtin_convertvector(none, eight_masks);
+	value = (value & ~hidden) | ((eight_masks)nan & hidden);
+	memcpy(channel->value_g + at, &value, sizeof(value));
+	memcpy(channel->sample + at, &marks, sizeof(marks));
+}
+
 static void drop_put_axis(struct channel *channel, size_t at, const int16_t *counts, size_t count)
 {
-	for (size_t i = 0; i < count; i++) {
+	/* the largest count within the range, as drop_mark has it */
+	const double range = channel->range_g * WIRE_COUNTS_PER_G;
+	const int16_t most = range < INT16_MAX ? (int16_t)range : INT16_MAX;
+	size_t i = 0;
+
+	for (; i + TOGETHER <= count; i += TOGETHER)
+		put_eight(channel, at + i, counts + i, most);
+	for (; i < count; i++) {
 		double value_g = (double)counts[i] / WIRE_COUNTS_PER_G;
 
 		if (counts[i] == WIRE_SAMPLE_NOT_TAKEN) {
@@ -85,14 +119,14 @@ static void drop_put_axis(struct channel *channel, size_t at, const int16_t *cou
 	}
 }
 
-void drop_put(struct record *record, unsigned sensor, uint32_t tick, const int16_t *x, const int16_t *y,
-              const int16_t *z)
+void drop_put(struct record *record, unsigned sensor, uint32_t tick, uint32_t ticks, const int16_t *x,
+              const int16_t *y, const int16_t *z)
 {
 	struct channel *axes = record->channels + 3 * (size_t)(sensor - 1);
 
-	drop_put_axis(&axes[0], (size_t)tick * WIRE_X_PER_TICK, x, WIRE_X_PER_TICK);
-	drop_put_axis(&axes[1], (size_t)tick * WIRE_YZ_PER_TICK, y, WIRE_YZ_PER_TICK);
-	drop_put_axis(&axes[2], (size_t)tick * WIRE_YZ_PER_TICK, z, WIRE_YZ_PER_TICK);
+	drop_put_axis(&axes[0], (size_t)tick * WIRE_X_PER_TICK, x, (size_t)ticks * WIRE_X_PER_TICK);
+	drop_put_axis(&axes[1], (size_t)tick * WIRE_YZ_PER_TICK, y, (size_t)ticks * WIRE_YZ_PER_TICK);
+	drop_put_axis(&axes[2], (size_t)tick * WIRE_YZ_PER_TICK, z, (size_t)ticks * WIRE_YZ_PER_TICK);
 }
 
 static void get_axis(const struct channel *channel, size_t at, int16_t *counts, size_t count)

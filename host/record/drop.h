@@ -19,9 +19,10 @@ enum {
 /* Makes *record the drop of ticks first..last, all samples lost. DT_E_RANGE, DT_E_MEMORY. */
 DT_MUST_USE int drop_open(struct record *record, uint32_t first_tick_ms, uint32_t last_tick_ms);
 
-/* The samples of one block, tick being its place from 0: 7 of x, 10 of y and z. */
-void drop_put(struct record *record, unsigned sensor, uint32_t tick, const int16_t *x, const int16_t *y,
-              const int16_t *z);
+/* The samples of so many blocks one behind the other, tick being the first's place from 0: 7 of x, 10 of y
+ * and z each. */
+void drop_put(struct record *record, unsigned sensor, uint32_t tick, uint32_t ticks, const int16_t *x,
+              const int16_t *y, const int16_t *z);
 
 /* The opposite: false if the block is lost. A sample that was not taken is WIRE_SAMPLE_NOT_TAKEN. */
 bool drop_get(const struct record *record, unsigned sensor, uint32_t tick, int16_t *x, int16_t *y,

@@ -410,7 +410,7 @@ static void fill_from_window(const struct join *join, struct record *record)
 			memcpy(frame.data, slot->data, sizeof(slot->data));
 			if (!slot->held || wire_unpack_block(&frame, &block))
 				continue;
-			drop_put(record, s + 1, tick, block.x, block.y, block.z);
+			drop_put(record, s + 1, tick, 1, block.x, block.y, block.z);
 		}
 	}
 	record->drop_id = count_slots(join, &record->counters);

@@ -378,6 +378,25 @@ int lcm_codec_outline(const droptower_drop *drop, struct record *record)
 	return 0;
 }
 
+/* All of a sensor's that are in no gap, those that follow on each other at once. */
+static void take_blocks(const droptower_drop *drop, unsigned sensor, struct record *record)
+{
+	const int16_t *x = sensor == 1 ? drop->s1_x : drop->s2_x, *y = sensor == 1 ? drop->s1_y : drop->s2_y,
+	              *z = sensor == 1 ? drop->s1_z : drop->s2_z;
+	uint32_t tick = 0, end;
+
+	for (; tick < drop_ticks(record); tick = end + 1) {
+		size_t first = (size_t)tick * WIRE_YZ_PER_TICK;
+
+		end = tick;
+		while (end < drop_ticks(record) &&
+		       !lcm_codec_in_gap(drop, sensor, record->first_tick_ms + end))
+			end++;
+		drop_put(record, sensor, tick, end - tick, x + (size_t)tick * WIRE_X_PER_TICK, y + first,
+		         z + first);
+	}
+}
+
 int lcm_codec_record(const droptower_drop *drop, struct record *record)
 {
 	struct record filled;
@@ -388,14 +407,8 @@ int lcm_codec_record(const droptower_drop *drop, struct record *record)
 	error = drop_open(&filled, (uint32_t)drop->first_tick_ms, (uint32_t)drop->last_tick_ms);
 	if (error)
 		return error;
-	for (uint32_t tick = 0; tick < drop_ticks(&filled); tick++) {
-		size_t x = (size_t)tick * WIRE_X_PER_TICK, yz = (size_t)tick * WIRE_YZ_PER_TICK;
-
-		if (!lcm_codec_in_gap(drop, 1, filled.first_tick_ms + tick))
-			drop_put(&filled, 1, tick, drop->s1_x + x, drop->s1_y + yz, drop->s1_z + yz);
-		if (!lcm_codec_in_gap(drop, 2, filled.first_tick_ms + tick))
-			drop_put(&filled, 2, tick, drop->s2_x + x, drop->s2_y + yz, drop->s2_z + yz);
-	}
+	take_blocks(drop, 1, &filled);
+	take_blocks(drop, 2, &filled);
 	fill_record(drop, &filled);
 	filled.crc_agrees = drop->gap_count == 0 && samples_agree(drop);
 	error = drop_close(&filled);

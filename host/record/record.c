@@ -50,11 +50,13 @@ struct channel *record_add_channel(struct record *record, const char *name, doub
 {
 	struct channel *channel = record_add_room(record, name, rate_hz, count);
 
-	for (size_t k = 0; channel != NULL && k < count; k++) {
-		channel->value_g[k] = NAN;
-		channel->sample[k] = SAMPLE_LOST;
-		if (k % RECORD_PART == 0)
-			mapped_seen(RECORD_PART * (sizeof(*channel->value_g) + 1));
+	for (size_t first = 0; channel != NULL && first < count; first += RECORD_PART) {
+		const size_t end = count - first < RECORD_PART ? count : first + RECORD_PART;
+
+		memset(channel->sample + first, SAMPLE_LOST, end - first);
+		for (size_t k = first; k < end; k++)
+			channel->value_g[k] = NAN;
+		mapped_seen(RECORD_PART * (sizeof(*channel->value_g) + 1));
 	}
 	return channel;
 }
@@ -82,29 +84,58 @@ const struct channel *record_axis(const struct record *record, const char *which
 	return NULL;
 }
 
+static unsigned marks_of(const struct channel *channel)
+{
+	uint64_t marks = 0;
+	size_t k = 0;
+
+	for (; k + sizeof(marks) <= channel->count; k += sizeof(marks)) {
+		uint64_t eight;
+
+		memcpy(&eight, channel->sample + k, sizeof(eight));
+		marks |= eight;
+		if (k % RECORD_PART == 0)
+			mapped_seen(RECORD_PART);
+	}
+	for (; k < channel->count; k++)
+		marks |= channel->sample[k];
+	marks |= marks >> 32;
+	marks |= marks >> 16;
+	return (marks | marks >> 8) & UINT8_MAX;
+}
+
+static bool reaches(const struct channel *channel, double level_g)
+{
+	enum {
+		TOGETHER = 8
+	}; /* the compiler makes one comparison of several only where none leaves the loop */
+	unsigned any = 0;
+	size_t k = 0;
+
+	for (; k + TOGETHER <= channel->count; k += TOGETHER)
+		for (size_t i = k; i < k + TOGETHER; i++)
+			any |= fabs(channel->value_g[i]) >= level_g;
+	for (; k < channel->count; k++)
+		any |= fabs(channel->value_g[k]) >= level_g;
+	return any != 0;
+}
+
 static void record_finish_channel(struct record *record, struct channel *channel)
 {
 	const double full_scale_g = (double)WIRE_SAMPLE_FULL_SCALE / WIRE_COUNTS_PER_G;
 	const unsigned readers =
 	        RECORD_FLAG_UNEVEN | RECORD_FLAG_NO_LINE_END | RECORD_FLAG_SAME_NAMES | RECORD_FLAG_ASSUMED;
 	unsigned flags = channel->flags & readers; /* only the reader knows */
-	unsigned marks = 0, full = 0;
+	unsigned marks = marks_of(channel);
 	uint64_t lost = 0;
 
-	for (size_t k = 0; k < channel->count; k++) {
-		marks |= channel->sample[k];
-		if (k % RECORD_PART == 0)
-			mapped_seen(RECORD_PART);
-	}
 	for (size_t k = 0; k < channel->count && marks & SAMPLE_LOST; k++)
 		lost += (channel->sample[k] & SAMPLE_LOST) != 0;
-	for (size_t k = 0; k < channel->count && record->is_drop; k++)
-		full |= fabs(channel->value_g[k]) >= full_scale_g;
 	if (marks & SAMPLE_BAD)
 		flags |= RECORD_FLAG_BAD;
 	if (marks & SAMPLE_CLIPPED)
 		flags |= RECORD_FLAG_CLIPPED;
-	if (full)
+	if (record->is_drop && reaches(channel, full_scale_g))
 		flags |= RECORD_FLAG_FULL_SCALE;
 	if (lost)
 		flags |= RECORD_FLAG_LOST;
