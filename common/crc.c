@@ -85,11 +85,11 @@ static const uint32_t table32[CRC_AT_ONCE][256] = {
 #endif
 };
 
-uint8_t crc8(uint8_t crc, const uint8_t *bytes, size_t count)
+/* From what is left of the bytes before to what is left of all. */
+static uint8_t remainder8(uint8_t crc, const uint8_t *bytes, size_t count)
 {
 	size_t i = 0;
 
-	crc ^= 0xFFu;
 #if CRC_AT_ONCE == 8
 	for (; i + 8 <= count; i += 8)
 		crc = table8[7][crc ^ bytes[i]] ^ table8[6][bytes[i + 1]] ^ table8[5][bytes[i + 2]] ^
@@ -98,7 +98,55 @@ uint8_t crc8(uint8_t crc, const uint8_t *bytes, size_t count)
 #endif
 	for (; i < count; i++)
 		crc = table8[0][crc ^ bytes[i]];
-	return crc ^ 0xFFu;
+	return crc;
+}
+
+#if defined(__x86_64__)
+
+/* Sixteen bytes side by side, each the remainder of every sixteenth: b x^128 is that of its lower half and of
+ * its upper, and a register holds a table of either. */
+enum { TOGETHER = 16 };
+#define BY_64(b) BY(h, b)
+enum { LATER(BY_64, i, h) };
+#define BY_I(n) (uint8_t) BY(i, n)
+#define BY_I_UPPER(n) (uint8_t) BY(i, (n) << 4)
+typedef uint8_t together __attribute__((vector_size(TOGETHER), may_alias, aligned(1)));
+typedef uint16_t halves __attribute__((vector_size(TOGETHER)));
+static const together lower = {SIXTEEN(BY_I, 0u)}, upper = {SIXTEEN(BY_I_UPPER, 0u)};
+static const together places = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+
+typedef char lookup __attribute__((vector_size(TOGETHER)));
+
+/* Of sixteen entries those that are asked for; 0 for one below them. */
+__attribute__((target("ssse3"))) static inline together look_up(together entries, together which)
+{
+	return (together)__builtin_ia32_pshufb128((lookup)entries, (lookup)which);
+}
+
+__attribute__((target("ssse3"))) static uint8_t together8(uint8_t crc, const uint8_t *bytes, size_t count)
+{
+	const size_t first = (count - 1) % TOGETHER + 1;
+	together left = *(const together *)bytes ^ (together) { crc }, last;
+
+	/* the first of them with zeros before them, which leave nothing */
+	left = look_up(left, places - (uint8_t)(TOGETHER - first));
+	for (size_t i = first; i < count; i += TOGETHER)
+		left = look_up(lower, left & 15) ^ look_up(upper, (together)((halves)left >> 4) & 15) ^
+		       *(const together *)(bytes + i);
+	last = left;
+	return remainder8(0, (const uint8_t *)&last, sizeof(last));
+}
+
+#endif
+
+uint8_t crc8(uint8_t crc, const uint8_t *bytes, size_t count)
+{
+	crc ^= 0xFFu;
+#if defined(__x86_64__)
+	if (count >= 2 * TOGETHER && __builtin_cpu_supports("ssse3"))
+		return together8(crc, bytes, count) ^ 0xFFu;
+#endif
+	return remainder8(crc, bytes, count) ^ 0xFFu;
 }
 
 uint32_t crc32(uint32_t crc, const uint8_t *bytes, size_t count)

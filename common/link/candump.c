@@ -63,14 +63,22 @@ static bool is_decimal(int c)
 	return c >= '0' && c <= '9';
 }
 
-/* Eight decimal digits at once: false if one of the characters is none. */
-static bool read_eight(const char *at, uint32_t *value)
+/* Eight characters, the first the lowest; those of a text with others in place of some are made by shifts, as
+ * a processor waits for what was just written piece by piece. */
+static uint64_t eight_at(const char *at)
 {
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-	uint64_t c, digit;
+	uint64_t c;
 
 	memcpy(&c, at, sizeof(c));
-	digit = c ^ 0x3030303030303030u;
+	return c;
+}
+
+/* Eight decimal digits at once: false if one of the characters is none. */
+static bool read_eight(uint64_t c, uint32_t *value)
+{
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+	uint64_t digit = c ^ 0x3030303030303030u;
+
 	if ((((digit + 0x7676767676767676u) | digit) & 0x8080808080808080u) != 0)
 		return false;
 	digit = (digit * 10 + (digit >> 8)) & 0x00FF00FF00FF00FFu;
@@ -78,7 +86,7 @@ static bool read_eight(const char *at, uint32_t *value)
 	*value = (uint32_t)(digit * 10000 + (digit >> 32));
 	return true;
 #else
-	(void)at;
+	(void)c;
 	(void)value;
 	return false;
 #endif
@@ -99,14 +107,13 @@ static bool eat_usual_time(struct text *text, int64_t *time_us)
 {
 	const char *at = text->at;
 	uint32_t high, middle, low;
-	char padded[2][8] = {"000000"};
 
 	if (text->end - at < 19 || at[0] != '(' || at[11] != '.' || at[18] != ')')
 		return false;
-	memcpy(padded[0] + 6, at + 1, 2);
-	memcpy(padded[1], "00", 2);
-	memcpy(padded[1] + 2, at + 12, 6);
-	if (!read_eight(padded[0], &high) || !read_eight(at + 3, &middle) || !read_eight(padded[1], &low))
+	/* zeros before the first two digits, and before the last six */
+	if (!read_eight(eight_at(at + 1) << 48 | 0x303030303030u, &high) ||
+	    !read_eight(eight_at(at + 3), &middle) ||
+	    !read_eight((eight_at(at + 10) & ~(uint64_t)0xFFFF) | 0x3030u, &low))
 		return false;
 	*time_us = (high * (int64_t)100000000 + middle) * 1000000 + low;
 	text->at += 19;
@@ -299,7 +306,12 @@ int candump_parse(const char *line, size_t length, struct frame *frame, unsigned
 		*column = (unsigned)(text.at - line) + 1u;
 		return DT_E_FORMAT;
 	}
-	*frame = parsed;
+	/* one by one, as they were written; whole, the processor waits until all of them are */
+	frame->time_us = parsed.time_us;
+	frame->id = parsed.id;
+	frame->flags = parsed.flags;
+	frame->length = parsed.length;
+	memcpy(frame->data, parsed.data, sizeof(frame->data));
 	return 1;
 }
 

@@ -5,17 +5,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <gsl/gsl_statistics_double.h>
-
 #include "common/units.h"
 #include "host/base/mapped.h"
+#include "host/estimate/median.h"
 
 #define LEVEL_SIGMAS 8.0
 #define LEVEL_PART 0.02
 #define WIDTH_PART 0.1
-#define MAD_TO_SIGMA 1.482602218505602
 
-enum { SPREAD_SAMPLES = 256, HOLD_OFF_SAMPLES = 3, BLOCK = 64, LANES = 8 };
+enum { SPREAD_SAMPLES = 256, HOLD_OFF_SAMPLES = 3, BLOCK = 64, LANES = 4 };
 enum { READ_AHEAD = 1 << 21 }; /* bytes that come with a sample of a mapped file */
 
 struct source {
@@ -49,7 +47,7 @@ static bool events_value_at(const struct source *source, size_t k, double *value
 static void rest_of(const struct channel *channel, double *rest_g, double *noise_g)
 {
 	size_t step = channel->count / SPREAD_SAMPLES + 1, n = 0;
-	double work[SPREAD_SAMPLES], scratch[SPREAD_SAMPLES];
+	double work[SPREAD_SAMPLES];
 
 	for (size_t k = 0; k < channel->count; k += step) {
 		if (isfinite(channel->value_g[k]))
@@ -60,39 +58,61 @@ static void rest_of(const struct channel *channel, double *rest_g, double *noise
 	*noise_g = 0;
 	if (n == 0)
 		return;
-	memcpy(scratch, work, n * sizeof(*work));
-	*rest_g = gsl_stats_median(scratch, 1, n);
-	*noise_g = MAD_TO_SIGMA * gsl_stats_mad0(work, 1, n, scratch);
+	*rest_g = median_find(work, n);
+	for (size_t i = 0; i < n; i++)
+		work[i] = fabs(work[i] - *rest_g);
+	*noise_g = MAD_TO_SIGMA * median_find(work, n);
 }
 
-static inline double events_larger(double a, double b)
+/* Where the processor has registers of that width they are used. */
+#if defined(__x86_64__) && defined(__gnu_linux__)
+#define WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define WIDE
+#endif
+
+typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
+typedef int64_t lane_masks __attribute__((vector_size(LANES * sizeof(int64_t))));
+
+/* Values side by side: the larger distance from rest of each lane; a NAN is never larger. */
+static inline __attribute__((always_inline)) void events_further(lanes *most, const double *value_g,
+                                                                 double rest_g)
 {
-	return a > b ? a : b; /* a NAN in a is never larger */
+	lanes value, distance;
+	lane_masks below, larger;
+
+	memcpy(&value, value_g, sizeof(value));
+	distance = value - rest_g;
+	below = distance < 0;
+	distance = (lanes)(((lane_masks)distance & ~below) | ((lane_masks)-distance & below));
+	larger = distance > *most;
+	*most = (lanes)(((lane_masks)distance & larger) | ((lane_masks)*most & ~larger));
 }
 
 /* The largest distance from rest between two instants, the samples beside them included. */
-static double events_reach(const struct channel *channel, double from_s, double until_s, double rest_g)
+WIDE static double events_reach(const struct channel *channel, double from_s, double until_s, double rest_g)
 {
 	double first = floor((from_s - channel->start_s) * channel->rate_hz);
 	double last = ceil((until_s - channel->start_s) * channel->rate_hz);
 	size_t k = first > 0 ? (size_t)first : 0, end = channel->count;
-	double most[LANES] = {0};
+	lanes most = {0};
+	double largest = 0;
 
 	if (last < 0)
 		return 0;
 	if (last + 1 < (double)end)
 		end = (size_t)last + 1;
 	for (; k + LANES <= end; k += LANES) {
-		for (unsigned i = 0; i < LANES; i++)
-			most[i] = events_larger(fabs(channel->value_g[k + i] - rest_g), most[i]);
+		events_further(&most, channel->value_g + k, rest_g);
 		if (k % RECORD_PART < LANES)
 			mapped_seen(RECORD_PART * sizeof(double));
 	}
+	for (unsigned i = 0; i < LANES; i++)
+		largest = most[i] > largest ? most[i] : largest;
 	for (; k < end; k++)
-		most[0] = events_larger(fabs(channel->value_g[k] - rest_g), most[0]);
-	for (unsigned i = 1; i < LANES; i++)
-		most[0] = events_larger(most[i], most[0]);
-	return most[0];
+		if (fabs(channel->value_g[k] - rest_g) > largest)
+			largest = fabs(channel->value_g[k] - rest_g);
+	return largest;
 }
 
 /* No reading between two instants lies further from rest: the axes' own extremes together. */

@@ -52,7 +52,7 @@ static void table_equals_bit_by_bit_and_continues(void **state)
 	(void)state;
 	for (size_t i = 0; i < sizeof(bytes); i++)
 		bytes[i] = (uint8_t)(i * 7 + (i >> 5));
-	for (size_t count = 0; count <= sizeof(bytes); count += 13) {
+	for (size_t count = 0; count <= sizeof(bytes); count++) {
 		size_t half = count / 2;
 
 		assert_int_equal(crc8(CRC8_INIT, bytes, count), slow8(bytes, count));
