@@ -11,8 +11,8 @@
  * them is about as high as anything in its block.
  *
  * Marks SAMPLE_SPIKE, which is not good from then on, and RECORD_FLAG_SPIKE. Before baseline_remove. Nothing
- * is marked where the noise is not known, nor among the four samples at an end: a pulse cut off there looks the
- * same. Beside missing samples only a single one is looked for, by a wider margin.
+ * is marked where the noise is not known, nor among the four samples at an end: a pulse cut off there looks
+ * the same. Beside missing samples only a single one is looked for, by a wider margin.
  */
 #include "host/estimate/estimate.h"
 #include "host/estimate/trace.h"
