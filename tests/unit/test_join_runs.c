@@ -104,6 +104,28 @@ static void test_a_restart_seen_by_its_boot_message(void **state)
 	check_restart(true);
 }
 
+/* Of a tick whose bytes are all 1 a ring that was not emptied to zeros has a block. */
+static void test_a_restart_empties_the_ring(void **state)
+{
+	enum { GONE = 20 };
+	static const uint8_t boot[5] = {0};
+	struct frame heartbeat = {.id = 0x701, .length = 5};
+	struct record record;
+
+	(void)state;
+	memcpy(heartbeat.data, boot, sizeof(boot));
+	hand_fill(&drop, 1000, 50, 9);
+	join_by_hand_feed_both(0, 49);
+	join_feed(join, &heartbeat);
+	hand_fill(&drop, 0x01010101 - GONE, 50, 10);
+	join_by_hand_feed_both(0, GONE - 1);
+	join_by_hand_feed_both(GONE + 1, 49);
+	assert_int_equal(join_by_hand_feed_end(), 1);
+	record = join_by_hand_take();
+	join_by_hand_check_counters(&record, (struct record_counters){.blocks = 98, .gaps = 2});
+	record_free(&record);
+}
+
 /* The capture of before the restart is still to be had, but not from what the tower sends now. */
 static void test_a_restart_leaves_the_capture_alone(void **state)
 {
@@ -246,6 +268,7 @@ int main(void)
 	        TEST(test_a_capture_outlives_the_ring),
 	        TEST(test_a_restart_seen_by_its_ticks),
 	        TEST(test_a_restart_seen_by_its_boot_message),
+	        TEST(test_a_restart_empties_the_ring),
 	        TEST(test_a_restart_leaves_the_capture_alone),
 	        TEST(test_the_ring_does_not_confuse_ticks),
 	        TEST(test_the_same_drop_after_a_restart_is_another),
