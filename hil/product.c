@@ -7,7 +7,7 @@
 
 #include "common/units.h"
 
-#define CLEAR_M 1e-3 /* more than the fastest box moves in a step */
+#define CLEAR_M 1e-5 /* more than gravity and mounts move a box in a step */
 
 /* Beyond this the imprint is no wedge any more and 1/sin would run away. */
 #define WEDGE_ANGLE_MIN_RAD UNITS_RAD(10.0)
@@ -99,9 +99,14 @@ static struct load product_mount_force(const struct product *p, const double s[]
 	return (struct load){k * x + p->mount_damping_n_s_m * vx, k * y + p->mount_damping_n_s_m * vy, 0};
 }
 
-static bool product_clear(const struct product *p)
+/* No corner can reach the mat within the step, turn and fall as they may. */
+static bool product_clear(const struct product *p, double step_s)
 {
-	return p->state[PRODUCT_Y] > p->clear_m;
+	const double lowest_m =
+	        p->state[PRODUCT_Y] - fabs(p->lever_x_m * p->turn.cs) - fabs(p->lever_y_m * p->turn.sn);
+	const double speed_m_s = fabs(p->state[PRODUCT_VY]) + fabs(p->state[PRODUCT_SPIN]) * p->radius_m;
+
+	return lowest_m > CLEAR_M + speed_m_s * step_s;
 }
 
 /* Of all corners, and how fast the deflection under each grows. */
@@ -157,15 +162,13 @@ static void corners_renew(struct product *p)
 }
 
 /* What the state asks for: the angle's sine and cosine, and all rates. */
-static void product_renew(struct product *p)
+static inline void product_renew(struct product *p, bool clear)
 {
 	struct load load = {0, 0, 0};
 
 	p->turn = turn_of(p->state);
-	if (!product_clear(p)) {
-		corners_renew(p);
+	if (!clear)
 		load = product_contact_load(p, p->state, p->turn, &p->rate[PRODUCT_GRIP]);
-	}
 	product_rates(p, p->state, load, p->rate);
 }
 
@@ -196,7 +199,7 @@ void product_init(struct product *p, const struct scene *scene, double angle_rad
 	                   12;
 	p->lever_y_m = scene->product_width_m / 2;
 	p->lever_x_m = p->lever_y_m / tan(UNITS_RAD(scene->product_balance_angle_deg));
-	p->clear_m = hypot(p->lever_x_m, p->lever_y_m) + CLEAR_M;
+	p->radius_m = hypot(p->lever_x_m, p->lever_y_m);
 	p->stiffness25_n_m15 = scene->contact_stiffness_n_m15;
 	p->hysteresis = hysteresis(scene->contact_restitution);
 	p->tangential_ratio = scene->contact_tangential_ratio;
@@ -223,19 +226,31 @@ void product_carry(struct product *p, double down_m_s2)
 #define STEPS_A_RADIAN 10.0
 
 /* The whole box on the corner that strikes, as stiff as hysteresis makes it at first. */
-static double longest_step_s(const struct product *p, double speed_m_s)
+static double contact_step_s(const struct product *p, double speed_m_s)
 {
 	const double k = p->stiffness_n_m15[0] * (1 + p->hysteresis);
 	const double contact_s = 2.943 * pow(1.25 * p->case_mass_kg / k, 0.4) * pow(speed_m_s, -0.2);
-	double step_s = fmin(PRODUCT_STEP_S, contact_s / STEPS_A_CONTACT);
 
-	if (p->plate_mass_kg > 0) {
-		const double per_mass = 1 / p->plate_mass_kg + 1 / p->case_mass_kg;
-		const double swing = sqrt(p->mount_n_m * (1 + p->softening) * per_mass);
+	return fmin(PRODUCT_STEP_S, contact_s / STEPS_A_CONTACT);
+}
 
-		step_s = fmin(step_s, 1 / (STEPS_A_RADIAN * fmax(swing, p->mount_damping_n_s_m * per_mass)));
-	}
-	return step_s;
+static double mount_step_s(const struct product *p)
+{
+	const double per_mass = 1 / p->plate_mass_kg + 1 / p->case_mass_kg;
+	const double swing = sqrt(p->mount_n_m * (1 + p->softening) * per_mass);
+
+	return 1 / (STEPS_A_RADIAN * fmax(swing, p->mount_damping_n_s_m * per_mass));
+}
+
+/* While a corner touches or may touch: the slower it came, the lower is its acceleration, whose error then
+ * stays what it is in the first contact. */
+static double touching_step_s(const struct product *p)
+{
+	double approach_m_s = PRODUCT_APPROACH_MIN_M_S;
+
+	for (int i = 0; i < PRODUCT_CORNERS; i++)
+		approach_m_s = fmax(approach_m_s, p->approach_m_s[i]);
+	return fmin(p->mount_step_s, p->contact_step_s * sqrt(p->strike_m_s / approach_m_s));
 }
 
 void product_strike(struct product *p, double speed_m_s)
@@ -251,37 +266,62 @@ void product_strike(struct product *p, double speed_m_s)
 		height_m = fmax(height_m, -corner_at(p, p->state, i, p->turn).arm_y_m);
 	p->state[PRODUCT_Y] = p->state[PRODUCT_PLATE_Y] = height_m;
 	p->state[PRODUCT_VY] = p->state[PRODUCT_PLATE_VY] = -speed_m_s;
-	product_renew(p);
+	corners_renew(p);
+	product_renew(p, false);
 	p->at_rest = false;
-	p->longest_step_s = longest_step_s(p, speed_m_s);
+	p->strike_m_s = fmax(speed_m_s, PRODUCT_APPROACH_MIN_M_S);
+	p->contact_step_s = contact_step_s(p, speed_m_s);
+	p->mount_step_s = p->plate_mass_kg > 0 ? mount_step_s(p) : INFINITY;
 }
 
-void product_step(struct product *p, double step_s)
+/* Classical Runge-Kutta. */
+static inline void product_integrate(struct product *p, double step_s, bool clear)
 {
 	static const double reach[3] = {0.5, 0.5, 1.0};
-	const bool clear = product_clear(p);
+	const int states = clear ? PRODUCT_GRIP : PRODUCT_STATES;
 	double at[PRODUCT_STATES], slope[PRODUCT_STATES], sum[PRODUCT_STATES];
 
-	if (p->at_rest)
-		return;
 	memcpy(slope, p->rate, sizeof(slope));
 	memcpy(sum, p->rate, sizeof(sum));
 	for (int stage = 0; stage < 3; stage++) {
 		const double weight = stage < 2 ? 2 : 1;
 		struct load load = {0, 0, 0};
 
-		for (int i = 0; i < PRODUCT_STATES; i++)
+		for (int i = 0; i < states; i++)
 			at[i] = p->state[i] + reach[stage] * step_s * slope[i];
 		if (!clear)
 			load = product_contact_load(p, at, turn_of(at), &slope[PRODUCT_GRIP]);
 		product_rates(p, at, load, slope);
-		for (int i = 0; i < PRODUCT_STATES; i++)
+		for (int i = 0; i < states; i++)
 			sum[i] += weight * slope[i];
 	}
-	for (int i = 0; i < PRODUCT_STATES; i++)
+	for (int i = 0; i < states; i++)
 		p->state[i] += step_s / 6 * sum[i];
-	product_renew(p);
+	product_renew(p, clear);
+}
+
+/* The first of so many equal steps that none is longer, but for rounding. */
+static double part_s(double span_s, double longest_s)
+{
+	return span_s > longest_s ? span_s / ceil(span_s / longest_s - 1e-6) : span_s;
+}
+
+double product_step(struct product *p, double span_s)
+{
+	double step_s;
+
+	if (p->at_rest)
+		return span_s;
+	if (product_clear(p, fmin(span_s, p->mount_step_s))) {
+		step_s = part_s(span_s, p->mount_step_s);
+		product_integrate(p, step_s, true);
+	} else {
+		corners_renew(p);
+		step_s = part_s(span_s, touching_step_s(p));
+		product_integrate(p, step_s, false);
+	}
 	p->at_rest = product_rests(p);
+	return step_s;
 }
 
 void product_read(const struct product *p, struct product_reading *reading)

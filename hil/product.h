@@ -45,7 +45,7 @@ enum product_state {
 	PRODUCT_STATES = PRODUCT_GRIP + PRODUCT_CORNERS
 };
 
-#define PRODUCT_STEP_S 20e-6 /* the longest step of any product; its error stays below a converter code */
+#define PRODUCT_STEP_S 20e-6 /* the longest of the first contact; its error stays below a converter code */
 #define PRODUCT_APPROACH_MIN_M_S 0.1
 #define PRODUCT_REST_SPEED 1e-11 /* m/s, rad/s */
 #define PRODUCT_REST_RATE 1e-8   /* of these, a second: 3e-8 of a converter code */
@@ -59,7 +59,7 @@ struct product {
 	double gravity_m_s2;
 	double case_mass_kg, plate_mass_kg, inertia_kg_m2;
 	double lever_x_m, lever_y_m;
-	double clear_m; /* with the centre of gravity above this no corner reaches the mat within a step */
+	double radius_m;                                                  /* of the corners */
 	double stiffness25_n_m15, hysteresis, tangential_ratio, friction; /* hysteresis: D */
 	double mount_n_m, mount_damping_n_s_m, softening, softening_per_m2;
 	double s2_offset_m, yaw_cos, yaw_sin;
@@ -67,7 +67,8 @@ struct product {
 	double state[PRODUCT_STATES];
 	double rate[PRODUCT_STATES]; /* of state, now */
 	double stiffness_n_m15[PRODUCT_CORNERS], approach_m_s[PRODUCT_CORNERS];
-	double longest_step_s; /* of product_step, by contact and mounts; from product_strike on */
+	double strike_m_s, contact_step_s,
+	        mount_step_s; /* from product_strike on; the steps by speed and mounts */
 	struct product_turn turn;
 	bool at_rest; /* nothing moves it any more, until the next product_strike */
 };
@@ -88,8 +89,9 @@ void product_carry(struct product *p, double down_m_s2);
  * the caller has put into the state stays. */
 void product_strike(struct product *p, double speed_m_s);
 
-/* After product_strike: one step of time; at rest none. */
-void product_step(struct product *p, double step_s);
+/* After product_strike: goes on by one step, all of the span at most, and returns its length; at rest the
+ * span goes by. */
+double product_step(struct product *p, double span_s);
 
 void product_read(const struct product *p, struct product_reading *reading);
 

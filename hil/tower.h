@@ -7,7 +7,7 @@
  * The frame hangs in its latch, falls along rails with friction past two light gates into the dampers; the
  * product is on the frame's magnet until it separates, falls freely, meets the mat and bounces until it
  * lies still. What the frame does has closed forms, so every event has its exact time; the contact is
- * integrated in steps of at most product.longest_step_s. README.md says what was left out and decided.
+ * integrated (product_step). README.md says what was left out and decided.
  *
  * Time is virtual, in seconds since the reset of the firmware, and only goes forward: a time before the
  * present counts as the present. The result does not depend on the machine.

@@ -364,28 +364,30 @@ static void event_happen(struct tower *t, enum event event)
 	tower_sensors_feel(t, 0);
 }
 
+/* One step, to that time at most, of what does not move uniformly. */
+static double step_on(struct tower *t, double time_s)
+{
+	const double span_s = time_s - t->now_s;
+	double step_s = span_s;
+
+	if (t->place == PLACE_MAT) {
+		step_s = product_step(&t->product, span_s);
+	} else if (product_on_frame(t) && isfinite(t->calm_s)) {
+		step_s = fmin(span_s, 1 / (KNOCK_STEPS * t->scene.tower_knock_hz));
+		product_carry(&t->product, t->frame.acceleration_m_s2 - frame_knock(t, t->now_s + step_s));
+	}
+	return step_s;
+}
+
 /* No event until then. */
 static void go_on(struct tower *t, double time_s)
 {
-	const double span_s = time_s - t->now_s;
-	const bool contact = t->place == PLACE_MAT && !t->product.at_rest;
-	const bool knocked = product_on_frame(t) && isfinite(t->calm_s);
-	const double longest_s = contact   ? t->product.longest_step_s
-	                         : knocked ? 1 / (KNOCK_STEPS * t->scene.tower_knock_hz)
-	                                   : INFINITY;
-	const long steps = isfinite(longest_s) ? (long)ceil(span_s / longest_s) : 1;
+	do {
+		const double step_s = step_on(t, time_s);
 
-	for (long i = 0; i < steps; i++) {
-		if (contact)
-			product_step(&t->product, span_s / (double)steps);
-		if (knocked)
-			product_carry(
-			        &t->product,
-			        t->frame.acceleration_m_s2 -
-			                frame_knock(t, t->now_s + span_s / (double)steps * (double)(i + 1)));
-		tower_sensors_feel(t, span_s / (double)steps);
-	}
-	t->now_s = time_s;
+		t->now_s = t->now_s + step_s < time_s ? t->now_s + step_s : time_s;
+		tower_sensors_feel(t, step_s);
+	} while (t->now_s < time_s);
 }
 
 void tower_advance(struct tower *t, double time_s)
