@@ -75,6 +75,7 @@ all: $(PROGRAMS) ## build the three programs into build/
 # ---- compiling --------------------------------------------------------------------------------------
 
 $(call obj,$(FREESTANDING_C) $(LOCKSTEP_C)): CFLAGS += -ffreestanding
+$(call obj,$(HIL_C) $(LOCKSTEP_C)): CFLAGS += -O3
 $(call obj,$(POSIX_C) $(INSIDE_C) $(LINK_C) $(HOST_C) host/main.c $(CONSOLE_C) host/console/main.c $(HIL_C) hil/main.c $(UNIT_C) \
 	$(UNIT_HELPER_C) $(TOOL_C)): CPPFLAGS += $(LINUX)
 

@@ -10,24 +10,29 @@ enum {
 
 /* ---- sample instants ---- */
 
+static int64_t instant_next(int64_t grid)
+{
+	const int64_t x = (grid / GRID_X + 1) * GRID_X, yz = (grid / GRID_YZ + 1) * GRID_YZ;
+
+	return x < yz ? x : yz;
+}
+
 int64_t bench_instant_after(int64_t grid, unsigned instants, int64_t limit)
 {
 	for (; instants > 0 && grid < limit; instants--)
-		do
-			grid++;
-		while (grid % GRID_X != 0 && grid % GRID_YZ != 0);
+		grid = instant_next(grid);
 	return grid < limit ? grid : limit;
 }
 
 bool bench_plant_next(const struct bench *bench, struct sensorbus_request *request)
 {
-	int64_t grid = bench_instant_after(bench->now_grid, 1, INT64_MAX) % BENCH_GRID_PER_MS;
+	int64_t grid = instant_next(bench->now_grid % BENCH_GRID_PER_MS);
 
 	request->group =
 	        (uint8_t)((grid % GRID_X == 0 ? SENSORBUS_X : 0) | (grid % GRID_YZ == 0 ? SENSORBUS_YZ : 0));
 	request->index = (uint8_t)(grid / (grid % GRID_X == 0 ? GRID_X : GRID_YZ));
 	request->edges = request->frames = request->reset = 0;
-	return grid != 0;
+	return grid != BENCH_GRID_PER_MS;
 }
 
 /* ---- the plant ---- */
@@ -99,8 +104,11 @@ static void make_edge(struct bench *bench, unsigned bit, bool on, double time_us
 static void apply_outputs(struct bench *bench, const struct sensorbus_request *request, int64_t before_grid)
 {
 	struct edge edges[SENSORBUS_OUTPUTS];
-	unsigned count = sort_edges(bench, request, bench_grid_us(before_grid), edges);
+	unsigned count;
 
+	if (request->edges == 0 && request->outputs == bench->outputs)
+		return;
+	count = sort_edges(bench, request, bench_grid_us(before_grid), edges);
 	for (unsigned i = 0; i < count; i++)
 		make_edge(bench, edges[i].bit, request->outputs >> edges[i].bit & 1,
 		          (double)edges[i].time_us);

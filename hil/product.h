@@ -26,6 +26,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "common/error.h"
 #include "common/scenes/scene.h"
 
 enum { PRODUCT_CORNERS = 4 };
@@ -91,7 +92,7 @@ void product_strike(struct product *p, double speed_m_s);
 
 /* After product_strike: goes on by one step, all of the span at most, and returns its length; at rest the
  * span goes by. */
-double product_step(struct product *p, double span_s);
+DT_MUST_USE double product_step(struct product *p, double span_s);
 
 void product_read(const struct product *p, struct product_reading *reading);
 

@@ -33,9 +33,20 @@ struct sensor_fading {
 struct sensor_fading sensor_fading(double time_constant_s, double step_s);
 
 /* Time went on by that step while the input went straight to input_g. */
-void sensor_advance(struct sensor *sensor, struct sensor_fading fading, double input_g);
+static inline void sensor_advance(struct sensor *sensor, struct sensor_fading fading, double input_g)
+{
+	const double change_g = input_g - sensor->input_g;
 
-/* -32767 to 32767; never -32768, which on the wire means "not taken". */
-int16_t sensor_convert(const struct sensor *sensor, gsl_rng *noise);
+	if (sensor->time_constant_s <= 0)
+		sensor->output_g = input_g;
+	else if (fading.part <= 0)
+		sensor->output_g += change_g;
+	else
+		sensor->output_g += change_g * fading.faded / fading.part - sensor->output_g * fading.faded;
+	sensor->input_g = input_g;
+}
+
+/* With a spike on top; -32767 to 32767, never -32768, which on the wire means "not taken". */
+int16_t sensor_convert(const struct sensor *sensor, double spike_g, gsl_rng *noise);
 
 #endif

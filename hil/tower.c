@@ -79,7 +79,7 @@ void tower_output(struct tower *t, unsigned bit, bool on, double time_s)
 		magnet_switch(t, on);
 	if (mask == WIRE_IO_DAMPERS_RELIEVE)
 		tower_motion_renew(t);
-	tower_sensors_feel(t, 0);
+	tower_happened(t);
 }
 
 /* The sensor on a cable. */
@@ -90,16 +90,16 @@ static int plugged(const struct tower *t, int cable)
 
 void tower_sample(struct tower *t, unsigned group, int16_t codes[CHANNELS])
 {
-	for (int i = 0; i < CHANNELS; i++) {
-		const unsigned member = i % AXES == 0 ? SENSORBUS_X : SENSORBUS_YZ;
-		const int from = plugged(t, i / AXES) * AXES + i % AXES;
-		struct sensor sensor = t->sensor[from];
+	const int first = group & SENSORBUS_X ? 0 : 1, end = group & SENSORBUS_YZ ? AXES : 1;
 
-		if (!(group & member))
-			continue;
-		sensor.output_g += t->spike_g[from];
-		t->spike_g[from] = 0;
-		codes[i] = sensor_convert(&sensor, t->noise);
+	for (int cable = 0; cable < SENSORS; cable++) {
+		const int from = plugged(t, cable) * AXES;
+
+		for (int axis = first; axis < end; axis++) {
+			codes[cable * AXES + axis] =
+			        sensor_convert(&t->sensor[from + axis], t->spike_g[from + axis], t->noise);
+			t->spike_g[from + axis] = 0;
+		}
 	}
 }
 
@@ -109,11 +109,10 @@ void tower_spike(struct tower *t, unsigned sensor, double spike_g)
 		t->spike_g[sensor * AXES + axis] += spike_g;
 }
 
-static bool gate_broken(const struct tower *t, enum mark mark, enum tower_fault dead, enum tower_fault wire)
+static bool gate_broken(const struct tower *t, double below_m, unsigned gate)
 {
-	const double below_m = tower_motion_distance(&t->frame, t->now_s) - tower_mark_travel(t, mark);
-
-	return t->fault[wire] || (!t->fault[dead] && below_m >= 0 && below_m < FLAG_HEIGHT_M);
+	return t->fault[TOWER_GATE_UPPER_WIRE + gate] ||
+	       (!t->fault[TOWER_GATE_UPPER_DEAD + gate] && below_m >= 0 && below_m < FLAG_HEIGHT_M);
 }
 
 static bool latch_reads_closed(const struct tower *t)
@@ -128,7 +127,7 @@ static bool frame_reads_down(const struct tower *t)
 	       (t->passed > MARK_DAMPERS && !t->fault[TOWER_FRAME_READS_UP]);
 }
 
-uint16_t tower_inputs(const struct tower *t)
+unsigned tower_inputs_but_gates(const struct tower *t)
 {
 	const bool *fault = t->fault;
 	const bool held = t->place == PLACE_PIN || t->place == PLACE_MAGNET;
@@ -140,15 +139,19 @@ uint16_t tower_inputs(const struct tower *t)
 	inputs |= fault[TOWER_DOOR_OPEN] ? 0 : WIRE_IO_DOOR_CLOSED;
 	inputs |= fault[TOWER_ESTOP] ? 0 : WIRE_IO_ESTOP_CLEAR;
 	inputs |= fault[TOWER_SUPPLY_LOW] ? 0 : WIRE_IO_SUPPLY_GOOD;
-	inputs |= gate_broken(t, MARK_GATE_UPPER, TOWER_GATE_UPPER_DEAD, TOWER_GATE_UPPER_WIRE)
-	                  ? WIRE_IO_GATE_UPPER
-	                  : 0;
-	inputs |= gate_broken(t, MARK_GATE_LOWER, TOWER_GATE_LOWER_DEAD, TOWER_GATE_LOWER_WIRE)
-	                  ? WIRE_IO_GATE_LOWER
-	                  : 0;
 	inputs |= frame_reads_down(t) ? WIRE_IO_FRAME_DOWN : 0;
 	inputs |= tower_sensor_cut_off(t, plugged(t, 0)) ? 0 : WIRE_IO_IEPE_S1;
 	inputs |= tower_sensor_cut_off(t, plugged(t, 1)) ? 0 : WIRE_IO_IEPE_S2;
+	return inputs;
+}
+
+uint16_t tower_inputs(const struct tower *t)
+{
+	const double travel_m = tower_motion_distance(&t->frame, t->now_s);
+	unsigned inputs = t->inputs;
+
+	inputs |= gate_broken(t, travel_m - t->scene.tower_gate_upper_m, 0) ? WIRE_IO_GATE_UPPER : 0;
+	inputs |= gate_broken(t, travel_m - t->scene.tower_gate_lower_m, 1) ? WIRE_IO_GATE_LOWER : 0;
 	return (uint16_t)inputs;
 }
 
@@ -195,6 +198,7 @@ void tower_set_friction(struct tower *t, double friction_n)
 {
 	t->scene.tower_frame_friction_n = friction_n;
 	tower_motion_renew(t);
+	tower_happened(t);
 }
 
 void tower_let_go(struct tower *t)
@@ -203,7 +207,7 @@ void tower_let_go(struct tower *t)
 		return;
 	tower_product_leave(t);
 	tower_motion_renew(t);
-	tower_sensors_feel(t, 0);
+	tower_happened(t);
 }
 
 const struct tower_truth *tower_truth(const struct tower *t)
@@ -230,7 +234,7 @@ void tower_fault(struct tower *t, enum tower_fault fault, bool on)
 	}
 	tower_sensors_set_up(t);
 	tower_motion_renew(t);
-	tower_sensors_feel(t, 0);
+	tower_happened(t);
 }
 
 bool tower_has_fault(const struct tower *t, enum tower_fault fault)

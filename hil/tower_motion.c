@@ -47,13 +47,8 @@ static double motion_stop(const struct motion *m)
 
 /* ---- sensors ---- */
 
-bool tower_sensor_cut_off(const struct tower *t, int sensor)
-{
-	return sensor == 0 ? t->fault[TOWER_CABLE_S1] || t->fault[TOWER_SHORT_S1]
-	                   : t->fault[TOWER_CABLE_S2] || t->fault[TOWER_SHORT_S2];
-}
-
-void tower_sensors_feel(struct tower *t, double step_s)
+/* Time went on by step_s; the sensors feel what the product now does. */
+static void sensors_feel(struct tower *t, double step_s)
 {
 	const double z_ratio[SENSORS] = {t->scene.sensor_s1_z_ratio, t->scene.sensor_s2_z_ratio};
 	/* all have the same supply */
@@ -76,6 +71,27 @@ void tower_sensors_feel(struct tower *t, double step_s)
 	}
 }
 
+static bool sensors_are_settled(const struct tower *t)
+{
+	double sum_g = 0;
+
+	for (int i = 0; i < CHANNELS; i++)
+		sum_g += fabs(t->sensor[i].output_g);
+	return sum_g == 0;
+}
+
+/* The product does what it did. */
+static void sensors_feel_the_same(struct tower *t, double step_s)
+{
+	struct sensor_fading fading;
+
+	if (sensors_are_settled(t))
+		return;
+	fading = sensor_fading(t->sensor[0].time_constant_s, step_s);
+	for (int i = 0; i < CHANNELS; i++)
+		sensor_advance(&t->sensor[i], fading, t->sensor[i].input_g);
+}
+
 void tower_sensors_set_up(struct tower *t)
 {
 	for (int i = 0; i < CHANNELS; i++) {
@@ -88,7 +104,7 @@ void tower_sensors_set_up(struct tower *t)
 
 void tower_sensors_settle(struct tower *t)
 {
-	tower_sensors_feel(t, 0);
+	tower_happened(t);
 	for (int i = 0; i < CHANNELS; i++)
 		sensor_settle(&t->sensor[i], t->sensor[i].input_g);
 }
@@ -236,8 +252,7 @@ double tower_mark_travel(const struct tower *t, unsigned mark)
 	}
 }
 
-/* The next event and its time, INFINITY if none is to come. */
-static enum event event_next(const struct tower *t, double *time_s)
+static void event_plan(struct tower *t)
 {
 	const bool moving = t->frame_state == FRAME_MOVING;
 	const double when[EVENTS] = {
@@ -249,14 +264,20 @@ static enum event event_next(const struct tower *t, double *time_s)
 	        [EVENT_TAUT] = t->place == PLACE_AIR ? product_taut(t) : INFINITY,
 	        [EVENT_MAT] = product_landing(t),
 	};
-	enum event next = 0;
 
+	t->next = 0;
 	for (enum event e = 1; e < EVENTS; e++) {
-		if (when[e] < when[next])
-			next = e;
+		if (when[e] < when[t->next])
+			t->next = e;
 	}
-	*time_s = fmax(when[next], t->now_s);
-	return next;
+	t->next_s = fmax(when[t->next], t->now_s);
+}
+
+void tower_happened(struct tower *t)
+{
+	sensors_feel(t, 0);
+	event_plan(t);
+	t->inputs = tower_inputs_but_gates(t);
 }
 
 static void latch_opens(struct tower *t)
@@ -361,44 +382,45 @@ static void event_happen(struct tower *t, enum event event)
 	case EVENTS:
 		break;
 	}
-	tower_sensors_feel(t, 0);
+	tower_happened(t);
 }
 
-/* One step, to that time at most, of what does not move uniformly. */
+static bool knocked(const struct tower *t)
+{
+	return product_on_frame(t) && isfinite(t->calm_s);
+}
+
+/* One step, to that time at most; returns its length. */
 static double step_on(struct tower *t, double time_s)
 {
 	const double span_s = time_s - t->now_s;
 	double step_s = span_s;
 
-	if (t->place == PLACE_MAT) {
-		step_s = product_step(&t->product, span_s);
-	} else if (product_on_frame(t) && isfinite(t->calm_s)) {
+	if (knocked(t)) {
 		step_s = fmin(span_s, 1 / (KNOCK_STEPS * t->scene.tower_knock_hz));
 		product_carry(&t->product, t->frame.acceleration_m_s2 - frame_knock(t, t->now_s + step_s));
+	} else {
+		step_s = product_step(&t->product, span_s);
 	}
+	sensors_feel(t, step_s);
 	return step_s;
 }
 
 /* No event until then. */
 static void go_on(struct tower *t, double time_s)
 {
-	do {
-		const double step_s = step_on(t, time_s);
-
-		t->now_s = t->now_s + step_s < time_s ? t->now_s + step_s : time_s;
-		tower_sensors_feel(t, step_s);
-	} while (t->now_s < time_s);
+	while (t->now_s < time_s && (knocked(t) || (t->place == PLACE_MAT && !t->product.at_rest)))
+		t->now_s = fmin(t->now_s + step_on(t, time_s), time_s);
+	if (t->now_s < time_s)
+		sensors_feel_the_same(t, time_s - t->now_s);
+	t->now_s = time_s;
 }
 
 void tower_advance(struct tower *t, double time_s)
 {
-	double next_s;
-	enum event next = event_next(t, &next_s);
-
-	while (next_s <= time_s) {
-		go_on(t, next_s);
-		event_happen(t, next);
-		next = event_next(t, &next_s);
+	while (t->next_s <= time_s) {
+		go_on(t, t->next_s);
+		event_happen(t, t->next);
 	}
 	if (time_s > t->now_s)
 		go_on(t, time_s);

@@ -33,8 +33,11 @@ struct tower {
 	bool ideal;
 	gsl_rng *scatter, *noise; /* apart, so that how often one converts does not change the next drop */
 	double now_s;
+	enum event next; /* and its time, INFINITY if none is to come */
+	double next_s;
 
 	unsigned outputs;
+	unsigned inputs; /* all but the gates, which see the frame move */
 	bool fault[TOWER_FAULTS];
 	double latch_opens_s, magnet_drops_s; /* INFINITY: not under way */
 	bool latch_energised;                 /* its coil */
@@ -80,14 +83,20 @@ void tower_motion_renew(struct tower *t);
 
 double tower_mark_travel(const struct tower *t, unsigned mark);
 
-/* Time went on by step_s; the sensors feel what the product now does. */
-void tower_sensors_feel(struct tower *t, double step_s);
+unsigned tower_inputs_but_gates(const struct tower *t);
+
+/* To be called when anything has happened: sensors and inputs feel it, and the next event may be another. */
+void tower_happened(struct tower *t);
 
 void tower_sensors_set_up(struct tower *t);
 
 void tower_sensors_settle(struct tower *t);
 
-bool tower_sensor_cut_off(const struct tower *t, int sensor);
+static inline bool tower_sensor_cut_off(const struct tower *t, int sensor)
+{
+	return sensor == 0 ? t->fault[TOWER_CABLE_S1] || t->fault[TOWER_SHORT_S1]
+	                   : t->fault[TOWER_CABLE_S2] || t->fault[TOWER_SHORT_S2];
+}
 
 void tower_product_leave(struct tower *t);
 

@@ -12,6 +12,12 @@
 
 #define STEP_S 5e-6
 
+static void go_on(struct product *p, double span_s)
+{
+	while (span_s > 0)
+		span_s -= product_step(p, span_s);
+}
+
 static void reading(const struct product *p, const struct by_hand *h, double mix[2][4], double felt[4])
 {
 	struct product_reading r;
@@ -79,7 +85,7 @@ void by_hand_drop(const struct by_hand *h, gsl_rng *random, struct by_hand_drop 
 		for (int a = 0; a < 4; a++)
 			before[a] = sensor[a].output_g;
 		if (t > 0)
-			product_step(&p, STEP_S);
+			go_on(&p, STEP_S);
 		reading(&p, h, mix, felt);
 		if (h->mode_hz > 0) {
 			ring_rate +=
@@ -143,7 +149,7 @@ struct by_hand_truth by_hand_truth(const struct by_hand *h, const struct by_hand
 	for (double t = 1e-6; t < 20e-3; t += 1e-6) {
 		double c, s, now, now_up;
 
-		product_step(&p, 1e-6);
+		go_on(&p, 1e-6);
 		product_read(&p, &r);
 		peak_follow(&peak[0], t, hypot(r.s1_x, r.s1_y));
 		peak_follow(&peak[1], t, hypot(r.s2_x, r.s2_y));

@@ -62,7 +62,7 @@ static void fall(const struct scene *scene, double angle_deg)
 		reading_g[S2Y][i] = r.s2_y / UNITS_G_M_S2;
 		for (int s = 0; s < 2; s++)
 			length_g[s][i] = hypot(reading_g[2 * s][i], reading_g[2 * s + 1][i]);
-		product_step(&product, STEP_S);
+		assert_true(product_step(&product, STEP_S) == STEP_S);
 	}
 }
 

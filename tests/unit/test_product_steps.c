@@ -22,7 +22,7 @@ static unsigned go_on(struct product *p)
 {
 	unsigned steps = 0;
 
-	for (double left_s = 100e-6; left_s > 1e-10; steps++)
+	for (double left_s = 100e-6; left_s > 0; steps++)
 		left_s -= product_step(p, left_s);
 	return steps;
 }

@@ -72,7 +72,7 @@ static void codes_are_rounded_and_limited(void **state)
 	(void)state;
 	for (size_t i = 0; i < sizeof(known) / sizeof(known[0]); i++) {
 		sensor_settle(&s, known[i].g);
-		assert_int_equal(sensor_convert(&s, NULL), known[i].code);
+		assert_int_equal(sensor_convert(&s, 0, NULL), known[i].code);
 	}
 }
 
@@ -93,7 +93,7 @@ static void noise_is_white_and_as_large_as_said(void **state)
 	gsl_rng_set(rng, seed);
 	sensor_settle(&s, 10);
 	for (int i = 0; i < COUNT; i++) {
-		const double off = sensor_convert(&s, rng) - 320;
+		const double off = sensor_convert(&s, 0, rng) - 320;
 
 		sum += off;
 		squares += off * off;

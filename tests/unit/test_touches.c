@@ -53,7 +53,7 @@ static void plant_peaks(const struct scene *s, double step_s, double until_s, do
 				peak[i] = value[i];
 				when[i] = (double)k * step_s;
 			}
-		product_step(&p, step_s);
+		assert_true(product_step(&p, step_s) == step_s);
 	}
 }
 

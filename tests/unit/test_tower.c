@@ -220,7 +220,7 @@ static int16_t codes_are_readings_of(const struct scene *scene, double tolerance
 	for (int i = 0; i < STEPS; i++) {
 		product_read(&p, &r[i]);
 		for (int k = 0; k < FINER; k++)
-			product_step(&p, 1e-6 / FINER);
+			assert_true(product_step(&p, 1e-6 / FINER) == 1e-6 / FINER);
 	}
 	for (int i = 0; i < TRACE; i++) {
 		const double place = (time_s[i] - truth->impact_s) * 1e6;
