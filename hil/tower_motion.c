@@ -236,7 +236,7 @@ static double product_landing(const struct tower *t)
 
 /* ---- events ---- */
 
-double tower_mark_travel(const struct tower *t, unsigned mark)
+static double mark_travel(const struct tower *t, unsigned mark)
 {
 	switch (mark) {
 	case MARK_GATE_UPPER:
@@ -258,7 +258,7 @@ static void event_plan(struct tower *t)
 	const double when[EVENTS] = {
 	        [EVENT_LATCH] = t->latch_opens_s,
 	        [EVENT_DROPOUT] = t->magnet_drops_s,
-	        [EVENT_MARK] = moving ? motion_reach(&t->frame, tower_mark_travel(t, t->passed)) : INFINITY,
+	        [EVENT_MARK] = moving ? motion_reach(&t->frame, mark_travel(t, t->passed)) : INFINITY,
 	        [EVENT_STOP] = moving ? motion_stop(&t->frame) : INFINITY,
 	        [EVENT_CALM] = t->calm_s,
 	        [EVENT_TAUT] = t->place == PLACE_AIR ? product_taut(t) : INFINITY,
@@ -301,7 +301,7 @@ static void gate_sees(struct tower *t, unsigned gate)
 
 static void frame_passes(struct tower *t)
 {
-	const double travel_m = tower_mark_travel(t, t->passed);
+	const double travel_m = mark_travel(t, t->passed);
 
 	switch ((enum mark)t->passed++) {
 	case MARK_GATE_UPPER:

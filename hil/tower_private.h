@@ -81,8 +81,6 @@ double tower_motion_distance(const struct motion *m, double time_s);
 /* To be called when something that moves the frame or holds the product has changed. */
 void tower_motion_renew(struct tower *t);
 
-double tower_mark_travel(const struct tower *t, unsigned mark);
-
 unsigned tower_inputs_but_gates(const struct tower *t);
 
 /* To be called when anything has happened: sensors and inputs feel it, and the next event may be another. */
