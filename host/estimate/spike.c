@@ -231,6 +231,46 @@ static bool spike_mark_in(struct trace *trace, size_t i, double noise_g)
 	return marked;
 }
 
+/* One of the SIDE samples at an end, which one side has not enough neighbours of: the rule of stands_alone by
+ * those it has, and by the wider margin. */
+static bool stands_at_end(const struct trace *trace, size_t k, double noise_g)
+{
+	const bool first = k < SIDE;
+	const size_t beyond = first ? k : trace->count - 1 - k;
+	const ptrdiff_t in = first ? 1 : -1;
+	const double *v = trace->value_g + k;
+	double bridge, around;
+
+	if (!(first ? all_good(trace, 0, k + SIDE + 2) : all_good(trace, k - SIDE - 1, trace->count)) ||
+	    !is_extreme(trace, k))
+		return false;
+	bridge = (v[in] - v[-in]) / 2;
+	around = fabs(v[2 * in] - v[in] - bridge);
+	if (beyond > 1)
+		around = fmax(around, fabs(v[-in] - v[-2 * in] - bridge));
+	for (ptrdiff_t away = 2; away <= SIDE; away++)
+		around = fmax(around, spike_bend(v + away * in));
+	return spike_bend(v) / 2 > WIDE_BENDS * around + 2 * LIMIT_NOISE * noise_g;
+}
+
+/* All but the very first and last: a pulse that is cut off there looks the same. */
+static bool mark_ends(struct trace *trace, double noise_g)
+{
+	bool marked = false;
+
+	for (size_t i = 1; i < SIDE && trace->count > 2 * SIDE + 1; i++) {
+		const size_t ends[] = {i, trace->count - 1 - i};
+
+		for (size_t side = 0; side < 2; side++) {
+			if (!stands_at_end(trace, ends[side], noise_g))
+				continue;
+			trace->sample[ends[side]] |= SAMPLE_SPIKE;
+			marked = true;
+		}
+	}
+	return marked;
+}
+
 bool spike_mark(struct trace *trace, double noise_g)
 {
 	bool marked = false;
@@ -243,6 +283,7 @@ bool spike_mark(struct trace *trace, double noise_g)
 		if (block->high_g - block->low_g > LIMIT_NOISE * noise_g)
 			marked |= spike_mark_in(trace, i, noise_g);
 	}
+	marked |= mark_ends(trace, noise_g);
 	if (marked)
 		trace->flags |= RECORD_FLAG_SPIKE;
 	return marked;

@@ -11,8 +11,9 @@
  * them is about as high as anything in its block.
  *
  * Marks SAMPLE_SPIKE, which is not good from then on, and RECORD_FLAG_SPIKE. Before baseline_remove. Nothing
- * is marked where the noise is not known, nor among the four samples at an end: a pulse cut off there looks
- * the same. Beside missing samples only a single one is looked for, by a wider margin.
+ * is marked where the noise is not known, nor the first or the last sample: a pulse cut off there looks the
+ * same. Beside missing samples only a single one is looked for, by a wider margin; so it is among the three
+ * next to an end, where none is missing and it is about as high as anything in its block.
  */
 #include "host/estimate/estimate.h"
 #include "host/estimate/trace.h"

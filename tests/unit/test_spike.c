@@ -216,6 +216,27 @@ static void on_the_pulse(void **state)
 	}
 }
 
+/* Among the first or last four samples, where one side has too few neighbours; the outermost has none. */
+static void at_the_ends(void **state)
+{
+	struct synth_random random = {27};
+	size_t missed = 0, at = 0;
+
+	(void)state;
+	for (int run = 0; run < 800; run++) {
+		struct channel channel = synth_channel("a", 7000, 0, 700);
+		size_t beyond = (size_t)(run / 2 % 4), k = run % 2 ? channel.count - 1 - beyond : beyond;
+
+		fill(&channel, SYNTH_HALF_SINE, true, 3e-3, 400, 3, &random);
+		channel.value_g[k] += run / 8 % 2 ? 300 : -300;
+		if (marked(&channel, 3, &at) != (beyond > 0) || (beyond > 0 && at != k))
+			missed++;
+		synth_free(&channel);
+	}
+	printf("%zu of 600 spikes at an end missed, or the outermost marked\n", missed);
+	assert_int_equal(missed, 0);
+}
+
 /* Records that begin or end anywhere in a pulse, in the decay after it, or in a vibration that begins there:
  * no clean sample is marked. */
 static void cut_off(void **state)
@@ -421,7 +442,8 @@ int main(void)
 	        cmocka_unit_test(clean),        cmocka_unit_test(vibrations),   cmocka_unit_test(found),
 	        cmocka_unit_test(found_near),   cmocka_unit_test(on_the_pulse), cmocka_unit_test(recordings),
 	        cmocka_unit_test(says_nothing), cmocka_unit_test(dropouts),     cmocka_unit_test(among_holes),
-	        cmocka_unit_test(cut_off),      cmocka_unit_test(held),         cmocka_unit_test(repeated),
+	        cmocka_unit_test(at_the_ends),  cmocka_unit_test(cut_off),      cmocka_unit_test(held),
+	        cmocka_unit_test(repeated),
 	};
 
 	for (int shape = 0; shape < SYNTH_SHAPES; shape++)
