@@ -81,7 +81,7 @@ LTO = $(if $(SANITIZE),,$(if $(findstring gcc,$(CC)),-flto=auto -ffat-lto-object
 $(call obj,$(HIL_C) hil/main.c $(LOCKSTEP_C) $(INSIDE_C) $(FREESTANDING_C)): CFLAGS += $(LTO)
 $(call obj,$(HIL_C)): CFLAGS += -O3 -fno-math-errno
 LDFLAGS += $(if $(LTO),-fno-lto)
-$(BUILD)/droptower-bench: LDFLAGS += $(LTO) -O3
+$(BUILD)/droptower-bench: LDFLAGS := $(filter-out -fno-lto,$(LDFLAGS)) $(LTO) -O3
 $(call obj,$(POSIX_C) $(INSIDE_C) $(LINK_C) $(HOST_C) host/main.c $(CONSOLE_C) host/console/main.c $(HIL_C) hil/main.c $(UNIT_C) \
 	$(UNIT_HELPER_C) $(TOOL_C)): CPPFLAGS += $(LINUX)
 
