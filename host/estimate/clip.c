@@ -68,17 +68,48 @@ static bool clip_whole(double steps)
 	return fabs(steps) < 1 / LIMIT_SMALL && fabs(steps - round(steps)) < STEP_WHOLE;
 }
 
+/* Steps show as stairs, one side of which has levels between its rises, or as rises of three sizes. Straight
+ * lines without noise are equal rises too, and come in any numbers. */
+struct stairs {
+	double last, size[2]; /* steps of the last rise, of other ones */
+	unsigned sizes;
+	bool level, seen;
+};
+
+static void clip_climb(struct stairs *stairs, double steps)
+{
+	const double size = fabs(steps);
+
+	if (size == 0) {
+		stairs->level = true;
+		return;
+	}
+	stairs->seen |= stairs->level && stairs->last * steps > 0;
+	if (size != stairs->size[0] && size != stairs->size[1]) {
+		stairs->size[stairs->sizes % 2] = size;
+		stairs->sizes++;
+	}
+	stairs->last = steps;
+	stairs->level = false;
+}
+
 double clip_resolution(const struct trace *trace, double noise_g)
 {
 	double step = clip_step(trace);
+	struct stairs stairs = {0};
 
 	if (!(noise_g < step / 2))
 		return 0;
-	for (size_t k = trace->first + 1; k < trace->last; k++)
-		if (trace_good(trace, k) && trace_good(trace, k - 1) &&
-		    !clip_whole((trace->value_g[k] - trace->value_g[k - 1]) / step))
+	for (size_t k = trace->first + 1; k < trace->last; k++) {
+		double steps = (trace->value_g[k] - trace->value_g[k - 1]) / step;
+
+		if (!trace_good(trace, k) || !trace_good(trace, k - 1))
+			continue;
+		if (!clip_whole(steps))
 			return 0;
-	return step;
+		clip_climb(&stairs, round(steps));
+	}
+	return stairs.seen || stairs.sizes > 2 ? step : 0;
 }
 
 /* Whether those beside a group, and it, are whole steps apart. */

@@ -90,9 +90,15 @@ static void log_walk_hold(struct log_walk *walk, const struct log_capture *captu
 	walk->corrupt = 0;
 }
 
-bool log_walk_wants(const struct log_walk *walk)
+static bool log_walk_wants(const struct log_walk *walk)
 {
 	return walk->visitor->wanted == LOG_EVERY || walk->visitor->wanted == walk->number + 1;
+}
+
+bool log_walk_may_want(const struct log_walk *walk)
+{
+	/* one that began and never ended comes before it */
+	return log_walk_wants(walk) || (walk->begun && walk->visitor->wanted == walk->number + 2);
 }
 
 /* What the join has, with its samples if they are wanted. DT_E_EMPTY only without a capture end. */
@@ -381,12 +387,13 @@ void log_walk_frame(struct log_walk *walk, const struct frame *frame)
 void log_walk_drop(struct log_walk *walk, struct record *record)
 {
 	struct log_capture capture = {.from = walk->at, .to = walk->next, .time_us = walk->time_us};
-	bool wanted = log_walk_wants(walk);
+	bool wanted;
 
 	log_capture_of_record(record, &capture);
 	record->time_s = log_capture_time_s(&capture);
 	if (walk->begun && walk->begun_drop != record->drop_id)
 		take_run(walk, true);
+	wanted = log_walk_wants(walk);
 	walk->begun = false;
 	join_forget_run(walk->join);
 	walk->ended.drop_id = record->drop_id;

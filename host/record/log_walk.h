@@ -120,10 +120,10 @@ struct log_walk {
 	struct wire_sdo request;
 };
 
-/* Whether the next capture is to come with its record. */
-bool log_walk_wants(const struct log_walk *walk);
+/* Whether the drop of the next message may have to come with its samples. */
+bool log_walk_may_want(const struct log_walk *walk);
 void log_walk_frame(struct log_walk *walk, const struct frame *frame);
-/* The record belongs to it from here on, and needs its samples only if log_walk_wants. */
+/* The record belongs to it from here on, and needs its samples only if log_walk_may_want. */
 void log_walk_drop(struct log_walk *walk, struct record *record);
 /* Behind a drop that log_walk_drop was given: its message is what was sealed. It ends where the seal does. */
 void log_walk_sealed(struct log_walk *walk);

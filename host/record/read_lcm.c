@@ -27,7 +27,7 @@ static int read_lcm_take_drop(struct log_walk *walk, const struct lcm_log_event 
 
 	if (error)
 		return error;
-	error = (log_walk_wants(walk) ? lcm_codec_record : lcm_codec_outline)(&drop, &record);
+	error = (log_walk_may_want(walk) ? lcm_codec_record : lcm_codec_outline)(&drop, &record);
 	lcm_codec_free_drop(&drop);
 	if (!error)
 		log_walk_drop(walk, &record);
@@ -98,7 +98,7 @@ static int take_event(struct reading *reading, const struct lcm_log_event *event
 	if (event->data == NULL || (event->cut && !is_drop))
 		return 0;
 	if (is_drop) {
-		reading->wanted = log_walk_wants(reading->walk);
+		reading->wanted = log_walk_may_want(reading->walk);
 		sha256_init(&reading->digest);
 		if (reading->wanted)
 			sha256_update(&reading->digest, event->size, event->data);

@@ -468,8 +468,9 @@ static void test_a_log_cut_in_its_drop(void **state)
 	hand_unlink(file);
 }
 
-/* A log as lcm-logger makes it, written by the library: blocks, things of others, and drops if asked. */
-static char *make_log(bool drops, size_t *size)
+/* A log as lcm-logger makes it, written by the library: blocks in that state, things of others, and drops if
+ * asked. */
+static char *make_log_in(unsigned wire_state, bool drops, size_t *size)
 {
 	char *file = hand_file(".lcm", "", 0), *bytes, block_channel[] = "DT_BLOCK", other[] = "OTHER";
 	lcm_eventlog_t *log = lcm_eventlog_create(file, "w");
@@ -484,6 +485,7 @@ static char *make_log(bool drops, size_t *size)
 
 		hand_block(&drop, 1 + i % 2, i / 2, false, &frame);
 		assert_int_equal(lcm_codec_block(&frame, &block), 0);
+		block.status = (int16_t)((block.status & ~15) | (int)wire_state);
 		event.datalen = droptower_block_encode(data, 0, sizeof(data), &block);
 		assert_true(event.datalen > 0);
 		assert_int_equal(lcm_eventlog_write_event(log, &event), 0);
@@ -495,6 +497,8 @@ static char *make_log(bool drops, size_t *size)
 	}
 	lcm_eventlog_destroy(log);
 	bytes = hand_read(file, size);
+	if (drops && wire_state != WIRE_STATE_CAPTURED)
+		drop.drop_id++; /* that of the blocks never ended */
 	if (drops) {
 		struct record record = make_record(true);
 		char message[READ_MESSAGE_MAX], *more;
@@ -511,6 +515,35 @@ static char *make_log(bool drops, size_t *size)
 	}
 	hand_unlink(file);
 	return bytes;
+}
+
+static char *make_log(bool drops, size_t *size)
+{
+	return make_log_in(WIRE_STATE_CAPTURED, drops, size);
+}
+
+/* By its number it is read with its samples, whatever came before it. */
+static void test_a_drop_behind_one_that_never_ended(void **state)
+{
+	char message[READ_MESSAGE_MAX] = "", *bytes, *file;
+	struct record record, expected;
+	size_t size;
+
+	(void)state;
+	hand_fill(&drop, 1000, 100, 7);
+	bytes = make_log_in(WIRE_STATE_FALLING, true, &size);
+	file = hand_file(".lcm", bytes, size);
+	expected = make_record(true);
+	assert_int_equal(read_nth(&record, file, NULL, 2, message), 0);
+	hand_check_equal(&record, &expected);
+	record_free(&record);
+	assert_int_equal(read_nth(&record, file, NULL, 1, message), 0);
+	assert_int_equal(record.drop_id, 3);
+	assert_int_equal(record.flags, RECORD_FLAG_NO_CRC);
+	record_free(&record);
+	record_free(&expected);
+	free(bytes);
+	unlink_listed(file);
 }
 
 static void test_blocks_without_a_drop(void **state)
@@ -677,6 +710,7 @@ int main(void)
 	        cmocka_unit_test(test_an_altered_drop_is_no_log_of_frames),
 	        cmocka_unit_test(test_a_log_cut_in_its_drop),
 	        cmocka_unit_test(test_blocks_without_a_drop),
+	        cmocka_unit_test(test_a_drop_behind_one_that_never_ended),
 	        cmocka_unit_test(test_a_drop_goes_before_blocks),
 	        cmocka_unit_test(test_bad_bytes_cost_one_event_each),
 	        cmocka_unit_test(test_events_in_turn),
