@@ -232,6 +232,41 @@ static void twins(void **state)
 	synth_free(&channel);
 }
 
+/* Coarse numbers show by stairs or by rises of three sizes: straight lines without noise have equal rises
+ * too. */
+static void stairs(void **state)
+{
+	static const struct {
+		double step_g;   /* 0: as drawn */
+		double up, down; /* samples of a triangle of 100 g; 0: a half-sine of 60 */
+		double resolution_g;
+	} cases[] = {
+	        {0, 30, 30, 0}, {0, 20, 30, 0}, {0, 30, 1, 0},  /* lines */
+	        {2, 0, 0, 2},   {10, 0, 0, 10}, {8, 40, 60, 8}, /* steps */
+	        {7, 25, 40, 7}, {0, 0, 0, 0},   {0.25, 0, 0, 0.25},
+	};
+	struct channel channel = synth_channel("a", 10000, 0, 300);
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+		const double step_g = cases[i].step_g, up = cases[i].up, down = cases[i].down;
+		struct trace trace;
+
+		for (size_t k = 0; k < channel.count; k++) {
+			double at = (double)k - 150, line = at < 0 ? 1 + at / up : 1 - at / down;
+			double v = 100 * (up > 0 ? fmax(0, line) : synth_pulse(SYNTH_HALF_SINE, at / 60));
+
+			channel.value_g[k] = step_g > 0 ? step_g * round(v / step_g) : v;
+		}
+		trace = open_trace(&channel);
+		if (fabs(clip_resolution(&trace, 0) - cases[i].resolution_g) > 1e-9)
+			fail_msg("case %zu: a step of %g g, expected %g", i, clip_resolution(&trace, 0),
+			         cases[i].resolution_g);
+		trace_close(&trace);
+	}
+	synth_free(&channel);
+}
+
 /* In the caller's memory, and not a byte beyond it: the sanitizer looks on. */
 static void laid(void **state)
 {
@@ -339,11 +374,17 @@ static void follows_changes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(copies),          cmocka_unit_test(extremes),
-	        cmocka_unit_test(no_acceleration), cmocka_unit_test(limits),
-	        cmocka_unit_test(level_tops),      cmocka_unit_test(twins),
-	        cmocka_unit_test(without_a_rate),  cmocka_unit_test(laid),
-	        cmocka_unit_test(edges),           cmocka_unit_test(follows_changes),
+	        cmocka_unit_test(copies),
+	        cmocka_unit_test(extremes),
+	        cmocka_unit_test(no_acceleration),
+	        cmocka_unit_test(limits),
+	        cmocka_unit_test(level_tops),
+	        cmocka_unit_test(twins),
+	        cmocka_unit_test(stairs),
+	        cmocka_unit_test(without_a_rate),
+	        cmocka_unit_test(laid),
+	        cmocka_unit_test(edges),
+	        cmocka_unit_test(follows_changes),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
