@@ -345,6 +345,16 @@ static int check_profile(const struct reading *reading)
 	                     profile->path, profile->names);
 }
 
+/* A clock has blanks in it: between date and time of day, before PM. */
+static bool has_clock(const struct columns *columns)
+{
+	size_t i = 0;
+
+	while (i < columns->count && !columns->column[i].is_clock)
+		i++;
+	return i < columns->count;
+}
+
 static int read_headers(struct reading *reading)
 {
 	const struct source *source = reading->source;
@@ -369,6 +379,8 @@ static int read_headers(struct reading *reading)
 			reading->source = &reading->rows_only;
 		}
 	}
+	if (reading->sniff == NULL && reading->style.separator == '\0' && has_clock(&reading->columns))
+		reading->style.separator = sniff_separator(source, reading->columns.count);
 	if (!error && !reading->columns.has_time && reading->columns.rate_hz == 0 && !any_delta(reading))
 		error = source_refuse(
 		        reading->message, DT_E_ARGUMENT, source->file, 0,

@@ -260,6 +260,23 @@ int sniff_text(struct sniff *sniff, const struct source *source, char message[RE
 	return error;
 }
 
+char sniff_separator(const struct source *source, size_t columns)
+{
+	struct sniff_work *work = calloc(1, sizeof(*work));
+	struct sniff_candidate style = {.columns = 0};
+	char unwanted[READ_MESSAGE_MAX], separator = '\0';
+
+	if (work == NULL)
+		return '\0';
+	work->source = source;
+	work->message = unwanted;
+	sniff_sample(work);
+	if (sniff_find_style(work, &style) == 0 && style.columns == columns)
+		separator = style.style.separator;
+	free(work);
+	return separator;
+}
+
 /* ---- what was understood ---- */
 
 __attribute__((format(printf, 4, 5))) static void tell(char *text, size_t size, size_t *used,

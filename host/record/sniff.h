@@ -35,6 +35,9 @@ struct sniff {
 /* 0, or DT_E_FORMAT or DT_E_ARGUMENT with a message. */
 DT_MUST_USE int sniff_text(struct sniff *sniff, const struct source *source, char message[READ_MESSAGE_MAX]);
 
+/* The separator of rows of so many columns; 0 where they do not tell one. */
+char sniff_separator(const struct source *source, size_t columns);
+
 /* Columns from names and units alone, of a table that is no text: time and channels found as in text. units
  * may be NULL, so may a unit's text. has_rate: the table tells its rate, so that a time column is not looked
  * for. */
