@@ -16,7 +16,7 @@
 #include "host/record/clock.h"
 #include "host/record/timebase.h"
 
-enum { HEADER_LINES_MAX = 1000 };
+enum { HEADER_LINES_MAX = 1000, SHOWN = 60 };
 
 static int refuse_memory(const struct reading *reading)
 {
@@ -63,7 +63,7 @@ static int find_data(struct reading *reading)
 {
 	const char *rows = reading->source->bytes +
 	                   (reading->sniff != NULL && !reading->is_lvm ? reading->sniff->first : 0);
-	uint64_t first = 0;
+	struct source_line first = {.number = 0}, second = {.number = 0};
 
 	/* behind the headers of a LabVIEW file stands one line of names, and nothing else */
 	if (reading->is_lvm && delimited_next_row(reading)) {
@@ -72,14 +72,19 @@ static int find_data(struct reading *reading)
 			return 0;
 	}
 	while (delimited_next_row(reading) && reading->line.number <= HEADER_LINES_MAX) {
-		if (first == 0)
-			first = reading->line.number;
+		if (first.number == 0)
+			first = reading->line;
+		else if (second.number == 0)
+			second = reading->line;
 		if (reading->line.text >= rows && is_data(reading))
 			return 0;
 		header_offer(&reading->header, reading->style, &reading->columns, &reading->line);
 	}
-	return source_refuse(reading->message, DT_E_FORMAT, reading->source->file, first,
-	                     "no row of numbers from here on, expected %zu columns", reading->columns.count);
+	return source_refuse(
+	        reading->message, DT_E_FORMAT, reading->source->file, first.number,
+	        "no row of numbers from here on, expected %zu columns; the next line has \"%.*s\"",
+	        reading->columns.count, (int)(second.length < SHOWN ? second.length : SHOWN),
+	        second.length > 0 ? second.text : "");
 }
 
 static int read_delimited_allocate(struct reading *reading)
