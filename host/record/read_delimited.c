@@ -80,11 +80,12 @@ static int find_data(struct reading *reading)
 			return 0;
 		header_offer(&reading->header, reading->style, &reading->columns, &reading->line);
 	}
-	return source_refuse(
-	        reading->message, DT_E_FORMAT, reading->source->file, first.number,
-	        "no row of numbers from here on, expected %zu columns; the next line has \"%.*s\"",
-	        reading->columns.count, (int)(second.length < SHOWN ? second.length : SHOWN),
-	        second.length > 0 ? second.text : "");
+	if (second.number == 0)
+		second = first;
+	return source_refuse(reading->message, DT_E_FORMAT, reading->source->file, first.number,
+	                     "no row of numbers from here on, expected %zu columns, found \"%.*s\"",
+	                     reading->columns.count, (int)(second.length < SHOWN ? second.length : SHOWN),
+	                     second.length > 0 ? second.text : "");
 }
 
 static int read_delimited_allocate(struct reading *reading)
