@@ -270,7 +270,7 @@ double cells_last_digit(const struct cells *cells, size_t i, int *digits)
 size_t cells_tail(struct piece cell, char decimal)
 {
 	const size_t end = exponent_at(cell);
-	const char *sign = memchr(cell.text, decimal, end);
+	const char *sign = end > 0 ? memchr(cell.text, decimal, end) : NULL;
 
 	return cell.length - (sign ? (size_t)(sign - cell.text) : end);
 }
