@@ -85,22 +85,6 @@ static const uint32_t table32[CRC_AT_ONCE][256] = {
 #endif
 };
 
-/* From what is left of the bytes before to what is left of all. */
-static uint8_t remainder8(uint8_t crc, const uint8_t *bytes, size_t count)
-{
-	size_t i = 0;
-
-#if CRC_AT_ONCE == 8
-	for (; i + 8 <= count; i += 8)
-		crc = table8[7][crc ^ bytes[i]] ^ table8[6][bytes[i + 1]] ^ table8[5][bytes[i + 2]] ^
-		      table8[4][bytes[i + 3]] ^ table8[3][bytes[i + 4]] ^ table8[2][bytes[i + 5]] ^
-		      table8[1][bytes[i + 6]] ^ table8[0][bytes[i + 7]];
-#endif
-	for (; i < count; i++)
-		crc = table8[0][crc ^ bytes[i]];
-	return crc;
-}
-
 #if defined(__x86_64__)
 
 /* Sixteen bytes side by side, each the remainder of every sixteenth: b x^128 is that of its lower half and of
@@ -126,7 +110,7 @@ __attribute__((target("ssse3"))) static inline together look_up(together entries
 __attribute__((target("ssse3"))) static uint8_t together8(uint8_t crc, const uint8_t *bytes, size_t count)
 {
 	const size_t first = (count - 1) % TOGETHER + 1;
-	together left = *(const together *)bytes ^ (together) { crc }, last;
+	together left = *(const together *)bytes ^ (together) { crc ^ 0xFFu }, last;
 
 	/* the first of them with zeros before them, which leave nothing */
 	left = look_up(left, places - (uint8_t)(TOGETHER - first));
@@ -134,19 +118,29 @@ __attribute__((target("ssse3"))) static uint8_t together8(uint8_t crc, const uin
 		left = look_up(lower, left & 15) ^ look_up(upper, (together)((halves)left >> 4) & 15) ^
 		       *(const together *)(bytes + i);
 	last = left;
-	return remainder8(0, (const uint8_t *)&last, sizeof(last));
+	return crc8(0xFFu, (const uint8_t *)&last, sizeof(last));
 }
 
 #endif
 
 uint8_t crc8(uint8_t crc, const uint8_t *bytes, size_t count)
 {
-	crc ^= 0xFFu;
+	size_t i = 0;
+
 #if defined(__x86_64__)
 	if (count >= 2 * TOGETHER && __builtin_cpu_supports("ssse3"))
-		return together8(crc, bytes, count) ^ 0xFFu;
+		return together8(crc, bytes, count);
 #endif
-	return remainder8(crc, bytes, count) ^ 0xFFu;
+	crc ^= 0xFFu;
+#if CRC_AT_ONCE == 8
+	for (; i + 8 <= count; i += 8)
+		crc = table8[7][crc ^ bytes[i]] ^ table8[6][bytes[i + 1]] ^ table8[5][bytes[i + 2]] ^
+		      table8[4][bytes[i + 3]] ^ table8[3][bytes[i + 4]] ^ table8[2][bytes[i + 5]] ^
+		      table8[1][bytes[i + 6]] ^ table8[0][bytes[i + 7]];
+#endif
+	for (; i < count; i++)
+		crc = table8[0][crc ^ bytes[i]];
+	return crc ^ 0xFFu;
 }
 
 uint32_t crc32(uint32_t crc, const uint8_t *bytes, size_t count)
