@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "common/base/wide.h"
 #include "common/link/transport.h"
 
 #define ERROR_BIT 0x20000000u
@@ -189,13 +190,6 @@ static bool eat_fd_flags(struct text *text, struct frame *frame)
 typedef uint8_t letters __attribute__((vector_size(32)));
 typedef uint16_t pairs __attribute__((vector_size(32)));
 typedef uint8_t octets __attribute__((vector_size(16)));
-
-/* Where the processor has registers of that width they are used. */
-#if defined(__x86_64__) && defined(__gnu_linux__)
-#define WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define WIDE
-#endif
 
 /* Sixteen bytes each from thirty-two hex digits, as long as all of them are some; how many bytes. */
 WIDE static unsigned read_many(const char *at, size_t digits, uint8_t bytes[FRAME_DATA_MAX])

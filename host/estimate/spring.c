@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "common/base/wide.h"
 #include "common/units.h"
 #include "host/estimate/limits.h"
 #include "host/estimate/modes.h"
@@ -23,13 +24,6 @@
 
 enum { PLACE_Q = MODES_LAW, PLACE_D = MODES_LAW + 1, LANES = 4, BEFORE = 5 };
 
-/* Where the processor has registers of four they are used. The numbers are the same, as nothing is fused or
- * reordered. */
-#if defined(__x86_64__) && defined(__gnu_linux__)
-#define WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define WIDE
-#endif
 #define INSIDE static inline __attribute__((always_inline)) void
 
 /* Four numbers side by side: element by element like one number. By pointers, since how they are passed hangs

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/wide.h"
 #include "common/crc.h"
 #include "common/wire.h"
 #include "common/wire_table.h"
@@ -69,13 +70,6 @@ uint8_t drop_mark(const struct channel *channel, double value_g)
 {
 	return fabs(value_g) > channel->range_g ? SAMPLE_CLIPPED : 0;
 }
-
-/* Where the processor has registers of that width they are used. */
-#if defined(__x86_64__) && defined(__gnu_linux__)
-#define WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define WIDE
-#endif
 
 /* Eight samples side by side, which the compiler does not make of a loop: a quarter of the instructions. */
 enum { TOGETHER = 8 };

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "common/base/wide.h"
 #include "host/base/mapped.h"
 
 enum {
@@ -136,12 +137,6 @@ static uint64_t line_of(const struct source *source, const char *byte)
 
 /* Thirty-two characters at once, where the processor has registers of that width in them. */
 typedef unsigned char letters __attribute__((vector_size(32)));
-
-#if defined(__x86_64__) && defined(__gnu_linux__)
-#define WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define WIDE
-#endif
 
 /* What is among the characters of a text. */
 struct looked {

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/wide.h"
 #include "common/wire.h"
 #include "host/base/mapped.h"
 
@@ -103,13 +104,6 @@ static unsigned marks_of(const struct channel *channel)
 	marks |= marks >> 16;
 	return (marks | marks >> 8) & UINT8_MAX;
 }
-
-/* Where the processor has registers of that width they are used. */
-#if defined(__x86_64__) && defined(__gnu_linux__)
-#define WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define WIDE
-#endif
 
 /* Four values side by side. */
 WIDE static bool reaches(const struct channel *channel, double level_g)

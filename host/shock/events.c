@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/base/wide.h"
 #include "common/units.h"
 #include "host/base/mapped.h"
 #include "host/estimate/median.h"
@@ -63,13 +64,6 @@ static void rest_of(const struct channel *channel, double *rest_g, double *noise
 		work[i] = fabs(work[i] - *rest_g);
 	*noise_g = MAD_TO_SIGMA * median_find(work, n);
 }
-
-/* Where the processor has registers of that width they are used. */
-#if defined(__x86_64__) && defined(__gnu_linux__)
-#define WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define WIDE
-#endif
 
 typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
 typedef int64_t lane_masks __attribute__((vector_size(LANES * sizeof(int64_t))));
