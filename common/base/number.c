@@ -362,6 +362,20 @@ static struct decimal decimal_of(double size)
 	return decimal;
 }
 
+/* e-05, e+123 */
+static void lay_out_exponent(char *at, int exponent)
+{
+	const unsigned size = (unsigned)abs(exponent);
+
+	*at++ = 'e';
+	*at++ = exponent < 0 ? '-' : '+';
+	if (size >= 100)
+		*at++ = (char)('0' + size / 100);
+	*at++ = (char)('0' + size / 10 % 10);
+	*at++ = (char)('0' + size % 10);
+	*at = '\0';
+}
+
 /* As "%.*g" lays it out, from the digits without the zeros at their end. */
 static void lay_out(char *at, struct decimal decimal, int digits)
 {
@@ -378,7 +392,7 @@ static void lay_out(char *at, struct decimal decimal, int digits)
 			*at++ = '.';
 		memcpy(at, digit + 1, (size_t)count - 1);
 		at += count - 1;
-		snprintf(at, 6, "e%c%02u", exponent < 0 ? '-' : '+', (unsigned)abs(exponent) % 1000);
+		lay_out_exponent(at, exponent);
 		return;
 	}
 	if (exponent < 0)
@@ -433,9 +447,31 @@ static bool shorten_decimal(char *text, double value, int least)
 	return false;
 }
 
+/* A whole number of so many digits at most is written with all it has. */
+static bool write_whole(char *text, double value, int most)
+{
+	const double size = fabs(value);
+	char digit[HELD];
+	int count = 0;
+	uint64_t left;
+
+	if (!(size < (double)power_of_ten[most]) || size != (double)(uint64_t)size)
+		return false;
+	left = (uint64_t)size;
+	do
+		digit[count++] = (char)('0' + left % 10);
+	while ((left /= 10) > 0);
+	if (signbit(value))
+		*text++ = '-';
+	while (count > 0)
+		*text++ = digit[--count];
+	*text = '\0';
+	return true;
+}
+
 void number_format(char text[NUMBER_CHARS], double value, int least)
 {
-	if (shorten_decimal(text, value, least))
+	if (write_whole(text, value, least) || shorten_decimal(text, value, least))
 		return;
 	for (int digits = least; digits <= ENOUGH; digits++) {
 		snprintf(text, NUMBER_CHARS, "%.*g", digits, value);
