@@ -191,23 +191,21 @@ typedef uint8_t letters __attribute__((vector_size(32)));
 typedef uint16_t pairs __attribute__((vector_size(32)));
 typedef uint8_t octets __attribute__((vector_size(16)));
 
-/* Sixteen bytes each from thirty-two hex digits, as long as all of them are some; how many bytes. */
+/* Sixteen bytes each from thirty-two hex digits; how many bytes; none if a character is no digit. */
 WIDE static unsigned read_many(const char *at, size_t digits, uint8_t bytes[FRAME_DATA_MAX])
 {
-	unsigned length = 0;
+	const unsigned length = digits < 2 * FRAME_DATA_MAX ? (unsigned)digits / 32 * 16 : FRAME_DATA_MAX;
+	letters valid = ~(letters){0};
+	uint64_t all[4];
 
-	for (; length + 16 <= FRAME_DATA_MAX && digits >= 32; length += 16, at += 32, digits -= 32) {
-		letters c, is_letter, valid;
+	for (unsigned i = 0; i < length; i += 16) {
+		letters c, is_letter;
 		pairs pair;
 		octets packed;
-		uint64_t all[4];
 
-		memcpy(&c, at, sizeof(c));
-		is_letter = (letters)(((c | 0x20) >= 'a') & ((c | 0x20) <= 'f'));
-		valid = (letters)((c >= '0') & (c <= '9')) | is_letter;
-		memcpy(all, &valid, sizeof(all));
-		if ((all[0] & all[1] & all[2] & all[3]) != UINT64_MAX)
-			break;
+		memcpy(&c, at + 2 * i, sizeof(c));
+		is_letter = (letters)((c | 0x20) - 'a' <= 'f' - 'a');
+		valid &= (letters)(c - '0' <= 9) | is_letter;
 		pair = (pairs)((c & 0x0F) + (is_letter & 9));
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ /* the first digit of two is the higher one */
 		pair = pair << 4 | pair >> 8;
@@ -215,9 +213,13 @@ WIDE static unsigned read_many(const char *at, size_t digits, uint8_t bytes[FRAM
 		pair = pair >> 4 | pair;
 #endif
 		packed = __builtin_convertvector(pair, octets);
-		memcpy(bytes + length, &packed, sizeof(packed));
+		memcpy(bytes + i, &packed, sizeof(packed));
 	}
-	return length;
+	memcpy(all, &valid, sizeof(all));
+	if ((all[0] & all[1] & all[2] & all[3]) == UINT64_MAX)
+		return length;
+	memset(bytes, 0, length);
+	return 0;
 }
 
 /* A frame's last or only eight bytes, as if as many zeros followed; false, and nothing written, if a digit is
