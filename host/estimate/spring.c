@@ -382,25 +382,29 @@ static bool by_unknowns(double by[SPRING_SIZE][SPRING_SIZE], const struct spring
 	return true;
 }
 
-/* From sums over columns to those over derivatives. */
+static double sum_of(const struct spring_sums *sums, unsigned i, unsigned j)
+{
+	const unsigned high = i > j ? i : j, low = i > j ? j : i;
+
+	return sums->of[high][low / LANES][low % LANES];
+}
+
+/* From sums over columns to those over derivatives, each of a few columns only. */
 static void spring_turn_sums(const struct spring_sums *sums, double by[SPRING_SIZE][SPRING_SIZE],
                              double normal[CHOLESKY_MAX][CHOLESKY_MAX], double right[CHOLESKY_MAX])
 {
 	double half[SPRING_SIZE][SPRING_SIZE + 1] = {{0}};
 
-	for (unsigned i = 0; i < SPRING_SIZE; i++)
-		for (unsigned j = 0; j <= SPRING_SIZE; j++)
-			for (unsigned n = 0; n < SPRING_SIZE; n++) {
-				const unsigned high = j > n ? j : n, low = j > n ? n : j;
-
-				half[i][j] += by[i][n] * sums->of[high][low / LANES][low % LANES];
-			}
 	for (unsigned i = 0; i < SPRING_SIZE; i++) {
-		for (unsigned j = 0; j <= i; j++)
-			for (unsigned n = 0; n < SPRING_SIZE; n++)
-				normal[i][j] += by[j][n] * half[i][n];
+		for (unsigned n = 0; n < SPRING_SIZE; n++)
+			for (unsigned j = 0; by[i][n] != 0 && j <= SPRING_SIZE; j++)
+				half[i][j] += by[i][n] * sum_of(sums, n, j);
 		right[i] = half[i][OF_RESIDUAL];
 	}
+	for (unsigned j = 0; j < SPRING_SIZE; j++)
+		for (unsigned n = 0; n < SPRING_SIZE; n++)
+			for (unsigned i = j; by[j][n] != 0 && i < SPRING_SIZE; i++)
+				normal[i][j] += by[j][n] * half[i][n];
 }
 
 size_t spring_normal(const struct series *series, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
