@@ -368,8 +368,8 @@ static int wait_for_bytes(struct target *target, char message[TARGET_MESSAGE_MAX
 	return say_silent(target, message);
 }
 
-/* 1, or 0 and below as target_receive. */
-static int ask_inside(struct target *target, char message[TARGET_MESSAGE_MAX])
+/* 1; 0 when told to stop. */
+static int ask_inside(struct target *target)
 {
 	const uint8_t *request;
 
@@ -377,8 +377,11 @@ static int ask_inside(struct target *target, char message[TARGET_MESSAGE_MAX])
 		return 0;
 	target->fill = target->inside->ask(&request);
 	memcpy(target->input, request, target->fill);
-	if (target->fill > 0 && bytes_needed(target) == (int)target->fill)
-		return 1;
+	return 1;
+}
+
+static int say_no_request(char message[TARGET_MESSAGE_MAX])
+{
 	snprintf(message, TARGET_MESSAGE_MAX, "the firmware ended, or gave no request");
 	return DT_E_CLOSED;
 }
@@ -386,7 +389,7 @@ static int ask_inside(struct target *target, char message[TARGET_MESSAGE_MAX])
 int target_receive(struct target *target, struct sensorbus_request *request,
                    struct frame frames[SENSORBUS_FRAMES_MAX], char message[TARGET_MESSAGE_MAX])
 {
-	int result = target->inside != NULL ? ask_inside(target, message) : 1;
+	int result = target->inside != NULL ? ask_inside(target) : 1;
 
 	if (result != 1)
 		return result;
@@ -398,6 +401,8 @@ int target_receive(struct target *target, struct sensorbus_request *request,
 			return say_garbage(target, message);
 		if (target->fill == (size_t)needed)
 			break;
+		if (target->inside != NULL)
+			return say_no_request(message);
 		result = wait_for_bytes(target, message);
 		if (result != 1)
 			return result;
