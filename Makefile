@@ -78,8 +78,8 @@ $(call obj,$(FREESTANDING_C) $(LOCKSTEP_C)): CFLAGS += -ffreestanding
 # Firmware and plant in one program are thousands of small calls a simulated ms: gcc joins them across
 # files, there only: --wrap of a test sees no call that has been joined.
 LTO = $(if $(SANITIZE),,$(if $(findstring gcc,$(CC)),-flto=auto -ffat-lto-objects))
-$(call obj,$(HIL_C) hil/main.c $(LOCKSTEP_C) $(INSIDE_C) $(FREESTANDING_C)): CFLAGS += $(LTO)
-$(call obj,$(HIL_C)): CFLAGS += -O3 -fno-math-errno
+$(call obj,$(HIL_C) hil/main.c $(LOCKSTEP_C) $(INSIDE_C) $(FREESTANDING_C)): CFLAGS += $(LTO) -O3
+$(call obj,$(HIL_C)): CFLAGS += -fno-math-errno
 LDFLAGS += $(if $(LTO),-fno-lto)
 $(BUILD)/droptower-bench: LDFLAGS := $(filter-out -fno-lto,$(LDFLAGS)) $(LTO) -O3
 $(call obj,$(POSIX_C) $(INSIDE_C) $(LINK_C) $(HOST_C) host/main.c $(CONSOLE_C) host/console/main.c $(HIL_C) hil/main.c $(UNIT_C) \
