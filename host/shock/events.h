@@ -8,8 +8,9 @@
  *
  * A shock begins when the reading leaves +-level about its rest, and is over when it has been inside for the
  * hold-off, so that what rings on after an impact belongs to it. Level: 8 sigma of the noise, and no less
- * than a fiftieth of the largest reading. Rest and noise are median and median deviation of at most 256 samples
- * spread over the record. Samples that are missing begin and end nothing; what a hole hides is not found.
+ * than a fiftieth of the largest reading. Rest and noise are median and median deviation of at most 256
+ * samples spread over the record. Samples that are missing begin and end nothing; what a hole hides is not
+ * found.
  *
  * Peak and time by a parabola through three samples; width at a tenth of the peak; velocity change over that
  * width, of a sensor the magnitude of the vector.
