@@ -59,7 +59,7 @@ knockout: all $(BUILD)/tests/knockout $(KNOCKOUT_DROPS) ## what each special mec
 	@$(BUILD)/tests/knockout $(KNOCKOUT_DROPS) $(KNOCKOUT_DATA)
 
 thresholds: all $(BUILD)/tests/knockout $(call obj,tests/accuracy/knockout_none.c) $(KNOCKOUT_DROPS) ## what each hand-set number does at half and at twice
-	@tests/accuracy/thresholds $(BUILD) $(BUILD)/thresholds.txt $(KNOCKOUT_DROPS) $(KNOCKOUT_DATA)
+	@LIBRARIES="$(LIBRARIES)" tests/accuracy/thresholds $(BUILD) $(BUILD)/thresholds.txt $(KNOCKOUT_DROPS) $(KNOCKOUT_DATA)
 	@echo "$(BUILD)/thresholds.txt"
 
 # What README.md and host/chart/README.md show; the other pictures stay in the build folder.
