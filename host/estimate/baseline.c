@@ -22,9 +22,6 @@ enum { DIFFERENCES_MIN = 16, BEGINNING = 16 };
 /* Of the good samples, outliers that are none. */
 #define OUTLIERS_MOST 0.03
 
-/* Means of this length carry the mains nearly whole, and a slope. */
-#define BLOCK_S 2e-3
-
 /* A sensor on a high-pass and gravity leave less. */
 #define OFFSET_MIN_G 3.0
 
@@ -190,7 +187,7 @@ static bool ends_elsewhere(const struct quiet *quiet, const struct estimate_base
 void baseline_find(const struct trace *trace, double *scratch, struct estimate_baseline *baseline)
 {
 	struct estimate_baseline found = nothing_found;
-	double length = ceil(BLOCK_S * trace->rate_hz - 1e-6);
+	double length = ceil(QUIET_BLOCK_S * trace->rate_hz - 1e-6);
 	struct quiet quiet = {.trace = trace};
 
 	quiet_find(trace, &quiet.from, &quiet.until);

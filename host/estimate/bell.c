@@ -13,8 +13,6 @@
 /* Samples this many bases to either side of the peak take part: beyond the feet zero is fitted. */
 #define REACH_BASES 0.8
 
-#define BULGE_PRIOR 0.05
-
 /* Reduced chi-square of a right model stays below 1 + this times sqrt(2 / freedom). Generous: what is left of
  * a wrong shape then is less than the samples' noise, as input, would do. */
 #define REFUSE 7.0
@@ -72,7 +70,7 @@ static size_t bell_normal(const void *model, double *p, double matrix[CHOLESKY_M
                           double right[CHOLESKY_MAX], double *squares)
 {
 	const struct scene *scene = model;
-	double prior = scene->noise_g / BULGE_PRIOR;
+	double prior = scene->noise_g / LIMIT_KNOWN;
 	struct walk walk;
 	size_t used = 0;
 	struct gram gram;

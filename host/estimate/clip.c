@@ -10,17 +10,13 @@ enum {
 	EQUAL_APART = 3, /* noise may keep samples between them below the limit */
 };
 
-/* Where samples tremble by so many steps of their numbers, two or three do not come out equal by chance. */
+/* Where samples tremble by so many steps of their numbers, two do not come out equal by chance. */
 #define TREMBLE_STEPS 200.0
-#define TREMBLE_THREE 20.0
-
-/* Of a step: numbers that are no nearer to whole ones have none. */
-#define STEP_WHOLE 1e-3
 
 /* The largest that both are whole numbers of, to rounding. */
 static double clip_common(double a, double b)
 {
-	double least = STEP_WHOLE * fmin(a, b);
+	double least = LIMIT_LEAST * fmin(a, b);
 
 	while (b > least) {
 		double rest = fabs(remainder(a, b));
@@ -65,7 +61,7 @@ static bool trembles(const struct trace *trace, double steps)
 
 static bool clip_whole(double steps)
 {
-	return fabs(steps) < 1 / LIMIT_SMALL && fabs(steps - round(steps)) < STEP_WHOLE;
+	return fabs(steps) < 1 / LIMIT_SMALL && fabs(steps - round(steps)) < LIMIT_LEAST;
 }
 
 /* Steps show as stairs, one side of which has levels between its rises, or as rises of three sizes. Straight
@@ -154,7 +150,7 @@ static bool enough(const struct trace *trace, size_t first, size_t last, size_t 
 
 	if (trace->range_g > 0 && fabs(extreme - trace->range_g) <= 1e-9 * trace->range_g)
 		return true;
-	if (trembles(trace, n < EQUAL_EXTREMES ? TREMBLE_STEPS : TREMBLE_THREE))
+	if (trembles(trace, n < EQUAL_EXTREMES ? TREMBLE_STEPS : CLIP_TREMBLE))
 		return n >= EQUAL_EXTREMES - 1;
 	if (n >= EQUAL_EXTREMES && !clip_coarse(trace, first, last))
 		return true;

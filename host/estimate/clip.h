@@ -11,6 +11,9 @@
  */
 #include "host/estimate/trace.h"
 
+/* Where samples tremble by so many steps of their numbers three are not equal by chance. */
+#define CLIP_TREMBLE 20.0
+
 enum { CLIP_WINDOW = 256 }; /* samples the step of the numbers is looked for in, from the first on */
 
 /* The step of the numbers that samples come in, in g: the least rise; 0 where none rises. */

@@ -25,15 +25,6 @@
  * its end, so that a fitted delay cannot undercut it. */
 #define MARGIN 0.1
 
-/* What is tried after a refusal must leave this part of its excess. */
-#define BETTER 0.5
-
-/* A lag less certain than this part of S2's pulse says nothing. */
-#define UNCERTAIN_MAX 0.1
-
-/* A residual beyond this part of S1's sum of squares: no oscillator. */
-#define UNEXPLAINED_MAX 0.05
-
 /* A decay is free when what still drives it moves it by less than this part of its noise. */
 #define DRIVE_LEFT 0.2
 
@@ -265,7 +256,7 @@ static bool driven_judge(const struct driven_axis *axis, const struct scene *sce
 	struct respond_crest crest;
 	struct respond_point top;
 
-	if (result->squares > UNEXPLAINED_MAX * scene->squares || !driven_same_contact(axis, solution) ||
+	if (result->squares > LIMIT_KNOWN * scene->squares || !driven_same_contact(axis, solution) ||
 	    !respond_crest(respond, axis->peak[1]->sign, &crest))
 		return false;
 	row[DECAY] = crest.time_by_decay;
@@ -321,7 +312,7 @@ static bool driven_solve(const struct driven_axis *axis, struct scene *scene, do
 
 static bool better(const struct solution *a, const struct solution *than)
 {
-	return a->chi_square - 1 < BETTER * (than->chi_square - 1);
+	return a->chi_square - 1 < LIMIT_EXPLAINS * (than->chi_square - 1);
 }
 
 /* Noise may lift a later swing above the first, and a clipped one is as high as the limit on either side. */
@@ -406,7 +397,7 @@ static void driven_express(const struct driven_axis *axis, const struct solution
 		            solution->peak_s - axis->peak[0]->result.time_s);
 	fit = hypot(fit, input_s);
 	sigma = hypot(fit, sigma_from_s);
-	if (!(sigma < UNCERTAIN_MAX * axis->peak[1]->width_s))
+	if (!(sigma < LIMIT_SLIGHT * axis->peak[1]->width_s))
 		return;
 	if (solution->refused)
 		driven->flags |= ESTIMATE_FLAG_MODEL;

@@ -14,9 +14,8 @@ enum {
 };
 
 /* Where half of what differs does so by more than so many steps, one in thirty samples equals the next, and
- * one in seventy: a run is chance's once in a million. */
+ * by CLIP_TREMBLE steps one in seventy: a run is chance's once in a million. */
 #define HELD_STEPS 8.0
-#define HELD_CALM_STEPS 20.0
 
 /* Of all samples, those that equal the one before, where half of what differs does so by more than so many
  * steps: repeated all along. Of noise one in eight does. */
@@ -43,7 +42,7 @@ static struct held held_find(const struct trace *trace)
 		rises += rise > 0;
 		some += rise > REPEATED_STEPS * step;
 		wide += rise > HELD_STEPS * step;
-		wider += rise > HELD_CALM_STEPS * step;
+		wider += rise > CLIP_TREMBLE * step;
 	}
 	if (rises < RISES_MIN)
 		return (struct held){0, false};

@@ -16,9 +16,6 @@
 /* A bump's edges are the force's less exactly. */
 #define BUMP_TAIL_WIDTHS 0.5
 
-/* A plate beside a case that rings too starts its decay at this many times the case's. */
-#define PLATE_OVER_CASE 2.0
-
 static bool estimate_decay_measured(const struct analysis *analysis, size_t i)
 {
 	return i < analysis->channel_count && isfinite(analysis->channels[i].pulse.end_s);
@@ -145,7 +142,7 @@ static bool rings(const struct desk *desk, char axis)
 	amplitude = desk->work[plate].ringdown.amplitude_g;
 	if (amplitude < LIMIT_EDGE * fabs(desk->work[plate].peak.result.value_g))
 		return false;
-	return box == none || amplitude >= PLATE_OVER_CASE * desk->work[box].ringdown.amplitude_g;
+	return box == none || amplitude >= LIMIT_OVER * desk->work[box].ringdown.amplitude_g;
 }
 
 /* An axis whose law gives it another damping than the plate's tells what it exchanged with the other one. */

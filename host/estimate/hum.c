@@ -26,12 +26,6 @@ enum {
 
 enum { TONE_HALVINGS = 14 };
 
-/* A tone that is there takes this part of its power from the samples. */
-#define TONE_SEEN 0.5
-
-/* The means may scatter by this much more, in squares, than the samples' noise asks. */
-#define COLOUR_MAX 3.0
-
 /* Adds up the normal equations, means taken from that of the first block on. */
 static void hum_add_blocks(struct hum_line *line, const struct quiet *quiet, double half_s, struct gram *gram)
 {
@@ -268,7 +262,7 @@ static bool unfold(struct hum_line *line, const struct quiet *quiet, double half
 		if (!fit_line(line, quiet, half_s))
 			return false;
 	}
-	return fmax(fast_g, slow_g) > TONE_SEEN * last_hum_g(line, quiet);
+	return fmax(fast_g, slow_g) > LIMIT_EXPLAINS * last_hum_g(line, quiet);
 }
 
 /* Whether the means scatter by more than the samples' noise makes them. */
@@ -323,7 +317,7 @@ static bool short_coloured(const struct quiet *quiet, double about, double reach
 		return false;
 	within = (moments.deviation * moments.deviation * (count - 1) - between) / (count - blocks);
 	limit = 1 + LIMIT_CHI_REFUSED * sqrt(2 / (blocks - 1) + 2 / (count - blocks));
-	return between / (blocks - 1) > fmax(fmax(COLOUR_MAX, limit) * within, LIMIT_LEAST * LIMIT_LEAST);
+	return between / (blocks - 1) > fmax(fmax(LIMIT_GROSS, limit) * within, LIMIT_LEAST * LIMIT_LEAST);
 }
 
 struct hum_line hum_find(struct quiet *quiet, double half_s, const struct quiet_moments *moments,
@@ -351,7 +345,7 @@ struct hum_line hum_find(struct quiet *quiet, double half_s, const struct quiet_
 	}
 	if (count >= HUM_BLOCKS_MIN && (best.hums > 0 || coloured(&best, count, variance)))
 		variance = find_tones(&best, quiet, half_s, moments, reach);
-	quiet->doubtful = left(&best, count) > fmax(COLOUR_MAX * variance, LIMIT_LEAST * LIMIT_LEAST);
+	quiet->doubtful = left(&best, count) > fmax(LIMIT_GROSS * variance, LIMIT_LEAST * LIMIT_LEAST);
 	if (quiet->doubtful)
 		return none;
 	if (best.term[1] * best.term[1] > LIMIT_F * best.slope_variance * left(&best, count) &&

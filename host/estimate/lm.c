@@ -10,14 +10,11 @@
 #define DAMPING_DOWN 0.1
 
 /* Less hardly changes a step: one that was taken back would be again. */
-#define DAMPING_FELT 1e-3
+#define DAMPING_FELT (DAMPING_START / DAMPING_DOWN)
 
 /* On a kinked model: to stay short of the kink takes more, and is needed again at the next step. */
 #define KINK_DOWN 0.3
-#define KINK_FELT 1e-2
-
-/* Damped this much and still no better: this is the bottom, as far as rounding can tell. */
-#define DAMPING_MAX 1e6
+#define KINK_FELT (DAMPING_FELT / DAMPING_DOWN)
 
 struct place {
 	double normal[CHOLESKY_MAX][CHOLESKY_MAX];
@@ -111,7 +108,8 @@ bool lm_fit(const struct lm_problem *problem, double *p, struct lm_result *resul
 		}
 		result->iterations++;
 		if (!stand(problem, trial, there) || there->squares > here->squares) {
-			if (promise <= rounding || damping > DAMPING_MAX)
+			/* Damped that much and still no better: the bottom, as far as rounding can tell. */
+			if (promise <= rounding || damping > 1 / LIMIT_SMALL)
 				return lm_finish(problem, here, 0, result);
 			damping = fmax(damping / DAMPING_DOWN, felt);
 			before = 0;

@@ -348,8 +348,7 @@ static void reach_across(const struct trace *trace, struct peak *peak)
 	    !peak_fit(trace, ESTIMATE_FAMILY_SINE_POWER, peak) || shape_judge(&peak->shape) != SHAPE_FITS)
 		return;
 	peak_take_shape(peak);
-	peak->result.sigma_g =
-	        hypot(peak->result.sigma_g, PEAK_OTHER_FAMILY * (fabs(peak->shape.peak_g) - sample));
+	peak->result.sigma_g = hypot(peak->result.sigma_g, LIMIT_KNOWN * (fabs(peak->shape.peak_g) - sample));
 }
 
 /* The family that is given; half of what is there without it differs by enters its uncertainty. */

@@ -5,12 +5,8 @@
 
 #include "host/estimate/limits.h"
 
-/* What readings beyond the range are trusted: this part of what they add is taken as their uncertainty. */
-#define BEYOND_RANGE 0.1
-
-/* Flanks tell of no more than this many times their limit, and of no cut that lasts this many times the
- * shorter one: that is a channel that hangs at its limit. */
-#define FLANKS_TELL 3.0
+/* Flanks tell of no cut that lasts this many times the shorter one: that is a channel that hangs at its
+ * limit. */
 #define FLANKS_LAST 20.0
 
 /* The clipped samples under the pulse. */
@@ -110,7 +106,7 @@ static void peak_clipped_take_choice(const struct trace *trace, enum shape_verdi
 
 	/* Of the other ones none was left. */
 	if (peak->shape.family == ESTIMATE_FAMILY_SINE_POWER)
-		*sigma_g = hypot(*sigma_g, PEAK_OTHER_FAMILY * (fabs(peak->shape.peak_g) - clipped->low));
+		*sigma_g = hypot(*sigma_g, LIMIT_KNOWN * (fabs(peak->shape.peak_g) - clipped->low));
 	else if (verdict == SHAPE_FITS)
 		*sigma_g = sigma_of_all(trace, peak);
 }
@@ -122,7 +118,7 @@ static bool flanks_silent(const struct clipped *clipped, const struct peak *peak
 	double after = peak->span.until_s - peak->clipped_until_s;
 
 	return peak->shape.family == ESTIMATE_FAMILY_AUTO ||
-	       !(fabs(peak->shape.peak_g) <= FLANKS_TELL * clipped->high) ||
+	       !(fabs(peak->shape.peak_g) <= LIMIT_GROSS * clipped->high) ||
 	       peak->clipped_until_s - peak->clipped_from_s > FLANKS_LAST * fmin(before, after);
 }
 
@@ -175,7 +171,7 @@ bool peak_unclip(const struct trace *trace, const struct estimate_options *optio
 	} else {
 		peak_climb(trace, options, peak);
 		result->sigma_g =
-		        hypot(result->sigma_g, BEYOND_RANGE * fmax(fabs(result->value_g) - clipped.low, 0));
+		        hypot(result->sigma_g, LIMIT_SLIGHT * fmax(fabs(result->value_g) - clipped.low, 0));
 	}
 	result->how.status = ESTIMATE_CLIPPED;
 	return true;

@@ -14,10 +14,6 @@
 /* Below this many sigma an axis is weak. */
 #define PEAK_WEAK_SIGMAS 10.0
 
-/* Of what an unasked sine-power adds to a limit, or across a hole: not every pulse it fits is of its family.
- */
-#define PEAK_OTHER_FAMILY 0.05
-
 /* One more method on the path. */
 void peak_tried(struct estimate_how *how, const char *name);
 

@@ -5,9 +5,6 @@
 
 #include "host/estimate/limits.h"
 
-/* The strongest axis must stand this many times higher than a weak one may. */
-#define STRONG_OVER_WEAK 2.0
-
 /* An amplitude is there from this many of its own sigma on: chance has one number to get there, not as many
  * as there are samples. */
 #define WEAK_SIGNIFICANT 3.5
@@ -64,7 +61,7 @@ bool peak_weak(const struct trace *trace, const struct estimate_options *options
 	struct amplitude amplitude;
 
 	if (from->how.status != ESTIMATE_OK || strong->model == PEAK_MODEL_NONE || !(trace->noise_g > 0) ||
-	    fabs(from->value_g) < STRONG_OVER_WEAK * PEAK_WEAK_SIGMAS * trace->noise_g ||
+	    fabs(from->value_g) < LIMIT_OVER * PEAK_WEAK_SIGMAS * trace->noise_g ||
 	    !fit_amplitude(trace, strong_trace, strong, &amplitude) ||
 	    fabs(amplitude.value) < WEAK_SIGNIFICANT * amplitude.sigma)
 		return false;

@@ -8,16 +8,13 @@
 #include "host/estimate/pair.h"
 #include "host/estimate/zero.h"
 
-/* As long as the study's pre-trigger and more; longer reaches into what happened before the fall. */
-#define QUIET_S 0.25
-
 enum { GLANCE = 31 }; /* samples that tell roughly where the middle is, and how wide */
 enum { SECOND_DIFFERENCES = 255 };
 
 /* Noise is coloured when samples side by side tremble by less than this part of it: white noise does once in
- * a million quiet parts. Its colour is that of means so long, of no fewer, and believed up to so much. */
+ * a million quiet parts. Its colour is that of means of two blocks, of no fewer, and believed up to so much.
+ */
 #define COLOURED 0.7
-#define COLOUR_S 4e-3
 #define COLOUR_MOST 5.0
 #define COLOUR_UNSURE 1.5 /* over their number: Student's factor beyond 2, of 2 / 3 as many */
 
@@ -25,10 +22,6 @@ enum { COLOUR_MEANS = 16 };
 
 /* Of a decay's quarters the last step against the first. */
 #define DECAYS_ON 1.2
-
-/* Noise spreads each block of samples by more than this in its standard deviations, and two blocks alike by
- * no more than this beside each other. */
-#define QUIET_SPREAD 2.0
 
 double quiet_glance(const struct trace *trace, size_t from, size_t until, double *sigma_g)
 {
@@ -257,7 +250,7 @@ bool quiet_restless(const struct quiet *quiet, double noise_g)
 	for (size_t i = quiet->from / TRACE_BLOCK + 1; (i + 1) * TRACE_BLOCK <= quiet->until; i++) {
 		double spread = quiet_spread_of(quiet->trace, i);
 
-		if (spread > 0 && spread < QUIET_SPREAD * noise_g)
+		if (spread > 0 && spread < LIMIT_OVER * noise_g)
 			return true;
 	}
 	return false;
@@ -277,7 +270,7 @@ bool quiet_narrow(struct quiet *quiet)
 	if (!(most > LIMIT_SURE * least))
 		return false;
 	for (size_t i = first; i < last; i++) {
-		run = quiet_spread_of(quiet->trace, i) <= QUIET_SPREAD * least ? run + 1 : 0;
+		run = quiet_spread_of(quiet->trace, i) <= LIMIT_OVER * least ? run + 1 : 0;
 		if (run > longest) {
 			longest = run;
 			quiet->from = (i + 1 - run) * TRACE_BLOCK;
@@ -302,7 +295,7 @@ double quiet_noise(const struct trace *trace, size_t from, size_t until)
 double quiet_colour(const struct trace *trace, const struct estimate_baseline *baseline)
 {
 	size_t from = trace_index(trace, baseline->from_s), until = trace_index(trace, baseline->until_s);
-	size_t length = (size_t)ceil(COLOUR_S * trace->rate_hz), means = 0;
+	size_t length = (size_t)ceil(2 * QUIET_BLOCK_S * trace->rate_hz), means = 0;
 	double square = 0;
 
 	if (baseline->samples == 0 || !(quiet_noise(trace, from, until) < COLOURED * trace->noise_g))

@@ -12,6 +12,11 @@
 #include "host/estimate/estimate.h"
 #include "host/estimate/trace.h"
 
+/* As long as the study's pre-trigger and more: longer reaches into what happened before the fall. Means of a
+ * block carry the mains nearly whole, and a slope. */
+#define QUIET_S 0.25
+#define QUIET_BLOCK_S 2e-3
+
 enum {
 	QUIET_SAMPLES_MIN = 32,
 	QUIET_BLOCKS_MAX = 128, /* 250 ms of 2 ms each, and one that is not full */

@@ -5,13 +5,9 @@
 
 #include "host/estimate/limits.h"
 
-/* An impact begins this part of a width before 10 % of its peak, more or less: contacts rise steeply. */
-#define FOOT_PART 0.05
-
-/* They fade slowly: from the 10 % point to this level, or to the noise, and on to the foot by this part
- * of that time, give or take half of it. A force linear in what is left to go asks for a quarter, one of
- * power 1.5 for a half. */
-#define FADE_LEVEL 0.02
+/* Contacts rise steeply and fade slowly: from the 10 % point to where they have faded, or to the noise, and
+ * on to the foot by this part of that time, give or take half of it. A force linear in what is left to go
+ * asks for a quarter, one of power 1.5 for a half. */
 #define FADE_ON 0.4
 
 double rebound_again_g(const struct trace *trace, double peak_g)
@@ -92,7 +88,7 @@ static double rebound_contact_end(const struct rebound_axes *axes, unsigned stro
 	const struct estimate_pulse *pulse = axes->pulse[strong];
 	const struct peak *peak = axes->peak[strong];
 	const struct trace *trace = axes->trace[strong];
-	double level = FADE_LEVEL * fabs(peak->result.value_g), fade;
+	double level = LIMIT_FADED * fabs(peak->result.value_g), fade;
 
 	level = fmax(level, LIMIT_AGREE * trace->noise_g);
 	(void)trace_edge(trace, peak->at, 1, peak->sign, level, &fade);
@@ -111,7 +107,7 @@ static void by_flight(const struct rebound_axes *axes, double speed_m_s, double 
 		return;
 	rebound->second_impact_s = impact;
 	end = rebound_contact_end(axes, strong, &sigma_end);
-	sigma = hypot(sigma, FOOT_PART * axes->pulse[strong]->duration_s);
+	sigma = hypot(sigma, LIMIT_KNOWN * axes->pulse[strong]->duration_s);
 	rebound->flight_ratio = ratio_s * (impact - end);
 	rebound->sigma_flight_ratio = ratio_s * hypot(sigma, sigma_end);
 }
@@ -129,7 +125,7 @@ void rebound_find(const struct rebound_axes *axes, double impact_speed_m_s, doub
 	by_velocity(axes, impact_speed_m_s, &found);
 	by_flight(axes, impact_speed_m_s, gravity_m_s2, &found);
 	apart = fabs(found.velocity_ratio - found.flight_ratio);
-	if (found.status == ESTIMATE_OK && apart > REBOUND_APART &&
+	if (found.status == ESTIMATE_OK && apart > LIMIT_SLIGHT &&
 	    !(apart <= LIMIT_AGREE * hypot(found.sigma_velocity_ratio, found.sigma_flight_ratio)))
 		found.status = ESTIMATE_AMBIGUOUS;
 	*rebound = found;

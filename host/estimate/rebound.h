@@ -11,12 +11,10 @@
  *              height it left, on the corner it left with.
  *
  * The second impact is where the case reads as much again as rebound_again_g says. Status: short without a
- * velocity change, clipped when an axis is; ambiguous when the two differ by more than REBOUND_APART and by
+ * velocity change, clipped when an axis is; ambiguous when the two differ by more than a tenth and by
  * more than three sigma.
  */
 #include "host/estimate/peak.h"
-
-#define REBOUND_APART 0.1
 
 enum { REBOUND_AXES = 3 };
 

@@ -11,11 +11,6 @@
 #include "host/estimate/ringdown_private.h"
 #include "host/estimate/spring.h"
 
-/* A fit that gains less of the sum of squares, in the noise's variance, or explains less of it, shows
- * nothing. */
-#define GAIN_MIN 64.0
-#define EXPLAINED_MIN 0.5
-
 /* Of these the plain decay is not the whole. */
 #define RICHER (ESTIMATE_FLAG_TWO_MODES | ESTIMATE_FLAG_AMPLITUDE | ESTIMATE_FLAG_HUM | ESTIMATE_FLAG_MODEL)
 
@@ -47,8 +42,8 @@ static bool estimate_ringdown_decays(const struct modes *modes)
 
 static enum estimate_status ringdown_judge(const struct ringdown_job *job)
 {
-	if (ringdown_explained(job) < EXPLAINED_MIN || ringdown_gain(job) < GAIN_MIN ||
-	    modes_swing_g(&job->modes, 0) < RINGDOWN_SWING_LEVEL * job->span->peak_g)
+	if (ringdown_explained(job) < LIMIT_EXPLAINS || ringdown_gain(job) < LIMIT_SURE * LIMIT_SURE ||
+	    modes_swing_g(&job->modes, 0) < LIMIT_FADED * job->span->peak_g)
 		return ESTIMATE_NO_PEAK;
 	return estimate_ringdown_decays(&job->modes) ? ESTIMATE_OK : ESTIMATE_NOT_CONVERGED;
 }
@@ -232,7 +227,7 @@ static double three_cycles(const struct ringdown_job *job)
 	struct crossings crossings;
 
 	crossings_find(&crossings, job->trace, job->first, job->last, job->modes.p[MODES_OFFSET],
-	               fmax(LIMIT_SIGNIFICANT * noise, RINGDOWN_SWING_LEVEL * job->span->peak_g));
+	               fmax(LIMIT_SIGNIFICANT * noise, LIMIT_FADED * job->span->peak_g));
 	if (crossings.count < CROSSINGS_MAX)
 		return NAN;
 	return 3 / (crossings.time_s[CROSSINGS_MAX - 1] - crossings.time_s[0]);

@@ -5,9 +5,6 @@
 
 #include "host/estimate/limits.h"
 
-/* X and Y are not of one thing when they are this part apart, and by more than chance. */
-#define APART_MAX 0.05
-
 /* How far apart exchange between the axes may lead a law's damping, as part of it; a hundredth of it is left
  * in doubt. */
 #define LAW_APART 0.15
@@ -67,7 +64,7 @@ void ringdown_combine(const struct ringdown *x, const struct ringdown *y, struct
 	found.frequency_hz = mean.value;
 	found.sigma_hz = mean.sigma;
 	agree = mean.agree;
-	if (!mean.agree && fabs(a->frequency_hz - b->frequency_hz) > APART_MAX * mean.value)
+	if (!mean.agree && fabs(a->frequency_hz - b->frequency_hz) > LIMIT_KNOWN * mean.value)
 		found.how.status = ESTIMATE_AMBIGUOUS;
 	mean = weighted_mean(a->natural_frequency_hz, a->sigma_natural_hz, b->natural_frequency_hz,
 	                     b->sigma_natural_hz);

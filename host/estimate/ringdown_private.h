@@ -13,9 +13,7 @@
 #include "host/estimate/ringdown.h"
 #include "host/estimate/series.h"
 
-/* What is no swing: this little of the peak. What of the swing is small enough not to matter whatever the
- * noise. */
-#define RINGDOWN_SWING_LEVEL 0.02
+/* What of the swing is small enough not to matter whatever the noise. */
 #define RINGDOWN_SWING_MODEL 1e-4
 
 /* So many blocks more to a cycle where the start is known, and for two modes or a law. */

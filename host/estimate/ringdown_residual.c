@@ -5,9 +5,6 @@
 
 #include "host/estimate/limits.h"
 
-/* How well the noise itself is known. */
-#define NOISE_KNOWN 0.05
-
 unsigned ringdown_freedom(const struct ringdown_job *job, const struct modes *modes)
 {
 	return job->series.used - modes_size(modes);
@@ -22,7 +19,7 @@ double ringdown_chi_square(const struct ringdown_job *job, const struct modes *m
 
 bool ringdown_passes(const struct ringdown_job *job, const struct modes *modes)
 {
-	double spread = sqrt(2.0 / ringdown_freedom(job, modes) + 2 * NOISE_KNOWN * NOISE_KNOWN);
+	double spread = sqrt(2.0 / ringdown_freedom(job, modes) + 2 * LIMIT_KNOWN * LIMIT_KNOWN);
 
 	return !(ringdown_chi_square(job, modes) > 1 + LIMIT_CHI * spread);
 }

@@ -21,13 +21,9 @@
 /* Fewer points per cycle would cost accuracy. */
 #define POINTS_PER_CYCLE 13.0
 
-/* Window and block are chosen anew when the fit's wish differs from them by more than this. */
-#define WINDOW_CHANGE 0.1
-
 /* Samples before the window that lie this far from what the fit foretells, in standard deviations of one,
- * were still driven: one alone, two together, if the next earlier one is off too. */
+ * were still driven: one alone, or two together by LIMIT_HINT, if the next earlier one is off too. */
 #define BACK_ALONE 2.2
-#define BACK_PAIR 2.0
 #define BACK_AGAIN 1.5
 
 enum { WINDOWS = 4 };
@@ -77,8 +73,8 @@ static bool ringdown_span_settle(struct ringdown_job *job, double omega, double 
 			return false;
 		most_s *= 4;
 		wish = window_end(job, modes->p[MODES_OMEGA], modes->p[MODES_DECAY], TIME_CONSTANTS, most_s);
-		if (fabs((double)wish - (double)end) < WINDOW_CHANGE * (double)(end - job->first) &&
-		    block <= ringdown_block(job, modes->p[MODES_OMEGA] * (1 - WINDOW_CHANGE)))
+		if (fabs((double)wish - (double)end) < LIMIT_SLIGHT * (double)(end - job->first) &&
+		    block <= ringdown_block(job, modes->p[MODES_OMEGA] * (1 - LIMIT_SLIGHT)))
 			break;
 		end = wish;
 		block = ringdown_block(job, modes->p[MODES_OMEGA]);
@@ -99,7 +95,7 @@ static bool settle_by_scan(struct ringdown_job *job)
 enum estimate_status ringdown_start(struct ringdown_job *job)
 {
 	double noise = isfinite(job->trace->noise_g) ? job->trace->noise_g : 0, omega, decay;
-	double threshold = fmax(LIMIT_SIGNIFICANT * noise, RINGDOWN_SWING_LEVEL * job->span->peak_g);
+	double threshold = fmax(LIMIT_SIGNIFICANT * noise, LIMIT_FADED * job->span->peak_g);
 	struct crossings crossings;
 	bool begun;
 
@@ -172,7 +168,7 @@ static size_t free_since(const struct ringdown_job *job, const struct modes *sam
 
 		/* Beyond noise: an outlier, or a contact too short to show twice. */
 		if (fabs(off) > LIMIT_NOISE ||
-		    ((fabs(off) > BACK_ALONE || fabs(off + after) > BACK_PAIR) &&
+		    ((fabs(off) > BACK_ALONE || fabs(off + after) > LIMIT_HINT) &&
 		     (k - 1 == earliest || fabs(off_by(job, samples, k - 2, noise)) > BACK_AGAIN)))
 			return k;
 		after = off;

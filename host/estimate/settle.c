@@ -13,9 +13,8 @@ enum {
 	BEGINNING = 16 /* whose mean is held against the samples before the pulse */
 };
 
-/* From try to try; more left than this many times the try before: something else began. */
+/* From try to try. */
 #define GROWTH 1.2
-#define WORSE 2.0
 
 /* What it leaves against the samples' noise and what it moves by. */
 #define OVER_NOISE 4.0
@@ -244,7 +243,7 @@ static size_t settle_grow(const struct trace *trace)
 		take_blocks(trace, samples, &blocks);
 		fit_robustly(&blocks, &fit);
 		now = fit.leaves * sqrt((double)blocks.length) + 1e-6 * fabs(fit.amplitude);
-		if (now > WORSE * before)
+		if (now > LIMIT_OVER * before)
 			break;
 		if (is_one(&blocks, &fit, quiet_noise(trace, 0, samples)))
 			fits = samples;

@@ -12,10 +12,8 @@ enum {
 	REACH = 10, /* how far for them, where some are missing */
 };
 
-/* A spike of one sample stands off by so many times its neighbours' bends, and noise; of two, or where some
- * of the neighbours are missing, by so many. */
-#define ONE_BENDS 2.0
-#define WIDE_BENDS 4.0
+/* A spike of one sample stands off by LIMIT_OVER times its neighbours' bends, and noise; of two, or where
+ * some of the neighbours are missing, by twice as many. */
 
 /* Deviation over mean magnitude: a Gaussian's, and its standard deviation times the root of how many samples;
  * Laplace has 1.41, Student's with five degrees of freedom 1.36. Asked where samples of the quiet part reach
@@ -23,9 +21,6 @@ enum {
 #define TAIL_RATIO 1.2533
 #define TAIL_SPREAD 0.334
 #define TAIL_ASKED 4.5
-
-/* Of the quiet part's largest: a spike of the same noise stands off by no more. */
-#define TAIL_AGAIN 3.0
 
 /* |second difference| about sample k */
 static double spike_bend(const double *v)
@@ -48,7 +43,7 @@ static bool stands_alone(const double *v, double noise_g)
 {
 	double off = fabs(v[0] - (v[-1] + v[1]) / 2);
 
-	return off > LIMIT_NOISE * noise_g && off > ONE_BENDS * bends_around(v, 1) + LIMIT_NOISE * noise_g;
+	return off > LIMIT_NOISE * noise_g && off > LIMIT_OVER * bends_around(v, 1) + LIMIT_NOISE * noise_g;
 }
 
 /* Two side by side, to the same side. */
@@ -58,7 +53,7 @@ static bool stand_alone(const double *v, double noise_g)
 	double off = fmin(fabs(a), fabs(b));
 
 	return a * b > 0 && off > LIMIT_NOISE * noise_g &&
-	       off > WIDE_BENDS * bends_around(v, 2) + LIMIT_NOISE * noise_g;
+	       off > 2 * LIMIT_OVER * bends_around(v, 2) + LIMIT_NOISE * noise_g;
 }
 
 static bool all_good(const struct trace *trace, size_t from, size_t until)
@@ -125,7 +120,7 @@ static bool stands_alone_by_hole(const struct trace *trace, size_t k, size_t ski
 	far = fmax(fmax(curvature(&a, m - 3, m - 2, m - 1), curvature(&a, m - 4, m - 3, m - 2)),
 	           fmax(curvature(&a, m + 1, m + 2, m + 3), curvature(&a, m + 2, m + 3, m + 4)));
 	return curvature(&a, m - 1, m, m + 1) * span >
-	       WIDE_BENDS * fmax(fmax(near, far) - calm, 0) * span + 2 * LIMIT_NOISE * noise_g;
+	       2 * LIMIT_OVER * fmax(fmax(near, far) - calm, 0) * span + 2 * LIMIT_NOISE * noise_g;
 }
 
 /* How far v[0] stands off the straight line between its neighbours so many samples before and after. */
@@ -250,7 +245,7 @@ static bool stands_at_end(const struct trace *trace, size_t k, double noise_g)
 		around = fmax(around, fabs(v[-in] - v[-2 * in] - bridge));
 	for (ptrdiff_t away = 2; away <= SIDE; away++)
 		around = fmax(around, spike_bend(v + away * in));
-	return spike_bend(v) / 2 > WIDE_BENDS * around + 2 * LIMIT_NOISE * noise_g;
+	return spike_bend(v) / 2 > 2 * LIMIT_OVER * around + 2 * LIMIT_NOISE * noise_g;
 }
 
 /* All but the very first and last: a pulse that is cut off there looks the same. */
@@ -340,7 +335,7 @@ void spike_of_noise(struct trace *trace, const struct estimate_baseline *baselin
 		return;
 	for (size_t k = 1; k + 1 < trace->count; k++)
 		if (trace->sample[k] & SAMPLE_SPIKE &&
-		    !(fabs(off_line(trace->value_g + k, 1, 1)) < TAIL_AGAIN * reach.most))
+		    !(fabs(off_line(trace->value_g + k, 1, 1)) < LIMIT_GROSS * reach.most))
 			return;
 	trace->flags &= ~(unsigned)RECORD_FLAG_SPIKE;
 }

@@ -13,8 +13,8 @@
 #define SOFT_MAX 1e4
 
 /* A small swing is stiffer than one without end by at most this part of that, and softer by less. */
-#define B_MIN -0.9
 #define B_MAX 10.0
+#define B_MIN (-1 + 1 / B_MAX)
 
 /* Of spring_at's steps. */
 #define STEPS_PER_CYCLE 64.0

@@ -2,6 +2,7 @@
 #include "host/estimate/zero.h"
 
 #include "common/units.h"
+#include "host/estimate/quiet.h"
 
 static void turn_with(struct zero *w, double hum_g, double hum_hz, double phase)
 {
@@ -13,7 +14,7 @@ static void turn_with(struct zero *w, double hum_g, double hum_hz, double phase)
 
 struct zero zero_from(const struct estimate_baseline *baseline, const struct trace *trace, size_t k)
 {
-	double reach_s = (baseline->until_s - baseline->from_s) / 2 + DRIFT_REACH_S;
+	double reach_s = (baseline->until_s - baseline->from_s) / 2 + 2 * QUIET_S;
 	double after_s = trace_time(trace, k) - (baseline->from_s + baseline->until_s) / 2;
 	struct zero w = {.baseline = baseline,
 	                 .after_s = {after_s, after_s + 1 / trace->rate_hz},

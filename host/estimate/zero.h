@@ -3,15 +3,12 @@
 #define DT_HOST_ESTIMATE_ZERO_H
 /*
  * Where a baseline puts zero, from two samples to the next two: offset, drift and hums, in g. A drift is
- * followed for DRIFT_REACH_S beyond the quiet part; zero stays where it is from there on. No memory but the
- * caller's; the baseline is borrowed.
+ * followed for two quiet parts of full length beyond its own; zero stays where it is from there on. No memory
+ * but the caller's; the baseline is borrowed.
  */
 #include "host/estimate/estimate.h"
 #include "host/estimate/phasor.h"
 #include "host/estimate/trace.h"
-
-/* As far as a drift is believed. */
-#define DRIFT_REACH_S 0.5
 
 /* The strongest has a place of its own in a baseline. */
 enum { ZERO_HUMS_MAX = 1 + ESTIMATE_TONES_MAX };
