@@ -19,9 +19,6 @@ enum { DIFFERENCES_MIN = 16, BEGINNING = 16 };
 /* Samples of a record's beginning for each of its rise: more than the foot of any pulse has. */
 #define LINGERS 6.0
 
-/* Of the good samples, outliers that are none. */
-#define OUTLIERS_MOST 0.03
-
 /* A sensor on a high-pass and gravity leave less. */
 #define OFFSET_MIN_G 3.0
 
@@ -65,7 +62,7 @@ static void baseline_measure(struct quiet *quiet, struct estimate_baseline *foun
 	found->from_s = trace_time(trace, quiet->from);
 	found->until_s = trace_time(trace, quiet->until - 1);
 	found->doubtful = found->doubtful || quiet->doubtful ||
-	                  (double)inner.count < (1 - OUTLIERS_MOST) * (double)inner.good;
+	                  (double)inner.count < (1 - LIMIT_KNOWN) * (double)inner.good;
 	if (line.terms == 0)
 		return;
 	hum_note(&line, half_s, (double)quiet->length / trace->rate_hz, found);

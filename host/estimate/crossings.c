@@ -5,10 +5,8 @@
 #include <string.h>
 
 #include "common/units.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/modes.h"
-
-/* The least damping to start from: a swing that noise lets grow decays all the same. */
-#define DAMPING_MIN 0.005
 
 /* Half-cycles without a swing after which there will be none. */
 #define QUIET 2.5
@@ -101,7 +99,8 @@ static double swings_decay(const struct crossings *found, double omega)
 	if (found->swing_g[last] > 0 && found->swing_s[last] > found->swing_s[0])
 		a = log(found->swing_g[0] / found->swing_g[last]) /
 		    (found->swing_s[last] - found->swing_s[0]);
-	return fmin(fmax(a, DAMPING_MIN * omega), MODES_DAMPING_MAX * omega);
+	/* A swing that noise lets grow decays all the same. */
+	return fmin(fmax(a, LIMIT_PART * omega), MODES_DAMPING_MAX * omega);
 }
 
 bool crossings_start(const struct crossings *found, double *omega, double *decay)

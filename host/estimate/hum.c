@@ -15,9 +15,6 @@ enum {
 	SHORT_BLOCKS = 40, /* of a quiet part that is too short for blocks of a length, at most */
 };
 
-/* Hum that would be significant makes the means scatter by more than this, in squares. */
-#define HUM_SIGN 1.2
-
 /* Hum of no mains frequency is looked for where the means scatter by more than chance: from so many cycles,
  * slower is motion, to as near half the means' rate, where they do not tell its phase, in steps of this part
  * of what the quiet part resolves, and then this often at half the step. */
@@ -335,8 +332,7 @@ struct hum_line hum_find(struct quiet *quiet, double half_s, const struct quiet_
 	if (!fit_line(&best, quiet, half_s))
 		return none;
 	start = best;
-	for (unsigned i = 0; count >= HUM_BLOCKS_MIN && left(&start, count) > HUM_SIGN * variance && i < 2;
-	     i++) {
+	for (unsigned i = 0; count >= HUM_BLOCKS_MIN && i < 2; i++) {
 		struct hum_line trial = {.has_slope = true, .hums = 1, .hum_hz = {mains_hz[i]}};
 
 		if (fit_line(&trial, quiet, half_s) && trial.squares < best.squares &&

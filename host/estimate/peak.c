@@ -12,22 +12,18 @@
 #define HOLE_MAX 0.35
 
 /* A pulse whose middles at half and at a tenth of its height lie further apart than this part of its width,
- * and this many times the noise's part of its height, is no symmetric one. */
+ * and LIMIT_HINT times the noise's part of its height, is no symmetric one. */
 #define SKEW_MAX 0.06
-#define SKEW_NOISE 2.0
 
 /* A top that stands aside of the middle at half its height by this part of what it is wide there is flatter
  * on one side than a polynomial tells: saw-tooths of 0.25 to 0.75 have 0.25 and are 0.02 of a width off; an
- * impact has 0.1. */
-#define ASIDE 0.1
+ * impact has LIMIT_SLIGHT. */
 #define ASIDE_WHOLE 0.18
 #define ASIDE_TIME 0.02
 
 /* A top this wide at nine tenths of its height, in parts of what it is wide at half, is flat: a half-sine has
  * 0.43, a trapezoid more than 0.6. Its highest instant is anywhere on it. */
-#define FLAT_LEVEL 0.9
 #define FLAT 0.6
-#define FLAT_TIME 0.1
 
 /* A crest this much sharper than a half-sine as wide may be a hump. */
 #define SHARP 1.5
@@ -37,9 +33,6 @@
 
 /* A half-sine is two thirds of its base wide at half height. */
 #define BASE_PER_HALF_WIDTH 1.5
-
-/* A family and the polynomials are of one pulse when they agree within this many sigma. */
-#define AGREE_SIGMAS 4.0
 
 /* From so many sigma of the polynomials on, what their time differs by from a symmetric family's is its
  * doubt. */
@@ -109,7 +102,7 @@ static bool is_lopsided(const struct trace *trace, const struct peak *peak)
 		return false;
 	return swings_back(trace, peak, until, until + (until - from) / 2) ||
 	       fabs((until + from) / 2 - peak->start.peak_s) >
-	               (SKEW_MAX + SKEW_NOISE * trace->noise_g / value) * (until - from);
+	               (SKEW_MAX + LIMIT_HINT * trace->noise_g / value) * (until - from);
 }
 
 /* Half width and feet around the highest sample. A side cut off by the end of the trace is taken as wide
@@ -213,14 +206,14 @@ static bool take_parabola(const struct trace *trace, struct peak *peak)
  * top, or on a hump that noise or a ripple may have lifted. */
 static double crest_doubt(const struct trace *trace, const struct peak *peak, const struct crest *crest)
 {
-	double half_s = peak->start.half_width_s, level = FLAT_LEVEL * fabs(trace->value_g[peak->at]);
-	double aside = fabs(crest->time_s - peak->start.peak_s) / half_s - ASIDE;
-	double doubt_s = ASIDE_TIME * peak->width_s * fmin(fmax(aside / (ASIDE_WHOLE - ASIDE), 0), 1);
+	double half_s = peak->start.half_width_s, level = (1 - LIMIT_EDGE) * fabs(trace->value_g[peak->at]);
+	double aside = fabs(crest->time_s - peak->start.peak_s) / half_s - LIMIT_SLIGHT;
+	double doubt_s = ASIDE_TIME * peak->width_s * fmin(fmax(aside / (ASIDE_WHOLE - LIMIT_SLIGHT), 0), 1);
 	double noise = pow(crest->sigma_time_s, 2) - pow(crest->model_s, 2), from, until, d[3], sharper;
 
 	if (trace_edge(trace, peak->at, -1, peak->sign, level, &from) &&
 	    trace_edge(trace, peak->at, 1, peak->sign, level, &until) && until - from > FLAT * half_s)
-		doubt_s = fmax(doubt_s, FLAT_TIME * (until - from));
+		doubt_s = fmax(doubt_s, LIMIT_SLIGHT * (until - from));
 	local_at(&crest->axis[0], crest->time_s, d);
 	sharper = fabs(d[2]) / (SHARP * half_sine_bend(peak));
 	return sharper > 1 ? hypot(doubt_s, sqrt(fmax(noise, 0)) * sharper) : doubt_s;
@@ -328,7 +321,7 @@ static void sharpen(const struct trace *trace, struct peak *peak)
 	apart_s = fabs(peak->shape.peak_s - local.time_s);
 	sigma_g = hypot(peak->shape.sigma_peak_g, LIMIT_UNSEEN * local.value_g);
 	if (shape_judge(&peak->shape) != SHAPE_FITS || isnan(peak->shape.chi_square) ||
-	    apart_g > AGREE_SIGMAS * local.sigma_g || apart_s > AGREE_SIGMAS * local.sigma_time_s ||
+	    apart_g > LIMIT_SIGNIFICANT * local.sigma_g || apart_s > LIMIT_SIGNIFICANT * local.sigma_time_s ||
 	    sigma_g > local.sigma_g)
 		return;
 	peak->plain = local;

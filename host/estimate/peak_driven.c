@@ -10,9 +10,6 @@
  */
 #define PULSE_CYCLES 0.8
 
-/* Sigma from which S2's shape is more than a guess. */
-#define SHAPE_SIGMAS 12.0
-
 /* S1's largest sample may lie above the oscillator by some of the peak and noise; higher, it is of another
  * contact. */
 static bool peak_driven_same_contact(const struct driven_axis *axis, const struct driven *driven,
@@ -31,7 +28,8 @@ static bool knows_better(const struct driven_axis *axis, double sigma_g)
 {
 	const struct estimate_peak *s1 = &axis->peak[0]->result, *s2 = &axis->peak[1]->result;
 
-	if (s2->how.status == ESTIMATE_CLIPPED || fabs(s2->value_g) < SHAPE_SIGMAS * axis->trace[1]->noise_g)
+	if (s2->how.status == ESTIMATE_CLIPPED ||
+	    fabs(s2->value_g) < PEAK_WEAK_SIGMAS * axis->trace[1]->noise_g)
 		return false;
 	if (s1->how.status == ESTIMATE_CLIPPED)
 		return !(sigma_g >= s1->sigma_g);

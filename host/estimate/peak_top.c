@@ -11,9 +11,8 @@
 /* Samples whose mean tells a level of the top, and how many of the width's samples they are. */
 #define LEVEL_PART (1.0 / 9)
 
-/* A level is as high as the highest within so many standard deviations of their difference; a top that is so
- * much wider there than the crest's bend makes it is flat. */
-#define LEVEL_SIGMAS 2.0
+/* A level is as high as the highest within LIMIT_HINT standard deviations of their difference; a top that is
+ * so much wider there than the crest's bend makes it is flat. */
 #define LEVEL_WIDER 1.6
 
 /* The time from the first to the last mean of n samples under the pulse that is within fall_g of the highest.
@@ -47,7 +46,7 @@ static double flat_doubt(const struct trace *trace, const struct peak *peak, con
 {
 	size_t n = (size_t)fmax(LEVEL_PART * peak->width_s * trace->rate_hz, 1);
 	/* A summit between two samples shows less in their mean. */
-	double fall = LEVEL_SIGMAS * trace->noise_g * sqrt(2.0 / (double)n) +
+	double fall = LIMIT_HINT * trace->noise_g * sqrt(2.0 / (double)n) +
 	              fabs(d[2]) / (8 * trace->rate_hz * trace->rate_hz);
 	double level = top_level(trace, peak, n, fall);
 	double bent = 2 * sqrt(2 * fall / fabs(d[2])) + 1 / trace->rate_hz;
@@ -171,7 +170,7 @@ void peak_top_doubt(const struct trace *trace, struct peak *peak)
 	}
 	if (peak->model != PEAK_MODEL_LOCAL) {
 		/* No polynomial follows: any sample that is as high may be the peak. */
-		level = top_level(trace, peak, 1, LEVEL_SIGMAS * sqrt(2.0) * trace->noise_g);
+		level = top_level(trace, peak, 1, LIMIT_HINT * sqrt(2.0) * trace->noise_g);
 		result->sigma_time_s = hypot(result->sigma_time_s, level / 2);
 		return;
 	}

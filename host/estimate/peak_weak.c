@@ -5,10 +5,6 @@
 
 #include "host/estimate/limits.h"
 
-/* An amplitude is there from this many of its own sigma on: chance has one number to get there, not as many
- * as there are samples. */
-#define WEAK_SIGNIFICANT 3.5
-
 bool peak_is_weak(const struct trace *trace, const struct peak *peak)
 {
 	if (peak->result.how.status == ESTIMATE_NO_PEAK)
@@ -63,7 +59,8 @@ bool peak_weak(const struct trace *trace, const struct estimate_options *options
 	if (from->how.status != ESTIMATE_OK || strong->model == PEAK_MODEL_NONE || !(trace->noise_g > 0) ||
 	    fabs(from->value_g) < LIMIT_OVER * PEAK_WEAK_SIGMAS * trace->noise_g ||
 	    !fit_amplitude(trace, strong_trace, strong, &amplitude) ||
-	    fabs(amplitude.value) < WEAK_SIGNIFICANT * amplitude.sigma)
+	    /* Chance has one number to get there, not as many as there are samples. */
+	    fabs(amplitude.value) < LIMIT_AGREE * amplitude.sigma)
 		return false;
 	result.value_g = amplitude.value;
 	result.sigma_g = amplitude.sigma;

@@ -8,10 +8,6 @@
 #include "host/estimate/guide.h"
 #include "host/estimate/limits.h"
 
-/* An edge that rises by less than this many sigma of noise from sample to sample is slow: two samples tell
- * its slope no more, and noise crosses the level before the pulse does. */
-#define SLOW_SIGMAS 6.0
-
 /* Of the time from the level to twice it: half the window of a parabola on a slow edge. */
 #define SLOW_HALF 0.7
 
@@ -136,7 +132,8 @@ static bool find_edge(const struct trace *trace, const struct peak *peak, int st
 	edge->sigma_s = hypot(noise, fmax(fabs(bend0 - bent), fabs(bend1 - bent)) / 16) / edge->slope_g_s;
 	edge->sigma_s = hypot(hypot(edge->sigma_s, missing),
 	                      crossed_again(trace, peak, step < 0 ? before : after, step, level_g));
-	if (after - before == 1 && fabs(rise) < SLOW_SIGMAS * trace->noise_g)
+	/* Two samples tell its slope no more, and noise crosses the level before the pulse does. */
+	if (after - before == 1 && fabs(rise) < LIMIT_NOISE * trace->noise_g)
 		find_slow_edge(trace, peak, step, level_g, edge);
 	return true;
 }

@@ -12,16 +12,11 @@ enum { GLANCE = 31 }; /* samples that tell roughly where the middle is, and how 
 enum { SECOND_DIFFERENCES = 255 };
 
 /* Noise is coloured when samples side by side tremble by less than this part of it: white noise does once in
- * a million quiet parts. Its colour is that of means of two blocks, of no fewer, and believed up to so much.
- */
+ * a million quiet parts. Its colour is that of means of two blocks, of no fewer. */
 #define COLOURED 0.7
-#define COLOUR_MOST 5.0
 #define COLOUR_UNSURE 1.5 /* over their number: Student's factor beyond 2, of 2 / 3 as many */
 
 enum { COLOUR_MEANS = 16 };
-
-/* Of a decay's quarters the last step against the first. */
-#define DECAYS_ON 1.2
 
 double quiet_glance(const struct trace *trace, size_t from, size_t until, double *sigma_g)
 {
@@ -314,9 +309,7 @@ double quiet_colour(const struct trace *trace, const struct estimate_baseline *b
 	}
 	if (means < COLOUR_MEANS)
 		return 1;
-	return fmin(
-	        fmax(sqrt(square / (double)means) / trace->noise_g * (1 + COLOUR_UNSURE / (double)means), 1),
-	        COLOUR_MOST);
+	return fmax(sqrt(square / (double)means) / trace->noise_g * (1 + COLOUR_UNSURE / (double)means), 1);
 }
 
 /* Whether the means of its quarters fall, or rise, each by more than noise and no faster at the end. */
@@ -342,7 +335,7 @@ static bool quiet_decays(const struct trace *trace, size_t from, size_t until)
 	for (size_t i = 0; i < 3; i++)
 		if (!(sign * (mean[i] - mean[i + 1]) > noise))
 			return false;
-	return fabs(mean[2] - mean[3]) < DECAYS_ON * fabs(mean[0] - mean[1]);
+	return fabs(mean[2] - mean[3]) < fabs(mean[0] - mean[1]);
 }
 
 bool quiet_settled(struct quiet *quiet)

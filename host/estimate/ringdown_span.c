@@ -23,7 +23,6 @@
 
 /* Samples before the window that lie this far from what the fit foretells, in standard deviations of one,
  * were still driven: one alone, or two together by LIMIT_HINT, if the next earlier one is off too. */
-#define BACK_ALONE 2.2
 #define BACK_AGAIN 1.5
 
 enum { WINDOWS = 4 };
@@ -168,7 +167,7 @@ static size_t free_since(const struct ringdown_job *job, const struct modes *sam
 
 		/* Beyond noise: an outlier, or a contact too short to show twice. */
 		if (fabs(off) > LIMIT_NOISE ||
-		    ((fabs(off) > BACK_ALONE || fabs(off + after) > LIMIT_HINT) &&
+		    ((fabs(off) > LIMIT_HINT || fabs(off + after) > LIMIT_HINT) &&
 		     (k - 1 == earliest || fabs(off_by(job, samples, k - 2, noise)) > BACK_AGAIN)))
 			return k;
 		after = off;

@@ -16,10 +16,6 @@ enum {
 /* From try to try. */
 #define GROWTH 1.2
 
-/* What it leaves against the samples' noise and what it moves by. */
-#define OVER_NOISE 4.0
-#define OVER_SPAN 0.003
-
 /* Time constants after which hardly any is left; seen for less than half of these it is a guess. */
 #define ENDED 4.0
 
@@ -174,7 +170,7 @@ static bool is_one(const struct blocks *blocks, const struct fit *fit, double no
 	double than_slope = sqrt(1 + LIMIT_F / (double)blocks->count);
 
 	return span > LIMIT_NOISE * fit->leaves && than_slope * fit->leaves < leaves_by_slope(blocks) &&
-	       fit->leaves <= fmax(OVER_NOISE * noise, OVER_SPAN * span);
+	       fit->leaves <= fmax(LIMIT_AGREE * noise, ESTIMATE_TOLERANCE * span);
 }
 
 /* Whether what it leaves keeps its sign over many blocks, more than noise of a sensor's band does. */

@@ -20,7 +20,6 @@ enum {
  * so far, which a Gaussian's hardly do. */
 #define TAIL_RATIO 1.2533
 #define TAIL_SPREAD 0.334
-#define TAIL_ASKED 4.5
 
 /* |second difference| about sample k */
 static double spike_bend(const double *v)
@@ -314,7 +313,7 @@ static struct reach spike_reach(const struct trace *trace, size_t from, size_t u
 static bool reaches_far(const struct trace *trace, size_t from, size_t until)
 {
 	for (size_t i = from / TRACE_BLOCK; i < until / TRACE_BLOCK; i++)
-		if (fmax(trace->block[i].high_g, -trace->block[i].low_g) > TAIL_ASKED * trace->noise_g)
+		if (fmax(trace->block[i].high_g, -trace->block[i].low_g) > LIMIT_SIGNIFICANT * trace->noise_g)
 			return true;
 	return trace->flags & RECORD_FLAG_SPIKE;
 }

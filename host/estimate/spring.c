@@ -9,9 +9,6 @@
 #include "host/estimate/limits.h"
 #include "host/estimate/modes.h"
 
-/* Q, of a swing as large as the start's: beyond is no spring any more. */
-#define SOFT_MAX 1e4
-
 /* A small swing is stiffer than one without end by at most this part of that, and softer by less. */
 #define B_MAX 10.0
 #define B_MIN (-1 + 1 / B_MAX)
@@ -159,7 +156,7 @@ double spring_mean_hz(const double *p, unsigned cycles, unsigned steps)
 static bool spring_possible(const double *p)
 {
 	return p[MODES_OMEGA] > 0 && fabs(p[MODES_DECAY]) < p[MODES_OMEGA] && p[PLACE_Q] > 0 &&
-	       p[PLACE_Q] * spring_swing(p) < SOFT_MAX && spring_lost(p) > B_MIN / (1 + B_MIN) &&
+	       p[PLACE_Q] * spring_swing(p) < 1 / LIMIT_SMALL && spring_lost(p) > B_MIN / (1 + B_MIN) &&
 	       spring_lost(p) < B_MAX / (1 + B_MAX);
 }
 
