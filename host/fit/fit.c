@@ -7,8 +7,6 @@
 #include <string.h>
 
 #include "host/fit/fit_private.h"
-#include "host/fit/judge.h"
-#include "host/fit/prepare.h"
 
 const char *const fit_axis_names[MOTION_AXES] = {"S1X", "S1Y", "S2X", "S2Y"};
 

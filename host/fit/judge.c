@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/fit/judge.h"
+#include "host/fit/fit_private.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "common/units.h"
-#include "host/fit/prepare.h"
 
 const char *const fit_window_names[FIT_WINDOWS] = {"before the touch", "0 to 1 ms",   "1 ms to the release",
                                                    "release to 10 ms", "10 to 20 ms", "beyond 20 ms"};

@@ -6,8 +6,6 @@
 #include <string.h>
 
 #include "host/fit/fit_private.h"
-#include "host/fit/judge.h"
-#include "host/fit/prepare.h"
 #include "host/model/corner.h"
 
 /* ---- predictions ---- */

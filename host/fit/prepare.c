@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/fit/prepare.h"
+#include "host/fit/fit_private.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -4,7 +4,6 @@
 #include <math.h>
 
 #include "common/units.h"
-#include "host/base/mapped.h"
 #include "host/record/source.h"
 
 static const double RATE_LEAST_HZ = 10, RATE_MOST_HZ = 20e6, CHANGE_LEAST_M_S = 0.02, CHANGE_MOST_M_S = 200;
@@ -23,8 +22,7 @@ static double largest_area(const struct record *record)
 				peak = of->value_g[k];
 				at = k;
 			}
-			if (k % RECORD_PART == 0)
-				mapped_seen(RECORD_PART * sizeof(double));
+			record_seen(k, sizeof(double));
 		}
 	for (size_t k = at; of != NULL && k < of->count && of->value_g[k] / peak > 0.1; k++)
 		area += fabs(of->value_g[k]);

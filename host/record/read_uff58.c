@@ -94,8 +94,7 @@ static void settle_samples(struct channel *channel, double factor)
 	for (size_t k = 0; k < channel->count; k++) {
 		channel->value_g[k] *= factor;
 		channel->sample[k] = isfinite(channel->value_g[k]) ? 0 : SAMPLE_BAD;
-		if (k % RECORD_PART == 0)
-			mapped_seen(RECORD_PART * (sizeof(double) + 1));
+		record_seen(k, sizeof(double) + 1);
 	}
 }
 
@@ -156,8 +155,7 @@ static int read_uff58_channel(struct reading *reading, const struct uff58_head *
 		settle_samples(channel, unit_factor_g(head->unit));
 	for (size_t k = 0; !error && time_s && k < head->count; k++) {
 		time_s[k] *= unit_s;
-		if (k % RECORD_PART == 0)
-			mapped_seen(RECORD_PART * sizeof(double));
+		record_seen(k, sizeof(double));
 	}
 	if (!error && time_s)
 		error = settle_times(reading, head, line, channel, time_s);
@@ -243,8 +241,7 @@ static uint64_t read_uff58_line_of(const struct reading *reading, const struct c
 static int check_good(const struct reading *reading, const struct channel *channel)
 {
 	for (size_t k = 0; k < channel->count; k++) {
-		if (k % RECORD_PART == 0)
-			mapped_seen(RECORD_PART * (sizeof(double) + 1));
+		record_seen(k, sizeof(double) + 1);
 		if (!isfinite(channel->value_g[k]) && !(channel->sample[k] & (SAMPLE_LOST | SAMPLE_BAD)))
 			return source_refuse(reading->text.message, DT_E_FORMAT, reading->text.source->file,
 			                     read_uff58_line_of(reading, channel, k),
@@ -309,8 +306,7 @@ static int read_mask(struct reading *reading, const struct uff58_head *head)
 			channel->sample[k] = (uint8_t)mask[k];
 		if (channel->sample[k] & (SAMPLE_LOST | SAMPLE_BAD))
 			channel->value_g[k] = NAN;
-		if (k % RECORD_PART == 0)
-			mapped_seen(RECORD_PART * (2 * sizeof(double) + 1));
+		record_seen(k, 2 * sizeof(double) + 1);
 	}
 	mapped_free(mask);
 	if (!error)

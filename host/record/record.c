@@ -95,8 +95,7 @@ static unsigned marks_of(const struct channel *channel)
 
 		memcpy(&eight, channel->sample + k, sizeof(eight));
 		marks |= eight;
-		if (k % RECORD_PART == 0)
-			mapped_seen(RECORD_PART);
+		record_seen(k, 1);
 	}
 	for (; k < channel->count; k++)
 		marks |= channel->sample[k];

@@ -13,6 +13,7 @@
 
 #include "common/error.h"
 #include "common/wire.h"
+#include "host/base/mapped.h"
 
 /* What is known of one sample; 0 is a good one. A sample keeps its place whatever it is. */
 enum {
@@ -82,6 +83,13 @@ struct channel {
 };
 
 enum { RECORD_PART = 1 << 14 }; /* samples of a pass through a channel, then mapped_seen is told */
+
+/* Of a pass at sample k: tells that at each part's beginning, of so many bytes a sample. */
+static inline void record_seen(size_t k, size_t bytes)
+{
+	if (k % RECORD_PART == 0)
+		mapped_seen(RECORD_PART * bytes);
+}
 
 struct record_gap {
 	unsigned sensor;        /* 1 or 2 */

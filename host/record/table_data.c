@@ -243,8 +243,7 @@ static int make_channel(struct making *making, size_t i)
 
 		if (k % RECORD_PART == 0)
 			table_column_take(column, k, part_of(column->count, k), channel->value_g + k);
-		if (k % RECORD_PART == 0)
-			mapped_seen(RECORD_PART * (sizeof(double) + 1));
+		record_seen(k, sizeof(double) + 1);
 		channel->value_g[k] /= spec->divisor;
 		good = isfinite(channel->value_g[k]);
 		channel->value_g[k] = good ? channel->value_g[k] : NAN;

@@ -64,8 +64,7 @@ static double worst_of(const struct search *search, double step_s, const size_t 
 			worst = e;
 			*row = k;
 		}
-		if (k % RECORD_PART == 0)
-			mapped_seen(RECORD_PART * sizeof(double));
+		record_seen(k, sizeof(double));
 	}
 	return worst;
 }
@@ -122,8 +121,7 @@ static int check_order(const struct search *search, bool equal_allowed)
 		if (!(now > before) && !(equal_allowed && now >= before))
 			return timebase_refuse(search, k, "time %.9g s after %.9g s, expected it to increase",
 			                       now, before);
-		if (k % RECORD_PART == 0)
-			mapped_seen(RECORD_PART * sizeof(double));
+		record_seen(k, sizeof(double));
 	}
 	return 0;
 }

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "common/base/number.h"
-#include "host/base/mapped.h"
 #include "host/record/table_data.h"
 
 /* ---- columns ---- */
@@ -239,8 +238,7 @@ int uff58_read_bytes(struct uff58_text *text, const struct uff58_head *head,
 		        head->id[0], head->count, size, binary->bytes, room);
 	for (size_t k = 0; k < head->count; k++) {
 		value[k] = bytes_value(text->source->bytes + text->line.next + k * size, kind, binary->big);
-		if (k % RECORD_PART == 0)
-			mapped_seen(RECORD_PART * (size + sizeof(*value)));
+		record_seen(k, size + sizeof(*value));
 	}
 	return 0;
 }
