@@ -17,10 +17,9 @@ enum {
  * by CLIP_TREMBLE steps one in seventy: a run is chance's once in a million. */
 #define HELD_STEPS 8.0
 
-/* Of all samples, those that equal the one before, where half of what differs does so by more than so many
+/* Of all samples, those that equal the one before, where half of what differs does so by more than LIMIT_OVER
  * steps: repeated all along. Of noise one in eight does. */
 #define REPEATED 0.25
-#define REPEATED_STEPS 2.0
 
 /* From the samples of the window that tells the step of their numbers. */
 struct held {
@@ -40,7 +39,7 @@ static struct held held_find(const struct trace *trace)
 			continue;
 		level += !(rise > 0);
 		rises += rise > 0;
-		some += rise > REPEATED_STEPS * step;
+		some += rise > LIMIT_OVER * step;
 		wide += rise > HELD_STEPS * step;
 		wider += rise > CLIP_TREMBLE * step;
 	}

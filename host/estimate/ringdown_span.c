@@ -8,10 +8,9 @@
 #include "host/estimate/limits.h"
 #include "host/estimate/scan.h"
 
-/* The window: SCAN_CYCLES, or time constants if that is longer, but no more cycles than the most, and
- * from a mere start no more than a start is good for. */
+/* The window: SCAN_CYCLES, or time constants if that is longer; from a mere start no more cycles than a start
+ * is good for. */
 #define TIME_CONSTANTS 4.4
-#define CYCLES_MOST 80.0
 #define CYCLES_START 7.0
 
 /* Where the start is known, and for two modes or a law. */
@@ -34,7 +33,7 @@ static size_t window_end(const struct ringdown_job *job, double omega, double de
 	size_t end;
 
 	if (decay * length < constants)
-		length = fmin(CYCLES_MOST * cycle, constants / fmax(decay, 1e-9 * omega));
+		length = constants / fmax(decay, 1e-9 * omega);
 	end = trace_index(job->trace, job->span->from_s + fmin(length, most_s));
 	return end < job->last ? end : job->last;
 }
@@ -133,8 +132,7 @@ bool ringdown_lengthen(struct ringdown_job *job)
 
 	if (job->flags & ESTIMATE_FLAG_SPIKE)
 		return true;
-	end = trace_index(job->trace, job->span->from_s + fmin(LONG_TIME_CONSTANTS / decay,
-	                                                       CYCLES_MOST * 2 * UNITS_PI / omega));
+	end = trace_index(job->trace, job->span->from_s + LONG_TIME_CONSTANTS / decay);
 	ringdown_span_take(job, end < job->last ? end : job->last,
 	                   ringdown_block(job, omega * RINGDOWN_FINER));
 	if (!modes_fit(&job->single, &job->series))
