@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <math.h>
 
+#include "common/units.h"
 #include "host/estimate/doubt.h"
+#include "host/estimate/gram.h"
 #include "host/estimate/limits.h"
+#include "host/estimate/phasor.h"
 #include "host/estimate/quiet.h"
 
 /* The case is at rest between two contacts when it has been so long. */
@@ -10,10 +13,6 @@
 
 /* Before a second contact its foot. */
 #define FOOT_S 1e-3
-
-/* Of a width: S1's peaks before S2's, on both axes. Two sensors on one box have up to 0.16 on one, as it
- * turns. */
-#define LEAD_APART 0.25
 
 /* Both sensors see one shock: what Y reads of X differs by more between them only where something is wrong.
  */
@@ -24,17 +23,36 @@
 #define BEGIN_APART 0.025
 #define END_APART 0.15
 
-/* What X reads beyond its part of Y under one pulse of the case, root mean square, as part of its peak. On
- * our own tower 0.016 at 35 degrees, 0.023 at 40. */
-#define SHAPE_APART 0.032
-enum { SHAPE_SAMPLES = 12 };
+/* What the stronger axis reads beyond its part of the other in the first swing, root mean square, as part of
+ * its peak: by two parts and by four. On our own tower at 10 to 45 degrees the case has 0.026 and 0.0085, a
+ * plate 0.07 and 0.029, and what shakes with the case like one, no wider than it, 0.25 and 0.17. */
+static const struct apart {
+	double two, four;
+} apart_case = {0.032, 0.013}, apart_plate = {0.09, 0.035}, apart_rigid = {0.3, 0.2};
+#define PLATE_WIDER 1.3
+enum { SHAPE_SAMPLES = 12, SHAPE_PARTS = 4 };
 
 /* An axis that stands out of its noise by less has width, time and area by its sensor's strongest one too. */
 #define SHARE_NOISE 40.0
 #define SHARE_CHANCE 3.0
 
-/* Axes that peak further apart than this part of the width do so. */
+/* Axes that peak further apart than this part of the width do so: no shape is asked then. By less than the
+ * other they may, as the box turns. */
 #define SHARE_TIME 0.1
+#define SHARE_TURNS 0.02
+#define SHARE_TOP 0.5
+
+/* Squared, over the mean square of what straight lines between samples miss of a bend, at kinks. */
+#define LINE_SQUARE 20.0
+
+/* The speed of S1 over S2's: of X and Y together, and of each. Own tower, 10 to 40 degrees: 0.99 to 1.16, and
+ * 0.72 to 1.48. Its fade, and the mean square of that. */
+#define SPEED_LEAST 0.9
+#define SPEED_MOST 1.2
+#define SPEED_AXIS_LEAST 0.6
+#define SPEED_AXIS_MOST 1.8
+#define FADE_S 0.08
+#define FADE_SQUARE 0.375
 
 /* Of an axis whose sign and height mean something; half of it is what the sign is taken by. */
 #define AXIS_SIGMAS 20.0
@@ -114,15 +132,6 @@ static void axis_flag(struct estimate_channel *channel)
 	channel->pulse.flags |= ESTIMATE_FLAG_AXES;
 }
 
-/* X and Y of one sensor against the other's, whose Y shows nothing of what it should by far. */
-static bool axis_dead(struct estimate_channel *const alive[2], struct estimate_channel *const other[2])
-{
-	return axis_sure(alive[0]) && axis_sure(alive[1]) && axis_sure(other[0]) &&
-	       other[1]->peak.how.status == ESTIMATE_NO_PEAK &&
-	       fabs(alive[1]->peak.value_g / alive[0]->peak.value_g * other[0]->peak.value_g) >
-	               AXIS_SIGMAS * other[1]->baseline.noise_g;
-}
-
 /* Exchanged X and Y explain what S1 and S2 read better than what they are called. */
 static bool axis_exchanged(struct estimate_channel *const channel[2][2])
 {
@@ -147,98 +156,153 @@ static bool axis_late(struct estimate_channel *const xy[2])
 	        fabs(x->end_s - y->end_s) > END_APART * width + chance);
 }
 
-/* What the stronger axis of the case reads beyond its part of the other, which sees the same pulse: a little
- * earlier or later, as filters of their own let it. */
+/* What the stronger axis of a sensor reads beyond its part of the other, which sees the same pulse: a little
+ * earlier or later, as filters of their own let it, and another part while the box turns. */
 struct shapes {
 	const struct trace *trace[2]; /* the stronger one first */
 	size_t from, until;           /* of its samples */
-	double part, rate_part;       /* of the other, and of what it rises by in a sample */
+	struct gram gram;
+	double bends; /* squares of the other's second differences */
 };
 
-/* The other axis at sample k and what it rises by there; false where it is missing. */
-static bool shapes_other(const struct shapes *shapes, size_t k, double other[2])
+/* The other axis at sample k, what it rises by there, both as they grow; false where it is missing. */
+static bool shapes_row(struct shapes *shapes, size_t k, double row[GRAM_COMMON])
 {
 	const struct trace *trace = shapes->trace[1];
-	double time_s = trace_time(shapes->trace[0], k), step_s = 1 / trace->rate_hz, before, behind;
+	double time_s = trace_time(shapes->trace[0], k), step_s = 1 / trace->rate_hz, at, before, behind;
+	double place = (double)(k - shapes->from) / (double)(shapes->until - shapes->from);
 
-	if (!trace_usable(shapes->trace[0], k) || !trace_at(trace, time_s, &other[0]) ||
+	if (!trace_usable(shapes->trace[0], k) || !trace_at(trace, time_s, &at) ||
 	    !trace_at(trace, time_s - step_s, &before) || !trace_at(trace, time_s + step_s, &behind))
 		return false;
-	other[1] = (behind - before) / 2;
+	row[0] = at;
+	row[1] = (behind - before) / 2;
+	row[2] = place * at;
+	row[3] = place * place * at;
+	row[4] = shapes->trace[0]->value_g[k];
+	row[5] = 0;
+	shapes->bends += pow(before - 2 * at + behind, 2);
 	return true;
 }
 
-/* Of sample k; NAN where either axis is missing. */
-static double shapes_beyond(const struct shapes *shapes, size_t k)
+/* Whether the mean square beyond the first parts is more than apart_g, noise and the straight lines between
+ * the other's samples make. */
+static bool shapes_beyond(const struct shapes *shapes, unsigned parts, double apart_g)
 {
-	double other[2];
+	double normal[CHOLESKY_MAX][CHOLESKY_MAX] = {{0}}, right[CHOLESKY_MAX] = {0},
+	       part[CHOLESKY_MAX] = {0};
+	double rest = 0, count = (double)gram_finish(&shapes->gram, normal, right, &rest), whole, noise;
+	struct cholesky factor;
 
-	if (!shapes_other(shapes, k, other))
-		return NAN;
-	return shapes->trace[0]->value_g[k] - shapes->part * other[0] - shapes->rate_part * other[1];
-}
-
-/* The parts by least squares; how many samples they are of, 0 where they tell none. */
-static double shapes_fit(struct shapes *shapes)
-{
-	double n = 0, square[3] = {0, 0, 0}, product[2] = {0, 0}, determinant;
-
-	for (size_t k = shapes->from; k < shapes->until; k++) {
-		double other[2], value = shapes->trace[0]->value_g[k];
-
-		if (!shapes_other(shapes, k, other))
-			continue;
-		square[0] += other[0] * other[0];
-		square[1] += other[0] * other[1];
-		square[2] += other[1] * other[1];
-		product[0] += value * other[0];
-		product[1] += value * other[1];
-		n++;
-	}
-	determinant = square[0] * square[2] - square[1] * square[1];
-	if (n < SHAPE_SAMPLES || !(determinant > 0))
-		return 0;
-	shapes->part = (product[0] * square[2] - product[1] * square[1]) / determinant;
-	shapes->rate_part = (product[1] * square[0] - product[0] * square[1]) / determinant;
-	return n;
-}
-
-static bool shapes_differ(struct shapes *shapes, double peak_g)
-{
-	double rest = 0, n = shapes_fit(shapes), noise, beyond;
-
-	if (!(n > 0))
+	if (count < SHAPE_SAMPLES || !cholesky_factor(&factor, parts, normal))
 		return false;
-	for (size_t k = shapes->from; k < shapes->until; k++) {
-		beyond = shapes_beyond(shapes, k);
-		rest += isnan(beyond) ? 0 : beyond * beyond / n;
-	}
-	noise = hypot(shapes->trace[0]->noise_g,
-	              hypot(shapes->part, shapes->rate_part) * shapes->trace[1]->noise_g);
-	return rest > pow(SHAPE_APART * peak_g, 2) + noise * noise * (1 + LIMIT_CHI * sqrt(2 / n));
+	cholesky_solve(&factor, right, part);
+	for (unsigned i = 0; i < parts; i++)
+		rest -= part[i] * right[i];
+	whole = part[0] + part[2] / 2 + part[3] / 3;
+	noise = hypot(shapes->trace[0]->noise_g, hypot(whole, part[1]) * shapes->trace[1]->noise_g);
+	count -= parts;
+	return rest / count > apart_g * apart_g + noise * noise * (1 + LIMIT_CHI * sqrt(2 / count)) +
+	                              whole * whole * shapes->bends / (LINE_SQUARE * count);
 }
 
-/* One axis of the case shows another pulse than the other: a limit, a gain, a filter or a hold of its own. */
-static bool axis_unlike(const struct trace *const trace[2], struct estimate_channel *const xy[2])
+/* One axis shows another pulse than its sensor's other one: a limit, a gain, a filter or a hold of its own.
+ */
+static bool axis_unlike(const struct trace *const trace[2], struct estimate_channel *const xy[2],
+                        struct apart apart)
 {
 	unsigned strong =
 	        fabs(xy[1]->peak.value_g) / trace[1]->noise_g > fabs(xy[0]->peak.value_g) / trace[0]->noise_g;
 	struct shapes shapes = {.trace = {trace[strong], trace[1 - strong]}};
+	double row[GRAM_COMMON], peak_g = fabs(xy[strong]->peak.value_g);
 
 	if (!axis_sure(xy[0]) || !axis_sure(xy[1]))
 		return false;
 	shapes.from = trace_index(trace[strong], xy[strong]->pulse.start_s);
 	shapes.until = trace_index(trace[strong], xy[strong]->pulse.end_s);
-	return shapes_differ(&shapes, fabs(xy[strong]->peak.value_g));
+	gram_start(&shapes.gram, SHAPE_PARTS);
+	for (size_t k = shapes.from; k < shapes.until; k++)
+		if (shapes_row(&shapes, k, row))
+			gram_add(&shapes.gram, row);
+	return shapes_beyond(&shapes, 2, apart.two * peak_g) ||
+	       shapes_beyond(&shapes, SHAPE_PARTS, apart.four * peak_g);
 }
 
-/* The plate before the case that shakes it: the sensors are exchanged, or their names are. */
-static bool axis_leads(const struct estimate_channel *s1, const struct estimate_channel *s2)
+/* Of the plate, where it swings slower than the case. */
+static bool axis_unlike_plate(const struct trace *const trace[2][2],
+                              struct estimate_channel *const channel[2][2])
 {
-	double width = fmin(s1->pulse.duration_s, s2->pulse.duration_s);
+	double wider = fmin(channel[0][0]->pulse.duration_s / channel[1][0]->pulse.duration_s,
+	                    channel[0][1]->pulse.duration_s / channel[1][1]->pulse.duration_s);
 
-	return axis_sure(s1) && axis_sure(s2) && s1->pulse.start_s < s2->pulse.start_s &&
-	       s2->peak.time_s - s1->peak.time_s > LEAD_APART * width;
+	return axis_unlike(trace[0], channel[0], wider > PLATE_WIDER ? apart_plate : apart_rigid);
+}
+
+/* What a sensor's axis has gained of speed, in g s, over the fade that lets the plate swing about the case;
+ * its standard deviation. NAN where a sample is missing. */
+static double axis_speed(const struct trace *trace, const struct estimate_baseline *baseline, double from_s,
+                         double *sigma)
+{
+	size_t k = trace_index(trace, from_s), n = (size_t)(FADE_S * trace->rate_hz);
+	struct phasor fade = phasor_at(0, UNITS_PI / (double)n);
+	double sum = 0;
+
+	if (k + n > trace->count || baseline->samples == 0)
+		return NAN;
+	for (size_t i = 0; i < n; i++) {
+		if (!trace_usable(trace, k + i))
+			return NAN;
+		sum += trace->value_g[k + i] * (1 + fade.cosine) / 2;
+		phasor_turn(&fade);
+	}
+	*sigma = trace->noise_g *
+	         hypot(sqrt(FADE_SQUARE * (double)n), (double)n / 2 / sqrt((double)baseline->samples)) /
+	         trace->rate_hz;
+	return sum / trace->rate_hz;
+}
+
+/* Plate and case go on together, whatever is between them: one of them reads too much or too little. */
+static bool axes_part(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2])
+{
+	double from_s = fmin(channel[1][0]->pulse.start_s, channel[1][1]->pulse.start_s), square[2] = {0, 0},
+	       speed[2], sigma[2], most = 0;
+	bool part = false;
+
+	if (isnan(from_s))
+		return false;
+	for (unsigned axis = 0; axis < 2; axis++) {
+		for (unsigned s = 0; s < 2; s++) {
+			if (channel[s][axis]->baseline.unsettled || channel[s][axis]->baseline.doubtful)
+				return false;
+			speed[s] = axis_speed(trace[s][axis], &channel[s][axis]->baseline, from_s, &sigma[s]);
+			square[s] += speed[s] * speed[s];
+		}
+		if (isnan(speed[0] + speed[1]))
+			return false;
+		most = fmax(most, hypot(sigma[0], sigma[1]));
+		speed[0] *= speed[1] < 0 ? -1 : 1;
+		part |= speed[0] <
+		                SPEED_AXIS_LEAST * fabs(speed[1]) - LIMIT_NOISE * hypot(sigma[0], sigma[1]) ||
+		        speed[0] > SPEED_AXIS_MOST * fabs(speed[1]) +
+		                           LIMIT_NOISE * hypot(SPEED_AXIS_MOST * sigma[1], sigma[0]);
+	}
+	return part || sqrt(square[0]) < SPEED_LEAST * sqrt(square[1]) - LIMIT_NOISE * most ||
+	       sqrt(square[0]) > SPEED_MOST * sqrt(square[1]) + LIMIT_NOISE * SPEED_MOST * most;
+}
+
+/* Whether the plate begins before the case that shakes it, whose axes begin together. */
+static bool axes_lead(struct estimate_channel *const s1[2], struct estimate_channel *const s2[2])
+{
+	for (unsigned i = 0; i < 2; i++) {
+		const struct estimate_pulse *plate = &s1[i]->pulse, *box = &s2[i]->pulse;
+
+		if (!axis_sure(s1[i]) || !axis_sure(s2[i]) ||
+		    !(plate->start_s <
+		      box->start_s - BEGIN_APART * box->duration_s -
+		              LIMIT_SIGNIFICANT * hypot(plate->sigma_duration_s, box->sigma_duration_s)))
+			return false;
+	}
+	return true;
 }
 
 /* A sensor is loose on all of its axes. */
@@ -310,11 +374,24 @@ void doubt_share(const struct trace *const trace[2], struct peak *const peak[2],
 		share_near_noise(strong, peak[1], pulse[0], pulse[1]);
 }
 
+void doubt_ripple(struct peak *const peak[2], double width_s)
+{
+	double apart = fabs(peak[0]->result.time_s - peak[1]->result.time_s);
+	double chance = hypot(peak[0]->result.sigma_time_s, peak[1]->result.sigma_time_s);
+
+	if (!(apart > SHARE_TURNS * width_s + SHARE_CHANCE * chance) || apart > SHARE_TOP * width_s)
+		return;
+	for (unsigned i = 0; i < 2; i++) {
+		peak[i]->result.sigma_time_s = hypot(peak[i]->result.sigma_time_s, apart);
+		peak[i]->doubt_s = hypot(peak[i]->doubt_s, apart);
+	}
+}
+
 unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2])
 {
 	struct estimate_channel *const *s1 = channel[0], *const *s2 = channel[1];
-	bool any = axis_exchanged(channel) || axis_dead(s1, s2) || axis_dead(s2, s1) || axis_late(s2) ||
-	           axis_unlike(trace[1], s2) || (axis_leads(s1[0], s2[0]) && axis_leads(s1[1], s2[1]));
+	bool any = axis_exchanged(channel) || axis_late(s2) || axis_unlike_plate(trace, channel) ||
+	           axis_unlike(trace[1], s2, apart_case) || axes_part(trace, channel) || axes_lead(s1, s2);
 	/* What shifts zero on both axes of the case is in a supply that the plate's have too. */
 	unsigned shared = s2[0]->peak.how.flags & s2[1]->peak.how.flags & ESTIMATE_FLAG_TAIL;
 

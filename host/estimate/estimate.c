@@ -100,7 +100,11 @@ static void analyse_weak(const struct desk *desk, const char *sensor, struct ana
 			            (struct peak *const[]){&desk->work[strong].peak, &work->peak},
 			            (struct estimate_pulse *const[]){&analysis->channels[strong].pulse,
 			                                             &analysis->channels[i].pulse});
+			if (sensor[1] == '2')
+				doubt_ripple((struct peak *const[]){&desk->work[strong].peak, &work->peak},
+				             analysis->channels[strong].pulse.duration_s);
 			analysis->channels[i].peak = work->peak.result;
+			analysis->channels[strong].peak = desk->work[strong].peak.result;
 			continue;
 		}
 		work->strong = &desk->work[strong].peak;

@@ -72,6 +72,9 @@ enum spoil {
 	LIMITED,
 	S1_GAIN_STEP,
 	LATE,
+	S2_LATE,
+	S1_LESS,
+	S1_LIMITED,
 	DULL,
 	HELD,
 	FROZEN,
@@ -147,6 +150,9 @@ static const struct class classes[] = {
         {"X limited softly", HERTZ, PLAIN, LIMITED, false},
         {"S1's gain steps", HALF_SINE, PLAIN, S1_GAIN_STEP, false},
         {"Y late", HALF_SINE, PLAIN, LATE, false},
+        {"S2 late", HALF_SINE, RIGID, S2_LATE, false},
+        {"S1 reads 0.8", HERTZ, PLAIN, S1_LESS, false},
+        {"S1X limited softly", HALF_SINE, PLAIN, S1_LIMITED, false},
         {"X behind 250 Hz", HALF_SINE, PLAIN, DULL, true},
         {"samples held", HALF_SINE, PLAIN, HELD, true},
         {"one value held, rising", HALF_SINE, PLAIN, FROZEN, false},
@@ -292,7 +298,7 @@ static double shown(const struct drop *d, int c, double t)
 
 	if (d->class->spoil == EXCHANGED && c <= S1Y)
 		height = d->part[S1X + S1Y - c];
-	if (d->class->spoil == LATE && (c == S1Y || c == S2Y))
+	if ((d->class->spoil == LATE && (c == S1Y || c == S2Y)) || (d->class->spoil == S2_LATE && c >= S2X))
 		t -= 0.3e-3 + 0.3e-3 * d->at;
 	value = sign * height * table(whole, t);
 	switch (d->class->spoil) {
@@ -331,6 +337,10 @@ static double shown(const struct drop *d, int c, double t)
 		return c == S2X && x > 0.2 + 0.3 * d->at && x < 0.5 + 0.3 * d->at ? 0.75 * value : value;
 	case LIMITED:
 		return c == S2X ? 0.8 * height * tanh(value / (0.8 * height)) : value;
+	case S1_LESS:
+		return c <= S1Y ? 0.8 * value : value;
+	case S1_LIMITED:
+		return c == S1X ? 0.6 * height * tanh(value / (0.6 * height)) : value;
 	case S1_GAIN_STEP:
 		return c <= S1Y && t > 0.015 ? 0.8 * value : value;
 	case RECTIFIED:
