@@ -11,7 +11,8 @@
 #include "host/record/can_text.h"
 #include "host/record/unpack.h"
 
-enum { WINDOW_BYTES = 1 << 20 };
+/* Small enough to stay near the processor; a window moves when a usual line no longer fits. */
+enum { WINDOW_BYTES = 1 << 17, LINE_USUAL = 1 << 10 };
 
 static int log_file_refuse(const struct log_file *log, int code, const char *why, char *message)
 {
@@ -234,6 +235,18 @@ static uint64_t end_of_long_line(struct log_file *log, uint64_t at, uint64_t end
 	}
 }
 
+/* The line's text as far as it is here; where it ends, NULL if not so far. */
+static const char *find_end_of_line(struct log_file *log, uint64_t end, size_t want, struct log_line *line)
+{
+	size_t held;
+
+	line->text = log_file_get(log, line->at, want, &held);
+	if (held > end - line->at)
+		held = (size_t)(end - line->at);
+	line->length = held < LOG_LINE_MAX ? held : LOG_LINE_MAX;
+	return memchr(line->text, '\n', line->length);
+}
+
 bool log_file_next_line(struct log_file *log, uint64_t end, struct log_line *line)
 {
 	size_t held;
@@ -244,13 +257,11 @@ bool log_file_next_line(struct log_file *log, uint64_t end, struct log_line *lin
 	if (line->next >= end)
 		return false;
 	line->at = line->next;
-	line->text = log_file_get(log, line->at, LOG_LINE_MAX, &held);
-	if (held > end - line->at)
-		held = (size_t)(end - line->at);
-	if (held == 0)
+	found = find_end_of_line(log, end, LINE_USUAL, line);
+	if (found == NULL)
+		found = find_end_of_line(log, end, LOG_LINE_MAX, line);
+	if (line->length == 0)
 		return false;
-	line->length = held < LOG_LINE_MAX ? held : LOG_LINE_MAX;
-	found = memchr(line->text, '\n', line->length);
 	if (found != NULL)
 		line->length = (size_t)(found - line->text);
 	line->next = line->at + line->length + (found != NULL);
