@@ -328,7 +328,7 @@ static bool decimal_by_product(double size, struct decimal *decimal)
 	int power, places;
 	uint64_t mantissa = (uint64_t)ldexp(frexp(size, &power), 64), five = 1;
 
-	places = HELD - 1 - (power * 1233 >> 12); /* log10(2); one too many, or right */
+	places = HELD - 1 - ((power - 1) * 1233 >> 12); /* log10(2); one too many, or right */
 	if (places > FIVES || places < 0)
 		return false;
 	for (int i = 0; i < places; i++)
@@ -408,43 +408,49 @@ static void lay_out(char *at, struct decimal decimal, int digits)
 	*at = '\0';
 }
 
+/* How far the nearest multiple is. */
+static double to_multiple(uint64_t digits, uint64_t scale)
+{
+	const uint64_t below = digits % scale, above = scale - below;
+
+	return (double)(below < above ? below : above);
+}
+
 /* Without asking strtod whether it reads back equal: it does where it lies by less than half a place of the
  * value's from it. False where that is too near to say, and where places are not even to both sides. */
 static bool shorten_decimal(char *text, double value, int least)
 {
 	const double size = fabs(value);
 	struct decimal decimal;
-	uint64_t scale = 100; /* of HELD and ENOUGH digits */
+	uint64_t scale = 100, below, above; /* of HELD and ENOUGH digits */
+	int digits = ENOUGH, power;
 	double half;
-	int power;
 
 	if (!(size > DBL_MIN / DBL_EPSILON && size < DBL_MAX) || frexp(size, &power) == 0.5)
 		return false;
 	decimal = decimal_of(size);
 	half = (double)decimal.digits * (ldexp(0.5, power - DBL_MANT_DIG) / size);
-	for (int digits = ENOUGH; digits > least; digits--)
-		scale *= 10;
-	for (int digits = least; digits <= ENOUGH; digits++, scale /= 10) {
-		uint64_t below = decimal.digits % scale, above = scale - below;
-		double off = (double)(below < above ? below : above);
+	for (; digits > least; digits--, scale *= 10) {
+		const double off = to_multiple(decimal.digits, 10 * scale);
 
-		if (below == above)
-			return false; /* which way it is rounded hangs on what is not held */
-		if (digits < ENOUGH && off - 1 > half)
-			continue;
-		if (digits < ENOUGH && off + 1 > half)
+		if (off - 1 > half)
+			break; /* fewer read back as another */
+		if (off + 1 > half)
 			return false;
-		decimal.digits = below < above ? decimal.digits - below : decimal.digits + above;
-		if (decimal.digits >= 10000000000000000000u) {
-			decimal.digits /= 10;
-			decimal.exponent++;
-		}
-		if (signbit(value))
-			*text++ = '-';
-		lay_out(text, decimal, digits);
-		return true;
 	}
-	return false;
+	below = decimal.digits % scale;
+	above = scale - below;
+	if (below == above)
+		return false; /* which way it is rounded hangs on what is not held */
+	decimal.digits = below < above ? decimal.digits - below : decimal.digits + above;
+	if (decimal.digits >= 10000000000000000000u) {
+		decimal.digits /= 10;
+		decimal.exponent++;
+	}
+	if (signbit(value))
+		*text++ = '-';
+	lay_out(text, decimal, digits);
+	return true;
 }
 
 /* A whole number of so many digits at most is written with all it has. */
