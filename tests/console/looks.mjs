@@ -21,6 +21,12 @@ function tooWide() {
 	return [`${root.scrollWidth} px, by ${over.slice(-5).map((node) => node.id || node.className || node.tagName).join(", ")}`];
 }
 
+/* In the page: cards with something in them that ends beyond them. */
+function overflowing() {
+	return [...document.querySelectorAll(".card")].filter((card) => card.scrollWidth > card.clientWidth)
+		.map((card) => `${card.id || card.className} is ${card.clientWidth} px wide and holds ${card.scrollWidth}`);
+}
+
 /* In the page: visible text whose colour is too near to what is behind it, by the formulas of WCAG 2.1. */
 function tooFaint(least) {
 	const pen = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
@@ -93,6 +99,7 @@ export async function look(desk, view) {
 	const [width, at] = [[size, ""], [DOUBLED, " 200 %"], [PHONE, " 390 px"]][found.views % 3]; // in turn: it takes a second
 	await page.setViewportSize(width);
 	tell(found.broken, await broken(page), at);
+	tell(found.wide, await page.evaluate(overflowing), at);
 	await page.setViewportSize(PHONE);
 	tell(found.wide, await page.evaluate(tooWide));
 	await desk.picture(`${view}-phone`);

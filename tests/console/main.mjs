@@ -16,7 +16,7 @@ const VIEWS = 18; // so many were looked at
 const looks = {
 	name: "looks", apart: true,
 	steps: [
-		["nothing scrolls sideways at 390 px", async () => assert.deepEqual([found.views === VIEWS, ...found.wide], [true])],
+		["nothing scrolls sideways at 390 px, nothing ends beyond its card", async () => assert.deepEqual([found.views === VIEWS, ...found.wide], [true])],
 		["every text has a contrast of 4.5, light and dark", async () => assert.deepEqual([found.views === VIEWS, ...found.faint], [true])],
 		["axe-core finds nothing, at full size, 200 % and 390 px", async () => assert.deepEqual([found.views === VIEWS, ...found.broken], [true])],
 	],

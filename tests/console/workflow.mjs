@@ -423,6 +423,35 @@ async function spectrum() {
 		assert.ok(Date.now() < end, "another kind is another picture");
 }
 
+/* Of whatever height and from whatever frequency: ticks that do not end have been seen where the range began at 0.0097. */
+async function spectraOfAnyHeight() {
+	const ranges = await desk.page.evaluate(async () => {
+		const { Group } = await import("./charts.js");
+		const host = document.body.appendChild(document.createElement("div"));
+		const group = new Group(), ranges = [];
+		for (let decade = -7; decade < 7; decade++)
+			for (const digits of [1, 1.01, 1.06, 1.08, 1.99, 4.44, 9.49, 9.7, 9.99999]) {
+				const from = digits * 10 ** decade;
+				group.clear();
+				const { scales } = group.add(host, [{ label: "a", x: [from, 20 * from], y: [3 * from, from] }],
+					{ title: "any", log: true });
+				await Promise.resolve();
+				ranges.push({ from, x: [scales.x.min, scales.x.max], y: [scales.y.min, scales.y.max] });
+			}
+		group.clear();
+		host.remove();
+		return ranges;
+	});
+	assert.equal(ranges.length, 126);
+	const within = ([lower, upper], min, max) =>
+		lower <= min * (1 + 1e-9) && lower > min / 2.01 && upper >= max * (1 - 1e-9) && upper < max * 2.01;
+	for (const { from, x, y } of ranges) {
+		assert.ok(within(x, from, 20 * from), `${from}: ${x}`);
+		assert.ok(within(y, from, 3 * from), `${from}: ${y}`);
+	}
+	assert.deepEqual(desk.errors, []);
+}
+
 async function overlay() {
 	await desk.click("#tab-overlay");
 	await desk.page.waitForSelector("#overlay canvas");
@@ -606,6 +635,7 @@ export default {
 		["means and SDs are those of the accepted drops", statistics],
 		["traces at native rates zoom together; the model can be taken away", traces],
 		["spectra", spectrum],
+		["a spectrum of any height has its ticks", spectraOfAnyHeight],
 		["the accepted drops over each other, with the model", overlay],
 		["table as CSV, report as one file", files],
 		["history: search, any drops over each other", history],

@@ -27,17 +27,16 @@ function align(series) {
 	return uPlot.join(series.map(({ x, y }) => [x, y]));
 }
 
-/* No digits beyond what a scale has: those of a logarithmic one are no round numbers. */
-const plainNumber = (value, digits) =>
-	value == null ? "" : String(Number(value.toPrecision(digits))).replace("-", "−");
+/* No digits beyond what a scale has. */
+const plainNumber = (value) => (value == null ? "" : String(Number(value.toPrecision(9))).replace("-", "−"));
 
-function axes(unit, xUnit, log) {
+function axes(unit, xUnit) {
 	const common = {
 		stroke: colour("--ink"),
 		font: "14px sans-serif",
 		grid: { stroke: colour("--line"), width: 1 },
 		ticks: { stroke: colour("--line"), width: 1 },
-		values: (_, values) => values.map((value) => plainNumber(value, log ? 3 : 9)),
+		values: (_, values) => values.map(plainNumber),
 		labelSize: 20,
 		labelFont: "14px sans-serif",
 	};
@@ -45,6 +44,16 @@ function axes(unit, xUnit, log) {
 		{ ...common, size: 28, label: xUnit },
 		{ ...common, size: 58, label: unit },
 	];
+}
+
+/* The range of a logarithmic scale, its ends to one digit: uPlot would go on to the next power of ten, and its ticks,
+ * which go from the lower end by that end's power of ten, meet the next power from such an end only. */
+function oneDigit(min, max) {
+	const round = (value, way) => {
+		const [digits, power] = value.toExponential(9).split("e");
+		return Number(`${way(Number(digits))}e${power}`);
+	};
+	return min > 0 ? [round(min, Math.floor), round(Math.max(max, 1.1 * min), Math.ceil)] : [1, 10];
 }
 
 function drawLimit(chart, limit) {
@@ -160,8 +169,7 @@ export class Group {
 	 * log, xUnit}. Replaces what the host showed. */
 	add(host, series, options) {
 		const { title, unit = "g", height = 210, limit, log = false, xUnit = "ms", xDecimals = 3 } = options;
-		/* uPlot would go on to the next power of ten */
-		const fit = log ? { range: (_, min, max) => (min > 0 ? [min / 1.1, max * 1.1] : [1, 10]) } : {};
+		const fit = log ? { range: (_, min, max) => oneDigit(min, max) } : {};
 		/* where the page has little room it says how high */
 		const size = () => ({
 			width: Math.max(280, host.clientWidth),
@@ -178,7 +186,7 @@ export class Group {
 					points: { size: 7 },
 				},
 				scales: { x: { time: false, distr: log ? 3 : 1, ...fit }, y: { distr: log ? 3 : 1, ...fit } },
-				axes: axes(unit, xUnit, log),
+				axes: axes(unit, xUnit),
 				series: [
 					{
 						label: log ? "frequency" : "time",
