@@ -150,6 +150,8 @@ static bool enough(const struct trace *trace, size_t first, size_t last, size_t 
 
 	if (trace->range_g > 0 && fabs(extreme - trace->range_g) <= 1e-9 * trace->range_g)
 		return true;
+	if (trace->step_g > 0) /* coarser than noise: a level top reads so, whatever made it (doubt.h) */
+		return false;
 	if (trembles(trace, n < EQUAL_EXTREMES ? TREMBLE_STEPS : CLIP_TREMBLE))
 		return n >= EQUAL_EXTREMES - 1;
 	if (n >= EQUAL_EXTREMES && !clip_coarse(trace, first, last))

@@ -17,6 +17,10 @@ enum {
  * by CLIP_TREMBLE steps one in seventy: a run is chance's once in a million. */
 #define HELD_STEPS 8.0
 
+/* In numbers coarser than noise the case at rest between two contacts reads nothing but zeros: so long they
+ * are no hole. */
+#define REST_S 1.5e-3
+
 /* Of all samples, those that equal the one before, where half of what differs does so by more than LIMIT_OVER
  * steps: repeated all along. Of noise one in eight does. */
 #define REPEATED 0.25
@@ -92,7 +96,8 @@ static unsigned dropout_mark_run(struct trace *trace, size_t first, size_t end, 
 {
 	bool zeros = is_zero(trace, first);
 
-	if (first == 0 || end == trace->count)
+	if (first == 0 || end == trace->count ||
+	    (zeros && trace->step_g > 0 && (double)(end - first) > REST_S * trace->rate_hz))
 		return 0;
 	if (zeros ? end - first < ZEROS || !stands_off(trace, first - 1, noise_g) ||
 	                    !stands_off(trace, end, noise_g)

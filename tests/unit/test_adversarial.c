@@ -43,6 +43,8 @@ enum spoil {
 	HUM,
 	LAPLACE,
 	COARSE,
+	COARSER,
+	COARSER_TWICE,
 	LOUD,
 	SPIKES,
 	LOST,
@@ -121,6 +123,8 @@ static const struct class classes[] = {
         {"hum", HALF_SINE, PLAIN, HUM, false},
         {"Laplace noise", HERTZ, PLAIN, LAPLACE, false},
         {"codes of 0.5 g", HALF_SINE, PLAIN, COARSE, false},
+        {"trapezoid in codes of 2 g", TRAPEZOID, PLAIN, COARSER, false},
+        {"two contacts in codes of 2 g", HALF_SINE, PLAIN, COARSER_TWICE, false},
         {"noise of 5 g", HERTZ, PLAIN, LOUD, false},
         {"spikes", HERTZ, PLAIN, SPIKES, false},
         {"0.6 ms lost at the peak", HERTZ, PLAIN, LOST, false},
@@ -275,6 +279,8 @@ static struct drop draw(const struct class *class, struct synth_random *random)
 		height = 11 + 19 * synth_uniform(random);
 	if (class->spoil == LOUD)
 		d.noise_g = 5;
+	if (class->spoil == COARSER || class->spoil == COARSER_TWICE)
+		d.noise_g = 0.2;
 	if (class->spoil == SLAP_NEAR)
 		d.again_s = 0.025;
 	d.part[S1X] = d.part[S2X] = height;
@@ -303,6 +309,7 @@ static double shown(const struct drop *d, int c, double t)
 	value = sign * height * table(whole, t);
 	switch (d->class->spoil) {
 	case SECOND:
+	case COARSER_TWICE:
 		return value + 0.6 * height * table(whole, t - d->again_s);
 	case SLAP:
 	case SLAP_NEAR:
@@ -420,7 +427,9 @@ static void chain(const struct drop *d, int c, double *v, size_t n, double rate_
 static void fill(struct drop *d, int c, struct synth_random *random)
 {
 	struct channel *channel = &d->channel[c];
-	double code = d->class->spoil == COARSE ? 0.5 : CODE_G, before = 0;
+	double before = 0, code = d->class->spoil == COARSE                                        ? 0.5
+	                          : d->class->spoil == COARSER || d->class->spoil == COARSER_TWICE ? 2
+	                                                                                           : CODE_G;
 	size_t rise = (size_t)((d->onset_s + (0.2 + 0.2 * d->at) * d->base_s - channel->start_s) *
 	                       channel->rate_hz);
 	size_t top = (size_t)((d->onset_s + d->base_s / 2 - channel->start_s) * channel->rate_hz);
@@ -589,7 +598,7 @@ static bool alarmed(const struct analysis *a)
 	unsigned seen = 0;
 
 	for (int c = 0; c < S2Z; c++)
-		seen |= (a->channels[c].flags & RECORD_FLAG_CLIPPED) |
+		seen |= (a->channels[c].flags & (RECORD_FLAG_CLIPPED | RECORD_FLAG_ZEROED)) |
 		        ((a->channels[c].peak.how.flags | a->channels[c].pulse.flags) & doubt);
 	return seen != 0;
 }
