@@ -31,7 +31,7 @@ CPPFLAGS = -I. -I$(BUILD)/generated
 # The posix side may use all of Linux; common/ and the firmware core get only what C11 has.
 LINUX = -D_GNU_SOURCE
 # Statically what every start would have to bind: three quarters of a start's instructions.
-LIBRARIES = -Wl,-Bstatic -lsqlite3 -lnettle -linih -lzstd -lgsl -lgslcblas -lz -Wl,-Bdynamic -llcm -lcjson -lm -lpthread
+LIBRARIES = -Wl,-Bstatic -lsqlite3 -lnettle -linih -lzstd -lgsl -lgslcblas -Wl,-Bdynamic -llcm -lcjson -lz -lm -lpthread
 
 VERSION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 
