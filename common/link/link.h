@@ -66,6 +66,10 @@ const char *link_url(const struct link *link);
  * DT_E_SYSTEM if it cannot be kept. Links that hold nothing back do nothing. */
 DT_MUST_USE int link_flush(struct link *link);
 
+/* Of a clock that nobody sets, for deadlines; and since the epoch, for a frame's time_us. */
+int64_t link_now_us(void);
+int64_t link_clock_us(void);
+
 /* Flushes and frees; NULL is allowed. 0 or DT_E_SYSTEM if what was written could not be kept. */
 int link_close(struct link *link);
 

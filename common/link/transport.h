@@ -54,10 +54,6 @@ bool link_frame_valid(const struct frame *frame);
 unsigned link_length_of_code(unsigned code);
 unsigned link_code_of_length(unsigned length);
 
-/* CLOCK_MONOTONIC for deadlines, CLOCK_REALTIME for time_us. */
-int64_t link_now_us(void);
-int64_t link_clock_us(void);
-
 /* Milliseconds until the deadline as poll and epoll_wait want them: rounded up, -1 for ever. */
 int link_poll_ms(int64_t deadline_us);
 

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/link/link.h"
 #include "common/wire_table.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
@@ -173,7 +174,7 @@ static void on_command(const lcm_recv_buf_t *buffer, const char *channel, void *
 	enum mac_refusal refusal;
 
 	(void)channel;
-	refusal = mac_judge(&bridge->taker, buffer->data, buffer->data_size, session_utime(), &command);
+	refusal = mac_judge(&bridge->taker, buffer->data, buffer->data_size, link_clock_us(), &command);
 	if (refusal == MAC_TAKEN && bridge->commanded && command.op != WIRE_OP_ABORT) {
 		refusal = MAC_BUSY;
 		bridge->taker.refused[MAC_BUSY]++;
@@ -212,7 +213,7 @@ static int obey_abort(struct bridge *bridge)
 	bridge->aborted_ms = now_ms;
 	result = session_command(bridge->session, WIRE_OP_ABORT);
 	if (result == 0)
-		bridge->publisher->state.aborted_utime = session_utime();
+		bridge->publisher->state.aborted_utime = link_clock_us();
 	if (proven) {
 		keep_record(bridge, &bridge->abort, result);
 		return bridge_answer(bridge, bridge->abort.counter, result);

@@ -5,7 +5,6 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "common/link/canbits.h"
 #include "common/segment.h"
@@ -69,14 +68,6 @@ void live_destroy(struct live *live)
 	if (live != NULL)
 		pthread_mutex_destroy(&live->lock);
 	free(live);
-}
-
-int64_t live_now_us(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
 /* ---- the bus ---- */

@@ -36,11 +36,8 @@ struct live;
 struct live *live_create(void); /* NULL without memory */
 void live_destroy(struct live *live);
 
-/* What now_us below stands for: microseconds of a clock that nobody sets. */
-int64_t live_now_us(void);
-
-/* A frame of the tower. True when it says that the tower started anew: the boot-up heartbeat, or a block
- * whose tick is too far behind to be a late one. */
+/* A frame of the tower; now_us here and below is link_now_us. True when it says that the tower started anew:
+ * the boot-up heartbeat, or a block whose tick is too far behind to be a late one. */
 bool live_feed(struct live *live, const struct frame *frame, int64_t now_us);
 
 /* The tower or the link started anew: the ticks begin again, counters stay. */

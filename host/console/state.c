@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "common/link/link.h"
 #include "common/wire_table.h"
 
 /* A drop's log, its results and what the index keeps of it: rounded up from what drops take. */
@@ -30,7 +31,7 @@ void state_look(struct state *state, struct tower *tower, struct work *work, str
 	memset(state, 0, sizeof(*state));
 	tower_look(tower, &state->tower);
 	work_look(work, &state->work);
-	live_look(live, live_now_us(), &state->live);
+	live_look(live, link_now_us(), &state->live);
 }
 
 static bool tower_changed(const struct tower_view *a, const struct tower_view *b)

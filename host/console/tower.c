@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/link/link.h"
 #include "common/wire_table.h"
 #include "host/session/tower_setup.h"
 #include "host/console/tower_private.h"
@@ -40,7 +41,7 @@ static void tower_on_frame(void *user, const struct frame *frame)
 {
 	struct tower *tower = user;
 
-	if (live_feed(tower->console->live, frame, live_now_us())) /* it has forgotten its parameters */
+	if (live_feed(tower->console->live, frame, link_now_us())) /* it has forgotten its parameters */
 		tower->setup_due = tower->series[0] != '\0';
 }
 

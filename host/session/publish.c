@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/link/link.h"
 #include "common/wire.h"
 #include "host/session/loopback.h"
 #include "host/session/session.h"
@@ -95,7 +96,7 @@ static int publish_signed(struct publisher *publisher, const char *channel, uint
 int publisher_state(struct publisher *publisher)
 {
 	uint8_t bytes[512];
-	int64_t now_us = session_utime();
+	int64_t now_us = link_clock_us();
 
 	if (!publisher->status_seen)
 		return 0;
@@ -148,7 +149,7 @@ int publisher_drop(struct publisher *publisher, const struct record *record)
 {
 	droptower_drop drop;
 	uint8_t *bytes;
-	int size, result = lcm_codec_drop(record, session_utime(), &drop);
+	int size, result = lcm_codec_drop(record, link_clock_us(), &drop);
 
 	if (result != 0)
 		return result;
@@ -171,7 +172,7 @@ int publisher_result(struct publisher *publisher, unsigned drop_id, const char *
 		const char *given;
 		char *taken;
 	} text = {.given = json};
-	droptower_result result = {.utime = session_utime(), .drop_id = (int32_t)drop_id, .json = text.taken};
+	droptower_result result = {.utime = link_clock_us(), .drop_id = (int32_t)drop_id, .json = text.taken};
 
 	return publish_sent(droptower_result_publish(publisher->lcm, PUBLISH_RESULT, &result));
 }

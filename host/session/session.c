@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
-#include <time.h>
 
+#include "common/link/link.h"
 #include "common/wire_table.h"
 #include "host/base/interrupt.h"
 #include "host/session/journal.h"
@@ -164,16 +164,5 @@ bool session_is_over(const struct session *session, uint64_t statuses)
 
 int64_t session_now_ms(void)
 {
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
-
-int64_t session_utime(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_REALTIME, &now);
-	return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+	return link_now_us() / 1000;
 }

@@ -137,8 +137,7 @@ bool session_at_rest(unsigned state);
  * tower's. */
 bool session_is_over(const struct session *session, uint64_t statuses);
 
-/* Monotonic milliseconds, and microseconds since the epoch. */
+/* Milliseconds of link_now_us. */
 int64_t session_now_ms(void);
-int64_t session_utime(void);
 
 #endif

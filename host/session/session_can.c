@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/link/link.h"
 #include "host/session/session_can.h"
 
 enum {
@@ -16,7 +17,7 @@ int can_way_send(struct session *session, struct frame *frame)
 	struct can_way *way = session->way;
 	int result;
 
-	frame->time_us = session_utime();
+	frame->time_us = link_clock_us();
 	result = link_send(way->link, frame);
 	if (result == DT_E_FULL)
 		return 0; /* as one lost on the bus: the link counts it, what matters is sent again */

@@ -14,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/link/link.h"
 #include "host/session/journal.h"
 #include "host/session/publish.h"
 #include "host/session/session_private.h"
@@ -47,7 +48,7 @@ static bool is_believed(const struct lcm_way *way, const char *channel, const lc
 
 static bool is_news(const struct lcm_way *way, const droptower_state *state)
 {
-	int64_t age_us = session_utime() - state->utime;
+	int64_t age_us = link_clock_us() - state->utime;
 
 	return !way->has_key ||
 	       (state->utime > way->state.utime && age_us < MAC_AGE_US && age_us > -MAC_AGE_US);
@@ -181,7 +182,7 @@ static int send_command(struct session *session, droptower_command *command)
 		way->counter = way->state.counter;
 	command->counter = ++way->counter;
 	command->session = way->state.session;
-	command->utime = session_utime();
+	command->utime = link_clock_us();
 	journal_sender(session->options.program != NULL ? session->options.program : "?",
 	               (char *)command->sender, sizeof(command->sender));
 	size = droptower_command_encode(bytes, 0, sizeof(bytes), command);
@@ -321,7 +322,7 @@ static int open_way(struct session *session, const char *url, char message[SESSI
 {
 	struct lcm_way *way = session->way;
 
-	way->drop_utime = session_utime();
+	way->drop_utime = link_clock_us();
 	if (session->options.key != NULL) {
 		if (mac_read_key(session->options.key, &way->key, message) != 0)
 			return DT_E_ARGUMENT;
