@@ -86,10 +86,15 @@ static double contact_height(const struct trace *trace, size_t k, size_t until, 
 {
 	double most = 0;
 
-	for (; k + 1 < until; k++)
+	for (; k + 1 < until; k++) {
+		if (!(trace_most(trace, k) + fabs(zero_g) > most)) {
+			k |= TRACE_BLOCK - 1;
+			continue;
+		}
 		if (trace_good(trace, k) && trace_good(trace, k + 1))
 			most = fmax(most, fmin(fabs(trace->value_g[k] - zero_g),
 			                       fabs(trace->value_g[k + 1] - zero_g)));
+	}
 	return most;
 }
 
