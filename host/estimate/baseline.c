@@ -7,8 +7,8 @@
 #include "host/estimate/hum.h"
 #include "host/estimate/limits.h"
 #include "host/estimate/median.h"
-#include "host/estimate/pair.h"
 #include "host/estimate/quiet.h"
+#include "host/estimate/simd2.h"
 #include "host/estimate/zero.h"
 
 enum { DIFFERENCES_MIN = 16, BEGINNING = 16 };

@@ -5,12 +5,12 @@
 #include <stddef.h>
 
 #include "common/units.h"
-#include "host/estimate/bell.h"
-#include "host/estimate/bridge.h"
+#include "host/estimate/complex_product.h"
+#include "host/estimate/cosine_pulse.h"
 #include "host/estimate/gram.h"
+#include "host/estimate/interpolate.h"
 #include "host/estimate/limits.h"
 #include "host/estimate/lm.h"
-#include "host/estimate/product.h"
 
 /* After the contact S1 is followed this long. A mount that stiffens as it swings out is one oscillator only
  * as long as the swing stays large: where the long window is refused the short one is tried. */
@@ -29,7 +29,7 @@
 #define DRIVE_LEFT 0.2
 
 enum {
-	BELL_STEPS = 16,
+	COSINE_STEPS = 16,
 	SINGLES = 512,
 	BLOCKS = 128,
 	CONTACT_SAMPLES = 256, /* at higher rates every second one, or fewer */
@@ -132,14 +132,14 @@ static size_t driven_normal(const void *model, double *p, double matrix[CHOLESKY
 	return gram_finish(&gram, matrix, right, squares);
 }
 
-static void input_from_bell(const struct bell *bell, struct respond_input *input)
+static void input_from_cosine_pulse(const struct cosine_pulse *cosine, struct respond_input *input)
 {
-	input->count = BELL_STEPS;
-	input->step_s = bell->base_s / BELL_STEPS;
-	input->from_s = bell->centre_s - bell->base_s / 2;
-	for (unsigned i = 0; i <= BELL_STEPS; i++)
-		input->value[i] = input->value[2 * BELL_STEPS - i] =
-		        bell_at(bell, input->from_s + i * input->step_s / 2);
+	input->count = COSINE_STEPS;
+	input->step_s = cosine->base_s / COSINE_STEPS;
+	input->from_s = cosine->centre_s - cosine->base_s / 2;
+	for (unsigned i = 0; i <= COSINE_STEPS; i++)
+		input->value[i] = input->value[2 * COSINE_STEPS - i] =
+		        cosine_pulse_at(cosine, input->from_s + i * input->step_s / 2);
 }
 
 static void input_from_samples(const struct trace *trace, const struct peak *peak,
@@ -155,7 +155,7 @@ static void input_from_samples(const struct trace *trace, const struct peak *pea
 	input->step_s = (double)stride / trace->rate_hz;
 	input->from_s = trace_time(trace, first);
 	for (unsigned i = 0; i <= 2 * input->count; i++)
-		input->value[i] = bridge_at(trace, input->from_s + i * input->step_s / 2);
+		input->value[i] = interpolate_at(trace, input->from_s + i * input->step_s / 2);
 	/* No jump where it ends: a crest there would be none. */
 	input->value[2 * input->count] = 0;
 }
@@ -430,7 +430,7 @@ void driven_find(const struct driven_axis *axis, struct driven *driven, struct d
 	const struct peak *peak = axis->peak[1];
 	struct solution smooth, sampled;
 	struct scene scene;
-	struct bell bell;
+	struct cosine_pulse cosine;
 	bool has_smooth, has_sampled = false;
 
 	*driven = (struct driven){.lag_s = NAN,
@@ -447,9 +447,9 @@ void driven_find(const struct driven_axis *axis, struct driven *driven, struct d
 	driven->status = ESTIMATE_NOT_CONVERGED;
 	driven->flags = flaws(axis);
 	scene.input = &curve->input;
-	driven->smooth = has_smooth = bell_fit(s2, peak, &bell);
+	driven->smooth = has_smooth = cosine_pulse_fit(s2, peak, &cosine);
 	if (has_smooth) {
-		input_from_bell(&bell, &curve->input);
+		input_from_cosine_pulse(&cosine, &curve->input);
 		has_smooth = solve_both(axis, &scene, &smooth);
 	}
 	if (!(has_smooth && !smooth.refused) &&
@@ -463,7 +463,7 @@ void driven_find(const struct driven_axis *axis, struct driven *driven, struct d
 		               sampled.input_spread_s * s2->noise_g, driven);
 		driven->doubt_s = peak->doubt_s;
 	} else if (has_smooth)
-		driven_express(axis, &smooth, bell.centre_s, bell.sigma_centre_s, 0, driven);
+		driven_express(axis, &smooth, cosine.centre_s, cosine.sigma_centre_s, 0, driven);
 	if (isnan(driven->peak_g))
 		return;
 	driven_draw(has_sampled ? &sampled : &smooth, driven, curve);

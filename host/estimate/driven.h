@@ -8,9 +8,9 @@
  * decay in block means; to half a cycle where the residual refuses that, and half a cycle fits far better.
  * The lag is the fitted response's largest peak less S2's.
  *
- * S2 enters as smooth pulse (bell.h) where it is one, since the noise of its samples would count as input,
- * otherwise by its samples from the pulse's foot to 1.1 widths after the peak. The delay is free because no
- * oscillator explains every lag that was measured.
+ * S2 enters as smooth pulse (cosine_pulse.h) where it is one, since the noise of its samples would count as
+ * input, otherwise by its samples from the pulse's foot to 1.1 widths after the peak. The delay is free
+ * because no oscillator explains every lag that was measured.
  *
  * Uncertainty: the fit's, S2's peak time and, with samples, S2's noise as input. Where the residual test
  * refuses (ESTIMATE_FLAG_MODEL) the residual takes the noise's place, and what the fitted peak misses S1's

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "host/estimate/bump.h"
+#include "host/estimate/burst.h"
 #include "host/estimate/limits.h"
 #include "host/estimate/rebound.h"
 
@@ -13,8 +13,8 @@
 #define TAIL_WIDTHS 0.3
 #define MARGIN_WIDTHS 0.35
 
-/* A bump's edges are the force's less exactly. */
-#define BUMP_TAIL_WIDTHS 0.5
+/* A burst's edges are the force's less exactly. */
+#define BURST_TAIL_WIDTHS 0.5
 
 static bool estimate_decay_measured(const struct analysis *analysis, size_t i)
 {
@@ -62,14 +62,14 @@ static void window_by_pulse(const struct estimate_pulse *pulse, struct ringdown_
 	span->margin_s = MARGIN_WIDTHS * pulse->duration_s;
 }
 
-static bool window_by_bump(const struct trace *trace, struct ringdown_span *span)
+static bool window_by_burst(const struct trace *trace, struct ringdown_span *span)
 {
-	struct bump bump;
+	struct burst burst;
 
-	if (!bump_find(trace, &bump))
+	if (!burst_find(trace, &burst))
 		return false;
-	span->from_s = bump.end_s + BUMP_TAIL_WIDTHS * (bump.end_s - bump.start_s);
-	span->margin_s = TAIL_WIDTHS * (bump.end_s - bump.start_s);
+	span->from_s = burst.end_s + BURST_TAIL_WIDTHS * (burst.end_s - burst.start_s);
+	span->margin_s = TAIL_WIDTHS * (burst.end_s - burst.start_s);
 	return true;
 }
 
@@ -90,7 +90,7 @@ static void look_at_contact(const struct desk *desk, const struct analysis *anal
 
 	contact->channel = i;
 	*span = (struct ringdown_span){.from_s = NAN, .until_s = INFINITY};
-	if (!doubtful(desk, analysis, i) || !window_by_bump(trace, span))
+	if (!doubtful(desk, analysis, i) || !window_by_burst(trace, span))
 		window_by_pulse(&hit->pulse, span);
 	contact->again_s = next_contact(trace, span->from_s + span->margin_s / MARGIN_WIDTHS,
 	                                rebound_again_g(trace, hit->peak.value_g));

@@ -8,7 +8,7 @@
 #include <stddef.h>
 
 #include "host/estimate/cholesky.h"
-#include "host/estimate/pair.h"
+#include "host/estimate/simd2.h"
 
 enum {
 	GRAM_MAX = CHOLESKY_MAX + 1,

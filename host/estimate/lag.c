@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "host/estimate/bridge.h"
+#include "host/estimate/interpolate.h"
 #include "host/estimate/limits.h"
 
 enum {
@@ -30,7 +30,7 @@ static double correlate(const struct lag_sensor *s1, const struct lag_sensor *s2
 
 		for (size_t k = first; k < last; k += stride)
 			part += bridge_sample(trace, (ptrdiff_t)k) *
-			        bridge_at(s1->axes.trace[i], trace_time(trace, k) + shift_s);
+			        interpolate_at(s1->axes.trace[i], trace_time(trace, k) + shift_s);
 		sum += part * (double)stride / trace->rate_hz;
 	}
 	return sum;

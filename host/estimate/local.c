@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "host/estimate/limits.h"
-#include "host/estimate/pair.h"
+#include "host/estimate/simd2.h"
 
 /* Sums over the samples: of the powers of x, of those times the value, of the value's square. */
 struct sums {

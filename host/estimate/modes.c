@@ -45,7 +45,7 @@ static size_t bent(const void *context, double *p, double normal[CHOLESKY_MAX][C
                    double right[CHOLESKY_MAX], double *squares)
 {
 	const struct modes_problem *problem = context;
-	const struct series *series = problem->series;
+	const struct block_means *series = problem->series;
 	double size = exp(-p[MODES_DECAY] * series->first_s), shrink = exp(-p[MODES_DECAY] * series->step_s);
 	struct gram gram;
 
@@ -100,7 +100,7 @@ static bool is_linear(const struct modes *modes, unsigned i)
 	return (i - MODES_DECAY) % MODES_EACH >= MODES_COSINE - MODES_DECAY;
 }
 
-bool modes_linear(struct modes *modes, const struct series *series)
+bool modes_linear(struct modes *modes, const struct block_means *series)
 {
 	struct modes_problem problem = {modes, series};
 	struct lm_problem lm = make_problem(modes, &problem);
@@ -130,7 +130,7 @@ bool modes_linear(struct modes *modes, const struct series *series)
 	return true;
 }
 
-bool modes_fit(struct modes *modes, const struct series *series)
+bool modes_fit(struct modes *modes, const struct block_means *series)
 {
 	struct modes_problem problem = {modes, series};
 	struct lm_problem lm = make_problem(modes, &problem);
@@ -161,7 +161,7 @@ double modes_at(const struct modes *modes, double time_s)
 	return value;
 }
 
-void modes_residual(const struct modes *modes, const struct series *series, double *residual_g)
+void modes_residual(const struct modes *modes, const struct block_means *series, double *residual_g)
 {
 	for (unsigned k = 0; k < series->count; k++)
 		residual_g[k] = series->value_g[k] - modes->p[MODES_OFFSET];
@@ -176,7 +176,7 @@ void modes_residual(const struct modes *modes, const struct series *series, doub
 }
 
 /* A mean of n samples of e^{q t} about its middle is sinh(n q / 2) / (n sinh(q / 2)) of it, q per sample. */
-void modes_unblock(struct modes *modes, const struct series *series)
+void modes_unblock(struct modes *modes, const struct block_means *series)
 {
 	if (series->block == 1 || modes->law == MODES_LAW_SPRING)
 		return;

@@ -17,8 +17,8 @@
  * not, since a swing that is free to follow ends on a spike more often. Times in s from the series' zero,
  * values in g, w and k in rad/s.
  */
+#include "host/estimate/block_means.h"
 #include "host/estimate/lm.h"
-#include "host/estimate/series.h"
 
 /* Where the unknowns of a fit stand: offset, four of each mode, then the law's two or the hum's two. */
 enum {
@@ -53,16 +53,16 @@ unsigned modes_size(const struct modes *modes);
 
 /* Fills in the linear unknowns (offset, cosines, sines) for the nonlinear ones in p by linear least squares;
  * not with a law. False when the series does not determine them. */
-bool modes_linear(struct modes *modes, const struct series *series);
+bool modes_linear(struct modes *modes, const struct block_means *series);
 
 /* Fits from p on. False when it does not converge; modes is then undefined. */
-bool modes_fit(struct modes *modes, const struct series *series);
+bool modes_fit(struct modes *modes, const struct block_means *series);
 
 /* The model at time_s, what the series' points are compared with. */
 double modes_at(const struct modes *modes, double time_s);
 
 /* What the points of the series, good or not, lie off plain modes by, without a law or hum. */
-void modes_residual(const struct modes *modes, const struct series *series, double *residual_g);
+void modes_residual(const struct modes *modes, const struct block_means *series, double *residual_g);
 
 /* How far mode m, 0 or 1, swings where times begin, and which swings more. */
 double modes_swing_g(const struct modes *modes, unsigned m);
@@ -72,6 +72,6 @@ unsigned modes_stronger(const struct modes *modes);
 double modes_mean_hz(const struct modes *modes, unsigned cycles, unsigned steps);
 
 /* From block means, which a fit to them describes, to the samples themselves: each mode's cosine and sine. */
-void modes_unblock(struct modes *modes, const struct series *series);
+void modes_unblock(struct modes *modes, const struct block_means *series);
 
 #endif

@@ -4,13 +4,13 @@
 /*
  * What the parts of modes share.
  *   modes.c       the shapes, their fits, what a fit says
- *   modes_sums.c  normal equations of undisturbed decays
+ *   modes_normal.c  normal equations of undisturbed decays
  */
 #include "host/estimate/modes.h"
 
 struct modes_problem {
 	const struct modes *modes;
-	const struct series *series;
+	const struct block_means *series;
 };
 
 /* Whether p is a swing. */

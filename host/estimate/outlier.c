@@ -34,9 +34,9 @@ static bool is_near(const double *value, size_t i, const double *about, double l
 	return fabs(value[i] - median_find(sorted, NEIGHBOURS)) <= limit;
 }
 
-unsigned outlier_drop(struct series *series, const struct modes *modes, const bool *usable)
+unsigned outlier_drop(struct block_means *series, const struct modes *modes, const bool *usable)
 {
-	double residual[SERIES_MAX], sorted[SERIES_MAX], limit;
+	double residual[BLOCK_MEANS_MAX], sorted[BLOCK_MEANS_MAX], limit;
 	size_t count = 0, i = 0, loud;
 
 	modes_residual(modes, series, residual);

@@ -11,6 +11,6 @@
 
 /* Modes without a law or hum. Of the usable points of the series, [series->count], makes the outliers not
  * good and all others good again; returns how many are out. */
-unsigned outlier_drop(struct series *series, const struct modes *modes, const bool *usable);
+unsigned outlier_drop(struct block_means *series, const struct modes *modes, const bool *usable);
 
 #endif

@@ -7,7 +7,7 @@
  */
 #include <math.h>
 
-#include "host/estimate/pair.h"
+#include "host/estimate/simd2.h"
 
 struct phasor {
 	double cosine, sine, step_cosine, step_sine;

@@ -4,8 +4,8 @@
 #include <math.h>
 
 #include "common/units.h"
+#include "host/estimate/control_variate.h"
 #include "host/estimate/crest.h"
-#include "host/estimate/guide.h"
 #include "host/estimate/limits.h"
 
 /* Of the time from the level to twice it: half the window of a parabola on a slow edge. */
@@ -279,10 +279,10 @@ static bool pulse_choose(const struct trace *trace, const struct peak *peak, enu
 	return true;
 }
 
-/* True with a guide to the samples: the family where none of its questions is open, otherwise a pulse without
- * one. */
+/* True with a curve through the samples: the family where none of its questions is open, otherwise a pulse
+ * without one. */
 static bool pulse_contact(const struct trace *trace, const struct peak *peak, enum estimate_family family,
-                          struct estimate_pulse *pulse, struct guide *guide)
+                          struct estimate_pulse *pulse, struct control_variate *variate)
 {
 	struct estimate_how *how = &pulse->contact;
 	struct shape shape = {.family = ESTIMATE_FAMILY_AUTO};
@@ -295,9 +295,11 @@ static bool pulse_contact(const struct trace *trace, const struct peak *peak, en
 	if (shape.family == ESTIMATE_FAMILY_AUTO) {
 		how->flags |= ESTIMATE_FLAG_MODEL;
 		how->status = ESTIMATE_NOT_CONVERGED;
-		return symmetric && guide_from_bell(trace, peak, guide) && guide_ends(guide, trace);
+		return symmetric && control_variate_from_cosine_pulse(trace, peak, variate) &&
+		       control_variate_ends(variate, trace);
 	}
-	if (family == ESTIMATE_FAMILY_AUTO && guide_from_shape(&shape, guide) && !guide_ends(guide, trace)) {
+	if (family == ESTIMATE_FAMILY_AUTO && control_variate_from_shape(&shape, variate) &&
+	    !control_variate_ends(variate, trace)) {
 		how->flags |= ESTIMATE_FLAG_MODEL;
 		how->status = ESTIMATE_NOT_CONVERGED;
 		return false;
@@ -313,34 +315,35 @@ static bool pulse_contact(const struct trace *trace, const struct peak *peak, en
 	pulse->contact_start_s = shape.peak_s - shape.base_s / 2;
 	pulse->fitted_velocity_m_s = UNITS_G_M_S2 * shape.area_g_s;
 	pulse->sigma_fitted_velocity_m_s = UNITS_G_M_S2 * shape.sigma_area_g_s;
-	return how->flags & ESTIMATE_FLAG_MODEL ? guide_from_bell(trace, peak, guide)
-	                                        : guide_from_shape(&shape, guide);
+	return how->flags & ESTIMATE_FLAG_MODEL ? control_variate_from_cosine_pulse(trace, peak, variate)
+	                                        : control_variate_from_shape(&shape, variate);
 }
 
-/* The sum once more, by what the samples say beyond the guide. */
-static void guided_velocity(const struct trace *trace, const struct peak *peak,
-                            const struct estimate_baseline *baseline, const struct guide *guide,
-                            struct estimate_pulse *pulse)
+/* The sum once more, by what the samples say beyond the curve. */
+static void variate_velocity(const struct trace *trace, const struct peak *peak,
+                             const struct estimate_baseline *baseline, const struct control_variate *variate,
+                             struct estimate_pulse *pulse)
 {
 	double sigma;
 
-	pulse->velocity_change_m_s = UNITS_G_M_S2 * guide_area(guide, trace, peak, &sigma);
-	take_velocity_sigma(trace, baseline, sigma, guide->curve.base_s, pulse);
+	pulse->velocity_change_m_s = UNITS_G_M_S2 * control_variate_area(variate, trace, peak, &sigma);
+	take_velocity_sigma(trace, baseline, sigma, variate->curve.base_s, pulse);
 }
 
-static void guided_width(const struct trace *trace, const struct peak *peak, const struct guide *guide,
-                         struct estimate_pulse *pulse)
+static void variate_width(const struct trace *trace, const struct peak *peak,
+                          const struct control_variate *variate, struct estimate_pulse *pulse)
 {
 	double level = LIMIT_EDGE * fabs(peak->result.value_g);
-	struct guide_edge edge[2];
+	struct control_variate_edge edge[2];
 
-	if (!guide_edge(guide, trace, -1, level, &edge[0]) || !guide_edge(guide, trace, 1, level, &edge[1]))
+	if (!control_variate_edge(variate, trace, -1, level, &edge[0]) ||
+	    !control_variate_edge(variate, trace, 1, level, &edge[1]))
 		return;
 	pulse->start_s = edge[0].time_s;
 	pulse->end_s = edge[1].time_s;
 	pulse->duration_s = pulse->end_s - pulse->start_s;
 	pulse->sigma_duration_s =
-	        hypot(guide_spread(guide, edge),
+	        hypot(control_variate_spread(variate, edge),
 	              LIMIT_EDGE * peak->result.sigma_g * (1 / edge[0].slope_g_s + 1 / edge[1].slope_g_s));
 }
 
@@ -365,8 +368,8 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	};
 	double level = LIMIT_EDGE * fabs(peak->result.value_g), tilt;
 	struct edge edge[2];
-	struct guide guide;
-	bool guided;
+	struct control_variate variate;
+	bool has_curve;
 
 	*pulse = found;
 	if (found.status == ESTIMATE_SHORT || found.status == ESTIMATE_NO_PEAK)
@@ -385,14 +388,14 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	pulse->sigma_duration_s =
 	        hypot(hypot(edge[0].sigma_s, edge[1].sigma_s), LIMIT_EDGE * peak->result.sigma_g * tilt);
 	/* In a peak near its noise a curve may have found one hump: its feet then are not the pulse's. */
-	guided = peak->model != PEAK_MODEL_NONE && pulse_contact(trace, peak, family, pulse, &guide) &&
-	         fabs(peak->result.value_g) > LIMIT_SURE * trace->noise_g;
-	if (!guided) {
+	has_curve = peak->model != PEAK_MODEL_NONE && pulse_contact(trace, peak, family, pulse, &variate) &&
+	            fabs(peak->result.value_g) > LIMIT_SURE * trace->noise_g;
+	if (!has_curve) {
 		pulse_velocity(trace, peak, baseline, edge, pulse);
 		return;
 	}
-	guided_velocity(trace, peak, baseline, &guide, pulse);
-	guided_width(trace, peak, &guide, pulse);
+	variate_velocity(trace, peak, baseline, &variate, pulse);
+	variate_width(trace, peak, &variate, pulse);
 }
 
 void pulse_of_weak(const struct trace *trace, const struct peak *weak,

@@ -4,12 +4,12 @@
 /*
  * Width and area of the pulse under a peak. The width is between the points where it meets 10 % of the
  * peak, the velocity change its sum with 1 g = 9.80665 m/s^2. Both are the samples' own: no family is needed,
- * but where one fits, or another symmetric pulse does, it tells what lies between the samples (guide.h), and
- * what is missing or clipped follows it, from its foot to its foot. Where none fits: straight lines between
- * samples, and the trapezoid sum from where the reading leaves zero to where it is back, at most one width
- * beyond the 10 % points on either side; what is missing or clipped follows the family that gave the peak;
- * where none did it is bridged by a straight line, clipped samples count as read, and the gap enters the
- * uncertainty.
+ * but where one fits, or another symmetric pulse does, it tells what lies between the samples
+ * (control_variate.h), and what is missing or clipped follows it, from its foot to its foot. Where none fits:
+ * straight lines between samples, and the trapezoid sum from where the reading leaves zero to where it is
+ * back, at most one width beyond the 10 % points on either side; what is missing or clipped follows the
+ * family that gave the peak; where none did it is bridged by a straight line, clipped samples count as read,
+ * and the gap enters the uncertainty.
  *
  * How long a contact is depends on its family by a fifth, so that it is given only together with one: the
  * family asked for, otherwise the one of half-sine and haversine that fits better, otherwise sine-power; foot

@@ -5,7 +5,7 @@
 
 #include "host/estimate/limits.h"
 #include "host/estimate/median.h"
-#include "host/estimate/pair.h"
+#include "host/estimate/simd2.h"
 #include "host/estimate/zero.h"
 
 enum { GLANCE = 31 }; /* samples that tell roughly where the middle is, and how wide */

@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "common/units.h"
-#include "host/estimate/product.h"
+#include "host/estimate/complex_product.h"
 
 enum {
 	TERMS = 12,

@@ -3,8 +3,8 @@
 
 #include <math.h>
 
-#include "host/estimate/bridge.h"
 #include "host/estimate/crest.h"
+#include "host/estimate/interpolate.h"
 #include "host/estimate/limits.h"
 
 /* The first local maximum is looked for above this part of the largest. */
@@ -313,7 +313,7 @@ static bool resultant_follow(const struct resultant_axes *axes, unsigned strong,
 	found->span = span_around(axes, strong, lead->time_s);
 	if (!was_read(other, &found->span))
 		return false;
-	add_to(lead, silent(axes->peak[1 - strong]) ? 0 : bridge_at(other, lead->time_s),
+	add_to(lead, silent(axes->peak[1 - strong]) ? 0 : interpolate_at(other, lead->time_s),
 	       fmax(other->noise_g, 0), found);
 	return true;
 }

@@ -27,7 +27,7 @@
  * The window opens where the decay is surely free and then reaches back as far as the fit foretells the
  * samples before it, since every cycle lost at the start costs most.
  *
- * The fit starts from zero crossings; from a scan (scan.h) where noise or outliers hide them.
+ * The fit starts from zero crossings; from a scan (grid_search.h) where noise or outliers hide them.
  *
  * Frequency is the damped one, w / 2 pi; the natural one is sqrt(w^2 + a^2) / 2 pi; the damping ratio a over
  * that. three_cycle_frequency_hz is 3 over the time from the first zero crossing to the seventh, offset

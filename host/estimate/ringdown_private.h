@@ -6,12 +6,12 @@
  *   ringdown.c           the order of attempts, and what the last of them says
  *   ringdown_span.c      where the decay begins and ends: window, block, the start of the fit
  *   ringdown_residual.c  what the residual says of a fit
- *   ringdown_richer.c    what a residual that is refused asks for
+ *   ringdown_models.c    what a residual that is refused asks for
  *   ringdown_combine.c   two axes as one
  */
+#include "host/estimate/block_means.h"
 #include "host/estimate/modes.h"
 #include "host/estimate/ringdown.h"
-#include "host/estimate/series.h"
 
 /* What of the swing is small enough not to matter whatever the noise. */
 #define RINGDOWN_SWING_MODEL 1e-4
@@ -30,7 +30,7 @@ struct ringdown_job {
 	unsigned flags;
 	const char *path[ESTIMATE_PATH_MAX];
 	unsigned tried;
-	struct series series; /* what is fitted; large, so it is last and not cleared */
+	struct block_means series; /* what is fitted; large, so it is last and not cleared */
 };
 
 /* ---- ringdown.c ---- */
@@ -79,7 +79,7 @@ double ringdown_explained(const struct ringdown_job *job);
 /* What it takes from the sum of squares, in the noise's variance: how far it stands out. */
 double ringdown_gain(const struct ringdown_job *job);
 
-/* ---- ringdown_richer.c ---- */
+/* ---- ringdown_models.c ---- */
 
 /* Every sample, outliers left out: who is one shows better each time they are gone. False, and nothing
  * changed, when that fails. */

@@ -5,10 +5,10 @@
 
 #include "common/units.h"
 #include "host/estimate/crossings.h"
+#include "host/estimate/grid_search.h"
 #include "host/estimate/limits.h"
-#include "host/estimate/scan.h"
 
-/* The window: SCAN_CYCLES, or time constants if that is longer; from a mere start no more cycles than a start
+/* The window: GRID_CYCLES, or time constants if that is longer; from a mere start no more cycles than a start
  * is good for. */
 #define TIME_CONSTANTS 4.4
 #define CYCLES_START 7.0
@@ -29,7 +29,7 @@ enum { WINDOWS = 4 };
 static size_t window_end(const struct ringdown_job *job, double omega, double decay, double constants,
                          double most_s)
 {
-	double cycle = 2 * UNITS_PI / omega, length = SCAN_CYCLES * cycle;
+	double cycle = 2 * UNITS_PI / omega, length = GRID_CYCLES * cycle;
 	size_t end;
 
 	if (decay * length < constants)
@@ -48,9 +48,9 @@ unsigned ringdown_block(const struct ringdown_job *job, double omega)
 /* Blocks, unless a sample is missing. */
 static void ringdown_span_take(struct ringdown_job *job, size_t end, unsigned block)
 {
-	series_take(&job->series, job->trace, job->first, end, job->span->from_s, block);
+	block_means_take(&job->series, job->trace, job->first, end, job->span->from_s, block);
 	if (job->series.used < job->series.count && block > 1)
-		series_take(&job->series, job->trace, job->first, end, job->span->from_s, 1);
+		block_means_take(&job->series, job->trace, job->first, end, job->span->from_s, 1);
 }
 
 /* One mode from a start, over a window that follows it: a start is good for a few cycles only. */
@@ -78,15 +78,15 @@ static bool ringdown_span_settle(struct ringdown_job *job, double omega, double 
 		block = ringdown_block(job, modes->p[MODES_OMEGA]);
 	}
 	job->single = *modes;
-	job->total = series_squares(&job->series);
+	job->total = block_means_squares(&job->series);
 	return true;
 }
 
-static bool settle_by_scan(struct ringdown_job *job)
+static bool settle_by_grid_search(struct ringdown_job *job)
 {
-	struct scan scan;
+	struct grid_search scan;
 
-	return scan_find(&scan, job->trace, job->first, job->last) &&
+	return grid_search_find(&scan, job->trace, job->first, job->last) &&
 	       ringdown_span_settle(job, scan.omega, scan.decay);
 }
 
@@ -97,7 +97,7 @@ enum estimate_status ringdown_start(struct ringdown_job *job)
 	struct crossings crossings;
 	bool begun;
 
-	if (noise > 0 && !scan_worth(job->trace, job->first, job->last, noise))
+	if (noise > 0 && !grid_search_worth(job->trace, job->first, job->last, noise))
 		return ESTIMATE_NO_PEAK;
 	crossings_find(&crossings, job->trace, job->first, job->last, 0, threshold);
 	begun = crossings_start(&crossings, &omega, &decay);
@@ -108,7 +108,7 @@ enum estimate_status ringdown_start(struct ringdown_job *job)
 	/* A start that explains less is doubted. */
 	if (begun && ringdown_span_settle(job, omega, decay) && ringdown_explained(job) > LIMIT_MOST)
 		return ESTIMATE_OK;
-	return settle_by_scan(job) ? ESTIMATE_OK : begun ? ESTIMATE_NOT_CONVERGED : ESTIMATE_NO_PEAK;
+	return settle_by_grid_search(job) ? ESTIMATE_OK : begun ? ESTIMATE_NOT_CONVERGED : ESTIMATE_NO_PEAK;
 }
 
 bool ringdown_restart(struct ringdown_job *job, double omega, double decay)
@@ -189,8 +189,8 @@ void ringdown_reach_back(struct ringdown_job *job)
 		return;
 	modes = job->modes;
 	if (job->series.block > 1)
-		series_take(&job->series, trace, first, end, job->span->from_s, job->series.block);
-	else if (!series_lengthen(&job->series, trace, first, (unsigned)(job->first - first)))
+		block_means_take(&job->series, trace, first, end, job->span->from_s, job->series.block);
+	else if (!block_means_lengthen(&job->series, trace, first, (unsigned)(job->first - first)))
 		return;
 	job->first = first;
 	if (modes_fit(&modes, &job->series))

@@ -4,8 +4,8 @@
 #include <math.h>
 
 #include "host/estimate/limits.h"
-#include "host/estimate/pair.h"
 #include "host/estimate/phasor.h"
+#include "host/estimate/simd2.h"
 
 /* The fit looks this many half widths to either side: as far as the foot of a haversine and a fifth more. */
 #define REACH_HALF_WIDTHS 1.2

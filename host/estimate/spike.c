@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "host/estimate/limits.h"
-#include "host/estimate/pair.h"
+#include "host/estimate/simd2.h"
 
 enum {
 	SIDE = 4,   /* neighbours looked at on each side */

@@ -317,7 +317,7 @@ struct spring_scale {
 };
 
 INSIDE spring_sum_by(struct spring_sums *sums, const struct quad *start, bool on,
-                     const struct spring_scale *scale, const struct series *series)
+                     const struct spring_scale *scale, const struct block_means *series)
 {
 	struct spring_sums all = {.taken = 0};
 	struct quad quad = *start;
@@ -342,7 +342,7 @@ INSIDE spring_sum_by(struct spring_sums *sums, const struct quad *start, bool on
 }
 
 WIDE static void spring_sum(struct spring_sums *sums, const struct quad *start, bool on,
-                            const struct spring_scale *scale, const struct series *series)
+                            const struct spring_scale *scale, const struct block_means *series)
 {
 	if (on)
 		spring_sum_by(sums, start, true, scale, series);
@@ -404,8 +404,8 @@ static void spring_turn_sums(const struct spring_sums *sums, double by[SPRING_SI
 				normal[i][j] += by[j][n] * half[i][n];
 }
 
-size_t spring_normal(const struct series *series, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
-                     double right[CHOLESKY_MAX], double *squares)
+size_t spring_normal(const struct block_means *series, const double *p,
+                     double normal[CHOLESKY_MAX][CHOLESKY_MAX], double right[CHOLESKY_MAX], double *squares)
 {
 	double by[SPRING_SIZE][SPRING_SIZE], difference[LANES] = {1};
 	const double sample_s = series->step_s / series->block;

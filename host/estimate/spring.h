@@ -16,14 +16,14 @@
  * a later state and another scale have the same solution. Unknowns at the places of modes.h: b, a, w (damped,
  * of a small swing), w0^2 x and w0 x' at time 0 in g, Q in 1/g^2 of the former, D.
  */
+#include "host/estimate/block_means.h"
 #include "host/estimate/cholesky.h"
-#include "host/estimate/series.h"
 
 enum { SPRING_SIZE = 7 };
 
 /* As lm.h asks for it. */
-size_t spring_normal(const struct series *series, const double *p, double normal[CHOLESKY_MAX][CHOLESKY_MAX],
-                     double right[CHOLESKY_MAX], double *squares);
+size_t spring_normal(const struct block_means *series, const double *p,
+                     double normal[CHOLESKY_MAX][CHOLESKY_MAX], double right[CHOLESKY_MAX], double *squares);
 
 /* The acceleration at time_s. */
 double spring_at(const double *p, double time_s);

@@ -7,7 +7,7 @@
 
 #include "host/estimate/clip.h"
 #include "host/estimate/limits.h"
-#include "host/estimate/pair.h"
+#include "host/estimate/simd2.h"
 
 /* Beyond any sensor; keeps squares and sums far from overflow. */
 #define VALUE_MAX_G 1e9

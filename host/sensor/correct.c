@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/estimate/bridge.h"
+#include "host/estimate/interpolate.h"
 #include "host/sensor/sensors.h"
 
 #define MATRIX_LEAST 0.1 /* of its determinant: less is no sensor */
@@ -112,7 +112,7 @@ static double correct_at(const struct trace *trace, double t, bool *clipped)
 	*clipped |= (trace->sample[k + 1] & SAMPLE_CLIPPED) != 0;
 	if (!is_there(trace, k - 1) || !is_there(trace, k + 2))
 		return v[0] + s * (v[1] - v[0]);
-	return bridge_at(trace, t);
+	return interpolate_at(trace, t);
 }
 
 /* Well between its ends: what is not known there was lost. */

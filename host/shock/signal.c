@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/estimate/bridge.h"
 #include "host/estimate/clean.h"
+#include "host/estimate/interpolate.h"
 
 #define EVENT_LEVEL 0.05 /* of the largest */
 #define MISSING_MAX 0.1  /* part of all samples */
@@ -29,11 +29,11 @@ const char *signal_flag_name(unsigned flags)
 static bool signal_bridge(const struct trace *trace, double *value, size_t from, size_t until, double quiet_g,
                           double zero_g)
 {
-	if (until - from > BRIDGE_CUBIC && !(fabs(trace->value_g[from - 1] - zero_g) < quiet_g &&
-	                                     fabs(trace->value_g[until] - zero_g) < quiet_g))
+	if (until - from > INTERPOLATE_CUBIC && !(fabs(trace->value_g[from - 1] - zero_g) < quiet_g &&
+	                                          fabs(trace->value_g[until] - zero_g) < quiet_g))
 		return false;
 	for (size_t k = from; k < until; k++)
-		value[k] = bridge_over(trace, from, until, k);
+		value[k] = interpolate_over(trace, from, until, k);
 	return true;
 }
 

@@ -5,7 +5,7 @@
  * A channel as a spectrum needs it: without holes and without offset, so that one bad sample cannot spoil all
  * of it. What was done is told; the record stays as it is.
  *
- * Holes (lost, bad, spike) of ten samples and less are bridged as the estimates bridge them (bridge.h),
+ * Holes (lost, bad, spike) of ten samples and less are bridged as the estimates bridge them (interpolate.h),
  * longer ones by a straight line where it is quiet: below a twentieth of the largest on both sides. Missing
  * samples at the ends are cut off.
  *

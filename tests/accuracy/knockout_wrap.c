@@ -5,21 +5,21 @@
 #include <string.h>
 
 #include "host/estimate/baseline.h"
-#include "host/estimate/bell.h"
-#include "host/estimate/bridge.h"
-#include "host/estimate/bump.h"
+#include "host/estimate/burst.h"
+#include "host/estimate/control_variate.h"
+#include "host/estimate/cosine_pulse.h"
 #include "host/estimate/crest.h"
 #include "host/estimate/driven.h"
 #include "host/estimate/dropout.h"
-#include "host/estimate/guide.h"
+#include "host/estimate/grid_search.h"
 #include "host/estimate/hum.h"
 #include "host/estimate/iepe.h"
+#include "host/estimate/interpolate.h"
 #include "host/estimate/modes.h"
 #include "host/estimate/outlier.h"
 #include "host/estimate/peak_private.h"
 #include "host/estimate/quiet.h"
 #include "host/estimate/ringdown_private.h"
-#include "host/estimate/scan.h"
 #include "host/estimate/settle.h"
 #include "host/estimate/spike.h"
 
@@ -54,22 +54,23 @@ const struct knockout knockouts[] = {
         {"clipped: from the flanks", "peak_clipped.c"},
         {"polynomials", "crest.c crest.h local.c local.h"},
         {"weak axes", "peak_weak.c"},
-        {"curve between samples", "guide.c guide.h"},
+        {"curve between samples", "control_variate.c control_variate.h"},
         {"families given up early", "shape_judge.c:shape_hopeless"},
-        {"pulse without a family", "bell.c bell.h"},
+        {"pulse without a family", "cosine_pulse.c cosine_pulse.h"},
         {"driven: S1's peak", "peak_driven.c"},
         {"driven: decay's start", "ringdown.c:ringdown_refine"},
-        {"driven: holes as lines", "bridge.c:bridge_hole"},
-        {"driven oscillator, all", "driven.c driven.h respond.c respond.h bridge.c bridge.h peak_driven.c"},
-        {"burst under noise", "bump.c bump.h"},
+        {"driven: holes as lines", "interpolate.c:interpolate_hole"},
+        {"driven oscillator, all",
+         "driven.c driven.h respond.c respond.h interpolate.c interpolate.h peak_driven.c"},
+        {"burst under noise", "burst.c burst.h"},
         {"decay: reach back", "ringdown_span.c:ringdown_reach_back"},
-        {"decay: grid start", "scan.c scan.h"},
+        {"decay: grid start", "grid_search.c grid_search.h"},
         {"decay: outliers", "outlier.c outlier.h"},
-        {"decay: hum", "ringdown_richer.c:fit_hum"},
-        {"decay: any law", "spring.c spring.h ringdown_richer.c:try_square"},
+        {"decay: hum", "ringdown_models.c:fit_hum"},
+        {"decay: any law", "spring.c spring.h ringdown_models.c:try_square"},
         {"decay: softening spring", "spring.c spring.h"},
         {"decay: two modes",
-         "ringdown_richer.c:fit_two ringdown_richer.c:try_two ringdown_richer.c:separable"},
+         "ringdown_models.c:fit_two ringdown_models.c:try_two ringdown_models.c:separable"},
 };
 /* clang-format on */
 const size_t knockout_count = sizeof(knockouts) / sizeof(knockouts[0]);
@@ -93,11 +94,13 @@ WRAP(bool, crest_fit,
       const struct local_span *s),
      (c, axes, n, near_s, width_s, s), "polynomials", false)
 WRAP(bool, peak_is_weak, (const struct trace *t, const struct peak *p), (t, p), "weak axes", false)
-WRAP(bool, guide_from_shape, (const struct shape *s, struct guide *g), (s, g), "curve between samples", false)
-WRAP(bool, guide_from_bell, (const struct trace *t, const struct peak *p, struct guide *g), (t, p, g),
+WRAP(bool, control_variate_from_shape, (const struct shape *s, struct control_variate *g), (s, g),
+     "curve between samples", false)
+WRAP(bool, control_variate_from_cosine_pulse,
+     (const struct trace *t, const struct peak *p, struct control_variate *g), (t, p, g),
      "curve between samples", false)
 WRAP(bool, shape_hopeless, (const struct shape *s), (s), "families given up early", false)
-WRAP(bool, bell_fit, (const struct trace *t, const struct peak *p, struct bell *b), (t, p, b),
+WRAP(bool, cosine_pulse_fit, (const struct trace *t, const struct peak *p, struct cosine_pulse *b), (t, p, b),
      "pulse without a family", false)
 WRAP(bool, peak_driven,
      (const struct driven_axis *a, const struct driven *d, const struct driven_curve *c,
@@ -105,13 +108,13 @@ WRAP(bool, peak_driven,
      (a, d, c, o, p), "driven: S1's peak", false)
 WRAP(void, ringdown_refine, (const struct trace *t, const struct ringdown_span *s, struct ringdown *r),
      (t, s, r), "driven: decay's start", )
-WRAP(double, bridge_hole, (const struct trace *t, ptrdiff_t k), (t, k), "driven: holes as lines", 0)
-WRAP(bool, bump_find, (const struct trace *t, struct bump *b), (t, b), "burst under noise", false)
+WRAP(double, interpolate_hole, (const struct trace *t, ptrdiff_t k), (t, k), "driven: holes as lines", 0)
+WRAP(bool, burst_find, (const struct trace *t, struct burst *b), (t, b), "burst under noise", false)
 WRAP(void, ringdown_reach_back, (struct ringdown_job * j), (j), "decay: reach back", )
-WRAP(bool, scan_find, (struct scan * s, const struct trace *t, size_t first, size_t last),
+WRAP(bool, grid_search_find, (struct grid_search * s, const struct trace *t, size_t first, size_t last),
      (s, t, first, last), "decay: grid start", false)
-WRAP(unsigned, outlier_drop, (struct series * s, const struct modes *m, const bool *usable), (s, m, usable),
-     "decay: outliers", 0)
+WRAP(unsigned, outlier_drop, (struct block_means * s, const struct modes *m, const bool *usable),
+     (s, m, usable), "decay: outliers", 0)
 WRAP(void, ringdown_try_hum, (struct ringdown_job * j), (j), "decay: hum", )
 
 static bool law_is_off(const struct modes *modes)
@@ -121,9 +124,9 @@ static bool law_is_off(const struct modes *modes)
 	       (modes->count > 1 && is_off("decay: two modes"));
 }
 
-bool __real_modes_fit(struct modes *modes, const struct series *series);
-bool __wrap_modes_fit(struct modes *modes, const struct series *series);
-bool __wrap_modes_fit(struct modes *modes, const struct series *series)
+bool __real_modes_fit(struct modes *modes, const struct block_means *series);
+bool __wrap_modes_fit(struct modes *modes, const struct block_means *series);
+bool __wrap_modes_fit(struct modes *modes, const struct block_means *series)
 {
 	return !law_is_off(modes) && __real_modes_fit(modes, series);
 }

@@ -10,7 +10,7 @@
 
 #include <gsl/gsl_linalg.h>
 
-#include "host/estimate/bell.h"
+#include "host/estimate/cosine_pulse.h"
 #include "host/estimate/driven.h"
 #include "host/estimate/respond.h"
 #include "tests/unit/near.h"
@@ -700,7 +700,7 @@ static void own_peak(void **state)
 }
 
 /* The pulse's shape: three families to a part in three thousand, the skewed one refused. */
-static void bells(void **state)
+static void cosines(void **state)
 {
 	const struct estimate_options options = {0};
 
@@ -709,7 +709,7 @@ static void bells(void **state)
 		struct channel channel = synth_channel("a", 7000, 0, 560);
 		struct trace trace;
 		struct peak peak;
-		struct bell bell;
+		struct cosine_pulse cosine;
 		bool fits;
 
 		for (size_t k = 0; k < channel.count; k++)
@@ -718,13 +718,13 @@ static void bells(void **state)
 		assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
 		trace.noise_g = 0;
 		peak_find(&trace, &options, &peak);
-		fits = bell_fit(&trace, &peak, &bell);
+		fits = cosine_pulse_fit(&trace, &peak, &cosine);
 		assert_int_equal(fits, shape != SYNTH_HUNT_CROSSLEY);
 		for (double x = -0.2; fits && x < 1.2; x += 0.01)
-			assert_near(bell_at(&bell, ONSET_S + x * BASE_S),
+			assert_near(cosine_pulse_at(&cosine, ONSET_S + x * BASE_S),
 			            400 * synth_pulse((enum synth_shape)shape, x), 0.4);
 		if (fits)
-			assert_near(bell.centre_s, ONSET_S + BASE_S / 2, 0.02e-6);
+			assert_near(cosine.centre_s, ONSET_S + BASE_S / 2, 0.02e-6);
 		trace_close(&trace);
 		synth_free(&channel);
 	}
@@ -734,7 +734,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 	        cmocka_unit_test(response),        cmocka_unit_test(free_since),
-	        cmocka_unit_test(bells),           cmocka_unit_test(bounds),
+	        cmocka_unit_test(cosines),         cmocka_unit_test(bounds),
 	        cmocka_unit_test(at_the_bound),    cmocka_unit_test(other_pulses),
 	        cmocka_unit_test(joint_reference), cmocka_unit_test(flawed),
 	        cmocka_unit_test(wrong_model),     cmocka_unit_test(bends),

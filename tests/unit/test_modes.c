@@ -7,11 +7,11 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "host/estimate/bump.h"
+#include "host/estimate/burst.h"
 #include "host/estimate/crossings.h"
+#include "host/estimate/grid_search.h"
 #include "host/estimate/modes.h"
 #include "host/estimate/outlier.h"
-#include "host/estimate/scan.h"
 #include "host/estimate/spring.h"
 #include "tests/unit/near.h"
 #include "tests/unit/synth.h"
@@ -44,11 +44,11 @@ static struct trace open_sum(double second_g, double hum_g, double noise_g, unsi
 static void series(void **state)
 {
 	struct trace trace = open_sum(0, 0, 0, 1);
-	struct series s;
+	struct block_means s;
 
 	(void)state;
 	trace.sample[13] = SAMPLE_LOST;
-	series_take(&s, &trace, 10, 30, 0.25, 4);
+	block_means_take(&s, &trace, 10, 30, 0.25, 4);
 	assert_int_equal(s.count, 5);
 	assert_int_equal(s.used, 4);
 	assert_false(s.good[0]);
@@ -59,17 +59,17 @@ static void series(void **state)
 	            1e-9);
 	/* Longer than there are points: the block grows. */
 	s.count = 0;
-	series_take(&s, &trace, 0, 700, 0.25, 0);
+	block_means_take(&s, &trace, 0, 700, 0.25, 0);
 	assert_int_equal(s.block, 1);
 	assert_int_equal(s.count, 700);
-	series_take(&s, &trace, 20, 40, 0.25, 1);
-	assert_true(series_lengthen(&s, &trace, 12, 8));
+	block_means_take(&s, &trace, 20, 40, 0.25, 1);
+	assert_true(block_means_lengthen(&s, &trace, 12, 8));
 	assert_int_equal(s.count, 28);
 	assert_int_equal(s.used, 27);
 	assert_false(s.good[1]);
 	assert_near(s.first_s, 12.0 / 7000, 1e-12);
 	assert_near(s.value_g[8], trace.value_g[20], 0);
-	assert_false(series_lengthen(&s, &trace, 0, SERIES_MAX));
+	assert_false(block_means_lengthen(&s, &trace, 0, BLOCK_MEANS_MAX));
 	trace_close(&trace);
 }
 
@@ -77,13 +77,13 @@ static void series(void **state)
 static void thinned(void **state)
 {
 	struct trace trace = open_sum(0, 0, 0, 1);
-	struct series all, thin, blocks;
+	struct block_means all, thin, blocks;
 
 	(void)state;
 	trace.sample[27] = SAMPLE_LOST;
-	series_take(&all, &trace, 10, 93, 0.25, 2);
-	series_thin(&thin, &all, 3);
-	series_take(&blocks, &trace, 10, 93, 0.25, 6);
+	block_means_take(&all, &trace, 10, 93, 0.25, 2);
+	block_means_thin(&thin, &all, 3);
+	block_means_take(&blocks, &trace, 10, 93, 0.25, 6);
 	assert_int_equal(thin.block, 6);
 	assert_int_equal(thin.count, blocks.count);
 	assert_int_equal(thin.used, blocks.used);
@@ -101,10 +101,10 @@ static void exact(void **state)
 {
 	struct trace trace = open_sum(40, 5, 0, 2);
 	struct modes modes = {.count = 2, .hum_hz = 50, .p = {0, 70, 1.05 * w1, 0, 0, 110, 0.96 * w2}};
-	struct series s;
+	struct block_means s;
 
 	(void)state;
-	series_take(&s, &trace, 0, 420, 0.25, 3);
+	block_means_take(&s, &trace, 0, 420, 0.25, 3);
 	assert_int_equal(modes_size(&modes), 11);
 	assert_true(modes_linear(&modes, &s));
 	assert_true(modes_fit(&modes, &s));
@@ -128,12 +128,12 @@ static void holes(void **state)
 	struct modes modes = {.count = 2, .hum_hz = 50, .p = {0, 70, 1.05 * w1, 0, 0, 110, 0.96 * w2}};
 	double normal[CHOLESKY_MAX][CHOLESKY_MAX] = {{0}};
 	struct cholesky factor;
-	struct series s;
+	struct block_means s;
 
 	(void)state;
 	for (size_t i = 0; i < sizeof(lost) / sizeof(lost[0]); i++)
 		trace.sample[lost[i]] = SAMPLE_LOST;
-	series_take(&s, &trace, 0, 301, 0.25, 1);
+	block_means_take(&s, &trace, 0, 301, 0.25, 1);
 	assert_int_equal(s.used, 291);
 	assert_true(modes_linear(&modes, &s));
 	assert_true(modes_fit(&modes, &s));
@@ -172,10 +172,10 @@ static void impossible(void **state)
 {
 	struct trace trace = open_sum(0, 0, 0, 3);
 	struct modes modes = {.count = 1, .p = {0, 80, -1}};
-	struct series s;
+	struct block_means s;
 
 	(void)state;
-	series_take(&s, &trace, 0, 300, 0.25, 1);
+	block_means_take(&s, &trace, 0, 300, 0.25, 1);
 	assert_false(modes_fit(&modes, &s));
 	modes.p[MODES_OMEGA] = w1;
 	memset(s.good, 0, sizeof(s.good));
@@ -188,14 +188,14 @@ static void impossible(void **state)
 /* Whatever the phase and where the decay is hidden from crossings: within what a fit finds its way from. */
 static void scanned(void **state)
 {
-	struct scan scan;
+	struct grid_search scan;
 
 	(void)state;
 	for (unsigned seed = 10; seed < 40; seed++) {
 		struct trace trace = open_sum(0, 0, 100, seed);
 
-		assert_true(scan_worth(&trace, 0, 700, 100));
-		assert_true(scan_find(&scan, &trace, 0, 700));
+		assert_true(grid_search_worth(&trace, 0, 700, 100));
+		assert_true(grid_search_find(&scan, &trace, 0, 700));
 		assert_near_part(scan.omega, w1, 0.1);
 		trace_close(&trace);
 	}
@@ -207,7 +207,7 @@ static void scanned(void **state)
 		for (size_t k = 0; k < channel.count; k++)
 			channel.value_g[k] = synth_normal(&random);
 		assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
-		assert_false(scan_worth(&trace, 0, 700, 1));
+		assert_false(grid_search_worth(&trace, 0, 700, 1));
 		trace_close(&trace);
 		synth_free(&channel);
 	}
@@ -219,12 +219,12 @@ static void outliers(void **state)
 	static const unsigned at[] = {0, 60, 61, 200, 299};
 	struct trace trace = open_sum(40, 0, 1, 6);
 	struct modes modes = {.count = 1, .p = {0, a1, w1}};
-	double residual[SERIES_MAX];
-	bool usable[SERIES_MAX];
-	struct series s;
+	double residual[BLOCK_MEANS_MAX];
+	bool usable[BLOCK_MEANS_MAX];
+	struct block_means s;
 
 	(void)state;
-	series_take(&s, &trace, 0, 300, 0.25, 1);
+	block_means_take(&s, &trace, 0, 300, 0.25, 1);
 	memcpy(usable, s.good, sizeof(usable));
 	assert_true(modes_linear(&modes, &s));
 	modes_residual(&modes, &s, residual);
@@ -266,9 +266,9 @@ static void crossings(void **state)
 }
 
 /* A half-sine of 3 ms and 485 g under 100 g of noise, of which no sample stands out. */
-static void bump(void **state)
+static void burst(void **state)
 {
-	struct bump found;
+	struct burst found;
 
 	(void)state;
 	for (unsigned seed = 60; seed < 90; seed++) {
@@ -282,15 +282,15 @@ static void bump(void **state)
 			        485 * synth_pulse(SYNTH_HALF_SINE, ((double)k / 7000 - 0.2) / 0.003);
 		assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
 		trace.noise_g = 100;
-		assert_true(bump_find(&trace, &found));
+		assert_true(burst_find(&trace, &found));
 		assert_near((found.start_s + found.end_s) / 2, 0.2015, 0.0008);
 		assert_true(found.end_s > 0.2018 && found.end_s < 0.2045);
 		trace.noise_g = 400;
-		assert_false(bump_find(&trace, &found));
+		assert_false(burst_find(&trace, &found));
 		trace.noise_g = NAN;
-		assert_false(bump_find(&trace, &found));
+		assert_false(burst_find(&trace, &found));
 		trace.noise_g = 0;
-		assert_false(bump_find(&trace, &found));
+		assert_false(burst_find(&trace, &found));
 		trace_close(&trace);
 		synth_free(&channel);
 	}
@@ -307,12 +307,12 @@ static void spring_slopes(void **state)
 		const double p[SPRING_SIZE] = {
 		        -2, 80, w1, 200, -150, (1.0 + round) / (250.0 * 250.0), d[round % 2]};
 		struct trace trace = open_sum(0, 0, 3, 1);
-		struct series s;
+		struct block_means s;
 		double normal[CHOLESKY_MAX][CHOLESKY_MAX] = {{0}}, right[CHOLESKY_MAX] = {0}, squares,
 		       model = 0;
 
 		trace.sample[100] = SAMPLE_LOST;
-		series_take(&s, &trace, 3, 300, 0.25, 1 + round % 4);
+		block_means_take(&s, &trace, 3, 300, 0.25, 1 + round % 4);
 		assert_int_equal(spring_normal(&s, p, normal, right, &squares), s.used);
 		for (unsigned k = 0; k < s.count; k++) {
 			double mean = 0;
@@ -348,7 +348,7 @@ int main(void)
 	        cmocka_unit_test(spring_slopes), cmocka_unit_test(series),   cmocka_unit_test(thinned),
 	        cmocka_unit_test(exact),         cmocka_unit_test(holes),    cmocka_unit_test(impossible),
 	        cmocka_unit_test(scanned),       cmocka_unit_test(outliers), cmocka_unit_test(crossings),
-	        cmocka_unit_test(bump),
+	        cmocka_unit_test(burst),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/estimate/bridge.h"
+#include "host/estimate/interpolate.h"
 
 static bool is_good(const struct trace *trace, size_t k)
 {
@@ -26,27 +26,27 @@ static double cubic(const struct trace *trace, size_t from, size_t until, size_t
 	return sum;
 }
 
-double bridge_over(const struct trace *trace, size_t from, size_t until, size_t k)
+double interpolate_over(const struct trace *trace, size_t from, size_t until, size_t k)
 {
 	const double before = trace->value_g[from - 1], after = trace->value_g[until];
 
-	if (until - from <= BRIDGE_CUBIC && from >= 2 && is_good(trace, from - 2) &&
+	if (until - from <= INTERPOLATE_CUBIC && from >= 2 && is_good(trace, from - 2) &&
 	    is_good(trace, until + 1))
 		return cubic(trace, from, until, k);
 	return before + (after - before) * (double)(k - from + 1) / (double)(until - from + 1);
 }
 
-double bridge_hole(const struct trace *trace, ptrdiff_t k)
+double interpolate_hole(const struct trace *trace, ptrdiff_t k)
 {
 	ptrdiff_t before = k, after = k, count = (ptrdiff_t)trace->count;
 
 	if (k < 0 || k >= count)
 		return 0;
-	while (before >= 0 && k - before <= BRIDGE_MAX && !trace_good(trace, (size_t)before))
+	while (before >= 0 && k - before <= INTERPOLATE_MAX && !trace_good(trace, (size_t)before))
 		before--;
-	while (after < count && after - k <= BRIDGE_MAX && !trace_good(trace, (size_t)after))
+	while (after < count && after - k <= INTERPOLATE_MAX && !trace_good(trace, (size_t)after))
 		after++;
-	if (before < 0 || after >= count || after - before > BRIDGE_MAX)
+	if (before < 0 || after >= count || after - before > INTERPOLATE_MAX)
 		return 0;
-	return bridge_over(trace, (size_t)before + 1, (size_t)after, (size_t)k);
+	return interpolate_over(trace, (size_t)before + 1, (size_t)after, (size_t)k);
 }

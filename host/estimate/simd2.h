@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_ESTIMATE_PAIR_H
-#define DT_HOST_ESTIMATE_PAIR_H
+#ifndef DT_HOST_ESTIMATE_SIMD2_H
+#define DT_HOST_ESTIMATE_SIMD2_H
 /*
  * Two numbers side by side, in what the processor has for it: element by element like one number, [0] and [1]
  * alone. What gcc and clang offer beyond C11; as exact as two numbers.

@@ -17,11 +17,11 @@ enum { OUTLIER_ROUNDS = 3, THIN_MIN = 48 };
 /* All samples of the series into it, and a fit through all but so many outliers. */
 static bool fit_inliers(struct ringdown_job *job, struct modes *modes, unsigned *out)
 {
-	struct series *series = &job->series;
-	bool usable[SERIES_MAX];
+	struct block_means *series = &job->series;
+	bool usable[BLOCK_MEANS_MAX];
 
-	series_take(series, job->trace, job->first, job->first + (size_t)series->count * series->block,
-	            job->span->from_s, 1);
+	block_means_take(series, job->trace, job->first, job->first + (size_t)series->count * series->block,
+	                 job->span->from_s, 1);
 	memcpy(usable, series->good, series->count);
 	*out = 0;
 	if (!modes_fit(modes, series))
@@ -41,7 +41,7 @@ static bool fit_inliers(struct ringdown_job *job, struct modes *modes, unsigned 
 bool ringdown_full(struct ringdown_job *job)
 {
 	struct modes modes = job->single;
-	struct series blocks = job->series;
+	struct block_means blocks = job->series;
 	unsigned out;
 
 	if (!fit_inliers(job, &modes, &out)) {
@@ -230,7 +230,7 @@ static void look_on_blocks(struct ringdown_job *job, void (*look)(struct ringdow
 	const unsigned points =
 	        ringdown_block(job, job->single.p[MODES_OMEGA] * RINGDOWN_FINER) / job->series.block;
 	const struct modes single = job->single;
-	struct series all;
+	struct block_means all;
 	struct modes found;
 
 	if (points < 2) {
@@ -238,7 +238,7 @@ static void look_on_blocks(struct ringdown_job *job, void (*look)(struct ringdow
 		return;
 	}
 	all = job->series;
-	series_thin(&job->series, &all, points);
+	block_means_thin(&job->series, &all, points);
 	if (job->series.used < THIN_MIN || !modes_fit(&job->single, &job->series)) {
 		job->series = all;
 		job->single = single;

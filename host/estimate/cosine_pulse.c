@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/estimate/bell.h"
+#include "host/estimate/cosine_pulse.h"
 
 #include <math.h>
 
@@ -30,7 +30,8 @@ struct scene {
 
 /* The pulse of height 1 at the angle whose cosine is c, and its derivative by the angle; row gets those by
  * height, power and bulge. */
-static inline double bell_shape(const double p[PARAMETERS], double c, double sine, double row[PARAMETERS])
+static inline double cosine_pulse_shape(const double p[PARAMETERS], double c, double sine,
+                                        double row[PARAMETERS])
 {
 	double logarithm = log(c), flank = exp(p[POWER] * logarithm), rise = 1 - c * c;
 	double value = flank * (1 + p[BULGE] * rise);
@@ -55,7 +56,7 @@ static struct walk start_walk(const struct scene *scene, const double p[PARAMETE
 	return (struct walk){angle, step, phasor_at(angle, step)};
 }
 
-static inline void bell_turn(struct walk *walk)
+static inline void cosine_pulse_turn(struct walk *walk)
 {
 	phasor_turn(&walk->at);
 	walk->angle += walk->step;
@@ -66,8 +67,8 @@ static inline bool is_inside(const struct walk *walk)
 	return fabs(walk->angle) < UNITS_PI / 2 && walk->at.cosine > 0;
 }
 
-static size_t bell_normal(const void *model, double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
-                          double right[CHOLESKY_MAX], double *squares)
+static size_t cosine_pulse_normal(const void *model, double *p, double matrix[CHOLESKY_MAX][CHOLESKY_MAX],
+                                  double right[CHOLESKY_MAX], double *squares)
 {
 	const struct scene *scene = model;
 	double prior = scene->noise_g / LIMIT_KNOWN;
@@ -79,7 +80,7 @@ static size_t bell_normal(const void *model, double *p, double matrix[CHOLESKY_M
 		return 0;
 	walk = start_walk(scene, p);
 	gram_start(&gram, PARAMETERS);
-	for (size_t k = scene->first; k < scene->last; k++, bell_turn(&walk)) {
+	for (size_t k = scene->first; k < scene->last; k++, cosine_pulse_turn(&walk)) {
 		double row[COLUMNS], residual = scene->trace->value_g[k];
 
 		if (!trace_usable(scene->trace, k))
@@ -89,7 +90,7 @@ static size_t bell_normal(const void *model, double *p, double matrix[CHOLESKY_M
 			*squares += residual * residual;
 			continue;
 		}
-		row[CENTRE] = bell_shape(p, walk.at.cosine, walk.at.sine, row);
+		row[CENTRE] = cosine_pulse_shape(p, walk.at.cosine, walk.at.sine, row);
 		row[BASE] = -row[CENTRE] * walk.angle / p[BASE];
 		row[CENTRE] *= -UNITS_PI / p[BASE];
 		row[RESIDUAL] = residual - p[HEIGHT] * row[HEIGHT];
@@ -104,7 +105,7 @@ static size_t bell_normal(const void *model, double *p, double matrix[CHOLESKY_M
 
 /* From the widths at half and at a tenth of the height: of a half-sine 2/3 and 0.9362 of the base, of a
  * haversine 1/2 and 0.7952. */
-static bool bell_start(const struct trace *trace, const struct peak *peak, double p[PARAMETERS])
+static bool cosine_pulse_start(const struct trace *trace, const struct peak *peak, double p[PARAMETERS])
 {
 	double height = fabs(peak->result.value_g), from[2], until[2], ratio;
 	static const double level[] = {0.5, 0.1};
@@ -129,12 +130,12 @@ static double lopsided(const struct scene *scene, const double p[PARAMETERS])
 	double odd_odd = 0, odd_centre = 0, centre_centre = 0, odd_residual = 0;
 	struct walk walk = start_walk(scene, p);
 
-	for (size_t k = scene->first; k < scene->last; k++, bell_turn(&walk)) {
+	for (size_t k = scene->first; k < scene->last; k++, cosine_pulse_turn(&walk)) {
 		double row[PARAMETERS], value, odd, centre;
 
 		if (!trace_usable(scene->trace, k) || !is_inside(&walk))
 			continue;
-		centre = bell_shape(p, walk.at.cosine, walk.at.sine, row);
+		centre = cosine_pulse_shape(p, walk.at.cosine, walk.at.sine, row);
 		value = p[HEIGHT] * row[HEIGHT];
 		odd = value * walk.at.sine;
 		odd_odd += odd * odd;
@@ -145,59 +146,59 @@ static double lopsided(const struct scene *scene, const double p[PARAMETERS])
 	return odd_residual / (scene->noise_g * sqrt(odd_odd - odd_centre * odd_centre / centre_centre));
 }
 
-bool bell_fit(const struct trace *trace, const struct peak *peak, struct bell *bell)
+bool cosine_pulse_fit(const struct trace *trace, const struct peak *peak, struct cosine_pulse *cosine)
 {
 	static const double centre_row[PARAMETERS] = {[CENTRE] = 1};
 	double noise = fmax(trace->noise_g, LIMIT_MISFIT * fabs(peak->result.value_g));
 	struct scene scene = {.trace = trace, .noise_g = noise};
 	struct lm_problem problem = {
-	        .size = PARAMETERS, .model = &scene, .normal = bell_normal, .kink = KINK};
+	        .size = PARAMETERS, .model = &scene, .normal = cosine_pulse_normal, .kink = KINK};
 	struct lm_result result;
 	double p[PARAMETERS], freedom;
 
-	if (peak->lopsided || !bell_start(trace, peak, p))
+	if (peak->lopsided || !cosine_pulse_start(trace, peak, p))
 		return false;
 	scene.first = trace_index(trace, p[CENTRE] - REACH_BASES * p[BASE]);
 	scene.last = trace_index(trace, p[CENTRE] + REACH_BASES * p[BASE]);
 	if (!lm_fit(&problem, p, &result))
 		return false;
 	freedom = (double)(result.used - PARAMETERS + 1);
-	bell->chi_square = result.squares / freedom / (noise * noise);
-	bell->height_g = p[HEIGHT];
-	bell->centre_s = p[CENTRE];
-	bell->base_s = p[BASE];
-	bell->power = p[POWER];
-	bell->bulge = p[BULGE];
-	bell->sigma_centre_s = noise * sqrt(cholesky_variance(&result.factor, centre_row));
-	return bell->chi_square <= 1 + REFUSE * sqrt(2 / freedom) &&
+	cosine->chi_square = result.squares / freedom / (noise * noise);
+	cosine->height_g = p[HEIGHT];
+	cosine->centre_s = p[CENTRE];
+	cosine->base_s = p[BASE];
+	cosine->power = p[POWER];
+	cosine->bulge = p[BULGE];
+	cosine->sigma_centre_s = noise * sqrt(cholesky_variance(&result.factor, centre_row));
+	return cosine->chi_square <= 1 + REFUSE * sqrt(2 / freedom) &&
 	       fabs(lopsided(&scene, p)) <= LIMIT_SIGNIFICANT;
 }
 
-double bell_of(const struct bell *bell, double c)
+double cosine_pulse_of(const struct cosine_pulse *cosine, double c)
 {
 	double flank = c;
 
 	/* The named families' without the cost of a power. */
-	if (bell->power == 2)
+	if (cosine->power == 2)
 		flank = c * c;
-	else if (bell->power != 1)
-		flank = pow(c, bell->power);
-	return bell->height_g * flank * (1 + bell->bulge * (1 - c * c));
+	else if (cosine->power != 1)
+		flank = pow(c, cosine->power);
+	return cosine->height_g * flank * (1 + cosine->bulge * (1 - c * c));
 }
 
-double bell_at(const struct bell *bell, double time_s)
+double cosine_pulse_at(const struct cosine_pulse *cosine, double time_s)
 {
-	double angle = UNITS_PI * (time_s - bell->centre_s) / bell->base_s, c = cos(angle);
+	double angle = UNITS_PI * (time_s - cosine->centre_s) / cosine->base_s, c = cos(angle);
 
 	if (!(fabs(angle) < UNITS_PI / 2) || !(c > 0))
 		return 0;
-	return bell_of(bell, c);
+	return cosine_pulse_of(cosine, c);
 }
 
-double bell_area(const struct bell *bell)
+double cosine_pulse_area(const struct cosine_pulse *cosine)
 {
-	double flank = shape_mean_cosine(bell->power);
+	double flank = shape_mean_cosine(cosine->power);
 
-	return bell->height_g * bell->base_s *
-	       (flank + bell->bulge * (flank - shape_mean_cosine(bell->power + 2)));
+	return cosine->height_g * cosine->base_s *
+	       (flank + cosine->bulge * (flank - shape_mean_cosine(cosine->power + 2)));
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_ESTIMATE_PRODUCT_H
-#define DT_HOST_ESTIMATE_PRODUCT_H
+#ifndef DT_HOST_ESTIMATE_COMPLEX_PRODUCT_H
+#define DT_HOST_ESTIMATE_COMPLEX_PRODUCT_H
 /*
  * Products of finite complex numbers, for loops: the language's own looks after infinities as well, which
  * takes longer than the product. Not every library has CMPLX for every compiler.

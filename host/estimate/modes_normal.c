@@ -4,8 +4,8 @@
 #include <string.h>
 
 #include "common/units.h"
-#include "host/estimate/pair.h"
 #include "host/estimate/phasor.h"
+#include "host/estimate/simd2.h"
 
 enum { DECAYS_MAX = 3 }; /* two modes and the hum */
 
@@ -33,7 +33,7 @@ struct view {
 static struct view modes_sums_look(const struct modes_problem *problem, const double *p)
 {
 	const struct modes *modes = problem->modes;
-	const struct series *series = problem->series;
+	const struct block_means *series = problem->series;
 	struct view view = {.count = series->count,
 	                    .decays = decays_of(modes),
 	                    .step_s = series->step_s,

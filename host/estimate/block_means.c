@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/estimate/series.h"
+#include "host/estimate/block_means.h"
 
 #include <string.h>
 
-static inline void take_point(struct series *series, const struct trace *trace, size_t first)
+static inline void take_point(struct block_means *series, const struct trace *trace, size_t first)
 {
 	const double *value = trace->value_g + first;
 	const uint8_t *sample = trace->sample + first;
@@ -21,11 +21,11 @@ static inline void take_point(struct series *series, const struct trace *trace, 
 	series->used += good;
 }
 
-void series_take(struct series *series, const struct trace *trace, size_t first, size_t last, double from_s,
-                 unsigned block)
+void block_means_take(struct block_means *series, const struct trace *trace, size_t first, size_t last,
+                      double from_s, unsigned block)
 {
 	size_t samples = last > first ? last - first : 0;
-	unsigned least = (unsigned)((samples + SERIES_MAX - 1) / SERIES_MAX);
+	unsigned least = (unsigned)((samples + BLOCK_MEANS_MAX - 1) / BLOCK_MEANS_MAX);
 
 	series->block = block > least ? block : least;
 	if (series->block == 0)
@@ -38,7 +38,7 @@ void series_take(struct series *series, const struct trace *trace, size_t first,
 		take_point(series, trace, k);
 }
 
-void series_thin(struct series *thin, const struct series *series, unsigned points)
+void block_means_thin(struct block_means *thin, const struct block_means *series, unsigned points)
 {
 	thin->first_s = series->first_s + (points - 1) * series->step_s / 2;
 	thin->step_s = series->step_s * points;
@@ -59,9 +59,9 @@ void series_thin(struct series *thin, const struct series *series, unsigned poin
 	}
 }
 
-bool series_lengthen(struct series *series, const struct trace *trace, size_t first, unsigned more)
+bool block_means_lengthen(struct block_means *series, const struct trace *trace, size_t first, unsigned more)
 {
-	if (more > SERIES_MAX - series->count)
+	if (more > BLOCK_MEANS_MAX - series->count)
 		return false;
 	memmove(series->value_g + more, series->value_g, series->count * sizeof(*series->value_g));
 	memmove(series->good + more, series->good, series->count * sizeof(*series->good));
@@ -75,7 +75,7 @@ bool series_lengthen(struct series *series, const struct trace *trace, size_t fi
 	return true;
 }
 
-double series_squares(const struct series *series)
+double block_means_squares(const struct block_means *series)
 {
 	double sum = 0, squares = 0, mean;
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/estimate/guide.h"
+#include "host/estimate/control_variate.h"
 
 #include <math.h>
 
@@ -10,32 +10,33 @@
 /* The bulge moves an edge by little: each round leaves a hundredth of that. */
 enum { EDGE_ROUNDS = 4 };
 
-bool guide_from_shape(const struct shape *shape, struct guide *guide)
+bool control_variate_from_shape(const struct shape *shape, struct control_variate *variate)
 {
 	if (isnan(shape->chi_square))
 		return false;
-	guide->curve = (struct bell){.height_g = shape->peak_g,
-	                             .centre_s = shape->peak_s,
-	                             .base_s = shape->base_s,
-	                             .power = shape->power};
-	guide->area_g_s = shape->area_g_s;
-	guide->sigma_peak_g = shape->sigma_peak_g;
-	guide->sigma_base_s = shape->power <= 1 ? shape->sigma_base_s : 0;
+	variate->curve = (struct cosine_pulse){.height_g = shape->peak_g,
+	                                       .centre_s = shape->peak_s,
+	                                       .base_s = shape->base_s,
+	                                       .power = shape->power};
+	variate->area_g_s = shape->area_g_s;
+	variate->sigma_peak_g = shape->sigma_peak_g;
+	variate->sigma_base_s = shape->power <= 1 ? shape->sigma_base_s : 0;
 	return true;
 }
 
-bool guide_from_bell(const struct trace *trace, const struct peak *peak, struct guide *guide)
+bool control_variate_from_cosine_pulse(const struct trace *trace, const struct peak *peak,
+                                       struct control_variate *variate)
 {
-	if (!(trace->noise_g > 0) || !bell_fit(trace, peak, &guide->curve))
+	if (!(trace->noise_g > 0) || !cosine_pulse_fit(trace, peak, &variate->curve))
 		return false;
-	guide->area_g_s = bell_area(&guide->curve);
-	guide->sigma_peak_g = peak->result.sigma_g;
-	guide->sigma_base_s = 0;
+	variate->area_g_s = cosine_pulse_area(&variate->curve);
+	variate->sigma_peak_g = peak->result.sigma_g;
+	variate->sigma_base_s = 0;
 	return true;
 }
 
 /* Sum of the good samples in between in g s; *n of them. */
-static double guide_beyond_sum(const struct trace *trace, double from_s, double until_s, double *n)
+static double control_variate_beyond_sum(const struct trace *trace, double from_s, double until_s, double *n)
 {
 	double sum = 0;
 
@@ -49,15 +50,15 @@ static double guide_beyond_sum(const struct trace *trace, double from_s, double 
 	return sum / trace->rate_hz;
 }
 
-bool guide_ends(const struct guide *guide, const struct trace *trace)
+bool control_variate_ends(const struct control_variate *variate, const struct trace *trace)
 {
-	double half = guide->curve.base_s / 2, centre = guide->curve.centre_s, n;
+	double half = variate->curve.base_s / 2, centre = variate->curve.centre_s, n;
 
 	for (int side = -1; side <= 1; side += 2) {
-		double sum = guide_beyond_sum(trace, centre + (side < 0 ? -2 : 1) * half,
-		                              centre + (side < 0 ? -1 : 2) * half, &n);
+		double sum = control_variate_beyond_sum(trace, centre + (side < 0 ? -2 : 1) * half,
+		                                        centre + (side < 0 ? -1 : 2) * half, &n);
 
-		if (fabs(sum) > LIMIT_PART * fabs(guide->area_g_s) &&
+		if (fabs(sum) > LIMIT_PART * fabs(variate->area_g_s) &&
 		    fabs(sum) > LIMIT_AGREE * trace->noise_g * sqrt(n) / trace->rate_hz)
 			return false;
 	}
@@ -65,7 +66,7 @@ bool guide_ends(const struct guide *guide, const struct trace *trace)
 }
 
 /* Cosine of the angle at which the curve is level parts of its height; negative where there is none. */
-static double edge_cosine(const struct bell *curve, double level)
+static double edge_cosine(const struct cosine_pulse *curve, double level)
 {
 	const int rounds = fabs(curve->bulge) > 0 ? EDGE_ROUNDS : 1;
 	double c = 0;
@@ -76,17 +77,18 @@ static double edge_cosine(const struct bell *curve, double level)
 }
 
 /* What a sample says beyond the curve, in the pulse's direction. */
-static double guide_beyond(const struct guide *guide, const struct trace *trace, size_t k)
+static double control_variate_beyond(const struct control_variate *variate, const struct trace *trace,
+                                     size_t k)
 {
-	double over = trace->value_g[k] - bell_at(&guide->curve, trace_time(trace, k));
+	double over = trace->value_g[k] - cosine_pulse_at(&variate->curve, trace_time(trace, k));
 
-	return guide->curve.height_g < 0 ? -over : over;
+	return variate->curve.height_g < 0 ? -over : over;
 }
 
-bool guide_edge(const struct guide *guide, const struct trace *trace, int step, double level_g,
-                struct guide_edge *edge)
+bool control_variate_edge(const struct control_variate *variate, const struct trace *trace, int step,
+                          double level_g, struct control_variate_edge *edge)
 {
-	const struct bell *curve = &guide->curve;
+	const struct cosine_pulse *curve = &variate->curve;
 	double height = fabs(curve->height_g), c = edge_cosine(curve, level_g / height), half, place, outside;
 	size_t after;
 
@@ -110,25 +112,26 @@ bool guide_edge(const struct guide *guide, const struct trace *trace, int step, 
 		edge->taken = 1 - outside;
 	}
 	edge->time_s += step *
-	                ((1 - place) * guide_beyond(guide, trace, after - 1) +
-	                 place * guide_beyond(guide, trace, after)) /
+	                ((1 - place) * control_variate_beyond(variate, trace, after - 1) +
+	                 place * control_variate_beyond(variate, trace, after)) /
 	                edge->slope_g_s;
 	return true;
 }
 
-double guide_spread(const struct guide *guide, const struct guide_edge edge[2])
+double control_variate_spread(const struct control_variate *variate,
+                              const struct control_variate_edge edge[2])
 {
 	double stays = (edge[0].stays + edge[1].stays) / 2, taken = (edge[0].taken + edge[1].taken) / 2;
 	/* The base hangs on the very samples that correct it. */
-	double foot = guide->sigma_base_s * sqrt(stays * (stays + 2 * taken));
+	double foot = variate->sigma_base_s * sqrt(stays * (stays + 2 * taken));
 
 	return hypot(foot, hypot(edge[0].sigma_s, edge[1].sigma_s));
 }
 
-double guide_area(const struct guide *guide, const struct trace *trace, const struct peak *peak,
-                  double *sigma_g_s)
+double control_variate_area(const struct control_variate *variate, const struct trace *trace,
+                            const struct peak *peak, double *sigma_g_s)
 {
-	const struct bell *curve = &guide->curve;
+	const struct cosine_pulse *curve = &variate->curve;
 	double turn = UNITS_PI / curve->base_s, step = 1 / trace->rate_hz, sum = 0;
 	size_t k = trace_index(trace, curve->centre_s - curve->base_s / 2), used = 0, follow = 0;
 	double angle = turn * (trace_time(trace, k) - curve->centre_s);
@@ -143,10 +146,10 @@ double guide_area(const struct guide *guide, const struct trace *trace, const st
 			continue;
 		}
 		used++;
-		sum += trace->value_g[k] - bell_of(curve, cosine);
+		sum += trace->value_g[k] - cosine_pulse_of(curve, cosine);
 	}
 	/* What stands in for a missing sample is a mean of the others: it errs as they do. */
 	*sigma_g_s = step * hypot(trace->noise_g * sqrt((double)(used + 2 * follow)),
-	                          guide->sigma_peak_g * (double)follow);
-	return guide->area_g_s + step * sum;
+	                          variate->sigma_peak_g * (double)follow);
+	return variate->area_g_s + step * sum;
 }

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/estimate/scan.h"
+#include "host/estimate/grid_search.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "common/units.h"
+#include "host/estimate/block_means.h"
 #include "host/estimate/cholesky.h"
 #include "host/estimate/limits.h"
-#include "host/estimate/pair.h"
-#include "host/estimate/series.h"
+#include "host/estimate/simd2.h"
 
 /* Each frequency is given up when fewer of its cycles fit. */
 #define CYCLES_LEAST 1.5
@@ -19,7 +19,7 @@
 enum { PER_OCTAVE = 8, LINEAR = 3, OCTAVES = 16, WORTH_SAMPLES = 32, LANES = 8 /* marks in a word */ };
 
 /* What c cos + s sin + b of that decay explains of the first points of the series beyond their mean. */
-static double explained(const struct series *series, unsigned points, double omega, double decay)
+static double explained(const struct block_means *series, unsigned points, double omega, double decay)
 {
 	double size = exp(-decay * series->step_s), turn_re = size * cos(omega * series->step_s);
 	double turn_im = size * sin(omega * series->step_s), re = 1, im = 0;
@@ -50,13 +50,13 @@ static double explained(const struct series *series, unsigned points, double ome
 }
 
 /* From top_hz down to half of it. */
-static void scan_octave(struct scan *best, const struct series *series, double top_hz)
+static void grid_search_octave(struct grid_search *best, const struct block_means *series, double top_hz)
 {
 	static const double damping[] = {0.02, 0.08, 0.3};
 
 	for (int i = 0; i < PER_OCTAVE; i++) {
 		double hz = top_hz * exp2(-(double)i / PER_OCTAVE), omega = 2 * UNITS_PI * hz;
-		double points = SCAN_CYCLES / (hz * series->step_s);
+		double points = GRID_CYCLES / (hz * series->step_s);
 		unsigned n = points < series->count ? (unsigned)points : series->count;
 
 		if (n * series->step_s * hz < CYCLES_LEAST)
@@ -65,26 +65,26 @@ static void scan_octave(struct scan *best, const struct series *series, double t
 			double squares = series->block * explained(series, n, omega, damping[d] * omega);
 
 			if (squares > best->squares)
-				*best = (struct scan){omega, damping[d] * omega, squares};
+				*best = (struct grid_search){omega, damping[d] * omega, squares};
 		}
 	}
 }
 
-bool scan_find(struct scan *scan, const struct trace *trace, size_t first, size_t last)
+bool grid_search_find(struct grid_search *scan, const struct trace *trace, size_t first, size_t last)
 {
-	struct scan best = {0, 0, 0};
-	struct series series;
+	struct grid_search best = {0, 0, 0};
+	struct block_means series;
 
 	for (unsigned octave = 0; octave < OCTAVES; octave++) {
 		unsigned block = 1u << octave;
 		double top_hz = trace->rate_hz / (POINTS * block);
-		double samples = 2 * SCAN_CYCLES * POINTS * block;
+		double samples = 2 * GRID_CYCLES * POINTS * block;
 		size_t until = samples < (double)(last - first) ? first + (size_t)samples : last;
 
 		if ((double)(last - first) < CYCLES_LEAST * POINTS * block)
 			break;
-		series_take(&series, trace, first, until, trace_time(trace, first), block);
-		scan_octave(&best, &series, top_hz);
+		block_means_take(&series, trace, first, until, trace_time(trace, first), block);
+		grid_search_octave(&best, &series, top_hz);
 	}
 	if (!(best.squares > 0))
 		return false;
@@ -93,7 +93,8 @@ bool scan_find(struct scan *scan, const struct trace *trace, size_t first, size_
 }
 
 /* Sum and sum of squares of the usable samples [k, end). Returns how many there are. */
-static size_t scan_add_up(const struct trace *trace, size_t k, size_t end, double *sum, double *squares)
+static size_t grid_search_add_up(const struct trace *trace, size_t k, size_t end, double *sum,
+                                 double *squares)
 {
 	PAIR sums[2] = {{0}, {0}}, squared[2] = {{0}, {0}};
 	size_t n = 0;
@@ -131,7 +132,7 @@ static size_t scan_add_up(const struct trace *trace, size_t k, size_t end, doubl
 	return n;
 }
 
-bool scan_worth(const struct trace *trace, size_t first, size_t last, double noise_g)
+bool grid_search_worth(const struct trace *trace, size_t first, size_t last, double noise_g)
 {
 	size_t n = 0, end = first;
 	double sum = 0, squares = 0;
@@ -140,7 +141,7 @@ bool scan_worth(const struct trace *trace, size_t first, size_t last, double noi
 		size_t k = end;
 
 		end = last - first > length ? first + length : last;
-		n += scan_add_up(trace, k, end, &sum, &squares);
+		n += grid_search_add_up(trace, k, end, &sum, &squares);
 		if (n > 0 && squares - sum * sum / (double)n >
 		                     noise_g * noise_g * ((double)n + LIMIT_CHI * sqrt(2 * (double)n)))
 			return true;

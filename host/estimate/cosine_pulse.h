@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HOST_ESTIMATE_BELL_H
-#define DT_HOST_ESTIMATE_BELL_H
+#ifndef DT_HOST_ESTIMATE_COSINE_PULSE_H
+#define DT_HOST_ESTIMATE_COSINE_PULSE_H
 /*
  * A symmetric contact pulse without a named family, as smooth input for the oscillator:
  *
@@ -14,7 +14,7 @@
  */
 #include "host/estimate/peak.h"
 
-struct bell {
+struct cosine_pulse {
 	double height_g; /* signed */
 	double centre_s, base_s, power, bulge;
 	double sigma_centre_s;
@@ -22,14 +22,14 @@ struct bell {
 };
 
 /* Lost, bad and clipped samples are left out. False when too few are left, the fit fails or its residual
- * refuses it; bell is then undefined. */
-bool bell_fit(const struct trace *trace, const struct peak *peak, struct bell *bell);
+ * refuses it; cosine is then undefined. */
+bool cosine_pulse_fit(const struct trace *trace, const struct peak *peak, struct cosine_pulse *cosine);
 
 /* Where the curve's cosine is c, from 0 to 1. */
-double bell_of(const struct bell *bell, double c);
+double cosine_pulse_of(const struct cosine_pulse *cosine, double c);
 
 /* At an instant; 0 beyond its feet. */
-double bell_at(const struct bell *bell, double time_s);
-double bell_area(const struct bell *bell); /* in g s */
+double cosine_pulse_at(const struct cosine_pulse *cosine, double time_s);
+double cosine_pulse_area(const struct cosine_pulse *cosine); /* in g s */
 
 #endif
