@@ -9,9 +9,9 @@
 #include <unistd.h>
 
 #include "common/base/text.h"
+#include "host/base/atomic_file.h"
 #include "host/base/durable.h"
 #include "host/base/put.h"
-#include "host/base/whole.h"
 #include "host/batch/columns.h"
 
 enum sheet_name { DROPS, CHANNELS, MESSAGES, SHEETS };
@@ -27,7 +27,7 @@ enum { AT_EXIT = AT_SHA256, AT_MESSAGE };
 struct sheet {
 	struct batch_columns columns;
 	struct table csv;
-	struct whole whole;
+	struct atomic_file atomic;
 	bool open; /* whole */
 	sqlite3_stmt *insert;
 };
@@ -37,7 +37,7 @@ struct collecting {
 	unsigned forms;
 	struct collected *collected;
 	char *message;
-	struct whole jsonl;
+	struct atomic_file jsonl;
 	bool jsonl_open;
 	sqlite3 *database;
 	char database_path[PATH_MAX];
@@ -86,11 +86,11 @@ static int open_csv(struct collecting *c, int i)
 
 	snprintf(name, sizeof(name), "%s.csv", names[i]);
 	store_path(c->store, name, c->path[i]);
-	result = whole_open(&sheet->whole, c->path[i], c->message, STORE_MESSAGE_MAX);
+	result = atomic_file_open(&sheet->atomic, c->path[i], c->message, STORE_MESSAGE_MAX);
 	if (result != 0)
 		return result;
 	sheet->open = true;
-	sheet->csv = (struct table){.out = sheet->whole.out, .format = TABLE_CSV};
+	sheet->csv = (struct table){.out = sheet->atomic.out, .format = TABLE_CSV};
 	table_begin(&sheet->csv, sheet->columns.column, sheet->columns.count);
 	return 0;
 }
@@ -100,7 +100,7 @@ static int open_jsonl(struct collecting *c)
 	int result;
 
 	store_path(c->store, "results.jsonl", c->path[SHEETS]);
-	result = whole_open(&c->jsonl, c->path[SHEETS], c->message, STORE_MESSAGE_MAX);
+	result = atomic_file_open(&c->jsonl, c->path[SHEETS], c->message, STORE_MESSAGE_MAX);
 	c->jsonl_open = result == 0;
 	return result;
 }
@@ -359,11 +359,11 @@ static int close_database(struct collecting *c, int error)
 	return error;
 }
 
-static int close_stream(struct collecting *c, struct whole *whole, int error)
+static int close_stream(struct collecting *c, struct atomic_file *atomic, int error)
 {
 	char unsaid[STORE_MESSAGE_MAX];
 
-	return whole_close(whole, error, error == 0 ? c->message : unsaid, STORE_MESSAGE_MAX);
+	return atomic_file_close(atomic, error, error == 0 ? c->message : unsaid, STORE_MESSAGE_MAX);
 }
 
 static int collect_close(struct collecting *c, int error)
@@ -372,7 +372,7 @@ static int collect_close(struct collecting *c, int error)
 		if (c->sheet[i].open) {
 			if (table_end(&c->sheet[i].csv) != 0 && error == 0)
 				error = fail(c, DT_E_MEMORY, c->path[i], error_text(DT_E_MEMORY));
-			error = close_stream(c, &c->sheet[i].whole, error);
+			error = close_stream(c, &c->sheet[i].atomic, error);
 		}
 	if (c->jsonl_open)
 		error = close_stream(c, &c->jsonl, error);

@@ -12,8 +12,8 @@
 
 #include "common/base/process.h"
 #include "common/base/text.h"
+#include "host/base/atomic_file.h"
 #include "host/base/durable.h"
-#include "host/base/whole.h"
 #include "host/record/digest.h"
 
 void store_path(const struct store *store, const char *name, char path[PATH_MAX])
@@ -52,7 +52,7 @@ static int open_settings(const struct store *store, const char *settings, char *
 	store_path(store, "settings", path);
 	there = durable_read(path, NULL);
 	if (there == NULL && errno == ENOENT)
-		return whole_write(path, settings, strlen(settings), message, STORE_MESSAGE_MAX);
+		return atomic_file_write(path, settings, strlen(settings), message, STORE_MESSAGE_MAX);
 	if (there == NULL) {
 		snprintf(message, STORE_MESSAGE_MAX, "%.200s: %s", path, strerror(errno));
 		return DT_E_SYSTEM;

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "host/report/picture.h"
 
 enum { PATH = 4096 };
@@ -42,7 +42,7 @@ static int put_named(const char *bytes, size_t length, const char *folder, const
 	char path[PATH];
 
 	if ((size_t)snprintf(path, sizeof(path), "%s/%s-%s.%s", folder, kind, name, extension) < sizeof(path))
-		return whole_write(path, bytes, length, message, CHART_MESSAGE_MAX);
+		return atomic_file_write(path, bytes, length, message, CHART_MESSAGE_MAX);
 	snprintf(message, CHART_MESSAGE_MAX, "%.300s: the name is too long", folder);
 	return DT_E_SYSTEM;
 }

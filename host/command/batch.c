@@ -11,7 +11,7 @@
 
 #include "common/base/number.h"
 #include "common/base/text.h"
-#include "host/base/beside.h"
+#include "host/base/installed.h"
 #include "host/base/progress.h"
 #include "host/batch/batch.h"
 #include "host/command/analyze.h"
@@ -150,7 +150,7 @@ static char *setting(const char *name, const char *value)
 	int64_t size;
 
 	if (strcmp(name, "scene") == 0)
-		file = beside_scene_file(value, path);
+		file = installed_scene_file(value, path);
 	if (strcmp(name, "columns") == 0 && value[0] != '@')
 		file = "";
 	if (file[0] != '\0' && digest_file(file, digest, &size, -1) == 0)

@@ -13,7 +13,7 @@
 #include "common/base/number.h"
 #include "common/error.h"
 #include "common/scenes/scene.h"
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "host/report/language.h"
 
 void command_error(const char *format, ...)
@@ -56,7 +56,7 @@ int command_write(const char *file, const void *bytes, size_t size)
 		return fwrite(bytes, 1, size, stdout) == size && fflush(stdout) == 0
 		               ? COMMAND_DONE
 		               : command_output_failed(strerror(errno));
-	if (whole_write(file, bytes, size, message, sizeof(message)) == 0)
+	if (atomic_file_write(file, bytes, size, message, sizeof(message)) == 0)
 		return COMMAND_DONE;
 	command_error("%s", message);
 	return COMMAND_INPUT;

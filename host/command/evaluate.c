@@ -11,7 +11,7 @@
 #include <time.h>
 
 #include "common/units.h"
-#include "host/base/beside.h"
+#include "host/base/installed.h"
 #include "host/command/command.h"
 #include "host/estimate/cfc.h"
 #include "host/estimate/filter.h"
@@ -19,7 +19,7 @@
 #include "host/record/drop.h"
 #include "host/record/fields.h"
 #include "common/base/text.h"
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "host/model/ensemble.h"
 #include "host/report/report.h"
 #include "host/result/quantity.h"
@@ -27,10 +27,11 @@
 
 static int write_json_file(const struct report *report, const char *file, char *message, size_t size)
 {
-	struct whole whole;
-	int result = whole_open(&whole, file, message, size);
+	struct atomic_file atomic;
+	int result = atomic_file_open(&atomic, file, message, size);
 
-	return result != 0 ? result : whole_close(&whole, report_json(report, whole.out), message, size);
+	return result != 0 ? result
+	                   : atomic_file_close(&atomic, report_json(report, atomic.out), message, size);
 }
 
 static int evaluate_write_out(const struct report *report, const struct evaluate_options *options)
@@ -514,11 +515,11 @@ char *evaluate_json(struct evaluated *e, const struct record *record, const stru
 int evaluate_read_scene(struct scene *scene, const char *file, double angle_deg)
 {
 	char message[SCENE_MESSAGE_MAX], reason[MODEL_MESSAGE_MAX], path[PATH_MAX];
-	int result = scene_read(scene, beside_scene_file(file, path), message);
+	int result = scene_read(scene, installed_scene_file(file, path), message);
 	struct plan plan;
 
 	if (result == 0)
-		result = plan_read(&plan, scene->limits, beside_scene_file(file, path), message);
+		result = plan_read(&plan, scene->limits, installed_scene_file(file, path), message);
 	if (result == 0 && !isnan(angle_deg)) {
 		scene->drop_angle_deg = angle_deg;
 		result = scene_check(scene, "--angle", message);

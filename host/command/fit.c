@@ -11,7 +11,7 @@
 
 #include "common/base/number.h"
 #include "common/base/text.h"
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "host/command/archived.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
@@ -210,11 +210,11 @@ static int fit_add_word(struct fitting *f, const char *word)
 static int fit_write(const struct fitting *f)
 {
 	char message[READ_MESSAGE_MAX];
-	struct whole whole;
+	struct atomic_file atomic;
 
-	if (whole_open(&whole, f->a->output, message, sizeof(message)) == 0) {
-		scene_write(&f->fit.scene, whole.out);
-		if (whole_close(&whole, 0, message, sizeof(message)) == 0)
+	if (atomic_file_open(&atomic, f->a->output, message, sizeof(message)) == 0) {
+		scene_write(&f->fit.scene, atomic.out);
+		if (atomic_file_close(&atomic, 0, message, sizeof(message)) == 0)
 			return COMMAND_DONE;
 	}
 	command_error("%s", message);

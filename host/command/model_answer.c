@@ -11,7 +11,7 @@
 
 #include "host/command/command.h"
 #include "host/command/model_private.h"
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "host/report/forecast.h"
 
 #define HISTORY_BEFORE_S 0.002
@@ -107,7 +107,7 @@ static int model_answer_history(const struct model_arguments *a)
 	size_t count = (size_t)((a->span_ms * 1e-3 + HISTORY_BEFORE_S) / step_s + 1e-9) + 1;
 	double(*value)[MODEL_AXES] = malloc(count * sizeof(*value));
 	struct model_prediction taken;
-	struct whole whole;
+	struct atomic_file atomic;
 	int result = value ? model_solve(e->scene, e->fidelity, &e->options, &taken, message) : DT_E_MEMORY;
 
 	if (result == 0)
@@ -119,10 +119,10 @@ static int model_answer_history(const struct model_arguments *a)
 		free(value);
 		return no_drop(a, message);
 	}
-	result = whole_open(&whole, a->history, message, sizeof(message));
+	result = atomic_file_open(&atomic, a->history, message, sizeof(message));
 	if (result == 0)
-		result = whole_close(&whole, write_history(whole.out, value, count, step_s), message,
-		                     sizeof(message));
+		result = atomic_file_close(&atomic, write_history(atomic.out, value, count, step_s), message,
+		                           sizeof(message));
 	free(value);
 	if (result == 0)
 		return COMMAND_DONE;

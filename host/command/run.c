@@ -9,7 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "host/base/beside.h"
+#include "host/base/installed.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
 #include "host/command/release.h"
@@ -93,7 +93,7 @@ static int choose_scene(struct run *run)
 		return command_usage(
 		        "run",
 		        "--link sets a tower up for what is dropped, expected --scene FILE or --series NAME");
-	name = beside_scene_file(name, run->scene_path);
+	name = installed_scene_file(name, run->scene_path);
 	if (run->scene_file == NULL && access(name, F_OK) != 0) {
 		command_error("no scene given and none installed; use --scene FILE");
 		return COMMAND_INPUT;

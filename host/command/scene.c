@@ -12,7 +12,7 @@
 #include "common/base/number.h"
 #include "common/scenes/scene.h"
 #include "common/units.h"
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "host/command/command.h"
 #include "host/model/contact.h"
 #include "host/model/corner.h"
@@ -127,7 +127,7 @@ static void scene_fill(const struct arguments *a, const char *file, struct scene
 static int scene_make(const struct arguments *a, const char *file)
 {
 	char message[SCENE_MESSAGE_MAX];
-	struct whole whole;
+	struct atomic_file atomic;
 	struct scene predicted, s = {
 #define SCENE_KEY(section, key, min, max, initial, doc) .section##_##key = initial,
 #include "common/scenes/scene.def"
@@ -144,9 +144,9 @@ static int scene_make(const struct arguments *a, const char *file)
 		command_error("%s: %s", file, message);
 		return COMMAND_INPUT;
 	}
-	if (whole_open(&whole, file, message, sizeof(message)) == 0) {
-		scene_write(&s, whole.out);
-		if (whole_close(&whole, 0, message, sizeof(message)) == 0 &&
+	if (atomic_file_open(&atomic, file, message, sizeof(message)) == 0) {
+		scene_write(&s, atomic.out);
+		if (atomic_file_close(&atomic, 0, message, sizeof(message)) == 0 &&
 		    scene_read(&s, file, message) == 0)
 			return COMMAND_DONE;
 	}

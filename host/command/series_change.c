@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "host/command/archived.h"
-#include "host/base/beside.h"
+#include "host/base/installed.h"
 #include "host/base/durable.h"
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
@@ -34,7 +34,7 @@ int series_verb_new(struct archive *archive, struct series_arguments *a)
 		code = evaluate_read_scene(&scene, a->scene, NAN);
 	if (code != COMMAND_DONE)
 		return code;
-	if (archive_new_series(archive, a->word[0], campaign, beside_scene_file(a->scene, path),
+	if (archive_new_series(archive, a->word[0], campaign, installed_scene_file(a->scene, path),
 	                       a->filter.angle_deg, a->height_m, a->chain, a->drops > 0 ? a->drops : 5) != 0)
 		return archived_failed(archive);
 	printf("series %s\n", a->word[0]);

@@ -11,7 +11,7 @@
 #include "host/command/archived.h"
 #include "host/command/command.h"
 #include "host/command/series_private.h"
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 
 int series_must_be(struct archive *archive, const char *name)
 {
@@ -38,7 +38,7 @@ static int print(struct job *job)
 {
 	const struct series_arguments *a = job->arguments;
 	char message[512];
-	struct whole whole;
+	struct atomic_file atomic;
 	int result;
 
 	if (a->csv == NULL || strcmp(a->csv, "-") == 0) {
@@ -49,9 +49,10 @@ static int print(struct job *job)
 		                    stdout);
 		return result == 0 ? COMMAND_DONE : print_failed(job->archive, result);
 	}
-	result = whole_open(&whole, a->csv, message, sizeof(message));
+	result = atomic_file_open(&atomic, a->csv, message, sizeof(message));
 	if (result == 0)
-		result = whole_close(&whole, job->print(job, TABLE_CSV, whole.out), message, sizeof(message));
+		result = atomic_file_close(&atomic, job->print(job, TABLE_CSV, atomic.out), message,
+		                           sizeof(message));
 	if (result == 0)
 		return COMMAND_DONE;
 	command_error("%s",

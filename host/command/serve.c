@@ -4,7 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "host/base/beside.h"
+#include "host/base/installed.h"
 #include "host/command/command.h"
 #include "host/command/serve.h"
 
@@ -56,7 +56,7 @@ int command_serve(int argc, char **argv)
 			option_help(&serve_options);
 			return COMMAND_DONE;
 		}
-	if (beside("droptower-console", path) == 0)
+	if (installed_path("droptower-console", path) == 0)
 		execv(path, argv);
 	if (errno == ENOENT)
 		command_error("serve needs droptower-console beside droptower: 'make console' builds it");

@@ -10,7 +10,7 @@
 #include "host/command/files.h"
 #include "host/command/stretch.h"
 #include "host/record/read.h"
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "host/report/spectrum.h"
 #include "host/shock/signal.h"
 
@@ -161,21 +161,23 @@ static int srs_check(struct arguments *arguments, int argc, char **argv)
 
 static int srs_write_csv(const struct spectrum_report *report, const char *file, char *message, size_t size)
 {
-	struct whole whole;
-	int result = whole_open(&whole, file, message, size);
+	struct atomic_file atomic;
+	int result = atomic_file_open(&atomic, file, message, size);
 
-	return result != 0 ? result : whole_close(&whole, spectrum_csv(report, whole.out), message, size);
+	return result != 0 ? result
+	                   : atomic_file_close(&atomic, spectrum_csv(report, atomic.out), message, size);
 }
 
 static int write_svg(const struct spectrum_report *report, const char *file, char *message, size_t size)
 {
 	char why[READ_MESSAGE_MAX] = "";
-	struct whole whole;
-	int result = whole_open(&whole, file, message, size);
+	struct atomic_file atomic;
+	int result = atomic_file_open(&atomic, file, message, size);
 
 	if (result != 0)
 		return result;
-	result = whole_close(&whole, spectrum_svg(report, whole.out, why, sizeof(why)), message, size);
+	result =
+	        atomic_file_close(&atomic, spectrum_svg(report, atomic.out, why, sizeof(why)), message, size);
 	if (result != 0 && why[0] != '\0')
 		snprintf(message, size, "%s: %s", file, why);
 	return result;

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "host/command/archived.h"
-#include "host/base/beside.h"
+#include "host/base/installed.h"
 #include "host/command/command.h"
 
 /* One that is not there yet is waited for; one that can never be is not. */
@@ -53,9 +53,9 @@ static int find_scenes(struct options *options)
 
 	if (scenes->count > 0)
 		return COMMAND_DONE;
-	count = beside_scene("", path) == 0 ? scandir(path, &entry, is_scene, alphasort) : 0;
+	count = installed_scene("", path) == 0 ? scandir(path, &entry, is_scene, alphasort) : 0;
 	for (int i = 0; i < count && i < SERVE_SCENES_MAX; i++) {
-		options->found[i] = beside_scene(entry[i]->d_name, path) == 0 ? strdup(path) : NULL;
+		options->found[i] = installed_scene(entry[i]->d_name, path) == 0 ? strdup(path) : NULL;
 		if (options->found[i] != NULL)
 			scenes->word[scenes->count++] = options->found[i];
 	}

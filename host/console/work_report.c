@@ -14,8 +14,8 @@
 #include <unistd.h>
 
 #include "common/base/process.h"
-#include "host/base/beside.h"
 #include "host/base/durable.h"
+#include "host/base/installed.h"
 #include "host/console/work_private.h"
 
 enum { NICE = 10 };
@@ -26,7 +26,7 @@ static int run_program(struct work_report *r, const char *folder, const char *se
 	const char *words[] = {path, "report", series, "--archive", folder, "--html", r->file, NULL};
 	int result;
 
-	if (beside("droptower", path) != 0)
+	if (installed_path("droptower", path) != 0)
 		return errno;
 	result = process_start(&(struct process){.words = words, .fd = {[STDERR_FILENO] = r->errors}},
 	                       &r->pid);

@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 
 #include "common/wire_table.h"
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 
 #define HEAD "# droptower index "
 
@@ -235,7 +235,7 @@ int log_index_visit(FILE *index, const struct log_file *log, const struct log_vi
 
 struct making {
 	struct log_visitor *to;
-	struct whole whole;
+	struct atomic_file atomic;
 	bool open;
 	FILE *out; /* of whole, or text in memory */
 	struct sha256_ctx hash;
@@ -320,8 +320,8 @@ static void log_index_begin(struct making *making, const char *name, const char 
 
 	sha256_init(&making->hash);
 	if (name != NULL && may_write(name))
-		making->open = whole_open(&making->whole, name, message, sizeof(message)) == 0;
-	making->out = making->whole.out;
+		making->open = atomic_file_open(&making->atomic, name, message, sizeof(message)) == 0;
+	making->out = making->atomic.out;
 	log_index_put(making, "%s", lines);
 }
 
@@ -343,9 +343,9 @@ static void log_index_end(struct making *making, struct log_file *log, int resul
 		return;
 	put_end(making);
 	if (result == 0 &&
-	    (!describe(log, false, now) || strcmp(now, lines) != 0 || ferror(making->whole.out)))
+	    (!describe(log, false, now) || strcmp(now, lines) != 0 || ferror(making->atomic.out)))
 		result = DT_E_STATE;
-	if (whole_close(&making->whole, result, message, sizeof(message)) != 0)
+	if (atomic_file_close(&making->atomic, result, message, sizeof(message)) != 0)
 		making->open = false; /* there is none then, as in a folder that cannot be written */
 }
 

@@ -6,7 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "host/record/columns.h"
 #include "host/record/encoding.h"
 #include "host/record/sniff.h"
@@ -142,20 +142,20 @@ void profile_names(const struct piece *name, size_t count, char names[PROFILE_NA
 
 static int profile_write(const char *path, const struct profile *profile, char *message)
 {
-	struct whole whole;
-	int error = whole_open(&whole, path, message, READ_MESSAGE_MAX);
+	struct atomic_file atomic;
+	int error = atomic_file_open(&atomic, path, message, READ_MESSAGE_MAX);
 
 	if (error)
 		return error;
-	fprintf(whole.out,
+	fprintf(atomic.out,
 	        "# droptower: how files of this kind are read (--profile)\n[import]\ncolumns = %s\n",
 	        profile->columns);
 	if (profile->style.separator != '\0')
-		fprintf(whole.out, "separator = %s\ndecimal = %s\n", sign_name(profile->style.separator),
+		fprintf(atomic.out, "separator = %s\ndecimal = %s\n", sign_name(profile->style.separator),
 		        profile->style.decimal == ',' ? "comma" : "point");
 	if (strspn(profile->names, "|") < strlen(profile->names))
-		fprintf(whole.out, "names = %s\n", profile->names);
-	return whole_close(&whole, ferror(whole.out) ? DT_E_SYSTEM : 0, message, READ_MESSAGE_MAX);
+		fprintf(atomic.out, "names = %s\n", profile->names);
+	return atomic_file_close(&atomic, ferror(atomic.out) ? DT_E_SYSTEM : 0, message, READ_MESSAGE_MAX);
 }
 
 int profile_save(const char *path, const char *file, const char *columns, char message[READ_MESSAGE_MAX])

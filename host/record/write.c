@@ -12,7 +12,7 @@
 #include "common/link/candump.h"
 #include "common/wire.h"
 #include "common/wire_table.h"
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "host/record/blocks.h"
 #include "host/record/digest.h"
 #include "host/record/drop.h"
@@ -444,11 +444,12 @@ static int put_uff58(const struct record *record, FILE *out)
 typedef int helper_writer(const struct record *, FILE *, const char *, char *);
 
 /* With a message of its own, which tells more than the code. */
-static int write_whole(const struct record *record, helper_writer *write, struct whole *whole, char *message)
+static int write_whole(const struct record *record, helper_writer *write, struct atomic_file *atomic,
+                       char *message)
 {
 	char why[READ_MESSAGE_MAX];
-	int result = write(record, whole->out, whole->file, why);
-	int closed = whole_close(whole, result, message, READ_MESSAGE_MAX);
+	int result = write(record, atomic->out, atomic->file, why);
+	int closed = atomic_file_close(atomic, result, message, READ_MESSAGE_MAX);
 
 	if (result != 0)
 		strcpy(message, why);
@@ -541,19 +542,19 @@ static int put_log(struct log_file *log, struct blocks_writer *writer)
 int write_blocks(struct log_file *log, const char *file, char message[READ_MESSAGE_MAX])
 {
 	struct blocks_writer *writer;
-	struct whole whole;
+	struct atomic_file atomic;
 	struct text index;
 	int error = log_index_text(log, &index, message);
 
 	if (error)
 		return error;
-	error = whole_open(&whole, file, message, READ_MESSAGE_MAX);
+	error = atomic_file_open(&atomic, file, message, READ_MESSAGE_MAX);
 	if (!error) {
-		error = blocks_begin(&writer, whole.out);
+		error = blocks_begin(&writer, atomic.out);
 		if (!error)
 			error = blocks_end(writer, put_log(log, writer), index.bytes, index.size);
-		error = whole_close(&whole, log->failed != 0 ? DT_E_SYSTEM : error, message,
-		                    READ_MESSAGE_MAX);
+		error = atomic_file_close(&atomic, log->failed != 0 ? DT_E_SYSTEM : error, message,
+		                          READ_MESSAGE_MAX);
 	}
 	free(index.bytes);
 	return log->failed != 0 ? log_file_error(log, message) : error;
@@ -562,7 +563,7 @@ int write_blocks(struct log_file *log, const char *file, char message[READ_MESSA
 int write_record(const struct record *record, const char *file, char message[READ_MESSAGE_MAX])
 {
 	const struct format *format = format_of(file);
-	struct whole whole;
+	struct atomic_file atomic;
 	int error;
 
 	if (!format)
@@ -579,12 +580,12 @@ int write_record(const struct record *record, const char *file, char message[REA
 		                     "frames cannot say so; expected .csv, .lcm, .unv or .h5");
 	if (format->files != NULL)
 		return format->files(record, file, message);
-	error = whole_open(&whole, file, message, READ_MESSAGE_MAX);
+	error = atomic_file_open(&atomic, file, message, READ_MESSAGE_MAX);
 	if (error)
 		return error;
 	if (format->by_helper != NULL)
-		return write_whole(record, format->by_helper, &whole, message);
-	error = write_packs(file) ? write_packed(record, format, whole.out)
-	                          : format->write(record, whole.out);
-	return whole_close(&whole, error, message, READ_MESSAGE_MAX);
+		return write_whole(record, format->by_helper, &atomic, message);
+	error = write_packs(file) ? write_packed(record, format, atomic.out)
+	                          : format->write(record, atomic.out);
+	return atomic_file_close(&atomic, error, message, READ_MESSAGE_MAX);
 }

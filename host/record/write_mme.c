@@ -13,7 +13,7 @@
 
 #include "common/base/number.h"
 #include "common/units.h"
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "host/record/fields.h"
 #include "host/record/mme.h"
 #include "host/record/source.h"
@@ -146,21 +146,22 @@ static int write_channel(const struct channel *channel, const char *folder, cons
                          char *message)
 {
 	char path[PATH_MAX];
-	struct whole whole;
+	struct atomic_file atomic;
 	int error;
 
 	if (snprintf(path, sizeof(path), "%s/%s.%03zu", folder, stem, i + 1) >= (int)sizeof(path))
 		return source_refuse(message, DT_E_ARGUMENT, folder, 0, "too long a name");
-	error = whole_open(&whole, path, message, READ_MESSAGE_MAX);
+	error = atomic_file_open(&atomic, path, message, READ_MESSAGE_MAX);
 	return error ? error
-	             : whole_close(&whole, put_channel(channel, whole.out), message, READ_MESSAGE_MAX);
+	             : atomic_file_close(&atomic, put_channel(channel, atomic.out), message,
+	                                 READ_MESSAGE_MAX);
 }
 
 int write_mme(const struct record *record, const char *file, char message[READ_MESSAGE_MAX])
 {
 	const char *slash = strrchr(file, '/');
 	char folder[PATH_MAX], stem[NAME_MAX + 1];
-	struct whole whole;
+	struct atomic_file atomic;
 	int error = check(record, file, message);
 
 	snprintf(stem, sizeof(stem), "%.*s", (int)(strlen(slash != NULL ? slash + 1 : file) - strlen(".mme")),
@@ -171,7 +172,8 @@ int write_mme(const struct record *record, const char *file, char message[READ_M
 		error = write_channel(&record->channels[i], folder, stem, i, message);
 	if (error)
 		return error;
-	error = whole_open(&whole, file, message, READ_MESSAGE_MAX);
+	error = atomic_file_open(&atomic, file, message, READ_MESSAGE_MAX);
 	return error ? error
-	             : whole_close(&whole, put_test(record, whole.out, stem), message, READ_MESSAGE_MAX);
+	             : atomic_file_close(&atomic, put_test(record, atomic.out, stem), message,
+	                                 READ_MESSAGE_MAX);
 }

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "host/record/fields.h"
 #include "host/result/measured.h"
 #include "host/report/page.h"
@@ -250,7 +250,7 @@ int report_html(const struct report *report, const char *file, char *message, si
 	}
 	result = text_close(&text, result);
 	if (result == 0)
-		result = whole_write(file, text.bytes, text.size, message, size);
+		result = atomic_file_write(file, text.bytes, text.size, message, size);
 	free(text.bytes);
 	return result;
 }

@@ -13,8 +13,8 @@
 
 #include "common/base/process.h"
 #include "common/link/temporary.h"
+#include "host/base/atomic_file.h"
 #include "host/base/durable.h"
-#include "host/base/whole.h"
 
 enum { LIMIT_MS = 60000, ASK_MS = 100, FOLDER_MAX = TEMPORARY_PATH_MAX, PROGRAM_MAX = 4096 };
 
@@ -149,7 +149,7 @@ int pdf_print(const char *page, size_t length, int (*stop)(void), char **pdf, si
 	if (temporary_make(&folder, "pdf") != 0)
 		return pdf_fail(DT_E_SYSTEM, "no temporary folder", message, size);
 	snprintf(file, sizeof(file), "%s/page.html", folder.path);
-	result = whole_write(file, page, length, message, size);
+	result = atomic_file_write(file, page, length, message, size);
 	if (!result)
 		result = print_in(folder.path, program, stop, &made, &made_length, message, size);
 	temporary_remove(&folder);

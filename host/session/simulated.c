@@ -14,7 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "host/base/beside.h"
+#include "host/base/installed.h"
 #include "host/base/interrupt.h"
 
 enum { START_MS = 5000, END_MS = 1000, TURN_MS = 10, ARGUMENTS_MAX = 40 };
@@ -96,7 +96,7 @@ int simulated_start(struct simulated *tower, const char *const *arguments, char 
 	char path[PATH_MAX];
 	int pipes[2], ready;
 
-	if (beside("droptower-bench", path) != 0 || pipe2(pipes, O_CLOEXEC) != 0) {
+	if (installed_path("droptower-bench", path) != 0 || pipe2(pipes, O_CLOEXEC) != 0) {
 		snprintf(message, size, "simulated tower: %s", strerror(errno));
 		return -1;
 	}

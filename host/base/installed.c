@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/base/beside.h"
+#include "host/base/installed.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -9,7 +9,7 @@
 
 enum { SCENE_NAME_MAX = 100 };
 
-int beside(const char *relative, char path[PATH_MAX])
+int installed_path(const char *relative, char path[PATH_MAX])
 {
 	ssize_t length = readlink("/proc/self/exe", path, PATH_MAX);
 	size_t size = strlen(relative) + 1;
@@ -28,25 +28,25 @@ int beside(const char *relative, char path[PATH_MAX])
 
 /* What was installed with the program comes first; a program that was not lies in the sources' build folder.
  */
-int beside_scene(const char *name, char path[PATH_MAX])
+int installed_scene(const char *name, char path[PATH_MAX])
 {
 	static const char *const folders[] = {"../share/droptower/scenes", "../common/scenes",
 	                                      "../../common/scenes"};
 	char relative[NAME_MAX];
 
 	for (size_t i = 0; i < sizeof(folders) / sizeof(folders[0]); i++) {
-		if (beside(folders[i], path) != 0)
+		if (installed_path(folders[i], path) != 0)
 			return -1;
 		if (access(path, R_OK) != 0)
 			continue;
 		snprintf(relative, sizeof(relative), "%s/%s", folders[i], name);
-		return beside(relative, path);
+		return installed_path(relative, path);
 	}
 	errno = ENOENT;
 	return -1;
 }
 
-const char *beside_scene_file(const char *name, char path[PATH_MAX])
+const char *installed_scene_file(const char *name, char path[PATH_MAX])
 {
 	static const char *const endings[] = {"", ".ini"};
 	char file[NAME_MAX];
@@ -55,7 +55,7 @@ const char *beside_scene_file(const char *name, char path[PATH_MAX])
 		return name;
 	for (size_t i = 0; i < sizeof(endings) / sizeof(endings[0]); i++) {
 		snprintf(file, sizeof(file), "%s%s", name, endings[i]);
-		if (beside_scene(file, path) == 0 && access(path, F_OK) == 0)
+		if (installed_scene(file, path) == 0 && access(path, F_OK) == 0)
 			return path;
 	}
 	return name;

@@ -13,7 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "host/base/whole.h"
+#include "host/base/atomic_file.h"
 #include "tests/unit/scratch.h"
 
 static char folder[SCRATCH_MAX];
@@ -54,11 +54,11 @@ static void check_file(const char *file, const char *text)
 /* Writes "new" as a writer that returns result. */
 static int write_new(const char *file, int result, char *message, size_t size)
 {
-	struct whole whole;
+	struct atomic_file atomic;
 
-	assert_int_equal(whole_open(&whole, file, message, size), 0);
-	fputs("new", whole.out);
-	return whole_close(&whole, result, message, size);
+	assert_int_equal(atomic_file_open(&atomic, file, message, size), 0);
+	fputs("new", atomic.out);
+	return atomic_file_close(&atomic, result, message, size);
 }
 
 static void test_new_and_replaced(void **state)
@@ -139,15 +139,15 @@ static void test_a_full_device_says_so(void **state)
 
 static void test_nowhere(void **state)
 {
-	struct whole whole;
+	struct atomic_file atomic;
 	char message[400], name[600];
 
 	(void)state;
-	assert_int_equal(whole_open(&whole, "no/such", message, sizeof(message)), DT_E_SYSTEM);
+	assert_int_equal(atomic_file_open(&atomic, "no/such", message, sizeof(message)), DT_E_SYSTEM);
 	assert_string_equal(message, "no/such: cannot be written: No such file or directory");
 	memset(name, 'n', sizeof(name));
 	name[sizeof(name) - 1] = '\0';
-	assert_int_equal(whole_open(&whole, name, message, sizeof(message)), DT_E_SYSTEM);
+	assert_int_equal(atomic_file_open(&atomic, name, message, sizeof(message)), DT_E_SYSTEM);
 	assert_non_null(strstr(message, ": cannot be written: File name too long"));
 }
 
