@@ -74,9 +74,9 @@ struct http *http_start(struct console *console, const struct http_options *opti
 	http->part_count = options->part_count;
 	http->token = options->token;
 	/* a technician and a page that fetches five drops at once are far below the first */
-	guard_rates_init(&http->asked, 400, 200);
-	http->held = (struct guard_rate){.burst = 400, .per_s = 200};
-	http->wrong = (struct guard_rate){.burst = 20, .per_s = 5};
+	auth_rates_init(&http->asked, 400, 200);
+	http->held = (struct auth_rate){.burst = 400, .per_s = 200};
+	http->wrong = (struct auth_rate){.burst = 20, .per_s = 5};
 	pthread_mutex_init(&http->visits_lock, NULL);
 	pthread_mutex_init(&http->jobs_lock, NULL);
 	http->streams = streams_create(console, &http->hold);

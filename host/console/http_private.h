@@ -8,7 +8,7 @@
 #include <microhttpd.h>
 #include <pthread.h>
 
-#include "host/console/guard.h"
+#include "host/console/auth.h"
 #include "host/console/hold.h"
 #include "host/console/http.h"
 #include "host/console/stream.h"
@@ -29,9 +29,9 @@ struct http {
 	const char *token;
 	struct hold hold;
 	struct streams *streams;
-	struct guard_rates asked;  /* requests with the token, of each console */
-	struct guard_rate held;    /* of the console that holds the arm, whatever others ask for */
-	struct guard_rate wrong;   /* without the token */
+	struct auth_rates asked;   /* requests with the token, of each console */
+	struct auth_rate held;     /* of the console that holds the arm, whatever others ask for */
+	struct auth_rate wrong;    /* without the token */
 	unsigned photos;           /* on their way in */
 	pthread_mutex_t jobs_lock; /* of closing and jobs */
 	bool closing;

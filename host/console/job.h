@@ -25,9 +25,9 @@ struct console;
 enum job_message {
 	JOB_RUN, /* what its run says */
 	/* The tower's thread asks the archive's. These two come back as JOB_RUN, or are answered when they
-	 * fail (404 without such a series), and then their luggage is freed. */
-	JOB_BEGIN, /* luggage: a drop with its series. Makes the next recording of it */
-	JOB_SCENE, /* luggage: a scene with its series. Adds scene and text */
+	 * fail (404 without such a series), and then their payload is freed. */
+	JOB_BEGIN, /* payload: a drop with its series. Makes the next recording of it */
+	JOB_SCENE, /* payload: a scene with its series. Adds scene and text */
 	/* These are never refused and go before all that waits; what comes with them is the receiver's. */
 	JOB_KEEP,     /* a drop that was collected: syncs, records, analyses it; JOB_SAVED when done */
 	JOB_DISCARD,  /* a drop of which nothing came, or nothing was collected (released) */
@@ -51,7 +51,7 @@ struct job {
 	size_t photo_size;
 	const char *path; /* what follows the route, "box-30/2" */
 	const char *(*query)(const struct job *job, const char *name); /* NULL: not given */
-	void *luggage;                                                 /* of a job that is handed on */
+	void *payload;                                                 /* of a job that is handed on */
 
 	/* the answer: freed by the maker */
 	int status;       /* HTTP */

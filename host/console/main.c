@@ -16,7 +16,7 @@
 
 #include "host/command/command.h"
 #include "host/command/notify.h"
-#include "host/console/guard.h"
+#include "host/console/auth.h"
 #include "host/console/options.h"
 
 enum {
@@ -28,7 +28,7 @@ enum {
 struct serve {
 	struct console console;
 	struct options options;
-	char token[GUARD_TOKEN_MAX + 1];
+	char token[AUTH_TOKEN_MAX + 1];
 	struct http *server;
 	/* a question to the tower's thread, whose answer says that it is alive */
 	struct job ping;
@@ -66,13 +66,13 @@ static void catch_signals(void)
 
 static int make_token(struct serve *serve)
 {
-	char message[GUARD_MESSAGE_MAX];
+	char message[AUTH_MESSAGE_MAX];
 
 	if (serve->options.given.token_file == NULL) {
-		guard_make_token(serve->token);
+		auth_make_token(serve->token);
 		return COMMAND_DONE;
 	}
-	if (guard_read_token(serve->options.given.token_file, serve->token, message) == 0)
+	if (auth_read_token(serve->options.given.token_file, serve->token, message) == 0)
 		return COMMAND_DONE;
 	command_error("%s", message);
 	return COMMAND_INPUT;

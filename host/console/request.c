@@ -253,7 +253,7 @@ static bool parse_body(struct request *request)
 	if (post) {
 		request->body[request->announced] = '\0';
 		request->tree = plain_is_utf8(request->body, request->announced) &&
-		                                !guard_json_has_nul(request->body) &&
+		                                !auth_json_has_nul(request->body) &&
 		                                strlen(request->body) == request->announced
 		                        ? cJSON_ParseWithOpts(request->body, NULL, true)
 		                        : NULL;
@@ -371,11 +371,11 @@ static bool within_rate(struct http *http, const char *console)
 {
 	int64_t now_ms = session_now_ms();
 
-	if (console == NULL || !guard_console_valid(console))
+	if (console == NULL || !auth_console_valid(console))
 		console = "";
 	if (hold_mine(&http->hold, console, now_ms))
-		return guard_take(&http->held, now_ms);
-	return guard_take_of(&http->asked, console, now_ms);
+		return auth_take(&http->held, now_ms);
+	return auth_take_of(&http->asked, console, now_ms);
 }
 
 static void forget_job(struct job *job)
@@ -401,12 +401,12 @@ static enum MHD_Result abort_at_once(struct http *http, struct MHD_Connection *c
 
 static enum MHD_Result check_token(struct http *http, struct MHD_Connection *connection, bool *passed)
 {
-	*passed = guard_token_agrees(http->token, header(connection, MHD_HTTP_HEADER_AUTHORIZATION));
+	*passed = auth_token_agrees(http->token, header(connection, MHD_HTTP_HEADER_AUTHORIZATION));
 	if (*passed) {
 		http_prove(http, connection);
 		return MHD_YES;
 	}
-	if (!guard_take(&http->wrong, session_now_ms()))
+	if (!auth_take(&http->wrong, session_now_ms()))
 		return request_refuse(connection, 429, "too many requests without the token",
 		                      MHD_HTTP_HEADER_RETRY_AFTER, "2");
 	return request_refuse(connection, 401, "expected the token that the console printed when it started",
@@ -461,7 +461,7 @@ static enum MHD_Result open_request(struct http *http, struct MHD_Connection *co
 		                      MHD_HTTP_HEADER_CONNECTION, "close");
 	if (!route->always && !within_rate(http, console))
 		return request_refuse(connection, 429, "too many requests", MHD_HTTP_HEADER_RETRY_AFTER, "1");
-	if (console != NULL && !guard_console_valid(console) && !route->always)
+	if (console != NULL && !auth_console_valid(console) && !route->always)
 		return request_refuse(connection, 400, "X-Console: expected 16 to 64 letters and digits",
 		                      NULL, NULL);
 	if (route->always && (longer_than(connection, BODY_MAX) ||
@@ -495,9 +495,9 @@ static enum MHD_Result look_at(struct http *http, struct MHD_Connection *connect
 	} address = {.stored = &local};
 
 	if (info == NULL || getsockname(info->connect_fd, address.any, &size) != 0 ||
-	    !guard_host_agrees(host, address.any))
+	    !auth_host_agrees(host, address.any))
 		return request_refuse(connection, 403, "Host is not this console's", NULL, NULL);
-	if (!guard_origin_agrees(header(connection, MHD_HTTP_HEADER_ORIGIN), host))
+	if (!auth_origin_agrees(header(connection, MHD_HTTP_HEADER_ORIGIN), host))
 		return request_refuse(connection, 403, "Origin is not this console's", NULL, NULL);
 	if (strncmp(url, "/api/", 5) == 0)
 		url += 5;

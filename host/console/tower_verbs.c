@@ -82,7 +82,7 @@ static void tower_verbs_arm(struct job *job, struct handover_drop *drop)
 static void send_arm(struct job *job)
 {
 	struct tower *tower = job->console->tower;
-	struct handover_drop *drop = job->luggage;
+	struct handover_drop *drop = job->payload;
 	bool may = false;
 
 	tower->wanted = drop->aborted;
@@ -118,7 +118,7 @@ void tower_arm(struct job *job)
 		return;
 	}
 	drop->aborted = aborted;
-	job->luggage = drop;
+	job->payload = drop;
 	job->message = JOB_BEGIN;
 	if (!hand_on(job, &job->console->work_queue, send_arm))
 		free(drop);
@@ -126,10 +126,10 @@ void tower_arm(struct job *job)
 
 /* ---- release, clear ---- */
 
-/* Of a verb without luggage of its own: how many aborts were asked for before it. */
+/* Of a verb without payload of its own: how many aborts were asked for before it. */
 static void tower_verbs_mark(struct job *job)
 {
-	job->luggage = (void *)(uintptr_t)atomic_load(&job->console->tower->aborts);
+	job->payload = (void *)(uintptr_t)atomic_load(&job->console->tower->aborts);
 }
 
 /* False with job refused when it is void, or there is no tower to send it to. */
@@ -137,7 +137,7 @@ static bool check_sending(struct job *job)
 {
 	struct tower *tower = job->console->tower;
 
-	tower->wanted = (unsigned)(uintptr_t)job->luggage;
+	tower->wanted = (unsigned)(uintptr_t)job->payload;
 	if (tower_refuse_void(job, tower->wanted))
 		return false;
 	if (tower->session != NULL)
@@ -303,7 +303,7 @@ static bool tower_verbs_select_series(struct job *job, const struct handover_sce
 
 static void send_select(struct job *job)
 {
-	struct handover_scene *scene = job->luggage;
+	struct handover_scene *scene = job->payload;
 	bool selected = false;
 
 	if (!tower_refuse_void(job, scene->aborted) && tower_check_select(job))
@@ -333,7 +333,7 @@ void tower_select(struct job *job)
 	}
 	snprintf(scene->series, sizeof(scene->series), "%s", series);
 	scene->aborted = atomic_load(&job->console->tower->aborts);
-	job->luggage = scene;
+	job->payload = scene;
 	job->message = JOB_SCENE;
 	if (!hand_on(job, &job->console->work_queue, send_select))
 		free(scene);

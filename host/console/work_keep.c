@@ -24,7 +24,7 @@ enum { RECOVER_MAX = 64 }; /* at one start */
 void work_keep_begin(struct job *job)
 {
 	struct work *work = job->console->work;
-	struct handover_drop *drop = job->luggage;
+	struct handover_drop *drop = job->payload;
 	int result = 0;
 
 	if (work->view.disk_free_bytes < ROOM_RESERVE_BYTES) {

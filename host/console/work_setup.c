@@ -228,7 +228,7 @@ void work_setup_scene(struct job *job)
 {
 	struct work *work = job->console->work;
 	struct archive_filter filter = archive_filter_none();
-	struct handover_scene *wanted = job->luggage;
+	struct handover_scene *wanted = job->payload;
 	int result = archive_scene(work->archive, wanted->series, &wanted->scene);
 
 	wanted->text = NULL;

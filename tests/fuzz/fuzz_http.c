@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "common/plain.h"
-#include "host/console/guard.h"
+#include "host/console/auth.h"
 #include "host/console/job.h"
 #include "host/console/route.h"
 #include "tests/fuzz/fuzz.h"
@@ -18,7 +18,7 @@ static void try_body(const char *body)
 {
 	static const char *const keys[] = {"name", "drop", "text", "take", "scene", "decision"};
 	struct job job = {0};
-	cJSON *tree = plain_is_utf8(body, strlen(body)) && !guard_json_has_nul(body)
+	cJSON *tree = plain_is_utf8(body, strlen(body)) && !auth_json_has_nul(body)
 	                      ? cJSON_ParseWithOpts(body, NULL, true)
 	                      : NULL;
 	double number;
@@ -58,15 +58,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	for (unsigned i = 0; i < LINES; i++)
 		if ((line[i] = strsep(&rest, "\n")) == NULL)
 			line[i] = all + size;
-	if (guard_token_agrees(token, line[0]) && strstr(line[0], token) == NULL)
+	if (auth_token_agrees(token, line[0]) && strstr(line[0], token) == NULL)
 		fuzz_fail("a wrong token");
-	if (guard_host_agrees(line[1], address.any) && strcasecmp(line[1], "127.0.0.1:8731") != 0 &&
+	if (auth_host_agrees(line[1], address.any) && strcasecmp(line[1], "127.0.0.1:8731") != 0 &&
 	    strcasecmp(line[1], "localhost:8731") != 0)
 		fuzz_fail("a wrong Host");
-	(void)guard_origin_agrees(line[2], line[1]);
+	(void)auth_origin_agrees(line[2], line[1]);
 	if (route_find(line[3], line[4], &behind, &other) != NULL && strstr(behind, "..") == behind)
 		fuzz_fail("a path upwards: %s", line[4]);
-	if (guard_console_valid(line[5]) && strlen(line[5]) > 64)
+	if (auth_console_valid(line[5]) && strlen(line[5]) > 64)
 		fuzz_fail("a console's name too long");
 	if (rest != NULL)
 		try_body(rest);

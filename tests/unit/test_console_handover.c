@@ -62,9 +62,9 @@ static struct job *hand_over(struct job *job, int status)
 
 static struct handover_drop *begin(const char *series)
 {
-	struct job job = {.run = and_then, .message = JOB_BEGIN, .luggage = new_drop(series)};
+	struct job job = {.run = and_then, .message = JOB_BEGIN, .payload = new_drop(series)};
 
-	return hand_over(&job, 0)->luggage;
+	return hand_over(&job, 0)->payload;
 }
 
 static void read_hand(struct record *record, int lost_tick)
@@ -319,14 +319,14 @@ static void test_a_drop_that_did_not_come(void **state)
 	assert_string_equal(desk_text(cJSON_GetArrayItem(drops, 3), "state"), "interrupted");
 	assert_string_equal(desk_text(cJSON_GetArrayItem(drops, 3), "note"), "nothing was heard of it");
 	cJSON_Delete(tree);
-	refused.luggage = new_drop("two");
+	refused.payload = new_drop("two");
 	assert_null(hand_over(&refused, 404));
 }
 
 static void test_the_scene_for_the_tower(void **state)
 {
 	struct handover_scene *wanted = calloc(1, sizeof(*wanted));
-	struct job job = {.run = and_then, .message = JOB_SCENE, .luggage = wanted};
+	struct job job = {.run = and_then, .message = JOB_SCENE, .payload = wanted};
 
 	(void)state;
 	desk_start_with_drops();

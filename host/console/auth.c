@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/console/guard.h"
+#include "host/console/auth.h"
 
 #include <arpa/inet.h>
 #include <ctype.h>
@@ -16,9 +16,9 @@
 
 #include "common/error.h"
 
-void guard_make_token(char token[GUARD_TOKEN_MAX + 1])
+void auth_make_token(char token[AUTH_TOKEN_MAX + 1])
 {
-	unsigned char random[GUARD_TOKEN_MIN / 2];
+	unsigned char random[AUTH_TOKEN_MIN / 2];
 
 	/* without randomness there is no console */
 	if (getrandom(random, sizeof(random), 0) != (ssize_t)sizeof(random))
@@ -46,49 +46,49 @@ static int write_token(int fd, const char *token)
 }
 
 /* The first line of an open file, and that it is nobody's business. */
-static int take_token(int fd, const char *file, char token[GUARD_TOKEN_MAX + 1],
-                      char message[GUARD_MESSAGE_MAX])
+static int take_token(int fd, const char *file, char token[AUTH_TOKEN_MAX + 1],
+                      char message[AUTH_MESSAGE_MAX])
 {
-	char text[GUARD_TOKEN_MAX + 2] = "";
+	char text[AUTH_TOKEN_MAX + 2] = "";
 	struct stat there;
 	ssize_t size = fstat(fd, &there) == 0 ? read(fd, text, sizeof(text) - 1) : -1;
 
 	if (size < 0) {
-		snprintf(message, GUARD_MESSAGE_MAX, "%s: %s", file, strerror(errno));
+		snprintf(message, AUTH_MESSAGE_MAX, "%s: %s", file, strerror(errno));
 		return DT_E_SYSTEM;
 	}
 	if ((there.st_mode & 027) != 0) {
-		snprintf(message, GUARD_MESSAGE_MAX,
+		snprintf(message, AUTH_MESSAGE_MAX,
 		         "%s: mode %04o lets others at the token, expected 0600 (chmod 600)", file,
 		         there.st_mode & 07777);
 		return DT_E_STATE;
 	}
 	text[strcspn(text, "\r\n")] = '\0';
-	if (!letters_and_digits(text, GUARD_TOKEN_MIN, GUARD_TOKEN_MAX)) {
-		snprintf(message, GUARD_MESSAGE_MAX, "%s: no token, expected %d to %d letters and digits",
-		         file, GUARD_TOKEN_MIN, GUARD_TOKEN_MAX);
+	if (!letters_and_digits(text, AUTH_TOKEN_MIN, AUTH_TOKEN_MAX)) {
+		snprintf(message, AUTH_MESSAGE_MAX, "%s: no token, expected %d to %d letters and digits",
+		         file, AUTH_TOKEN_MIN, AUTH_TOKEN_MAX);
 		return DT_E_FORMAT;
 	}
 	strcpy(token, text);
 	return 0;
 }
 
-int guard_read_token(const char *file, char token[GUARD_TOKEN_MAX + 1], char message[GUARD_MESSAGE_MAX])
+int auth_read_token(const char *file, char token[AUTH_TOKEN_MAX + 1], char message[AUTH_MESSAGE_MAX])
 {
 	int fd = open(file, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600), result;
 
 	if (fd >= 0) {
-		guard_make_token(token);
+		auth_make_token(token);
 		if (write_token(fd, token) == 0)
 			return 0;
-		snprintf(message, GUARD_MESSAGE_MAX, "%s: %s", file, strerror(errno));
+		snprintf(message, AUTH_MESSAGE_MAX, "%s: %s", file, strerror(errno));
 		unlink(file);
 		return DT_E_SYSTEM;
 	}
 	/* where nothing can be made, what is there may still be read: a service's credentials */
 	fd = open(file, O_RDONLY | O_CLOEXEC);
 	if (fd < 0) {
-		snprintf(message, GUARD_MESSAGE_MAX, "%s: %s", file, strerror(errno));
+		snprintf(message, AUTH_MESSAGE_MAX, "%s: %s", file, strerror(errno));
 		return DT_E_SYSTEM;
 	}
 	result = take_token(fd, file, token, message);
@@ -96,7 +96,7 @@ int guard_read_token(const char *file, char token[GUARD_TOKEN_MAX + 1], char mes
 	return result;
 }
 
-bool guard_token_agrees(const char *token, const char *authorization)
+bool auth_token_agrees(const char *token, const char *authorization)
 {
 	static const char scheme[] = "Bearer ";
 	size_t length = strlen(token);
@@ -126,7 +126,7 @@ static unsigned own_address(const struct sockaddr *local, char text[INET6_ADDRST
 	return ntohs(address.four->sin_port);
 }
 
-bool guard_host_agrees(const char *host, const struct sockaddr *local)
+bool auth_host_agrees(const char *host, const struct sockaddr *local)
 {
 	char address[INET6_ADDRSTRLEN + 2], wanted[sizeof(address) + 8];
 	unsigned port = own_address(local, address);
@@ -140,7 +140,7 @@ bool guard_host_agrees(const char *host, const struct sockaddr *local)
 	return false;
 }
 
-bool guard_origin_agrees(const char *origin, const char *host)
+bool auth_origin_agrees(const char *origin, const char *host)
 {
 	static const char scheme[] = "http://";
 
@@ -148,12 +148,12 @@ bool guard_origin_agrees(const char *origin, const char *host)
 	                          strcasecmp(origin + sizeof(scheme) - 1, host) == 0);
 }
 
-bool guard_console_valid(const char *console)
+bool auth_console_valid(const char *console)
 {
 	return letters_and_digits(console, 16, 64);
 }
 
-bool guard_take(struct guard_rate *rate, int64_t now_ms)
+bool auth_take(struct auth_rate *rate, int64_t now_ms)
 {
 	rate->left += (double)(now_ms - rate->then_ms) / 1000.0 * rate->per_s;
 	rate->then_ms = now_ms;
@@ -165,32 +165,32 @@ bool guard_take(struct guard_rate *rate, int64_t now_ms)
 	return true;
 }
 
-void guard_rates_init(struct guard_rates *rates, double burst, double per_s)
+void auth_rates_init(struct auth_rates *rates, double burst, double per_s)
 {
-	*rates = (struct guard_rates){.unnamed = {.burst = burst, .per_s = per_s}};
-	for (unsigned i = 0; i < GUARD_CONSOLES; i++)
+	*rates = (struct auth_rates){.unnamed = {.burst = burst, .per_s = per_s}};
+	for (unsigned i = 0; i < AUTH_CONSOLES; i++)
 		rates->console[i].rate = rates->unnamed;
 }
 
-bool guard_take_of(struct guard_rates *rates, const char *console, int64_t now_ms)
+bool auth_take_of(struct auth_rates *rates, const char *console, int64_t now_ms)
 {
 	struct guard_console *place = &rates->console[0];
 
 	if (console[0] == '\0')
-		return guard_take(&rates->unnamed, now_ms);
-	for (unsigned i = 0; i < GUARD_CONSOLES; i++) {
+		return auth_take(&rates->unnamed, now_ms);
+	for (unsigned i = 0; i < AUTH_CONSOLES; i++) {
 		struct guard_console *other = &rates->console[i];
 
 		if (strcmp(other->name, console) == 0)
-			return guard_take(&other->rate, now_ms);
+			return auth_take(&other->rate, now_ms);
 		if (other->rate.then_ms < place->rate.then_ms)
 			place = other;
 	}
 	snprintf(place->name, sizeof(place->name), "%s", console);
-	return guard_take(&place->rate, now_ms);
+	return auth_take(&place->rate, now_ms);
 }
 
-bool guard_json_has_nul(const char *text)
+bool auth_json_has_nul(const char *text)
 {
 	while ((text = strchr(text, '\\')) != NULL && text[1] != '\0') {
 		if (strncmp(text + 1, "u0000", 5) == 0)

@@ -18,7 +18,7 @@
 #include <unistd.h>
 
 #include "common/error.h"
-#include "host/console/guard.h"
+#include "host/console/auth.h"
 #include "host/console/hold.h"
 #include "host/console/route.h"
 #include "tests/unit/scratch.h"
@@ -27,11 +27,11 @@ static const char token[] = "00112233445566778899aabbccddeeff";
 
 static void test_a_new_token_is_128_bit(void **state)
 {
-	char one[GUARD_TOKEN_MAX + 1] = "", other[GUARD_TOKEN_MAX + 1] = "";
+	char one[AUTH_TOKEN_MAX + 1] = "", other[AUTH_TOKEN_MAX + 1] = "";
 
 	(void)state;
-	guard_make_token(one);
-	guard_make_token(other);
+	auth_make_token(one);
+	auth_make_token(other);
 	assert_int_equal(strlen(one), 32);
 	assert_int_equal(strspn(one, "0123456789abcdef"), 32);
 	assert_string_not_equal(one, other);
@@ -54,11 +54,11 @@ static void test_token(void **state)
 	};
 
 	(void)state;
-	assert_true(guard_token_agrees(token, "Bearer 00112233445566778899aabbccddeeff"));
-	assert_true(guard_token_agrees(token, "bearer 00112233445566778899aabbccddeeff"));
-	assert_false(guard_token_agrees(token, NULL));
+	assert_true(auth_token_agrees(token, "Bearer 00112233445566778899aabbccddeeff"));
+	assert_true(auth_token_agrees(token, "bearer 00112233445566778899aabbccddeeff"));
+	assert_false(auth_token_agrees(token, NULL));
 	for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++)
-		if (guard_token_agrees(token, wrong[i]))
+		if (auth_token_agrees(token, wrong[i]))
 			fail_msg("'%s' was let in", wrong[i]);
 }
 
@@ -74,32 +74,32 @@ static void write_file(const char *file, const char *text, mode_t mode)
 
 static void test_token_file(void **state)
 {
-	char folder[SCRATCH_MAX], file[SCRATCH_MAX + 8], message[GUARD_MESSAGE_MAX];
-	char made[GUARD_TOKEN_MAX + 1] = "", again[GUARD_TOKEN_MAX + 1] = "untouched";
+	char folder[SCRATCH_MAX], file[SCRATCH_MAX + 8], message[AUTH_MESSAGE_MAX];
+	char made[AUTH_TOKEN_MAX + 1] = "", again[AUTH_TOKEN_MAX + 1] = "untouched";
 	struct stat there;
 
 	(void)state;
 	assert_non_null(mkdtemp(scratch_name(folder, "guard")));
 	snprintf(file, sizeof(file), "%s/token", folder);
-	assert_int_equal(guard_read_token(file, made, message), 0);
+	assert_int_equal(auth_read_token(file, made, message), 0);
 	assert_int_equal(stat(file, &there), 0);
 	assert_int_equal(there.st_mode & 0777, 0600);
 	assert_int_equal(there.st_size, 33);
-	assert_int_equal(guard_read_token(file, again, message), 0);
+	assert_int_equal(auth_read_token(file, again, message), 0);
 	assert_string_equal(again, made);
 
 	chmod(file, 0604);
-	assert_int_equal(guard_read_token(file, again, message), DT_E_STATE);
+	assert_int_equal(auth_read_token(file, again, message), DT_E_STATE);
 	assert_non_null(strstr(message, file));
 	write_file(file, "too-short\n", 0600);
-	assert_int_equal(guard_read_token(file, again, message), DT_E_FORMAT);
+	assert_int_equal(auth_read_token(file, again, message), DT_E_FORMAT);
 	write_file(file, "0011223344556677 8899aabbccddeeff\n", 0600);
-	assert_int_equal(guard_read_token(file, again, message), DT_E_FORMAT);
+	assert_int_equal(auth_read_token(file, again, message), DT_E_FORMAT);
 	assert_string_equal(again, made); /* unchanged on errors */
 	write_file(file, "0123456789abcdefghijklmnopqrstuvwxyz", 0400);
-	assert_int_equal(guard_read_token(file, again, message), 0);
+	assert_int_equal(auth_read_token(file, again, message), 0);
 	assert_string_equal(again, "0123456789abcdefghijklmnopqrstuvwxyz");
-	assert_int_equal(guard_read_token("/no/such/folder/token", again, message), DT_E_SYSTEM);
+	assert_int_equal(auth_read_token("/no/such/folder/token", again, message), DT_E_SYSTEM);
 	unlink(file);
 	rmdir(folder);
 }
@@ -132,51 +132,51 @@ static void test_host_is_ours(void **state)
 	union address web = at(AF_INET, "192.168.1.7", 80);
 
 	(void)state;
-	assert_true(guard_host_agrees("127.0.0.1:8731", &four.any));
-	assert_true(guard_host_agrees("localhost:8731", &four.any));
-	assert_true(guard_host_agrees("LOCALHOST:8731", &four.any));
-	assert_true(guard_host_agrees("[::1]:8731", &six.any));
-	assert_true(guard_host_agrees("192.168.1.7", &web.any));
-	assert_true(guard_host_agrees("192.168.1.7:80", &web.any));
-	assert_false(guard_host_agrees(NULL, &four.any));
-	assert_false(guard_host_agrees("", &four.any));
-	assert_false(guard_host_agrees("127.0.0.1", &four.any)); /* another port's */
-	assert_false(guard_host_agrees("127.0.0.1:8732", &four.any));
-	assert_false(guard_host_agrees("rebound.example:8731", &four.any));
-	assert_false(guard_host_agrees("127.0.0.1.rebound.example:8731", &four.any));
-	assert_false(guard_host_agrees("127.0.0.1:87310", &four.any));
-	assert_false(guard_host_agrees("[::1]:8731", &four.any));
+	assert_true(auth_host_agrees("127.0.0.1:8731", &four.any));
+	assert_true(auth_host_agrees("localhost:8731", &four.any));
+	assert_true(auth_host_agrees("LOCALHOST:8731", &four.any));
+	assert_true(auth_host_agrees("[::1]:8731", &six.any));
+	assert_true(auth_host_agrees("192.168.1.7", &web.any));
+	assert_true(auth_host_agrees("192.168.1.7:80", &web.any));
+	assert_false(auth_host_agrees(NULL, &four.any));
+	assert_false(auth_host_agrees("", &four.any));
+	assert_false(auth_host_agrees("127.0.0.1", &four.any)); /* another port's */
+	assert_false(auth_host_agrees("127.0.0.1:8732", &four.any));
+	assert_false(auth_host_agrees("rebound.example:8731", &four.any));
+	assert_false(auth_host_agrees("127.0.0.1.rebound.example:8731", &four.any));
+	assert_false(auth_host_agrees("127.0.0.1:87310", &four.any));
+	assert_false(auth_host_agrees("[::1]:8731", &four.any));
 }
 
 static void test_origin_is_ours(void **state)
 {
 	(void)state;
-	assert_true(guard_origin_agrees(NULL, "127.0.0.1:8731"));
-	assert_true(guard_origin_agrees("http://127.0.0.1:8731", "127.0.0.1:8731"));
-	assert_false(guard_origin_agrees("null", "127.0.0.1:8731"));
-	assert_false(guard_origin_agrees("", "127.0.0.1:8731"));
-	assert_false(guard_origin_agrees("https://127.0.0.1:8731", "127.0.0.1:8731"));
-	assert_false(guard_origin_agrees("http://127.0.0.1:8732", "127.0.0.1:8731"));
-	assert_false(guard_origin_agrees("http://evil.example", "127.0.0.1:8731"));
-	assert_false(guard_origin_agrees("http://localhost:8731", "127.0.0.1:8731"));
+	assert_true(auth_origin_agrees(NULL, "127.0.0.1:8731"));
+	assert_true(auth_origin_agrees("http://127.0.0.1:8731", "127.0.0.1:8731"));
+	assert_false(auth_origin_agrees("null", "127.0.0.1:8731"));
+	assert_false(auth_origin_agrees("", "127.0.0.1:8731"));
+	assert_false(auth_origin_agrees("https://127.0.0.1:8731", "127.0.0.1:8731"));
+	assert_false(auth_origin_agrees("http://127.0.0.1:8732", "127.0.0.1:8731"));
+	assert_false(auth_origin_agrees("http://evil.example", "127.0.0.1:8731"));
+	assert_false(auth_origin_agrees("http://localhost:8731", "127.0.0.1:8731"));
 }
 
 static void test_rate(void **state)
 {
-	struct guard_rate rate = {.burst = 3, .per_s = 2, .then_ms = 1000};
+	struct auth_rate rate = {.burst = 3, .per_s = 2, .then_ms = 1000};
 
 	(void)state;
 	/* full at its first use, however late: 10 s at 2 a second is more than it holds */
 	for (int i = 0; i < 3; i++)
-		assert_true(guard_take(&rate, 11000));
-	assert_false(guard_take(&rate, 11000));
-	assert_false(guard_take(&rate, 11499));
-	assert_true(guard_take(&rate, 11500));
-	assert_false(guard_take(&rate, 11999));
-	assert_true(guard_take(&rate, 12000));
+		assert_true(auth_take(&rate, 11000));
+	assert_false(auth_take(&rate, 11000));
+	assert_false(auth_take(&rate, 11499));
+	assert_true(auth_take(&rate, 11500));
+	assert_false(auth_take(&rate, 11999));
+	assert_true(auth_take(&rate, 12000));
 	for (int i = 0; i < 3; i++)
-		assert_true(guard_take(&rate, 60000));
-	assert_false(guard_take(&rate, 60000));
+		assert_true(auth_take(&rate, 60000));
+	assert_false(auth_take(&rate, 60000));
 }
 
 static void test_hold(void **state)
@@ -209,16 +209,16 @@ static void test_console_names(void **state)
 	char text[80];
 
 	(void)state;
-	assert_true(guard_console_valid("0123456789abcdEF"));
-	assert_false(guard_console_valid("0123456789abcdE"));
-	assert_false(guard_console_valid("0123456789abcdE-"));
-	assert_false(guard_console_valid(""));
+	assert_true(auth_console_valid("0123456789abcdEF"));
+	assert_false(auth_console_valid("0123456789abcdE"));
+	assert_false(auth_console_valid("0123456789abcdE-"));
+	assert_false(auth_console_valid(""));
 	memset(text, 'a', sizeof(text));
 	text[64] = '\0';
-	assert_true(guard_console_valid(text));
+	assert_true(auth_console_valid(text));
 	text[64] = 'a';
 	text[65] = '\0';
-	assert_false(guard_console_valid(text));
+	assert_false(auth_console_valid(text));
 }
 
 /* What a path may say: nothing that a file system or a query would understand. */
@@ -289,24 +289,24 @@ static void test_who_needs_the_hold(void **state)
 	assert_true(route_find("POST", "abort", &rest, &other)->always);
 }
 
-static unsigned granted(struct guard_rates *rates, const char *console, unsigned asked, int64_t now_ms)
+static unsigned granted(struct auth_rates *rates, const char *console, unsigned asked, int64_t now_ms)
 {
 	unsigned count = 0;
 
 	for (unsigned i = 0; i < asked; i++)
-		count += guard_take_of(rates, console, now_ms);
+		count += auth_take_of(rates, console, now_ms);
 	return count;
 }
 
 /* Who asks for all there is takes nothing of another's; who makes names up gets what sixteen would. */
 static void test_each_console_has_its_own_rate(void **state)
 {
-	struct guard_rates rates;
-	char name[GUARD_CONSOLE_MAX + 1];
+	struct auth_rates rates;
+	char name[AUTH_CONSOLE_MAX + 1];
 	unsigned all = 0;
 
 	(void)state;
-	guard_rates_init(&rates, 10, 5);
+	auth_rates_init(&rates, 10, 5);
 	assert_int_equal(granted(&rates, "greedygreedygreedy", 1000, 100000), 10);
 	assert_int_equal(granted(&rates, "", 1000, 100000), 10);
 	assert_int_equal(granted(&rates, "modestmodestmodest", 4, 100001), 4);
@@ -322,12 +322,12 @@ static void test_each_console_has_its_own_rate(void **state)
 static void test_json_with_nul(void **state)
 {
 	(void)state;
-	assert_true(guard_json_has_nul("{\"a\":\"b\\u0000c\"}"));
-	assert_true(guard_json_has_nul("\\\\\\u0000"));
-	assert_false(guard_json_has_nul("\\\\u0000")); /* a backslash, and the letters */
-	assert_false(guard_json_has_nul("{\"a\":\"\\u0001\\n\"}"));
-	assert_false(guard_json_has_nul("\\"));
-	assert_false(guard_json_has_nul(""));
+	assert_true(auth_json_has_nul("{\"a\":\"b\\u0000c\"}"));
+	assert_true(auth_json_has_nul("\\\\\\u0000"));
+	assert_false(auth_json_has_nul("\\\\u0000")); /* a backslash, and the letters */
+	assert_false(auth_json_has_nul("{\"a\":\"\\u0001\\n\"}"));
+	assert_false(auth_json_has_nul("\\"));
+	assert_false(auth_json_has_nul(""));
 }
 
 int main(void)
