@@ -287,7 +287,7 @@ static void bench_set_up(struct bench *bench)
 	for (unsigned state = 0; state < WIRE_STATES; state++)
 		bench->entered_ms[state] = -1;
 	if (bench->watch != NULL)
-		observe_init(&bench->watch->observe, &options->scene, bench->tower_rate);
+		monitor_init(&bench->watch->monitor, &options->scene, bench->tower_rate);
 	script_init(&bench->script, &options->script);
 	if (options->ready_fd >= 0) /* the firmware must not keep it open */
 		(void)fcntl(options->ready_fd, F_SETFD, FD_CLOEXEC);
@@ -299,7 +299,7 @@ static void bench_set_up(struct bench *bench)
 		bench->log = open_file(bench, options->log);
 	if (!bench->stop)
 		bench->truth = open_file(bench, options->truth);
-	codes_init(&bench->codes, bench->truth);
+	adc_log_init(&bench->codes, bench->truth);
 	if (!bench->stop)
 		bench_open_link(bench);
 	if (!bench->stop)
@@ -312,7 +312,7 @@ static void tear_down(struct bench *bench)
 {
 	end_target(bench);
 	bench_control_close(bench);
-	codes_flush(&bench->codes);
+	adc_log_flush(&bench->codes);
 	close_file(bench, bench->log, bench->options->log);
 	close_file(bench, bench->truth, bench->options->truth);
 	if (link_close(bench->link) != 0)
@@ -369,7 +369,7 @@ static void bench_take_results(const struct bench *bench, double wall_s)
 
 	for (unsigned i = 0; i < SCENARIO_RESULTS; i++)
 		results[i] = NAN;
-	observe_results(&watch->observe, results);
+	monitor_results(&watch->monitor, results);
 	results[SCENARIO_done] = all_done(bench);
 	results[SCENARIO_complete] = bench->script.drops_done - bench->script.incomplete;
 	results[SCENARIO_discarded] = bench->script.incomplete;

@@ -17,7 +17,7 @@
 #include "common/sensorbus.h"
 #include "hil/busfault.h"
 #include "hil/event.h"
-#include "hil/observe.h"
+#include "hil/monitor.h"
 #include "hil/script.h"
 #include "hil/timeline.h"
 
@@ -55,7 +55,7 @@ struct bench_options {
 	 * drops, all events have happened and every counter was told since, or at end_s. */
 	struct bench_watch *watch; /* NULL: nobody looks */
 	const char *log;           /* candump text of the host's side of the bus, NULL: none */
-	const char *truth;         /* codes as given to the firmware (hil/codes.h), NULL: none */
+	const char *truth;         /* codes as given to the firmware (hil/adc_log.h), NULL: none */
 	int ready_fd;              /* gets one byte when the firmware runs; -1: none */
 };
 
@@ -63,7 +63,7 @@ struct bench_watch {
 	double end_s;
 	bool soon;                 /* the counters need not be told */
 	struct timeline *timeline; /* NULL: none */
-	struct observe observe;
+	struct monitor monitor;
 	double results[SCENARIO_RESULTS]; /* NAN: did not happen */
 	double virtual_s, wall_s;
 };

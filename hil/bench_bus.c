@@ -25,7 +25,7 @@ static void give_to_host(struct bench *bench, const struct frame *frame)
 
 	bench_bus_log_frame(bench, frame);
 	if (bench->watch != NULL)
-		observe_at_host(&bench->watch->observe, frame);
+		monitor_at_host(&bench->watch->monitor, frame);
 	if (bench->link == NULL) {
 		script_feed(&bench->script, frame, (uint32_t)bench_now_ms(bench));
 		return;
@@ -53,15 +53,15 @@ static void watch_status(struct bench *bench, const struct frame *frame)
 /* The state that events count from: seen in every live block, without one in the status. */
 static void watch_state(struct bench *bench, const struct frame *frame)
 {
-	struct observe *observe = &bench->watch->observe;
+	struct monitor *monitor = &bench->watch->monitor;
 
-	observe->now_s = bench_now_s(bench);
-	observe_from_firmware(observe, frame, bench_tower_s(bench, bench->base_grid),
+	monitor->now_s = bench_now_s(bench);
+	monitor_from_firmware(monitor, frame, bench_tower_s(bench, bench->base_grid),
 	                      bench_tower_s(bench, bench->now_grid));
-	if (observe->state >= WIRE_STATES || observe->state == bench->event_state)
+	if (monitor->state >= WIRE_STATES || monitor->state == bench->event_state)
 		return;
-	bench->event_state = observe->state;
-	bench->entered_ms[observe->state] = bench_now_ms(bench);
+	bench->event_state = monitor->state;
+	bench->entered_ms[monitor->state] = bench_now_ms(bench);
 }
 
 void bench_from_firmware(struct bench *bench, const struct frame *frame)
@@ -144,7 +144,7 @@ void bench_to_firmware(struct bench *bench, struct sensorbus_answer *answer, str
 {
 	while (answer->frames < ANSWER_FRAMES && ring_get(&bench->queue, &received[answer->frames]) == 0) {
 		if (bench->watch != NULL)
-			observe_to_firmware(&bench->watch->observe, &received[answer->frames],
+			monitor_to_firmware(&bench->watch->monitor, &received[answer->frames],
 			                    1e6 * bench_now_s(bench));
 		answer->frames++;
 	}

@@ -34,7 +34,7 @@ static bool goes_wrong(enum event_action action)
 void bench_event(struct bench *bench, const struct event *event)
 {
 	if (bench->watch != NULL && goes_wrong(event->action))
-		observe_event(&bench->watch->observe, bench_now_s(bench));
+		monitor_event(&bench->watch->monitor, bench_now_s(bench));
 	switch (event->action) {
 	case EVENT_FAULT:
 	case EVENT_REPAIR:
@@ -55,7 +55,7 @@ void bench_event(struct bench *bench, const struct event *event)
 	case EVENT_LET_GO:
 		tower_let_go(bench->tower);
 		if (bench->watch != NULL)
-			hazard_let_go(&bench->watch->observe.hazard);
+			hazard_let_go(&bench->watch->monitor.hazard);
 		break;
 	case EVENT_GLITCH:
 		tower_glitch(bench->tower, event->number, event->pulses);

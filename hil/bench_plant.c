@@ -46,7 +46,7 @@ static bool bench_plant_take_time(struct bench *bench, const struct sensorbus_re
 	if (request->reset && bench->running) { /* the firmware's clock starts again at the next whole ms */
 		bench->base_grid = (bench_now_ms(bench) + 1) * BENCH_GRID_PER_MS;
 		if (bench->watch != NULL)
-			observe_reset(&bench->watch->observe);
+			monitor_reset(&bench->watch->monitor);
 	}
 	grid = bench->base_grid + (int64_t)request->tick_ms * BENCH_GRID_PER_MS +
 	       (int64_t)request->index * (BENCH_GRID_PER_MS / (int64_t)per_tick);
@@ -97,7 +97,7 @@ static void make_edge(struct bench *bench, unsigned bit, bool on, double time_us
 	double time_s = fmin(1e-6 * time_us * bench->tower_rate, bench_tower_s(bench, bench->now_grid));
 
 	if (bench->watch != NULL)
-		observe_edge(&bench->watch->observe, bit, on, time_us, time_s);
+		monitor_edge(&bench->watch->monitor, bit, on, time_us, time_s);
 	tower_output(bench->tower, bit, on, time_s);
 }
 
@@ -134,7 +134,7 @@ static void bench_plant_sample(struct bench *bench, const struct sensorbus_reque
 
 	tower_advance(bench->tower, time_s);
 	tower_sample(bench->tower, request->group, answer->codes);
-	codes_put(&bench->codes, request, answer->codes);
+	adc_log_put(&bench->codes, request, answer->codes);
 	answer->ready = request->group;
 	answer->inputs = tower_inputs(bench->tower);
 	answer->bias_high = tower_bias_high(bench->tower);
@@ -148,9 +148,9 @@ static void bench_plant_sample(struct bench *bench, const struct sensorbus_reque
 	}
 	if (bench->watch == NULL)
 		return;
-	observe_sample(&bench->watch->observe, request->group, answer, tower_truth(bench->tower), time_s);
+	monitor_sample(&bench->watch->monitor, request->group, answer, tower_truth(bench->tower), time_s);
 	timeline_sample(bench->watch->timeline, bench_now_s(bench),
-	                (uint16_t)(answer->inputs | request->outputs), bench->watch->observe.state,
+	                (uint16_t)(answer->inputs | request->outputs), bench->watch->monitor.state,
 	                request->group, answer->codes);
 }
 

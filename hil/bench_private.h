@@ -13,8 +13,8 @@
 #include "common/link/link.h"
 #include "common/ring.h"
 #include "common/wire.h"
+#include "hil/adc_log.h"
 #include "hil/bench.h"
-#include "hil/codes.h"
 #include "hil/target.h"
 #include "hil/tower.h"
 
@@ -32,7 +32,7 @@ struct bench {
 	struct link *link; /* NULL: the script is the host */
 	struct script script;
 	FILE *log, *truth;
-	struct codes codes;
+	struct adc_log codes;
 
 	struct busfault to_host, to_tower;
 	struct ring queue;

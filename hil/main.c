@@ -261,7 +261,7 @@ static int main_judge(const struct scenario *scenario, const struct line *line,
 	int result = text_open(&report);
 
 	if (result == 0) {
-		failures = verdict_print(scenario, &watch->observe, watch->results, report.out, failed,
+		failures = verdict_print(scenario, &watch->monitor, watch->results, report.out, failed,
 		                         sizeof(failed));
 		result = text_close(&report, 0);
 	}
@@ -271,18 +271,18 @@ static int main_judge(const struct scenario *scenario, const struct line *line,
 	}
 	main_name_of(line->scenario_file, name, sizeof(name));
 	printf("%s %s %s %.3f %.2f %016" PRIx64 " %s\n%s", failures ? "FAIL" : "PASS", name,
-	       wire_state_name(watch->observe.state), watch->virtual_s, watch->wall_s, watch->observe.hash,
+	       wire_state_name(watch->monitor.state), watch->virtual_s, watch->wall_s, watch->monitor.hash,
 	       failures ? failed : "-", report.bytes);
-	if (watch->observe.hazard.first != NULL)
-		printf("  unsafe at %.3f s: %s\n", watch->observe.hazard.first_s,
-		       watch->observe.hazard.first);
+	if (watch->monitor.hazard.first != NULL)
+		printf("  unsafe at %.3f s: %s\n", watch->monitor.hazard.first_s,
+		       watch->monitor.hazard.first);
 	if (!isnan(watch->results[SCENARIO_reaction_ms]))
 		printf("  answered after %.3f ms\n", watch->results[SCENARIO_reaction_ms]);
 	free(report.bytes);
 	snprintf(title, sizeof(title), "%s: %s (%s%s)", name, scenario->title, failures ? "FAIL " : "PASS",
 	         failures ? failed : "");
 	if (line->timeline_file != NULL &&
-	    timeline_draw(watch->timeline, &watch->observe, title, line->timeline_file) != 0) {
+	    timeline_draw(watch->timeline, &watch->monitor, title, line->timeline_file) != 0) {
 		bench_say("%s: gnuplot could not draw it", line->timeline_file);
 		return BENCH_LINK;
 	}

@@ -177,12 +177,12 @@ static size_t timeline_find_drop(const struct timeline *timeline)
 	return i;
 }
 
-static void put_emergencies(const struct observe *observe, double from_s, double to_s, FILE *out)
+static void put_emergencies(const struct monitor *monitor, double from_s, double to_s, FILE *out)
 {
-	const struct observe_notes *notes = &observe->emcy;
+	const struct monitor_notes *notes = &monitor->emcy;
 
 	fputs("unset arrow\nunset label\n", out);
-	for (unsigned i = 0; i < notes->count && i < OBSERVE_NOTES; i++) {
+	for (unsigned i = 0; i < notes->count && i < MONITOR_NOTES; i++) {
 		double time_s = notes->note[i].time_s;
 
 		if (time_s < from_s || time_s > to_s)
@@ -199,7 +199,7 @@ static void put_emergencies(const struct observe *observe, double from_s, double
 }
 
 /* One column of three panels between two times. */
-static void put_column(const struct observe *observe, const char *trace, double left, double right,
+static void put_column(const struct monitor *monitor, const char *trace, double left, double right,
                        double from_s, double to_s, FILE *out)
 {
 	fprintf(out, "set lmargin at screen %g\nset rmargin at screen %g\nset xrange [%.6f:%.6f]\n", left,
@@ -209,7 +209,7 @@ static void put_column(const struct observe *observe, const char *trace, double 
 		fprintf(out, "%s'%s' %u", i ? ", " : "", wire_state_name(i), i);
 	fprintf(out, ")\nset yrange [-0.7:%u.7]", WIRE_STATES - 1);
 	fputs("\nset tmargin at screen 0.92\nset bmargin at screen 0.67\n", out);
-	put_emergencies(observe, from_s, to_s, out);
+	put_emergencies(monitor, from_s, to_s, out);
 	fputs("plot $levels using 1:2 with steps lw 2 lc rgb '#205090'\nunset label\n", out);
 	fprintf(out, "set yrange [0.3:%u.7]\nset ytics (", LANES);
 	for (unsigned i = 0; i < LANES; i++)
@@ -223,7 +223,7 @@ static void put_column(const struct observe *observe, const char *trace, double 
 	fprintf(out, "plot $%s using 1:2 with lines lw 0.8 lc rgb '#404040'\n", trace);
 }
 
-static void put_picture(const struct timeline *timeline, const struct observe *observe, const char *title,
+static void put_picture(const struct timeline *timeline, const struct monitor *monitor, const char *title,
                         const char *file, FILE *out)
 {
 	size_t count = timeline->count, drop = timeline_find_drop(timeline), first, last;
@@ -241,18 +241,18 @@ static void put_picture(const struct timeline *timeline, const struct observe *o
 	      out);
 	timeline_put_text(out, title);
 	fputc('\n', out);
-	put_column(observe, "wide", 0.095, dropped ? 0.52 : 0.985, 0, end_s, out);
+	put_column(monitor, "wide", 0.095, dropped ? 0.52 : 0.985, 0, end_s, out);
 	if (dropped) {
 		first = drop > BEFORE_DROP_MS ? drop - BEFORE_DROP_MS : 0;
 		last = drop + DROP_MS < count ? drop + DROP_MS : count;
 		put_trace(timeline, "drop", first, last, 1, out);
-		put_column(observe, "drop", 0.625, 0.985, timeline->points[first].time_s,
+		put_column(monitor, "drop", 0.625, 0.985, timeline->points[first].time_s,
 		           timeline->points[last - 1].time_s, out);
 	}
 	fputs("unset multiplot\n", out);
 }
 
-int timeline_draw(const struct timeline *timeline, const struct observe *observe, const char *title,
+int timeline_draw(const struct timeline *timeline, const struct monitor *monitor, const char *title,
                   const char *file)
 {
 	static const char *const gnuplot[] = {"gnuplot", "--default-settings", NULL};
@@ -269,7 +269,7 @@ int timeline_draw(const struct timeline *timeline, const struct observe *observe
 	result = text_open(&script);
 	if (result != 0)
 		return result;
-	put_picture(timeline, observe, title, file, script.out);
+	put_picture(timeline, monitor, title, file, script.out);
 	result = text_close(&script, 0);
 	if (result != 0)
 		return result;

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #include "common/error.h"
-#include "hil/observe.h"
+#include "hil/monitor.h"
 
 struct timeline;
 
@@ -23,7 +23,7 @@ void timeline_sample(struct timeline *timeline, double time_s, uint16_t io, uint
                      const int16_t codes[6]);
 
 /* 0, or DT_E_SYSTEM: gnuplot or the file; errno tells where it can. */
-DT_MUST_USE int timeline_draw(const struct timeline *timeline, const struct observe *observe,
+DT_MUST_USE int timeline_draw(const struct timeline *timeline, const struct monitor *monitor,
                               const char *title, const char *file);
 
 #endif

@@ -63,7 +63,7 @@ static void add_item(char text[TEXT_MAX], uint32_t number, const char *(*name_of
 		snprintf(text + used, TEXT_MAX - used, "%s0x%08" PRIX32, used ? " " : "", number);
 }
 
-static void judge_notes(struct verdict *verdict, const char *name, const struct observe_notes *notes,
+static void judge_notes(struct verdict *verdict, const char *name, const struct monitor_notes *notes,
                         const struct scenario_list *list, const char *(*name_of)(unsigned))
 {
 	char measured[TEXT_MAX] = "", expected[TEXT_MAX] = "";
@@ -71,7 +71,7 @@ static void judge_notes(struct verdict *verdict, const char *name, const struct 
 
 	if (!list->given)
 		return;
-	for (unsigned i = 0; i < notes->count && i < OBSERVE_NOTES; i++) {
+	for (unsigned i = 0; i < notes->count && i < MONITOR_NOTES; i++) {
 		add_item(measured, notes->note[i].number, name_of);
 		good = good && (int32_t)notes->note[i].number == list->item[i];
 	}
@@ -83,7 +83,7 @@ static void judge_notes(struct verdict *verdict, const char *name, const struct 
 static void judge_one(struct verdict *verdict, const char *name, uint32_t number,
                       const struct scenario_list *list, const char *(*name_of)(unsigned))
 {
-	const struct observe_notes notes = {1, {{number, 0}}};
+	const struct monitor_notes notes = {1, {{number, 0}}};
 
 	judge_notes(verdict, name, &notes, list, name_of);
 }
@@ -109,41 +109,41 @@ static void judge_bits(struct verdict *verdict, const char *name, unsigned bits,
 	            expected[0] ? expected : "-");
 }
 
-static void judge_marks(struct verdict *verdict, const struct observe *observe,
+static void judge_marks(struct verdict *verdict, const struct monitor *monitor,
                         const struct scenario_list *list)
 {
-	if (list->given && observe->captures == 0)
+	if (list->given && monitor->captures == 0)
 		verdict_say(verdict, false, "marks", "no capture", "a capture end");
 	else
-		judge_bits(verdict, "marks", observe->capture.marks, list, wire_mark_name);
+		judge_bits(verdict, "marks", monitor->capture.marks, list, wire_mark_name);
 }
 
 static void judge_counters(struct verdict *verdict, const struct scenario *scenario,
-                           const struct observe *observe)
+                           const struct monitor *monitor)
 {
 	for (unsigned i = 0; i < WIRE_COUNTERS; i++)
 		judge_range(verdict, wire_counter_name(i),
-		            observe->has_counter[i] ? (double)observe->counter[i] : (double)NAN,
+		            monitor->has_counter[i] ? (double)monitor->counter[i] : (double)NAN,
 		            &scenario->counter[i]);
 }
 
-unsigned verdict_print(const struct scenario *scenario, const struct observe *observe,
+unsigned verdict_print(const struct scenario *scenario, const struct monitor *monitor,
                        const double results[SCENARIO_RESULTS], FILE *out, char *failed, size_t size)
 {
 	struct verdict verdict = {.out = out, .failed = failed, .size = size};
 
 	failed[0] = '\0';
-	judge_one(&verdict, "end", observe->state, &scenario->end, wire_state_name);
-	judge_one(&verdict, "fault", observe->fault, &scenario->fault, wire_fault_name);
-	judge_notes(&verdict, "emcy", &observe->emcy, &scenario->emcy, wire_fault_name);
-	judge_notes(&verdict, "path", &observe->path, &scenario->path, wire_state_name);
-	judge_bits(&verdict, "checks", observe->checks, &scenario->checks, wire_check_name);
-	judge_marks(&verdict, observe, &scenario->marks);
-	judge_notes(&verdict, "replies", &observe->replies, &scenario->replies, wire_state_name);
-	judge_notes(&verdict, "refused", &observe->refused, &scenario->refused, verdict_error_of);
-	judge_notes(&verdict, "aborts", &observe->aborts, &scenario->aborts, NULL);
+	judge_one(&verdict, "end", monitor->state, &scenario->end, wire_state_name);
+	judge_one(&verdict, "fault", monitor->fault, &scenario->fault, wire_fault_name);
+	judge_notes(&verdict, "emcy", &monitor->emcy, &scenario->emcy, wire_fault_name);
+	judge_notes(&verdict, "path", &monitor->path, &scenario->path, wire_state_name);
+	judge_bits(&verdict, "checks", monitor->checks, &scenario->checks, wire_check_name);
+	judge_marks(&verdict, monitor, &scenario->marks);
+	judge_notes(&verdict, "replies", &monitor->replies, &scenario->replies, wire_state_name);
+	judge_notes(&verdict, "refused", &monitor->refused, &scenario->refused, verdict_error_of);
+	judge_notes(&verdict, "aborts", &monitor->aborts, &scenario->aborts, NULL);
 	for (unsigned i = 0; i < SCENARIO_RESULTS; i++)
 		judge_range(&verdict, scenario_result_name(i), results[i], &scenario->result[i]);
-	judge_counters(&verdict, scenario, observe);
+	judge_counters(&verdict, scenario, monitor);
 	return verdict.failures;
 }

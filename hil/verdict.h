@@ -7,12 +7,12 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-#include "hil/observe.h"
+#include "hil/monitor.h"
 #include "hil/scenario.h"
 
 /* One line for each expectation, "  ok" or "  FAIL", its name, what was measured, what was expected.
  * Returns how many failed; the names of the first of them, with a space between, are in failed. */
-unsigned verdict_print(const struct scenario *scenario, const struct observe *observe,
+unsigned verdict_print(const struct scenario *scenario, const struct monitor *monitor,
                        const double results[SCENARIO_RESULTS], FILE *out, char *failed, size_t size);
 
 #endif

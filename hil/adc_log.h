@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HIL_CODES_H
-#define DT_HIL_CODES_H
+#ifndef DT_HIL_ADC_LOG_H
+#define DT_HIL_ADC_LOG_H
 /*
  * The truth file: the converter codes exactly as the firmware got them, one line for each tick and sensor,
  *
@@ -15,19 +15,19 @@
 #include "common/sensorbus.h"
 #include "common/wire.h"
 
-struct codes {
+struct adc_log {
 	FILE *file; /* NULL: nothing is kept */
 	uint32_t tick_ms;
 	bool begun;
 	int16_t values[WIRE_SENSORS][WIRE_X_PER_TICK + 2 * WIRE_YZ_PER_TICK];
 };
 
-void codes_init(struct codes *codes, FILE *file);
+void adc_log_init(struct adc_log *codes, FILE *file);
 
 /* What was answered to a request. */
-void codes_put(struct codes *codes, const struct sensorbus_request *request, const int16_t given[6]);
+void adc_log_put(struct adc_log *codes, const struct sensorbus_request *request, const int16_t given[6]);
 
 /* Writes the tick that has begun, complete or not. */
-void codes_flush(struct codes *codes);
+void adc_log_flush(struct adc_log *codes);
 
 #endif

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "hil/codes.h"
+#include "hil/adc_log.h"
 
 enum { VALUES = WIRE_X_PER_TICK + 2 * WIRE_YZ_PER_TICK };
 
-static void codes_begin(struct codes *codes, uint32_t tick_ms)
+static void adc_log_begin(struct adc_log *codes, uint32_t tick_ms)
 {
 	codes->tick_ms = tick_ms;
 	codes->begun = true;
@@ -12,12 +12,12 @@ static void codes_begin(struct codes *codes, uint32_t tick_ms)
 			codes->values[sensor][i] = WIRE_SAMPLE_NOT_TAKEN;
 }
 
-void codes_init(struct codes *codes, FILE *file)
+void adc_log_init(struct adc_log *codes, FILE *file)
 {
-	*codes = (struct codes){.file = file};
+	*codes = (struct adc_log){.file = file};
 }
 
-void codes_flush(struct codes *codes)
+void adc_log_flush(struct adc_log *codes)
 {
 	if (codes->file == NULL || !codes->begun)
 		return;
@@ -30,13 +30,13 @@ void codes_flush(struct codes *codes)
 	codes->begun = false;
 }
 
-void codes_put(struct codes *codes, const struct sensorbus_request *request, const int16_t given[6])
+void adc_log_put(struct adc_log *codes, const struct sensorbus_request *request, const int16_t given[6])
 {
 	if (codes->file == NULL)
 		return;
 	if (!codes->begun || codes->tick_ms != request->tick_ms || request->reset) {
-		codes_flush(codes);
-		codes_begin(codes, request->tick_ms);
+		adc_log_flush(codes);
+		adc_log_begin(codes, request->tick_ms);
 	}
 	for (unsigned sensor = 0; sensor < WIRE_SENSORS; sensor++) {
 		int16_t *values = codes->values[sensor];

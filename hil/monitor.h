@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef DT_HIL_OBSERVE_H
-#define DT_HIL_OBSERVE_H
+#ifndef DT_HIL_MONITOR_H
+#define DT_HIL_MONITOR_H
 /*
  * Watches a run and writes down what a verdict needs: states, emergencies, replies, counters, what the
  * outputs did against what the tower did, and who lost which frames. Decides nothing.
@@ -23,33 +23,33 @@
 #include "hil/tower.h"
 
 enum {
-	OBSERVE_TICKS = 1 << 16, /* blocks are told apart up to this tick since a reset */
-	OBSERVE_NOTES = 64,      /* of each kind that are kept; further ones are counted */
+	MONITOR_TICKS = 1 << 16, /* blocks are told apart up to this tick since a reset */
+	MONITOR_NOTES = 64,      /* of each kind that are kept; further ones are counted */
 };
 
-struct observe_note {
+struct monitor_note {
 	uint32_t number; /* state, fault, error or abort code */
 	double time_s;   /* virtual */
 };
 
-struct observe_notes {
+struct monitor_notes {
 	unsigned count; /* all of them */
-	struct observe_note note[OBSERVE_NOTES];
+	struct monitor_note note[MONITOR_NOTES];
 };
 
 /* The live blocks of one sensor since the latest reset. */
-struct observe_blocks {
-	uint8_t sent[OBSERVE_TICKS], received[OBSERVE_TICKS]; /* 0 or 1 */
+struct monitor_blocks {
+	uint8_t sent[MONITOR_TICKS], received[MONITOR_TICKS]; /* 0 or 1 */
 	int64_t last;                                         /* tick received, -1: none */
 	int64_t gaps;
 };
 
-struct observe {
+struct monitor {
 	double tower_rate;       /* the tower's seconds in one of the firmware's */
 	double planned_travel_m; /* where the product shall leave the frame */
 	double now_s;            /* virtual time */
 
-	struct observe_notes path, emcy, replies, refused, aborts;
+	struct monitor_notes path, emcy, replies, refused, aborts;
 	uint8_t state, fault;
 	bool was_ready;
 	uint32_t checks;    /* told as not green at any time since it first was READY */
@@ -62,7 +62,7 @@ struct observe {
 	int64_t sent_error, given_error; /* the firmware's count less ours, the worst */
 	uint64_t hash;                   /* FNV-1a of all frames from the firmware, with their times */
 
-	struct observe_blocks blocks[WIRE_SENSORS];
+	struct monitor_blocks blocks[WIRE_SENSORS];
 	int64_t blocks_error; /* of boots before the present one */
 	double gaps_before, blocks_before;
 
@@ -70,7 +70,7 @@ struct observe {
 	struct wire_capture_end capture;
 	unsigned captures;
 	double capture_first_s; /* tower's time of its first tick */
-	struct observe_tail {   /* what follows a capture end */
+	struct monitor_tail {   /* what follows a capture end */
 		struct wire_measured measured;
 		bool has_measured;
 		uint32_t value[WIRE_PARAMETERS];
@@ -97,28 +97,28 @@ struct observe {
 };
 
 /* tower_rate: the tower's seconds in one of the firmware's. */
-void observe_init(struct observe *observe, const struct scene *scene, double tower_rate);
+void monitor_init(struct monitor *monitor, const struct scene *scene, double tower_rate);
 
 /* The firmware started anew: its counters and ticks begin at 0. */
-void observe_reset(struct observe *observe);
+void monitor_reset(struct monitor *monitor);
 
 /* Something goes wrong now. */
-void observe_event(struct observe *observe, double now_s);
+void monitor_event(struct monitor *monitor, double now_s);
 
 /* An edge of the firmware's output; the tower has not made it yet. */
-void observe_edge(struct observe *observe, unsigned bit, bool on, double edge_us, double tower_s);
+void monitor_edge(struct monitor *monitor, unsigned bit, bool on, double edge_us, double tower_s);
 
 /* What was converted, and the tower as it is now. */
-void observe_sample(struct observe *observe, unsigned group, const struct sensorbus_answer *answer,
+void monitor_sample(struct monitor *monitor, unsigned group, const struct sensorbus_answer *answer,
                     const struct tower_truth *truth, double tower_s);
 
 /* tick_s: tower's time of the firmware's tick 0; tower_s: now. */
-void observe_from_firmware(struct observe *observe, const struct frame *frame, double tick_s, double tower_s);
-void observe_at_host(struct observe *observe, const struct frame *frame);
-void observe_to_firmware(struct observe *observe, const struct frame *frame, double now_us);
+void monitor_from_firmware(struct monitor *monitor, const struct frame *frame, double tick_s, double tower_s);
+void monitor_at_host(struct monitor *monitor, const struct frame *frame);
+void monitor_to_firmware(struct monitor *monitor, const struct frame *frame, double now_us);
 
 /* The numbers of scenario.def that come from here; the rest (done, complete, discarded, ledger_bus,
  * edges_outside, queue_lost) is the bench's. NAN: did not happen. */
-void observe_results(const struct observe *observe, double results[SCENARIO_RESULTS]);
+void monitor_results(const struct monitor *monitor, double results[SCENARIO_RESULTS]);
 
 #endif
