@@ -14,7 +14,7 @@
 
 #include "host/command/command.h"
 #include "host/command/evaluate.h"
-#include "host/record/fields.h"
+#include "host/record/metadata.h"
 #include "host/record/read.h"
 
 const char *archived_folder(const char *given)
@@ -101,7 +101,7 @@ int archived_read(struct archive *archive, const char *drop, struct record *reco
 	result = read_record(record, log.file, NULL, said);
 	if (result == 0) {
 		record->time_s = log.time_s;
-		fields_take_words(record->operator_name, log.operator_name);
+		metadata_take_words(record->operator_name, log.operator_name);
 		record->simulated = log.simulated;
 		snprintf(record->file, sizeof(record->file), "%s", log.raw);
 	} else {
@@ -115,7 +115,7 @@ int archived_read(struct archive *archive, const char *drop, struct record *reco
 
 struct origin {
 	struct record *record;
-	char serials[FIELDS_TEXT_MAX];
+	char serials[METADATA_TEXT_MAX];
 };
 
 static int take_origin(void *context, const struct archive_drop *drop)
@@ -125,8 +125,8 @@ static int take_origin(void *context, const struct archive_drop *drop)
 
 	if (strptime(drop->time, "%Y-%m-%dT%H:%M:%SZ", &utc) != NULL)
 		record->time_s = timegm(&utc);
-	fields_take_words(record->operator_name, drop->operator_name);
-	fields_take_words(record->scene, drop->series.scene_name);
+	metadata_take_words(record->operator_name, drop->operator_name);
+	metadata_take_words(record->scene, drop->series.scene_name);
 	record->simulated = drop->simulated;
 	return 0;
 }
@@ -177,7 +177,7 @@ void archived_origin(const char *file, struct record *record)
 		*slash = '\0';
 		filter.series = drop;
 		if (archive_each_drop(archive, &filter, take_origin, &origin) == 0 && known)
-			fields_take_words(record->sensors, origin.serials);
+			metadata_take_words(record->sensors, origin.serials);
 	}
 	archive_close(archive);
 }

@@ -17,7 +17,7 @@
 #include "host/estimate/filter.h"
 #include "host/model/corner.h"
 #include "host/record/drop.h"
-#include "host/record/fields.h"
+#include "host/record/metadata.h"
 #include "common/base/text.h"
 #include "host/base/atomic_file.h"
 #include "host/model/ensemble.h"
@@ -348,19 +348,19 @@ int evaluate_check_chain(const char *list)
 
 int evaluate_sign(struct record *record, const struct evaluate_options *options, const char *operator_name)
 {
-	char message[SETTINGS_MESSAGE_MAX], serials[FIELDS_TEXT_MAX];
+	char message[SETTINGS_MESSAGE_MAX], serials[METADATA_TEXT_MAX];
 	struct sensors sensors;
 
 	record->time_s = time(NULL);
 	record->simulated = options->simulated;
-	fields_take_words(record->operator_name, operator_name);
-	fields_take_words(record->scene, options->scene != NULL ? options->scene->name : "");
+	metadata_take_words(record->operator_name, operator_name);
+	metadata_take_words(record->scene, options->scene != NULL ? options->scene->name : "");
 	if (sensors_read(&sensors, evaluate_chain(options), 0.0, message) != 0) {
 		command_error("%s", message);
 		return COMMAND_INPUT;
 	}
 	sensors_serials(&sensors, serials, sizeof(serials));
-	fields_take_words(record->sensors, serials);
+	metadata_take_words(record->sensors, serials);
 	return COMMAND_DONE;
 }
 

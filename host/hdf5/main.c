@@ -11,7 +11,7 @@
 
 #include "host/hdf5/foreign.h"
 #include "host/record/drop.h"
-#include "host/record/fields.h"
+#include "host/record/metadata.h"
 #include "host/record/helper.h"
 #include "host/record/digest.h"
 #include "host/record/seal.h"
@@ -223,21 +223,21 @@ static int put_seal(hid_t file, const struct record *record)
 
 static int put_record(hid_t file, const struct record *record)
 {
-	const struct fields_entry *entry;
-	char text[FIELDS_TEXT_MAX];
+	const struct metadata_entry *entry;
+	char text[METADATA_TEXT_MAX];
 	int result = put_text(file, "format", "droptower") | put_whole(file, "version", LAYOUT) |
 	             put_seal(file, record);
 
-	for (size_t i = 0; (entry = fields_entry(i)) != NULL && result == 0; i++) {
-		if (!fields_known(record, entry))
+	for (size_t i = 0; (entry = metadata_entry(i)) != NULL && result == 0; i++) {
+		if (!metadata_known(record, entry))
 			continue;
-		fields_format(record, entry, text);
-		if (entry->kind >= FIELDS_TIME)
+		metadata_format(record, entry, text);
+		if (entry->kind >= METADATA_TIME)
 			result = put_text(file, entry->name, text);
-		else if (entry->kind == FIELDS_REAL)
-			result = put_real(file, entry->name, fields_real(record, entry));
+		else if (entry->kind == METADATA_REAL)
+			result = put_real(file, entry->name, metadata_real(record, entry));
 		else
-			result = put_whole(file, entry->name, fields_whole(record, entry));
+			result = put_whole(file, entry->name, metadata_whole(record, entry));
 	}
 	for (size_t i = 0; i < record->channel_count && result == 0; i++)
 		result = put_channel(file, &record->channels[i]);
@@ -389,21 +389,21 @@ static int get_channels(struct record *record, hid_t file, bool sealed)
 
 static int get_fields(struct record *record, hid_t file)
 {
-	const struct fields_entry *entry;
+	const struct metadata_entry *entry;
 
-	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++) {
-		char text[FIELDS_TEXT_MAX];
+	for (size_t i = 0; (entry = metadata_entry(i)) != NULL; i++) {
+		char text[METADATA_TEXT_MAX];
 		double value;
 		int result;
 
 		if (H5Aexists(file, entry->name) <= 0)
 			continue;
-		if (entry->kind >= FIELDS_TIME)
+		if (entry->kind >= METADATA_TIME)
 			result = get_text(file, entry->name, text, sizeof(text)) != 0 ||
-			         fields_parse(record, entry, text) != 0;
+			         metadata_parse(record, entry, text) != 0;
 		else
 			result = get_real(file, entry->name, &value) != 0 ||
-			         fields_set(record, entry, value) != 0;
+			         metadata_set(record, entry, value) != 0;
 		if (result != 0)
 			return refuse_written(entry->name, "a value that fits");
 	}
@@ -412,11 +412,11 @@ static int get_fields(struct record *record, hid_t file)
 
 static int hold_file(const struct record *record, hid_t file)
 {
-	const struct fields_entry *entry;
+	const struct metadata_entry *entry;
 	int count = 3; /* format, version, sha256 */
 
-	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++)
-		count += fields_known(record, entry);
+	for (size_t i = 0; (entry = metadata_entry(i)) != NULL; i++)
+		count += metadata_known(record, entry);
 	return hold_count(file, "/", count);
 }
 

@@ -10,7 +10,7 @@
 
 #include "common/base/process.h"
 #include "common/link/temporary.h"
-#include "host/record/fields.h"
+#include "host/record/metadata.h"
 #include "host/record/source.h"
 
 enum { NAME_CHARS = 63 };
@@ -113,25 +113,25 @@ static int put_channel(mat_t *mat, const struct record *record, size_t i)
 
 static int put_drop(mat_t *mat, const struct record *record)
 {
-	const struct fields_entry *entry;
+	const struct metadata_entry *entry;
 	size_t one[2] = {1, 1};
 	matvar_t *variable = Mat_VarCreateStruct("drop", 2, one, NULL, 0);
 	int result = variable != NULL ? 0 : -1;
 
-	for (size_t i = 0; result == 0 && (entry = fields_entry(i)) != NULL; i++) {
-		char text[FIELDS_TEXT_MAX];
+	for (size_t i = 0; result == 0 && (entry = metadata_entry(i)) != NULL; i++) {
+		char text[METADATA_TEXT_MAX];
 		double value;
 
-		if (!fields_known(record, entry))
+		if (!metadata_known(record, entry))
 			continue;
-		fields_format(record, entry, text);
-		value = entry->kind == FIELDS_REAL ? fields_real(record, entry)
-		                                   : (double)fields_whole(record, entry);
+		metadata_format(record, entry, text);
+		value = entry->kind == METADATA_REAL ? metadata_real(record, entry)
+		                                     : (double)metadata_whole(record, entry);
 		result = Mat_VarAddStructField(variable, entry->name);
 		if (result == 0)
 			result = set(variable, entry->name,
-			             entry->kind >= FIELDS_TIME ? words(entry->name, text)
-			                                        : new_number(entry->name, value));
+			             entry->kind >= METADATA_TIME ? words(entry->name, text)
+			                                          : new_number(entry->name, value));
 	}
 	return write_and_free(mat, variable, result);
 }

@@ -339,7 +339,7 @@ static void ring_step(struct ring *ring, const struct ode *ode, struct course_re
 
 	if ((ode->last.term[0][OFF_UP] < 0.0) == (ode->y[OFF_UP] < 0.0))
 		return;
-	t = watch_crossing(ode, OFF_UP);
+	t = peak_tracker_crossing(ode, OFF_UP);
 	ode_at(ode, t, off);
 	if (ring->crossings == 0) {
 		ring->first_s = t;
@@ -353,14 +353,15 @@ static void ring_step(struct ring *ring, const struct ode *ode, struct course_re
 }
 
 /* Whether all peaks asked for are behind; an axis may have a second one, the other way. */
-static bool all_passed(const struct course *p, const struct watch *watch)
+static bool all_passed(const struct course *p, const struct peak_tracker *tracker)
 {
 	const unsigned axes = 1u << COURSE_S1X | 1u << COURSE_S1Y | 1u << COURSE_S2X | 1u << COURSE_S2Y;
 
 	if (p->count_ring || (axes & ~p->skipped))
 		return false;
 	for (size_t i = 0; i < COURSE_SIGNALS; i++)
-		if (!(p->skipped >> i & 1u) && i != COURSE_DEPTH && !watch_passed(watch, i, PASSED_SHARE))
+		if (!(p->skipped >> i & 1u) && i != COURSE_DEPTH &&
+		    !peak_tracker_passed(tracker, i, PASSED_SHARE))
 			return false;
 	return true;
 }
@@ -426,7 +427,7 @@ static bool course_peaks_in_flight(const struct course *in)
 
 /* Steps until the window of peaks ends: the release and, if anything may peak then, a share of the plate's
  * period after it. What touches by then is followed likewise, whichever touch it is; the next one ends it. */
-static int follow(struct run *c, struct watch *watch, struct course_result *r)
+static int follow(struct run *c, struct peak_tracker *tracker, struct course_result *r)
 {
 	const struct course *in = c->in;
 	bool flies = course_peaks_in_flight(in);
@@ -439,9 +440,9 @@ static int follow(struct run *c, struct watch *watch, struct course_result *r)
 		error = course_step(c, course_end(c));
 		if (error)
 			break;
-		watch_step(watch, &c->ode);
-		if (in->rough && !heavy && !c->strikes && watch_passed(watch, COURSE_DEPTH, 1.0) &&
-		    all_passed(in, watch)) {
+		peak_tracker_step(tracker, &c->ode);
+		if (in->rough && !heavy && !c->strikes && peak_tracker_passed(tracker, COURSE_DEPTH, 1.0) &&
+		    all_passed(in, tracker)) {
 			c->strikes = c->touching > BODY_FIRST || course_may_strike(c, c->window_s - c->ode.t);
 			r->cut_short = !c->strikes && isnan(c->released_s);
 			if (!c->strikes)
@@ -449,7 +450,7 @@ static int follow(struct run *c, struct watch *watch, struct course_result *r)
 		}
 		if (c->event.corner < 0)
 			continue;
-		watch_end(watch, &c->ode);
+		peak_tracker_end(tracker, &c->ode);
 		if (course_turn_over(c)) {
 			conclude_contact(c, r);
 			flies = flies || course_may_strike(c, flight);
@@ -457,48 +458,50 @@ static int follow(struct run *c, struct watch *watch, struct course_result *r)
 			if (in->count_ring)
 				error = ring_down(c, r);
 		}
-		watch_resume(watch, &c->ode);
+		peak_tracker_resume(tracker, &c->ode);
 	}
-	watch_end(watch, &c->ode);
+	peak_tracker_end(tracker, &c->ode);
 	return error;
 }
 
 /* Of a body that does not turn these are shares of S1R and CENTRE_R. */
 #define UPRIGHT_SKIPS (1u << COURSE_S1X | 1u << COURSE_S1Y | 1u << COURSE_S2X)
 
-static void peaks_upright(struct watch *w)
+static void peaks_upright(struct peak_tracker *w)
 {
 	const enum course_signal of[] = {
 	        [COURSE_S1X] = COURSE_S1R, [COURSE_S1Y] = COURSE_S1R, [COURSE_S2X] = COURSE_CENTRE_R};
 
 	for (int i = COURSE_S1X; i <= COURSE_S2X; i++)
-		w->peak[i] = (struct watch_peak){w->with[of[i]][i], w->peak[of[i]].time_s};
+		w->peak[i] = (struct peak_tracker_peak){w->with[of[i]][i], w->peak[of[i]].time_s};
 }
 
 int course_solve(const struct course *in, struct course_result *result)
 {
 	struct course_result r = {.ring_hz = (double)NAN, .ring_damping = (double)NAN};
 	struct run run;
-	struct watch watch = {.count = COURSE_SIGNALS,
-	                      .signals = course_signals,
-	                      .context = &run,
-	                      .skipped = in->skipped | (in->body.turns ? 0u : UPRIGHT_SKIPS),
-	                      .rough = in->rough};
+	struct peak_tracker tracker = {.count = COURSE_SIGNALS,
+	                               .signals = course_signals,
+	                               .context = &run,
+	                               .skipped = in->skipped | (in->body.turns ? 0u : UPRIGHT_SKIPS),
+	                               .rough = in->rough};
 	int error;
 
 	course_start(&run, in);
-	watch_start(&watch, &run.ode);
-	error = follow(&run, &watch, &r);
+	peak_tracker_start(&tracker, &run.ode);
+	error = follow(&run, &tracker, &r);
 	if (error)
 		return error;
 	if (isnan(run.released_s))
 		conclude_contact(&run, &r);
 	if (!in->body.turns)
-		peaks_upright(&watch);
+		peaks_upright(&tracker);
 	for (int i = 0; i < COURSE_SIGNALS; i++)
-		r.peak[i] = watch.peak[i];
-	r.s1_direction_rad = atan2(watch.with[COURSE_S1R][COURSE_S1Y], watch.with[COURSE_S1R][COURSE_S1X]);
-	r.s2_direction_rad = atan2(watch.with[COURSE_S2R][COURSE_S2Y], watch.with[COURSE_S2R][COURSE_S2X]);
+		r.peak[i] = tracker.peak[i];
+	r.s1_direction_rad =
+	        atan2(tracker.with[COURSE_S1R][COURSE_S1Y], tracker.with[COURSE_S1R][COURSE_S1X]);
+	r.s2_direction_rad =
+	        atan2(tracker.with[COURSE_S2R][COURSE_S2Y], tracker.with[COURSE_S2R][COURSE_S2X]);
 	if (r.cut_short)
 		r.velocity_change_m_s = r.spin_rad_s = (double)NAN;
 	r.second_s = run.second_s;

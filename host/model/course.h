@@ -13,7 +13,7 @@
 
 #include "common/error.h"
 #include "host/model/body.h"
-#include "host/model/watch.h"
+#include "host/model/peak_tracker.h"
 
 struct course {
 	struct body body; /* the caller's part of it */
@@ -39,7 +39,7 @@ enum course_signal {
 };
 
 struct course_result {
-	struct watch_peak peak[COURSE_SIGNALS];
+	struct peak_tracker_peak peak[COURSE_SIGNALS];
 	double s1_direction_rad, s2_direction_rad; /* from X towards Y, when the resultant peaks */
 	double contact_time_s;                     /* NAN when the corner stays in the mat */
 	double restitution;           /* corner's speed of leaving over that of impact, NAN too */

@@ -25,7 +25,7 @@ static double step_tolerance(const struct model_options *options, bool turns)
 }
 
 /* One that was not looked for is 0. */
-static struct model_peak peak_of(struct watch_peak peak)
+static struct model_peak peak_of(struct peak_tracker_peak peak)
 {
 	if (peak.value == 0.0)
 		return (struct model_peak){(double)NAN, (double)NAN};

@@ -21,7 +21,7 @@ enum { LCM_LOG_CHANNEL_MAX = 63 };
 #define LCM_LOG_SEAL "DT_SEAL"
 
 /* The channel of the event between the two, where more is known of the drop: no message, a line "name value"
- * for each (fields.h). The seal is then of both, one behind the other. */
+ * for each (metadata.h). The seal is then of both, one behind the other. */
 #define LCM_LOG_ORIGIN "DT_ORIGIN"
 
 struct lcm_log_event {

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "common/wire_table.h"
-#include "host/record/fields.h"
 #include "host/record/lcm_log.h"
+#include "host/record/metadata.h"
 
 enum {
 	PLACE_TICKS = 64,           /* between places */
@@ -417,13 +417,13 @@ void log_walk_sealed(struct log_walk *walk)
 
 int log_walk_told(struct log_walk *walk, const char *name, const char *value)
 {
-	const struct fields_entry *entry = fields_find(name);
+	const struct metadata_entry *entry = metadata_find(name);
 	struct record unwanted = {.file = ""};
 
 	if (entry == NULL || entry->of_drop)
 		return DT_E_FORMAT;
-	return fields_parse(walk->has_held && walk->held_record != NULL ? walk->held_record : &unwanted,
-	                    entry, value);
+	return metadata_parse(walk->has_held && walk->held_record != NULL ? walk->held_record : &unwanted,
+	                      entry, value);
 }
 
 void log_walk_altered(struct log_walk *walk, const char *found, const char *expected)

@@ -127,7 +127,7 @@ void log_walk_frame(struct log_walk *walk, const struct frame *frame);
 void log_walk_drop(struct log_walk *walk, struct record *record);
 /* Behind a drop that log_walk_drop was given: its message is what was sealed. It ends where the seal does. */
 void log_walk_sealed(struct log_walk *walk);
-/* A value of fields.h that any record can have, of the same drop. DT_E_FORMAT: none; DT_E_RANGE: not as it
+/* A value of metadata.h that any record can have, of the same drop. DT_E_FORMAT: none; DT_E_RANGE: not as it
  * is. */
 DT_MUST_USE int log_walk_told(struct log_walk *walk, const char *name, const char *value);
 /* Or it is not what was sealed: the walk ends with DT_E_CORRUPT. */

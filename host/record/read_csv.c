@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "host/record/drop.h"
-#include "host/record/fields.h"
+#include "host/record/metadata.h"
 #include "common/base/number.h"
 #include "host/record/seal.h"
 #include "host/record/write.h"
@@ -71,18 +71,18 @@ static int read_csv_channel(struct reading *reading, const char *text)
 
 static int read_csv_key(struct reading *reading, const char *key, const char *text)
 {
-	const struct fields_entry *entry = fields_find(key);
+	const struct metadata_entry *entry = metadata_find(key);
 
 	if (strcmp(key, "channel") == 0)
 		return read_csv_channel(reading, text);
 	if (!entry)
 		return REFUSE(reading, DT_E_FORMAT, "unknown key \"%.80s\"", key);
-	if (fields_parse(reading->record, entry, text) != 0)
+	if (metadata_parse(reading->record, entry, text) != 0)
 		return REFUSE(reading, DT_E_FORMAT, "%s \"%.80s\", expected %s", key, text,
-		              entry->kind == FIELDS_TIME   ? "a time as 2026-11-27T23:18:58+00:00"
-		              : entry->kind == FIELDS_TEXT ? "a text of less than 64 letters"
-		              : entry->kind == FIELDS_REAL ? "a number"
-		                                           : "a number that is whole and fits");
+		              entry->kind == METADATA_TIME   ? "a time as 2026-11-27T23:18:58+00:00"
+		              : entry->kind == METADATA_TEXT ? "a text of less than 64 letters"
+		              : entry->kind == METADATA_REAL ? "a number"
+		                                             : "a number that is whole and fits");
 	return 0;
 }
 

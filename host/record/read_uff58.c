@@ -11,7 +11,7 @@
 #include "common/base/number.h"
 #include "host/base/mapped.h"
 #include "host/record/drop.h"
-#include "host/record/fields.h"
+#include "host/record/metadata.h"
 #include "host/record/seal.h"
 #include "host/record/timebase.h"
 #include "host/record/uff58_text.h"
@@ -169,14 +169,14 @@ static int read_uff58_channel(struct reading *reading, const struct uff58_head *
 static int read_words(struct reading *reading, const char *line)
 {
 	const char *value = strchr(line, '=');
-	const struct fields_entry *entry;
+	const struct metadata_entry *entry;
 	char name[32];
 
 	if (strcmp(line, "NONE") == 0)
 		return 0;
 	snprintf(name, sizeof(name), "%.*s", (int)(value ? value - line : 0), line);
-	entry = fields_find(name);
-	if (!entry || entry->kind != FIELDS_TEXT || fields_parse(reading->record, entry, value + 1) != 0)
+	entry = metadata_find(name);
+	if (!entry || entry->kind != METADATA_TEXT || metadata_parse(reading->record, entry, value + 1) != 0)
 		return UFF58_REFUSE(&reading->text, DT_E_FORMAT,
 		                    "identification \"%.80s\", expected NONE or name=words", line);
 	return 0;
@@ -192,12 +192,12 @@ static int read_fields(struct reading *reading, const char *line)
 	strcpy(text, line);
 	for (char *word = strtok_r(text, " ", &rest); word; word = strtok_r(NULL, " ", &rest)) {
 		char *value = strchr(word, '=');
-		const struct fields_entry *entry;
+		const struct metadata_entry *entry;
 
 		if (value)
 			*value++ = '\0';
-		entry = value ? fields_find(word) : NULL;
-		if (!entry || fields_parse(reading->record, entry, value) != 0)
+		entry = value ? metadata_find(word) : NULL;
+		if (!entry || metadata_parse(reading->record, entry, value) != 0)
 			return UFF58_REFUSE(&reading->text, DT_E_FORMAT,
 			                    "identification \"%.80s\", expected name=value words", line);
 	}

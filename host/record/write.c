@@ -16,12 +16,12 @@
 #include "host/record/blocks.h"
 #include "host/record/digest.h"
 #include "host/record/drop.h"
-#include "host/record/fields.h"
 #include "host/record/hdf5.h"
 #include "host/record/lcm_codec.h"
 #include "host/record/lcm_log.h"
 #include "host/record/log_index.h"
 #include "host/record/mat.h"
+#include "host/record/metadata.h"
 #include "host/record/mme.h"
 #include "host/record/seal.h"
 #include "host/record/uff58.h"
@@ -131,13 +131,13 @@ static void write_put_number(FILE *out, double value)
 /* What is known of it by name, a line each behind a mark; of_drop: what only a drop has, too. */
 static void put_fields(const struct record *record, const char *mark, bool of_drop, FILE *out)
 {
-	const struct fields_entry *entry;
-	char text[FIELDS_TEXT_MAX];
+	const struct metadata_entry *entry;
+	char text[METADATA_TEXT_MAX];
 
-	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++) {
-		if (!fields_known(record, entry) || (entry->of_drop && !of_drop))
+	for (size_t i = 0; (entry = metadata_entry(i)) != NULL; i++) {
+		if (!metadata_known(record, entry) || (entry->of_drop && !of_drop))
 			continue;
-		fields_format(record, entry, text);
+		metadata_format(record, entry, text);
 		fprintf(out, "%s%s %s\n", mark, entry->name, text);
 	}
 }

@@ -14,7 +14,7 @@
 #include "common/base/number.h"
 #include "common/units.h"
 #include "host/base/atomic_file.h"
-#include "host/record/fields.h"
+#include "host/record/metadata.h"
 #include "host/record/mme.h"
 #include "host/record/source.h"
 
@@ -36,10 +36,10 @@ static void put_number(FILE *out, const char *key, double value)
 /* When it fell, in UTC, as "2026-11-28 03:22:26". */
 static void put_date(FILE *out, const struct record *record)
 {
-	char date[FIELDS_TEXT_MAX] = "";
+	char date[METADATA_TEXT_MAX] = "";
 
-	if (fields_known(record, fields_find("date"))) {
-		fields_format(record, fields_find("date"), date);
+	if (metadata_known(record, metadata_find("date"))) {
+		metadata_format(record, metadata_find("date"), date);
 		date[10] = ' ';
 		date[19] = '\0';
 	}
@@ -48,25 +48,25 @@ static void put_date(FILE *out, const struct record *record)
 
 static int put_test(const struct record *record, FILE *out, const char *title)
 {
-	const struct fields_entry *entry;
-	char key[80], text[FIELDS_TEXT_MAX];
+	const struct metadata_entry *entry;
+	char key[80], text[METADATA_TEXT_MAX];
 
 	put_text(out, "Data format edition number", "1.6");
 	put_text(out, "Laboratory name", "");
 	put_text(out, "Title", title);
 	put_date(out, record);
 	put_number(out, "Number of test objects", 1);
-	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++) {
-		if (!fields_known(record, entry))
+	for (size_t i = 0; (entry = metadata_entry(i)) != NULL; i++) {
+		if (!metadata_known(record, entry))
 			continue;
 		snprintf(key, sizeof(key), ".droptower %s ", entry->name);
-		fields_format(record, entry, text);
-		if (entry->kind >= FIELDS_TIME)
+		metadata_format(record, entry, text);
+		if (entry->kind >= METADATA_TIME)
 			put_text(out, key, text);
 		else
 			put_number(out, key,
-			           entry->kind == FIELDS_REAL ? fields_real(record, entry)
-			                                      : (double)fields_whole(record, entry));
+			           entry->kind == METADATA_REAL ? metadata_real(record, entry)
+			                                        : (double)metadata_whole(record, entry));
 	}
 	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
 }

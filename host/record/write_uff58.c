@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "host/record/fields.h"
+#include "host/record/metadata.h"
 #include "common/base/number.h"
 #include "host/record/seal.h"
 #include "host/record/uff58.h"
@@ -90,14 +90,14 @@ static unsigned mask_of(const struct channel *channel, size_t k)
 /* The which-th of what a record knows in words, in a line of its own; "NONE" if there are not so many. */
 static void fill_words(const struct record *record, size_t which, char line[UFF58_ID_CHARS + 1])
 {
-	const struct fields_entry *entry;
-	char text[FIELDS_TEXT_MAX];
+	const struct metadata_entry *entry;
+	char text[METADATA_TEXT_MAX];
 
 	strcpy(line, "NONE");
-	for (size_t i = 0; (entry = fields_entry(i)) != NULL; i++) {
-		if (entry->kind != FIELDS_TEXT || !fields_known(record, entry) || which-- != 0)
+	for (size_t i = 0; (entry = metadata_entry(i)) != NULL; i++) {
+		if (entry->kind != METADATA_TEXT || !metadata_known(record, entry) || which-- != 0)
 			continue;
-		fields_format(record, entry, text);
+		metadata_format(record, entry, text);
 		snprintf(line, UFF58_ID_CHARS + 1, "%s=%s", entry->name, text);
 		return;
 	}
@@ -106,17 +106,17 @@ static void fill_words(const struct record *record, size_t which, char line[UFF5
 /* As many of the drop's numbers as fit into one line, from *next on; "NONE" if none is left. */
 static void fill_line(const struct record *record, size_t *next, char line[UFF58_ID_CHARS + 1])
 {
-	const struct fields_entry *entry;
+	const struct metadata_entry *entry;
 	size_t used = 0;
 
 	strcpy(line, "NONE");
-	for (; (entry = fields_entry(*next)) != NULL; ++*next) {
-		char number[FIELDS_TEXT_MAX], word[2 * UFF58_ID_CHARS];
+	for (; (entry = metadata_entry(*next)) != NULL; ++*next) {
+		char number[METADATA_TEXT_MAX], word[2 * UFF58_ID_CHARS];
 		size_t length;
 
-		if (!fields_known(record, entry) || entry->kind == FIELDS_TEXT)
+		if (!metadata_known(record, entry) || entry->kind == METADATA_TEXT)
 			continue;
-		fields_format(record, entry, number);
+		metadata_format(record, entry, number);
 		length =
 		        (size_t)snprintf(word, sizeof(word), "%s%s=%s", used ? " " : "", entry->name, number);
 		if (used + length > ID_MAX)
@@ -177,7 +177,7 @@ int write_uff58(const struct record *record, FILE *out)
 			return DT_E_ARGUMENT;
 	for (size_t i = 0; i < record->channel_count; i++)
 		write_uff58_put_channel(record, i, &next_field, out);
-	if (record->is_drop && fields_entry(next_field) != NULL)
+	if (record->is_drop && metadata_entry(next_field) != NULL)
 		return DT_E_FULL; /* a number that no line has room for */
 	return fflush(out) || ferror(out) ? DT_E_SYSTEM : 0;
 }

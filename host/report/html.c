@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "host/base/atomic_file.h"
-#include "host/record/fields.h"
+#include "host/record/metadata.h"
 #include "host/result/measured.h"
 #include "host/report/page.h"
 #include "host/report/shock.h"
@@ -22,11 +22,11 @@ static const char *title(const struct report *report)
 /* When and by whom. */
 static void put_origin(const struct record *r, FILE *out)
 {
-	char date[FIELDS_TEXT_MAX];
+	char date[METADATA_TEXT_MAX];
 
 	if (r->time_s == 0)
 		return;
-	fields_format(r, fields_find("date"), date);
+	metadata_format(r, metadata_find("date"), date);
 	fprintf(out, "<time>%c%s%c</time>", HTML_OWN, date, HTML_OWN_END);
 	fputs(r->operator_name[0] != '\0' ? ", " : "", out);
 	html_own(out, r->operator_name);

@@ -8,7 +8,7 @@
 #include "host/model/ensemble.h"
 #include "common/base/text.h"
 #include "host/estimate/cfc.h"
-#include "host/record/fields.h"
+#include "host/record/metadata.h"
 #include "host/report/facts.h"
 #include "host/base/put.h"
 #include "host/report/shock.h"
@@ -278,21 +278,21 @@ static void json_put_origin(struct builder *b, cJSON *root, const struct report 
 	struct record known = {.time_s = report->record->time_s,
 	                       .simulated = report->simulated || report->record->simulated != 0};
 	cJSON *origin = put_object(b, root, "origin");
-	const struct fields_entry *entry;
-	char text[FIELDS_TEXT_MAX];
+	const struct metadata_entry *entry;
+	char text[METADATA_TEXT_MAX];
 
 	strcpy(known.operator_name, report->record->operator_name);
 	strcpy(known.scene, report->record->scene);
 	strcpy(known.sensors, report->record->sensors);
 	if (report->scene != NULL)
-		fields_take_words(known.scene, report->scene->name);
+		metadata_take_words(known.scene, report->scene->name);
 	if (report->sensors != NULL)
 		sensors_serials(report->sensors, known.sensors, sizeof(known.sensors));
-	for (size_t i = 0; (entry = fields_entry(i)) != NULL && !entry->of_drop; i++) {
-		fields_format(&known, entry, text);
-		if (entry->kind == FIELDS_U16)
+	for (size_t i = 0; (entry = metadata_entry(i)) != NULL && !entry->of_drop; i++) {
+		metadata_format(&known, entry, text);
+		if (entry->kind == METADATA_U16)
 			put_bool(b, origin, entry->name, known.simulated != 0);
-		else if (fields_known(&known, entry))
+		else if (metadata_known(&known, entry))
 			put_text(b, origin, entry->name, text);
 		else
 			put_item(b, origin, entry->name, cJSON_CreateNull());

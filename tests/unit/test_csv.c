@@ -12,7 +12,7 @@
 #include "host/record/join.h"
 #include "host/record/read.h"
 #include "host/record/seal.h"
-#include "host/record/fields.h"
+#include "host/record/metadata.h"
 #include "host/record/write.h"
 #include "tests/unit/drop_by_hand.h"
 
@@ -186,7 +186,7 @@ static void test_the_layout(void **state)
 	b->sample[1] = SAMPLE_BAD;
 	record.time_s = 1795821538;
 	record.simulated = 1;
-	fields_take_words(record.operator_name, " Ann, B.\n");
+	metadata_take_words(record.operator_name, " Ann, B.\n");
 	assert_int_equal(write_record(&record, file, message), 0);
 	bytes = hand_read(file, &size);
 	assert_string_equal(bytes, expected);

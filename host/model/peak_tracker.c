@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "host/model/watch.h"
+#include "host/model/peak_tracker.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -16,7 +16,7 @@ enum { ROUNDS = sizeof(round_share) / sizeof(round_share[0]), KINK_STEPS = 60 };
 #define GOLDEN 0.6180339887498949
 #define ROUGH_SHARE 0.2
 
-static void watch_sample(struct watch *w, const struct ode *ode, double t)
+static void peak_tracker_sample(struct peak_tracker *w, const struct ode *ode, double t)
 {
 	double y[ODE_STATES_MAX];
 
@@ -30,33 +30,34 @@ static void watch_sample(struct watch *w, const struct ode *ode, double t)
 		w->seen++;
 }
 
-static void record(struct watch *w, size_t signal, double t, const double value[])
+static void record(struct peak_tracker *w, size_t signal, double t, const double value[])
 {
-	w->peak[signal] = (struct watch_peak){value[signal], t};
+	w->peak[signal] = (struct peak_tracker_peak){value[signal], t};
 	memcpy(w->with[signal], value, w->count * sizeof(*value));
 }
 
-void watch_start(struct watch *w, const struct ode *ode)
+void peak_tracker_start(struct peak_tracker *w, const struct ode *ode)
 {
 	w->seen = 0;
-	watch_sample(w, ode, ode->t);
+	peak_tracker_sample(w, ode, ode->t);
 	for (size_t i = 0; i < w->count; i++)
 		record(w, i, ode->t, w->value[2]);
 }
 
-void watch_resume(struct watch *w, const struct ode *ode)
+void peak_tracker_resume(struct peak_tracker *w, const struct ode *ode)
 {
 	w->seen = 0;
 	w->resumed = true;
-	watch_sample(w, ode, ode->t);
+	peak_tracker_sample(w, ode, ode->t);
 	for (size_t i = 0; i < w->count; i++)
 		if (!(w->skipped >> i & 1u) && fabs(w->value[2][i]) > fabs(w->peak[i].value))
 			record(w, i, ode->t, w->value[2]);
 }
 
-static double watch_magnitude(const struct watch *w, const struct ode *ode, size_t signal, double t)
+static double peak_tracker_magnitude(const struct peak_tracker *w, const struct ode *ode, size_t signal,
+                                     double t)
 {
-	double y[ODE_STATES_MAX], value[WATCH_SIGNALS_MAX];
+	double y[ODE_STATES_MAX], value[PEAK_TRACKER_SIGNALS_MAX];
 
 	ode_at(ode, t, y);
 	w->signals(w->context, y, value);
@@ -76,8 +77,8 @@ static double vertex(const double t[3], const double f[3])
 }
 
 /* Sharpens *t, a peak between two instants. False if no parabola fits. */
-static bool close_in(const struct watch *w, const struct ode *ode, size_t signal, const double time_s[3],
-                     double *t)
+static bool close_in(const struct peak_tracker *w, const struct ode *ode, size_t signal,
+                     const double time_s[3], double *t)
 {
 	double reach = fmin(time_s[2] - time_s[1], time_s[1] - time_s[0]), most = 0.0;
 	bool within = false;
@@ -89,20 +90,21 @@ static bool close_in(const struct watch *w, const struct ode *ode, size_t signal
 		if (at[0] < time_s[0] || at[2] > time_s[2])
 			return false;
 		for (int k = 0; k < 3; k++)
-			f[k] = watch_magnitude(w, ode, signal, at[k]);
+			f[k] = peak_tracker_magnitude(w, ode, signal, at[k]);
 		*t = vertex(at, f);
 		within = *t > at[0] && *t < at[2];
 		most = fmax(fmax(f[0], f[1]), f[2]);
 	}
-	return within && watch_magnitude(w, ode, signal, *t) >= most * (1.0 - 1e-12);
+	return within && peak_tracker_magnitude(w, ode, signal, *t) >= most * (1.0 - 1e-12);
 }
 
 /* The largest between two instants that have one peak between them, whatever its shape. */
-static double golden_section(const struct watch *w, const struct ode *ode, size_t signal, double low,
+static double golden_section(const struct peak_tracker *w, const struct ode *ode, size_t signal, double low,
                              double high)
 {
 	double a = high - GOLDEN * (high - low), b = low + GOLDEN * (high - low);
-	double at_a = watch_magnitude(w, ode, signal, a), at_b = watch_magnitude(w, ode, signal, b);
+	double at_a = peak_tracker_magnitude(w, ode, signal, a),
+	       at_b = peak_tracker_magnitude(w, ode, signal, b);
 
 	for (int i = 0; i < KINK_STEPS; i++) {
 		if (at_a > at_b) {
@@ -110,20 +112,20 @@ static double golden_section(const struct watch *w, const struct ode *ode, size_
 			b = a;
 			at_b = at_a;
 			a = high - GOLDEN * (high - low);
-			at_a = watch_magnitude(w, ode, signal, a);
+			at_a = peak_tracker_magnitude(w, ode, signal, a);
 		} else {
 			low = a;
 			a = b;
 			at_a = at_b;
 			b = low + GOLDEN * (high - low);
-			at_b = watch_magnitude(w, ode, signal, b);
+			at_b = peak_tracker_magnitude(w, ode, signal, b);
 		}
 	}
 	return 0.5 * (low + high);
 }
 
 /* A narrower parabola about t, as good as long steps deserve. */
-static double vertex_again(const struct watch *w, const struct ode *ode, size_t signal,
+static double vertex_again(const struct peak_tracker *w, const struct ode *ode, size_t signal,
                            const double time_s[3], double t)
 {
 	double step = ROUGH_SHARE * fmin(time_s[2] - time_s[1], time_s[1] - time_s[0]), f[3];
@@ -132,15 +134,15 @@ static double vertex_again(const struct watch *w, const struct ode *ode, size_t 
 	if (at[0] < time_s[0] || at[2] > time_s[2])
 		return t;
 	for (int k = 0; k < 3; k++)
-		f[k] = watch_magnitude(w, ode, signal, at[k]);
+		f[k] = peak_tracker_magnitude(w, ode, signal, at[k]);
 	return vertex(at, f);
 }
 
 /* The middle one of three instants is where the signal is largest, as far as known; f: its magnitudes. */
-static void watch_refine(struct watch *w, const struct ode *ode, size_t signal, const double time_s[3],
-                         const double f[3])
+static void peak_tracker_refine(struct peak_tracker *w, const struct ode *ode, size_t signal,
+                                const double time_s[3], const double f[3])
 {
-	double t = vertex(time_s, f), y[ODE_STATES_MAX], value[WATCH_SIGNALS_MAX];
+	double t = vertex(time_s, f), y[ODE_STATES_MAX], value[PEAK_TRACKER_SIGNALS_MAX];
 
 	if (w->rough)
 		t = vertex_again(w, ode, signal, time_s, t);
@@ -163,22 +165,22 @@ static void watch_refine(struct watch *w, const struct ode *ode, size_t signal, 
 /* How near the end, or the new start, of all its slope is looked at. */
 #define END_SHARE 1e-3
 
-/* Between the first two samples after watch_resume, where no earlier one tells of a peak. */
-static void watch_look_at_start(struct watch *w, const struct ode *ode, size_t signal)
+/* Between the first two samples after peak_tracker_resume, where no earlier one tells of a peak. */
+static void watch_look_at_start(struct peak_tracker *w, const struct ode *ode, size_t signal)
 {
 	double from = w->time_s[0], to = w->time_s[1], edge[3] = {from, from + END_SHARE * (to - from), to};
 	double f[3] = {fabs(w->value[0][signal]), 0.0, fabs(w->value[1][signal])};
 
 	if (f[0] < f[2])
 		return;
-	f[1] = watch_magnitude(w, ode, signal, edge[1]);
+	f[1] = peak_tracker_magnitude(w, ode, signal, edge[1]);
 	if (f[1] > f[0])
-		watch_refine(w, ode, signal, edge, f);
+		peak_tracker_refine(w, ode, signal, edge, f);
 }
 
-static void watch_look(struct watch *w, const struct ode *ode, double t)
+static void peak_tracker_look(struct peak_tracker *w, const struct ode *ode, double t)
 {
-	watch_sample(w, ode, t);
+	peak_tracker_sample(w, ode, t);
 	if (w->seen < 3)
 		return;
 	for (size_t i = 0; i < w->count; i++) {
@@ -189,46 +191,46 @@ static void watch_look(struct watch *w, const struct ode *ode, double t)
 		for (int k = 0; k < 3; k++)
 			f[k] = fabs(w->value[k][i]);
 		if (f[1] >= f[0] && f[1] > f[2] && f[1] * HIDDEN_SHARE > fabs(w->peak[i].value))
-			watch_refine(w, ode, i, w->time_s, f);
+			peak_tracker_refine(w, ode, i, w->time_s, f);
 		if (w->resumed && f[0] * HIDDEN_SHARE > fabs(w->peak[i].value))
 			watch_look_at_start(w, ode, i);
 	}
 	w->resumed = false;
 }
 
-void watch_step(struct watch *w, const struct ode *ode)
+void peak_tracker_step(struct peak_tracker *w, const struct ode *ode)
 {
-	watch_look(w, ode, 0.5 * (ode->last.from + ode->last.end));
-	watch_look(w, ode, ode->last.end);
+	peak_tracker_look(w, ode, 0.5 * (ode->last.from + ode->last.end));
+	peak_tracker_look(w, ode, ode->last.end);
 }
 
 /* Between the last two samples, where no later one tells of a peak. */
-static void watch_look_at_end(struct watch *w, const struct ode *ode, size_t signal)
+static void watch_look_at_end(struct peak_tracker *w, const struct ode *ode, size_t signal)
 {
 	double from = w->time_s[1], to = w->time_s[2], half[3] = {from, 0.5 * (from + to), to};
 	double edge[3] = {half[1], to - END_SHARE * (to - from), to}, end = fabs(w->value[2][signal]);
-	double middle = watch_magnitude(w, ode, signal, half[1]);
+	double middle = peak_tracker_magnitude(w, ode, signal, half[1]);
 	double before = fabs(w->value[1][signal]), slope;
 
 	if (middle >= end && middle >= before) {
-		watch_refine(w, ode, signal, half, (const double[]){before, middle, end});
+		peak_tracker_refine(w, ode, signal, half, (const double[]){before, middle, end});
 	} else if (middle < end) {
-		slope = watch_magnitude(w, ode, signal, edge[1]);
+		slope = peak_tracker_magnitude(w, ode, signal, edge[1]);
 		if (slope > end)
-			watch_refine(w, ode, signal, edge, (const double[]){middle, slope, end});
+			peak_tracker_refine(w, ode, signal, edge, (const double[]){middle, slope, end});
 	}
 	if (end > fabs(w->peak[signal].value))
 		record(w, signal, to, w->value[2]);
 }
 
-bool watch_passed(const struct watch *w, size_t signal, double share)
+bool peak_tracker_passed(const struct peak_tracker *w, size_t signal, double share)
 {
 	double now = fabs(w->value[2][signal]);
 
 	return w->seen == 3 && now < fabs(w->value[1][signal]) && now < share * fabs(w->peak[signal].value);
 }
 
-void watch_end(struct watch *w, const struct ode *ode)
+void peak_tracker_end(struct peak_tracker *w, const struct ode *ode)
 {
 	for (size_t i = 0; i < w->count; i++)
 		if (!(w->skipped >> i & 1u) && fabs(w->value[2][i]) * HIDDEN_SHARE > fabs(w->peak[i].value))
@@ -249,7 +251,7 @@ static double crossing_at(double t, void *context)
 	return y[c->state];
 }
 
-double watch_crossing(const struct ode *ode, size_t state)
+double peak_tracker_crossing(const struct ode *ode, size_t state)
 {
 	struct crossing c = {ode, state};
 	double t = ode->last.end;
