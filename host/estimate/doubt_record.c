@@ -23,13 +23,10 @@
 #define BEGIN_APART 0.025
 #define END_APART 0.15
 
-/* What the stronger axis reads beyond its part of the other in the first swing, root mean square, as part of
- * its peak: by two parts and by four. On our own tower at 10 to 45 degrees the case has 0.026 and 0.0085, a
- * plate 0.07 and 0.029, and what shakes with the case like one, no wider than it, 0.25 and 0.17. */
-static const struct apart {
-	double two, four;
-} apart_case = {0.032, 0.013}, apart_plate = {0.09, 0.035}, apart_rigid = {0.3, 0.2};
-#define PLATE_WIDER 1.3
+/* What the stronger axis of the case reads beyond its part of the other, root mean square, as part of its
+ * peak: by two parts and by four. Own tower, 10 to 70 degrees: 0.046 and 0.023. */
+#define UNLIKE_TWO 0.06
+#define UNLIKE_FOUR 0.03
 enum { SHAPE_SAMPLES = 12, SHAPE_PARTS = 4 };
 
 /* An axis that stands out of its noise by less has width, time and area by its sensor's strongest one too. */
@@ -45,12 +42,9 @@ enum { SHAPE_SAMPLES = 12, SHAPE_PARTS = 4 };
 /* Squared, over the mean square of what straight lines between samples miss of a bend, at kinks. */
 #define LINE_SQUARE 20.0
 
-/* The speed of S1 over S2's: of X and Y together, and of each. Own tower, 10 to 40 degrees: 0.99 to 1.16, and
- * 0.72 to 1.48. Its fade, and the mean square of that. */
-#define SPEED_LEAST 0.9
-#define SPEED_MOST 1.2
-#define SPEED_AXIS_LEAST 0.6
-#define SPEED_AXIS_MOST 1.8
+/* How far the speeds that S1 and S2 gain in X and Y may be apart, over S2's: where the box turns. Own tower,
+ * 10 to 70 degrees: 0.48 at most. Their fade, and the mean square of that. */
+#define SPEED_APART 0.6
 #define FADE_S 0.08
 #define FADE_SQUARE 0.375
 
@@ -137,6 +131,15 @@ static void axis_flag(struct estimate_channel *channel)
 	channel->pulse.flags |= ESTIMATE_FLAG_AXES;
 }
 
+/* X and Y of one sensor against the other's, whose Y shows nothing of what it should by far. */
+static bool axis_dead(struct estimate_channel *const alive[2], struct estimate_channel *const other[2])
+{
+	return axis_sure(alive[0]) && axis_sure(alive[1]) && axis_sure(other[0]) &&
+	       other[1]->peak.how.status == ESTIMATE_NO_PEAK &&
+	       fabs(alive[1]->peak.value_g / alive[0]->peak.value_g * other[0]->peak.value_g) >
+	               AXIS_SIGMAS * other[1]->baseline.noise_g;
+}
+
 /* Exchanged X and Y explain what S1 and S2 read better than what they are called. */
 static bool axis_exchanged(struct estimate_channel *const channel[2][2])
 {
@@ -213,8 +216,7 @@ static bool shapes_beyond(const struct shapes *shapes, unsigned parts, double ap
 
 /* One axis shows another pulse than its sensor's other one: a limit, a gain, a filter or a hold of its own.
  */
-static bool axis_unlike(const struct trace *const trace[2], struct estimate_channel *const xy[2],
-                        struct apart apart)
+static bool axis_unlike(const struct trace *const trace[2], struct estimate_channel *const xy[2])
 {
 	unsigned strong =
 	        fabs(xy[1]->peak.value_g) / trace[1]->noise_g > fabs(xy[0]->peak.value_g) / trace[0]->noise_g;
@@ -229,18 +231,8 @@ static bool axis_unlike(const struct trace *const trace[2], struct estimate_chan
 	for (size_t k = shapes.from; k < shapes.until; k++)
 		if (shapes_row(&shapes, k, row))
 			gram_add(&shapes.gram, row);
-	return shapes_beyond(&shapes, 2, apart.two * peak_g) ||
-	       shapes_beyond(&shapes, SHAPE_PARTS, apart.four * peak_g);
-}
-
-/* Of the plate, where it swings slower than the case. */
-static bool axis_unlike_plate(const struct trace *const trace[2][2],
-                              struct estimate_channel *const channel[2][2])
-{
-	double wider = fmin(channel[0][0]->pulse.duration_s / channel[1][0]->pulse.duration_s,
-	                    channel[0][1]->pulse.duration_s / channel[1][1]->pulse.duration_s);
-
-	return axis_unlike(trace[0], channel[0], wider > PLATE_WIDER ? apart_plate : apart_rigid);
+	return shapes_beyond(&shapes, 2, UNLIKE_TWO * peak_g) ||
+	       shapes_beyond(&shapes, SHAPE_PARTS, UNLIKE_FOUR * peak_g);
 }
 
 /* What a sensor's axis has gained of speed, in g s, over the fade that lets the plate swing about the case;
@@ -266,33 +258,28 @@ static double axis_speed(const struct trace *trace, const struct estimate_baseli
 	return sum / trace->rate_hz;
 }
 
-/* Plate and case go on together, whatever is between them: one of them reads too much or too little. */
+/* Plate and case go on together, but for what the box turns, whatever is between them: one of them reads too
+ * much or too little. */
 static bool axes_part(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2])
 {
-	double from_s = fmin(channel[1][0]->pulse.start_s, channel[1][1]->pulse.start_s), square[2] = {0, 0},
-	       speed[2], sigma[2], most = 0;
-	bool part = false;
+	double from_s = fmin(channel[1][0]->pulse.start_s, channel[1][1]->pulse.start_s);
+	double gained = 0, apart = 0, most = 0;
 
 	if (isnan(from_s))
 		return false;
 	for (unsigned axis = 0; axis < 2; axis++) {
+		double speed[2], sigma[2];
+
 		for (unsigned s = 0; s < 2; s++) {
 			if (channel[s][axis]->baseline.unsettled || channel[s][axis]->baseline.doubtful)
 				return false;
 			speed[s] = axis_speed(trace[s][axis], &channel[s][axis]->baseline, from_s, &sigma[s]);
-			square[s] += speed[s] * speed[s];
 		}
-		if (isnan(speed[0] + speed[1]))
-			return false;
+		gained = hypot(gained, speed[1]);
+		apart = hypot(apart, speed[0] - speed[1]);
 		most = fmax(most, hypot(sigma[0], sigma[1]));
-		speed[0] *= speed[1] < 0 ? -1 : 1;
-		part |= speed[0] <
-		                SPEED_AXIS_LEAST * fabs(speed[1]) - LIMIT_NOISE * hypot(sigma[0], sigma[1]) ||
-		        speed[0] > SPEED_AXIS_MOST * fabs(speed[1]) +
-		                           LIMIT_NOISE * hypot(SPEED_AXIS_MOST * sigma[1], sigma[0]);
 	}
-	return part || sqrt(square[0]) < SPEED_LEAST * sqrt(square[1]) - LIMIT_NOISE * most ||
-	       sqrt(square[0]) > SPEED_MOST * sqrt(square[1]) + LIMIT_NOISE * SPEED_MOST * most;
+	return apart > SPEED_APART * gained + LIMIT_NOISE * most; /* false where one is not known */
 }
 
 /* Whether the plate begins before the case that shakes it, whose axes begin together. */
@@ -395,8 +382,8 @@ void doubt_ripple(struct peak *const peak[2], double width_s)
 unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2])
 {
 	struct estimate_channel *const *s1 = channel[0], *const *s2 = channel[1];
-	bool any = axis_exchanged(channel) || axis_late(s2) || axis_unlike_plate(trace, channel) ||
-	           axis_unlike(trace[1], s2, apart_case) || axes_part(trace, channel) || axes_lead(s1, s2);
+	bool any = axis_exchanged(channel) || axis_dead(s1, s2) || axis_dead(s2, s1) || axis_late(s2) ||
+	           axis_unlike(trace[1], s2) || axes_part(trace, channel) || axes_lead(s1, s2);
 	/* What shifts zero on both axes of the case is in a supply that the plate's have too. */
 	unsigned shared = s2[0]->peak.how.flags & s2[1]->peak.how.flags & ESTIMATE_FLAG_TAIL;
 
