@@ -44,11 +44,11 @@ static const char *name_of(uint8_t which)
 	static const char *const ours[] = {"format",  "version", "sha256", "name", "rate_hz", "start_s",
 	                                   "range_g", "uneven",  "units",  "bits", "other"};
 	const size_t count = sizeof(ours) / sizeof(ours[0]);
-	const struct fields_entry *entry;
+	const struct metadata_entry *entry;
 
 	if (which < count)
 		return ours[which];
-	entry = fields_entry(which - count);
+	entry = metadata_entry(which - count);
 	return entry != NULL ? entry->name : "";
 }
 
