@@ -174,12 +174,12 @@ void auth_rates_init(struct auth_rates *rates, double burst, double per_s)
 
 bool auth_take_of(struct auth_rates *rates, const char *console, int64_t now_ms)
 {
-	struct guard_console *place = &rates->console[0];
+	struct auth_console *place = &rates->console[0];
 
 	if (console[0] == '\0')
 		return auth_take(&rates->unnamed, now_ms);
 	for (unsigned i = 0; i < AUTH_CONSOLES; i++) {
-		struct guard_console *other = &rates->console[i];
+		struct auth_console *other = &rates->console[i];
 
 		if (strcmp(other->name, console) == 0)
 			return auth_take(&other->rate, now_ms);

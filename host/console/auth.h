@@ -45,7 +45,7 @@ bool auth_take(struct auth_rate *rate, int64_t now_ms);
  * more. */
 enum { AUTH_CONSOLES = 16, AUTH_CONSOLE_MAX = 64 };
 struct auth_rates {
-	struct guard_console {
+	struct auth_console {
 		char name[AUTH_CONSOLE_MAX + 1];
 		struct auth_rate rate;
 	} console[AUTH_CONSOLES];

@@ -2,7 +2,7 @@
 #ifndef DT_HOST_CONSOLE_HTTP_H
 #define DT_HOST_CONSOLE_HTTP_H
 /*
- * The console's web server: a thread that takes connections, looks who asks (guard), finds the job (route),
+ * The console's web server: a thread that takes connections, looks who asks (auth), finds the job (route),
  * puts the connection to sleep until the job is done, and sends the answer. It waits for nothing and touches
  * no file.
  *

@@ -30,7 +30,7 @@ struct view {
 	double swing[DECAYS_MAX][2];     /* their cosines and sines */
 };
 
-static struct view modes_sums_look(const struct modes_problem *problem, const double *p)
+static struct view modes_normal_look(const struct modes_problem *problem, const double *p)
 {
 	const struct modes *modes = problem->modes;
 	const struct block_means *series = problem->series;
@@ -75,7 +75,7 @@ static inline struct complex_pair plus(struct complex_pair a, struct complex_pai
 	return (struct complex_pair){a.re + b.re, a.im + b.im};
 }
 
-static inline struct complex_pair modes_sums_scale(PAIR factor, struct complex_pair a)
+static inline struct complex_pair modes_normal_scale(PAIR factor, struct complex_pair a)
 {
 	return (struct complex_pair){factor * a.re, factor * a.im};
 }
@@ -94,8 +94,8 @@ static void sum_geometric(struct complex_pair w, unsigned n, struct complex_pair
 	while (bit <= n / 2)
 		bit *= 2;
 	while (bit >>= 1) {
-		struct complex_pair late = plus(sum[1], modes_sums_scale(m, sum[0]));
-		struct complex_pair later = plus(sum[2], modes_sums_scale(m, plus(sum[1], late)));
+		struct complex_pair late = plus(sum[1], modes_normal_scale(m, sum[0]));
+		struct complex_pair later = plus(sum[2], modes_normal_scale(m, plus(sum[1], late)));
 
 		sum[0] = plus(sum[0], times(power, sum[0]));
 		sum[1] = plus(sum[1], times(power, late));
@@ -104,8 +104,8 @@ static void sum_geometric(struct complex_pair w, unsigned n, struct complex_pair
 		m += m;
 		if (n & bit) {
 			sum[0] = plus(sum[0], power);
-			sum[1] = plus(sum[1], modes_sums_scale(m, power));
-			sum[2] = plus(sum[2], modes_sums_scale(m * m, power));
+			sum[1] = plus(sum[1], modes_normal_scale(m, power));
+			sum[2] = plus(sum[2], modes_normal_scale(m * m, power));
 			power = times(power, w);
 			m += one;
 		}
@@ -116,10 +116,10 @@ static void sum_geometric(struct complex_pair w, unsigned n, struct complex_pair
 static void by_time(struct complex_pair sum[3], struct complex_pair start, const struct view *view)
 {
 	const PAIR first = {view->first_s, view->first_s}, step = {view->step_s, view->step_s};
-	struct complex_pair late = plus(modes_sums_scale(first, sum[0]), modes_sums_scale(step, sum[1]));
-	struct complex_pair later = plus(modes_sums_scale(step, sum[1]), late);
+	struct complex_pair late = plus(modes_normal_scale(first, sum[0]), modes_normal_scale(step, sum[1]));
+	struct complex_pair later = plus(modes_normal_scale(step, sum[1]), late);
 
-	later = plus(modes_sums_scale(first, later), modes_sums_scale(step * step, sum[2]));
+	later = plus(modes_normal_scale(first, later), modes_normal_scale(step * step, sum[2]));
 	sum[0] = times(start, sum[0]);
 	sum[1] = times(start, late);
 	sum[2] = times(start, later);
@@ -168,8 +168,8 @@ static inline void take_off(struct complex_pair sum[3], struct complex_pair valu
 {
 	const PAIR minus = {-1, -1}, later = {time, time};
 
-	value = modes_sums_scale(minus, value);
-	for (unsigned i = 0; i < 3; i++, value = modes_sums_scale(later, value))
+	value = modes_normal_scale(minus, value);
+	for (unsigned i = 0; i < 3; i++, value = modes_normal_scale(later, value))
 		sum[i] = plus(sum[i], value);
 }
 
@@ -262,7 +262,7 @@ static unsigned make_columns(struct column column[CHOLESKY_MAX], const struct mo
 	return n;
 }
 
-static inline double modes_sums_both(PAIR pair)
+static inline double modes_normal_both(PAIR pair)
 {
 	return pair[0] + pair[1];
 }
@@ -274,12 +274,12 @@ static void linear_products(const struct sums *sums, const struct view *view, un
 	const struct residual_sums *r = &sums->residual;
 
 	product[0][0] = used;
-	right[0] = modes_sums_both(r->sum);
+	right[0] = modes_normal_both(r->sum);
 	for (unsigned d = 0; d < view->decays; d++) {
 		double *c = product[1 + 2 * d], *s = product[2 + 2 * d];
 
-		right[1 + 2 * d] = modes_sums_both(r->c[d][0]);
-		right[2 + 2 * d] = modes_sums_both(r->s[d][0]);
+		right[1 + 2 * d] = modes_normal_both(r->c[d][0]);
+		right[2 + 2 * d] = modes_normal_both(r->s[d][0]);
 		c[0] = sums->of[d][0].re[0];
 		s[0] = sums->of[d][0].im[0];
 		for (unsigned e = 0; e <= d; e++) {
@@ -355,21 +355,21 @@ size_t modes_undisturbed(const void *context, double *p, double normal[CHOLESKY_
 
 	if (!modes_possible(problem->modes, p))
 		return 0;
-	view = modes_sums_look(problem, p);
+	view = modes_normal_look(problem, p);
 	sum_up(&sums, &view);
 	if (problem->modes->count > 1)
 		project(&sums, &view, problem, p);
 	n = make_columns(column, problem->modes, p);
 	normal[MODES_OFFSET][MODES_OFFSET] = problem->series->used;
-	right[MODES_OFFSET] = modes_sums_both(sums.residual.sum);
-	*squares = modes_sums_both(sums.residual.squares);
+	right[MODES_OFFSET] = modes_normal_both(sums.residual.sum);
+	*squares = modes_normal_both(sums.residual.squares);
 	for (unsigned i = 0; i < n; i++) {
 		const struct column a = column[i];
 		const struct complex_pair of = sums.of[a.decay][a.late];
 
 		normal[1 + i][MODES_OFFSET] = a.c * of.re[0] + a.s * of.im[0];
-		right[1 + i] = modes_sums_both(a.c * sums.residual.c[a.decay][a.late] +
-		                               a.s * sums.residual.s[a.decay][a.late]);
+		right[1 + i] = modes_normal_both(a.c * sums.residual.c[a.decay][a.late] +
+		                                 a.s * sums.residual.s[a.decay][a.late]);
 		for (unsigned j = 0; j <= i; j++) {
 			const struct column b = column[j];
 			const struct complex_pair with = sums.with[a.decay][b.decay][a.late + b.late];

@@ -145,7 +145,7 @@ static void try_spring_like(struct ringdown_job *job, double k)
 #define ASIDE 1.15
 
 /* Two modes from the one and another beside it; false unless both come out as decays. */
-static bool ringdown_richer_fit_two(struct modes *modes, const struct ringdown_job *job, double aside)
+static bool ringdown_models_fit_two(struct modes *modes, const struct ringdown_job *job, double aside)
 {
 	*modes = (struct modes){.count = 2};
 	for (unsigned m = 0; m < 2; m++) {
@@ -177,7 +177,7 @@ static void try_two(struct ringdown_job *job)
 
 	ringdown_try(job, "two-modes");
 	for (size_t i = 0; i < sizeof(aside) / sizeof(aside[0]) && !ringdown_passes(job, &best); i++)
-		if (ringdown_richer_fit_two(&modes, job, aside[i]) && modes.fit.squares < best.fit.squares)
+		if (ringdown_models_fit_two(&modes, job, aside[i]) && modes.fit.squares < best.fit.squares)
 			best = modes;
 	if (best.count < 2)
 		return;
@@ -200,7 +200,7 @@ static void distrust(struct ringdown_job *job)
 }
 
 /* What was found before, but the path that has been gone since. */
-static void ringdown_richer_restore(struct ringdown_job *job, const struct ringdown_job *before)
+static void ringdown_models_restore(struct ringdown_job *job, const struct ringdown_job *before)
 {
 	const char *path[ESTIMATE_PATH_MAX];
 	unsigned tried = job->tried;
@@ -284,7 +284,7 @@ void ringdown_try_richer(struct ringdown_job *job)
 	const struct ringdown_job before = *job;
 
 	if (!ringdown_lengthen(job)) {
-		ringdown_richer_restore(job, &before);
+		ringdown_models_restore(job, &before);
 		return;
 	}
 	if (!is_like_another(job))
@@ -292,7 +292,7 @@ void ringdown_try_richer(struct ringdown_job *job)
 	if (ringdown_passes(job, &job->modes))
 		job->flags &= ~(unsigned)ESTIMATE_FLAG_NOT_SEPARABLE;
 	else if (ringdown_chi_square(&before, &before.modes) < ringdown_chi_square(job, &job->modes))
-		ringdown_richer_restore(job, &before);
+		ringdown_models_restore(job, &before);
 	else if (ringdown_chi_square(job, &job->modes) > LIMIT_GROSS)
 		distrust(job);
 }

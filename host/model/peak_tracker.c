@@ -166,7 +166,7 @@ static void peak_tracker_refine(struct peak_tracker *w, const struct ode *ode, s
 #define END_SHARE 1e-3
 
 /* Between the first two samples after peak_tracker_resume, where no earlier one tells of a peak. */
-static void watch_look_at_start(struct peak_tracker *w, const struct ode *ode, size_t signal)
+static void peak_tracker_look_at_start(struct peak_tracker *w, const struct ode *ode, size_t signal)
 {
 	double from = w->time_s[0], to = w->time_s[1], edge[3] = {from, from + END_SHARE * (to - from), to};
 	double f[3] = {fabs(w->value[0][signal]), 0.0, fabs(w->value[1][signal])};
@@ -193,7 +193,7 @@ static void peak_tracker_look(struct peak_tracker *w, const struct ode *ode, dou
 		if (f[1] >= f[0] && f[1] > f[2] && f[1] * HIDDEN_SHARE > fabs(w->peak[i].value))
 			peak_tracker_refine(w, ode, i, w->time_s, f);
 		if (w->resumed && f[0] * HIDDEN_SHARE > fabs(w->peak[i].value))
-			watch_look_at_start(w, ode, i);
+			peak_tracker_look_at_start(w, ode, i);
 	}
 	w->resumed = false;
 }
@@ -205,7 +205,7 @@ void peak_tracker_step(struct peak_tracker *w, const struct ode *ode)
 }
 
 /* Between the last two samples, where no later one tells of a peak. */
-static void watch_look_at_end(struct peak_tracker *w, const struct ode *ode, size_t signal)
+static void peak_tracker_look_at_end(struct peak_tracker *w, const struct ode *ode, size_t signal)
 {
 	double from = w->time_s[1], to = w->time_s[2], half[3] = {from, 0.5 * (from + to), to};
 	double edge[3] = {half[1], to - END_SHARE * (to - from), to}, end = fabs(w->value[2][signal]);
@@ -234,7 +234,7 @@ void peak_tracker_end(struct peak_tracker *w, const struct ode *ode)
 {
 	for (size_t i = 0; i < w->count; i++)
 		if (!(w->skipped >> i & 1u) && fabs(w->value[2][i]) * HIDDEN_SHARE > fabs(w->peak[i].value))
-			watch_look_at_end(w, ode, i);
+			peak_tracker_look_at_end(w, ode, i);
 }
 
 struct crossing {
