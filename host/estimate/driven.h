@@ -67,6 +67,6 @@ void driven_at(const struct driven_curve *curve, double time_s, double derivativ
  * there the smooth curve's value stays, and its time is less certain by what the two differ. Nor where S1's
  * largest sample is of another contact: nothing is changed. */
 bool peak_driven(const struct driven_axis *axis, const struct driven *driven,
-                 const struct driven_curve *curve, const struct estimate_options *options, struct peak *peak);
+                 const struct driven_curve *curve, struct peak *peak);
 
 #endif

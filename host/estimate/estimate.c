@@ -94,8 +94,8 @@ static void analyse_weak(const struct desk *desk, const char *sensor, struct ana
 		if (i == analysis->channel_count || i == strong)
 			continue;
 		if (!peak_is_weak(&work->trace, &work->peak) ||
-		    !peak_weak(&work->trace, desk->options, &desk->work[strong].trace,
-		               &desk->work[strong].peak, &work->peak)) {
+		    !peak_weak(&work->trace, &desk->work[strong].trace, &desk->work[strong].peak,
+		               &work->peak)) {
 			doubt_share((const struct trace *const[]){&desk->work[strong].trace, &work->trace},
 			            (struct peak *const[]){&desk->work[strong].peak, &work->peak},
 			            (struct estimate_pulse *const[]){&analysis->channels[strong].pulse,
@@ -227,6 +227,7 @@ static int estimate_analyse(const struct desk *desk, struct analysis *analysis)
 	estimate_compare(desk, analysis);
 	if (desk->options->impact_speed_m_s > 0)
 		analyse_rebound(desk, analysis);
+	estimate_tolerance(desk, analysis);
 	return 0;
 }
 

@@ -64,6 +64,12 @@ struct estimate_how {
 	enum estimate_status status;
 };
 
+#define ESTIMATE_TOLERANCE 0.005
+
+/* Whether a standard uncertainty is within a tolerance (0: ESTIMATE_TOLERANCE) of a value, or of the whole
+ * that an instant is part of. One that is not known is not. */
+bool estimate_meets(double sigma, double whole, double tolerance);
+
 /* Pulse families. AUTO: family-free unless precision asks for more. */
 enum estimate_family {
 	ESTIMATE_FAMILY_AUTO,
@@ -222,8 +228,6 @@ struct analysis {
 	bool has_motion; /* a fitted scene was given, and the tower's sensors are there */
 	struct estimate_motion motion;
 };
-
-#define ESTIMATE_TOLERANCE 0.005
 
 struct estimate_options {
 	double lowpass_hz; /* zero-phase low-pass with this corner before everything else; 0 = raw */

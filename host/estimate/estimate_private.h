@@ -6,6 +6,7 @@
  *   estimate.c          the order of it all; each channel by itself
  *   estimate_decay.c    where a channel's decay begins and ends; the plate's of two axes
  *   estimate_sensors.c  S1 on S2, and what that says of S1's peaks and decays; resultants and lag
+ *   estimate_tolerance.c  what of a channel is less certain than asked
  *   estimate_name.c     words for status, flags and families
  */
 #include "host/estimate/estimate.h"
@@ -43,5 +44,9 @@ void estimate_sensors(const struct desk *desk, struct analysis *analysis);
 
 /* X's and Y's ring-down of S1 as one, where it rings on its own. */
 void estimate_plate(const struct desk *desk, struct analysis *analysis);
+
+/* Flags peaks, pulses and contact times that are less certain than asked. Last: every check has widened its
+ * bars. */
+void estimate_tolerance(const struct desk *desk, struct analysis *analysis);
 
 #endif

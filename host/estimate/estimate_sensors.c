@@ -41,10 +41,10 @@ static void estimate_sensors_drive(const struct desk *desk, unsigned i, const st
 	        {&work->trace, s2->axes.trace[i]}, {&work->peak, s2->axes.peak[i]}, &work->ringdown};
 
 	driven_find(&axis, driven, curve);
-	if (peak_driven(&axis, driven, curve, desk->options, &work->peak))
+	if (peak_driven(&axis, driven, curve, &work->peak))
 		s1->axes.curve[i] = curve;
 	else if (driven->status == ESTIMATE_NOT_CONVERGED || driven->flags & ESTIMATE_FLAG_MODEL)
-		peak_narrow(&work->trace, desk->options, &work->peak);
+		peak_narrow(&work->trace, &work->peak);
 	if (isnan(driven->free_s))
 		return;
 	work->span.from_s = driven->free_s;
@@ -61,7 +61,7 @@ static void time_weak(const struct desk *desk, struct analysis *analysis)
 		if (i == analysis->channel_count || !work->strong ||
 		    !(work->peak.result.how.flags & ESTIMATE_FLAG_WEAK))
 			continue;
-		peak_weak_time(desk->options, work->strong, &work->peak);
+		peak_weak_time(work->strong, &work->peak);
 		analysis->channels[i].peak = work->peak.result;
 	}
 }
@@ -77,7 +77,6 @@ static void estimate_sensors_add_resultant(const char *name, struct sensor *sens
 
 void estimate_sensors(const struct desk *desk, struct analysis *analysis)
 {
-	double tolerance = desk->options->tolerance > 0 ? desk->options->tolerance : ESTIMATE_TOLERANCE;
 	struct estimate_lag *lag = &analysis->lag;
 	struct sensor s1, s2;
 	struct driven driven[2];
@@ -103,6 +102,6 @@ void estimate_sensors(const struct desk *desk, struct analysis *analysis)
 	lag_find(&(struct lag_sensor){s1.axes, &s1.resultant}, &(struct lag_sensor){s2.axes, &s2.resultant},
 	         driven, lag);
 	if (!(lag->driven.flags & ESTIMATE_FLAG_MODEL) &&
-	    lag->sigma_driven_s > tolerance * s2.resultant.width_s)
+	    !estimate_meets(lag->sigma_driven_s, s2.resultant.width_s, desk->options->tolerance))
 		lag->driven.flags |= ESTIMATE_FLAG_TOLERANCE;
 }

@@ -287,20 +287,10 @@ void peak_take_shape(struct peak *peak)
 	peak->model = PEAK_MODEL_SHAPE;
 }
 
-/* Whether the tolerance is met. */
 static bool peak_meets(const struct peak *peak, const struct estimate_options *options)
 {
-	double tolerance = options->tolerance > 0 ? options->tolerance : ESTIMATE_TOLERANCE;
-
-	return peak->result.sigma_g <= tolerance * fabs(peak->result.value_g) &&
-	       peak->result.sigma_time_s <= tolerance * peak->width_s;
-}
-
-void peak_flag_tolerance(struct peak *peak, const struct estimate_options *options)
-{
-	peak->result.how.flags &= ~(unsigned)ESTIMATE_FLAG_TOLERANCE;
-	if (!peak_meets(peak, options))
-		peak->result.how.flags |= ESTIMATE_FLAG_TOLERANCE;
+	return estimate_meets(peak->result.sigma_g, peak->result.value_g, options->tolerance) &&
+	       estimate_meets(peak->result.sigma_time_s, peak->width_s, options->tolerance);
 }
 
 /* Sine-power in place of the polynomials, if nothing speaks against it. */
@@ -439,16 +429,14 @@ void peak_find(const struct trace *trace, const struct estimate_options *options
 	peak_top_doubt(trace, peak);
 	if (peak->result.how.status == ESTIMATE_OK && may_be_spike(trace, peak))
 		peak->result.how.status = ESTIMATE_AMBIGUOUS;
-	peak_flag_tolerance(peak, options);
 }
 
-void peak_narrow(const struct trace *trace, const struct estimate_options *options, struct peak *peak)
+void peak_narrow(const struct trace *trace, struct peak *peak)
 {
 	if (peak->model != PEAK_MODEL_LOCAL || peak->result.how.status != ESTIMATE_OK ||
 	    peak->result.how.flags & ESTIMATE_FLAG_WEAK || !take_crest(trace, BENT * peak->width_s, peak))
 		return;
 	peak_top_doubt(trace, peak);
-	peak_flag_tolerance(peak, options);
 }
 
 bool peak_at(const struct peak *peak, double time_s, double derivative[3], double variance[2])

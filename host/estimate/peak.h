@@ -81,16 +81,16 @@ bool peak_is_weak(const struct trace *trace, const struct peak *peak);
 /* The amplitude of strong's shape in trace, an axis of the same sensor. Peak stays as it is when that is not
  * significant and it has none of its own, or when the residual says that the shape is another one. True if it
  * was replaced. */
-bool peak_weak(const struct trace *trace, const struct estimate_options *options,
-               const struct trace *strong_trace, const struct peak *strong, struct peak *peak);
+bool peak_weak(const struct trace *trace, const struct trace *strong_trace, const struct peak *strong,
+               struct peak *peak);
 
 /* The peak of a plate that no oscillator explains, by polynomials as narrow as what the case's contact leaves
  * under its top. Those as wide as its swing fit within the noise and are up to five of their sigma off in
  * time. A peak that is not of polynomials, ok and an axis of its own stays. */
-void peak_narrow(const struct trace *trace, const struct estimate_options *options, struct peak *peak);
+void peak_narrow(const struct trace *trace, struct peak *peak);
 
 /* The time of peak, which peak_weak gave strong's shape, once strong's has changed. */
-void peak_weak_time(const struct estimate_options *options, const struct peak *strong, struct peak *peak);
+void peak_weak_time(const struct peak *strong, struct peak *peak);
 
 /* Value, slope per s and curvature per s^2 of the axis' model at an instant, and the variances of the first
  * two unless that is NULL; false where it does not reach. */

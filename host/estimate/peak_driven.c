@@ -64,7 +64,7 @@ static void peak_driven_take(const struct driven *driven, double sigma_g, struct
 }
 
 bool peak_driven(const struct driven_axis *axis, const struct driven *driven,
-                 const struct driven_curve *curve, const struct estimate_options *options, struct peak *peak)
+                 const struct driven_curve *curve, struct peak *peak)
 {
 	struct estimate_peak *s1 = &peak->result;
 	bool clipped = s1->how.status == ESTIMATE_CLIPPED, taken;
@@ -79,6 +79,5 @@ bool peak_driven(const struct driven_axis *axis, const struct driven *driven,
 		peak_driven_take(driven, sigma, s1);
 	else
 		s1->sigma_time_s = hypot(s1->sigma_time_s, s1->time_s - driven->peak_s);
-	peak_flag_tolerance(peak, options);
 	return taken;
 }

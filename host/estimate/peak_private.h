@@ -17,9 +17,6 @@
 /* One more method on the path. */
 void peak_tried(struct estimate_how *how, const char *name);
 
-/* Flags the tolerance that is not met, or takes the flag away. */
-void peak_flag_tolerance(struct peak *peak, const struct estimate_options *options);
-
 /* What the samples at the top say against the curve that gave the value, into its bars. */
 void peak_top_doubt(const struct trace *trace, struct peak *peak);
 

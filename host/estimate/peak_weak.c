@@ -44,16 +44,14 @@ static bool fit_amplitude(const struct trace *trace, const struct trace *strong_
 	return !(amplitude->chi_square > 1 + LIMIT_CHI * sqrt(2.0 / (used - 1)));
 }
 
-bool peak_weak(const struct trace *trace, const struct estimate_options *options,
-               const struct trace *strong_trace, const struct peak *strong, struct peak *peak)
+bool peak_weak(const struct trace *trace, const struct trace *strong_trace, const struct peak *strong,
+               struct peak *peak)
 {
 	const struct estimate_peak *from = &strong->result;
 	struct estimate_peak result = {
 	        .time_s = from->time_s,
 	        .sigma_time_s = from->sigma_time_s,
-	        .how = {.method = "strong-axis",
-	                .flags =
-	                        ESTIMATE_FLAG_WEAK | (from->how.flags & ~(unsigned)ESTIMATE_FLAG_TOLERANCE)}};
+	        .how = {.method = "strong-axis", .flags = ESTIMATE_FLAG_WEAK | from->how.flags}};
 	struct amplitude amplitude;
 
 	if (from->how.status != ESTIMATE_OK || strong->model == PEAK_MODEL_NONE || !(trace->noise_g > 0) ||
@@ -76,13 +74,11 @@ bool peak_weak(const struct trace *trace, const struct estimate_options *options
 		peak->at--;
 	peak->sign = amplitude.value < 0 ? -1 : 1;
 	peak->scale = amplitude.value / from->value_g;
-	peak_flag_tolerance(peak, options);
 	return true;
 }
 
-void peak_weak_time(const struct estimate_options *options, const struct peak *strong, struct peak *peak)
+void peak_weak_time(const struct peak *strong, struct peak *peak)
 {
 	peak->result.time_s = strong->result.time_s;
 	peak->result.sigma_time_s = strong->result.sigma_time_s;
-	peak_flag_tolerance(peak, options);
 }

@@ -351,10 +351,8 @@ static void compare_axes(const struct resultant_axes *axes, unsigned strong, str
 
 static bool meets(const struct resultant_axes *axes, const struct resultant *found)
 {
-	double tolerance = axes->tolerance > 0 ? axes->tolerance : ESTIMATE_TOLERANCE;
-
-	return found->result.sigma_g <= tolerance * found->result.peak_g &&
-	       found->result.sigma_time_s <= tolerance * found->width_s;
+	return estimate_meets(found->result.sigma_g, found->result.peak_g, axes->tolerance) &&
+	       estimate_meets(found->result.sigma_time_s, found->width_s, axes->tolerance);
 }
 
 static void take_flags(const struct resultant_axes *axes, struct resultant *found)
@@ -364,7 +362,6 @@ static void take_flags(const struct resultant_axes *axes, struct resultant *foun
 	for (unsigned i = 0; i < 2; i++)
 		if (resultant_usable(axes->peak[i]))
 			*flags |= axes->peak[i]->result.how.flags;
-	*flags &= ~(unsigned)ESTIMATE_FLAG_TOLERANCE;
 	if (!meets(axes, found))
 		*flags |= ESTIMATE_FLAG_TOLERANCE;
 }

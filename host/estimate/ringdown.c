@@ -198,10 +198,10 @@ static const char *method_of(const struct ringdown_job *job)
 /* Values that their residual allows may still be less certain than what was asked for. */
 static bool meets_tolerance(const struct ringdown_job *job, const struct estimate_ringdown *result)
 {
-	double tolerance = job->span->tolerance > 0 ? job->span->tolerance : ESTIMATE_TOLERANCE;
+	double tolerance = job->span->tolerance;
 
-	return result->sigma_hz <= tolerance * result->frequency_hz &&
-	       result->sigma_damping <= tolerance * result->damping_ratio;
+	return estimate_meets(result->sigma_hz, result->frequency_hz, tolerance) &&
+	       estimate_meets(result->sigma_damping, result->damping_ratio, tolerance);
 }
 
 static unsigned shape_flags(const struct ringdown_job *job)

@@ -329,7 +329,8 @@ size_t report_notes(const struct report *report, struct report_note notes[REPORT
 {
 	const struct analysis *a = report->analysis;
 	/* Others are said of the peak. */
-	const unsigned of_pulse = ESTIMATE_FLAG_ZERO | ESTIMATE_FLAG_STEP | ESTIMATE_FLAG_TAIL;
+	const unsigned of_pulse =
+	        ESTIMATE_FLAG_ZERO | ESTIMATE_FLAG_STEP | ESTIMATE_FLAG_TAIL | ESTIMATE_FLAG_TOLERANCE;
 	struct noting noting = {.notes = notes, .flag = 1};
 
 	for (; estimate_flag_name(noting.flag)[0]; noting.flag <<= 1) {
@@ -341,7 +342,8 @@ size_t report_notes(const struct report *report, struct report_note notes[REPORT
 
 			facts_note(&noting, e->peak.value_g, e->peak.how.flags, name, "peak");
 			facts_note(&noting, e->pulse.velocity_change_m_s, e->pulse.flags & of_pulse, name,
-			           "velocity change");
+			           noting.flag == ESTIMATE_FLAG_TOLERANCE ? "width or velocity change"
+			                                                  : "velocity change");
 			facts_note(&noting, e->pulse.contact_time_s, e->pulse.contact.flags, name, "contact");
 		}
 		for (size_t i = 0; i < a->resultant_count; i++)
