@@ -35,6 +35,10 @@ void doubt_channel(const struct trace *trace, const struct estimate_baseline *ba
 void doubt_chain(struct trace *trace, const struct estimate_baseline *baseline, struct peak *peak,
                  struct estimate_pulse *pulse);
 
+/* Of an axis of S2 as read, in its event: until when it was quiet before its first contact; INFINITY where
+ * noise hides that, or it begins so. */
+double doubt_touch_s(const struct trace *trace);
+
 /* Of an axis of S2 as read, in its event: when a contact larger than the first begins; INFINITY: none does.
  */
 double doubt_slap_s(const struct trace *trace);

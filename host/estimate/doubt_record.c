@@ -92,14 +92,30 @@ static double contact_height(const struct trace *trace, size_t k, size_t until, 
 	return most;
 }
 
+double doubt_touch_s(const struct trace *trace)
+{
+	double sigma, zero = quiet_glance(trace, 0, trace->count, &sigma);
+	double most = contact_height(trace, trace->first, trace->last, zero);
+	size_t k = contact_begin(trace, trace->first, zero, fmax(LIMIT_AGAIN * most, LIMIT_NOISE * sigma));
+	size_t foot = k, rise;
+
+	if (k >= trace->last)
+		return INFINITY;
+	while (foot > 0 &&
+	       !(trace_good(trace, foot) && fabs(trace->value_g[foot] - zero) < LIMIT_EDGE * most))
+		foot--;
+	rise = k - foot + 2;
+	return foot < rise ? INFINITY : trace_time(trace, foot - rise);
+}
+
 double doubt_slap_s(const struct trace *trace)
 {
 	double zero, most;
 	size_t first, end, again;
 
-	if (trace->last <= trace->first + 1 || trace->first == 0)
+	if (trace->still == 0 || trace->still >= trace->last)
 		return INFINITY;
-	zero = quiet_glance(trace, 0, trace->first, NULL);
+	zero = quiet_glance(trace, 0, trace->still, NULL);
 	most = contact_height(trace, trace->first, trace->last, zero);
 	first = contact_begin(trace, trace->first, zero, LIMIT_AGAIN * most);
 	end = contact_end(trace, first, zero, LIMIT_EDGE * most);

@@ -134,6 +134,30 @@ static void flag_short(const struct desk *desk, struct analysis *analysis)
 	}
 }
 
+/* What all channels were before the case was hit is quiet. A drop whose trigger did not come with it has that
+ * instant for one. */
+static void estimate_touch(const struct desk *desk)
+{
+	double touch_s = INFINITY;
+
+	for (const char *axis = "XYZ"; *axis; axis++) {
+		size_t i = estimate_find(desk, "S2", *axis);
+
+		if (i < desk->record->channel_count)
+			touch_s = fmin(touch_s, doubt_touch_s(&desk->work[i].trace));
+	}
+	for (size_t i = 0; isfinite(touch_s) && desk->record->is_drop && i < desk->record->channel_count;
+	     i++) {
+		struct trace *trace = &desk->work[i].trace;
+
+		trace->still = trace_index(trace, touch_s);
+		if (isfinite(desk->record->trigger_s))
+			continue;
+		trace->first = trace_index(trace, touch_s - EVENT_BEFORE_S);
+		trace->last = trace_index(trace, touch_s + EVENT_AFTER_S);
+	}
+}
+
 /* A corner drop's second contact may be the larger one: the first is the one that was asked for. */
 static void estimate_first_contact(const struct desk *desk)
 {
@@ -208,6 +232,7 @@ static bool has_good_sample(const struct desk *desk)
 
 static int estimate_analyse(const struct desk *desk, struct analysis *analysis)
 {
+	estimate_touch(desk);
 	estimate_first_contact(desk);
 	for (size_t i = 0; i < analysis->channel_count; i++) {
 		int status = estimate_prepare(desk, i, &analysis->channels[i].baseline);

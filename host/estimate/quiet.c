@@ -86,27 +86,9 @@ static double find_peak(const struct trace *trace, size_t *peak)
 	return middle;
 }
 
-/* The first two samples side by side of the event that reach as far, or peak: the largest may be of a later
- * swing or contact. */
-static size_t quiet_ends(const struct trace *trace, size_t peak, double level)
-{
-	double sigma, middle;
-	size_t k = trace->first;
-
-	if (trace->first < QUIET_SAMPLES_MIN || trace->first > peak)
-		return peak;
-	middle = quiet_glance(trace, 0, trace->first, &sigma);
-	level = fmax(level, LIMIT_NOISE * sigma);
-	while (k < peak &&
-	       !(trace_good(trace, k) && trace_good(trace, k + 1) &&
-	         fabs(trace->value_g[k] - middle) > level && fabs(trace->value_g[k + 1] - middle) > level))
-		k++;
-	return k;
-}
-
 void quiet_find(const struct trace *trace, size_t *from, size_t *until)
 {
-	size_t peak, k, rise, top;
+	size_t peak, k, rise;
 	double middle = find_peak(trace, &peak), quiet = floor(QUIET_S * trace->rate_hz), level;
 
 	k = peak;
@@ -115,13 +97,12 @@ void quiet_find(const struct trace *trace, size_t *from, size_t *until)
 	if (peak == trace->count)
 		return;
 	level = LIMIT_EDGE * fabs(trace->value_g[peak] - middle);
-	k = top = quiet_ends(trace, peak, level);
-	while (top < peak && (!trace_good(trace, top) || fabs(trace->value_g[top] - middle) >= level))
-		top++;
 	while (k > 0 && (!trace_good(trace, k) || fabs(trace->value_g[k] - middle) >= level))
 		k--;
-	rise = top - k + 2;
+	rise = peak - k + 2;
 	*until = k > rise ? k - rise : 0;
+	if (*until > trace->still)
+		*until = trace->still;
 	*from = (double)*until > quiet ? *until - (size_t)quiet : 0;
 }
 

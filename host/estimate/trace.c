@@ -165,6 +165,7 @@ void trace_lay(struct trace *trace, const struct channel *channel, double from_s
 	clip_mark(trace, NAN);
 	trace->first = trace_index(trace, from_s);
 	trace->last = trace_index(trace, until_s);
+	trace->still = trace->count;
 }
 
 int trace_open(struct trace *trace, const struct channel *channel, double from_s, double until_s)

@@ -38,6 +38,7 @@ struct trace {
 	double *value_g;    /* [count]; meaningless where the mask says lost or bad */
 	uint8_t *sample;    /* [count], SAMPLE_* and TRACE_LIMIT */
 	size_t first, last; /* the event is looked for in [first, last) */
+	size_t still;       /* nothing of it is before this, on any channel; count: that is not known */
 	double noise_g;     /* per sample, before any filter; NAN while unknown */
 	double hum_hz;  /* of the strongest hum that was taken off, a little of which may be left; NAN if none
 	                 */
