@@ -23,10 +23,13 @@
 #define BEGIN_APART 0.025
 #define END_APART 0.15
 
-/* What the stronger axis of the case reads beyond its part of the other, root mean square, as part of its
- * peak: by two parts and by four. Own tower, 10 to 70 degrees: 0.046 and 0.023. */
+/* What the stronger axis of a sensor reads beyond its part of the other, root mean square, as part of its
+ * peak: by two parts and by four. Own tower, 10 to 70 degrees: of the case 0.046 and 0.023, of a plate that
+ * swings at one frequency 0.077 and 0.034. */
 #define UNLIKE_TWO 0.06
 #define UNLIKE_FOUR 0.03
+#define PLATE_TWO 0.1
+#define PLATE_FOUR 0.045
 enum { SHAPE_SAMPLES = 12, SHAPE_PARTS = 4 };
 
 /* An axis that stands out of its noise by less has width, time and area by its sensor's strongest one too. */
@@ -232,7 +235,8 @@ static bool shapes_beyond(const struct shapes *shapes, unsigned parts, double ap
 
 /* One axis shows another pulse than its sensor's other one: a limit, a gain, a filter or a hold of its own.
  */
-static bool axis_unlike(const struct trace *const trace[2], struct estimate_channel *const xy[2])
+static bool axis_unlike(const struct trace *const trace[2], struct estimate_channel *const xy[2], double two,
+                        double four)
 {
 	unsigned strong =
 	        fabs(xy[1]->peak.value_g) / trace[1]->noise_g > fabs(xy[0]->peak.value_g) / trace[0]->noise_g;
@@ -247,8 +251,17 @@ static bool axis_unlike(const struct trace *const trace[2], struct estimate_chan
 	for (size_t k = shapes.from; k < shapes.until; k++)
 		if (shapes_row(&shapes, k, row))
 			gram_add(&shapes.gram, row);
-	return shapes_beyond(&shapes, 2, UNLIKE_TWO * peak_g) ||
-	       shapes_beyond(&shapes, SHAPE_PARTS, UNLIKE_FOUR * peak_g);
+	return shapes_beyond(&shapes, 2, two * peak_g) || shapes_beyond(&shapes, SHAPE_PARTS, four * peak_g);
+}
+
+/* X and Y of a plate that swing at one frequency show one swing from the same pulse. */
+static bool plate_unlike(const struct trace *const trace[2], struct estimate_channel *const xy[2])
+{
+	const struct estimate_ringdown *x = &xy[0]->ringdown, *y = &xy[1]->ringdown;
+
+	return x->how.status == ESTIMATE_OK && y->how.status == ESTIMATE_OK &&
+	       fabs(x->frequency_hz - y->frequency_hz) < LIMIT_PART * x->frequency_hz &&
+	       axis_unlike(trace, xy, PLATE_TWO, PLATE_FOUR);
 }
 
 /* What a sensor's axis has gained of speed, in g s, over the fade that lets the plate swing about the case;
@@ -399,7 +412,8 @@ unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_chann
 {
 	struct estimate_channel *const *s1 = channel[0], *const *s2 = channel[1];
 	bool any = axis_exchanged(channel) || axis_dead(s1, s2) || axis_dead(s2, s1) || axis_late(s2) ||
-	           axis_unlike(trace[1], s2) || axes_part(trace, channel) || axes_lead(s1, s2);
+	           axis_unlike(trace[1], s2, UNLIKE_TWO, UNLIKE_FOUR) || plate_unlike(trace[0], s1) ||
+	           axes_part(trace, channel) || axes_lead(s1, s2);
 	/* What shifts zero on both axes of the case is in a supply that the plate's have too. */
 	unsigned shared = s2[0]->peak.how.flags & s2[1]->peak.how.flags & ESTIMATE_FLAG_TAIL;
 

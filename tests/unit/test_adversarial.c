@@ -699,9 +699,22 @@ static void adversarial(void **state)
 	assert_true(whole.alarms <= 1 + whole.drops / 50);
 }
 
+/* A plate whose axes swing at one frequency shows one swing in both: X, limited softly, does not. */
+static void plate_axes(void **state)
+{
+	(void)state;
+	for (int i = 0; i < CLASSES; i++)
+		if (classes[i].spoil == S1_LIMITED) {
+			struct count count = play(i, 30);
+
+			print_count(classes[i].name, &count);
+			assert_in_range(count.alarms, 22, 30);
+		}
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(adversarial)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(adversarial), cmocka_unit_test(plate_axes)};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
