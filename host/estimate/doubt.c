@@ -96,27 +96,30 @@ static bool plateau_ends(const struct trace *trace, const struct plateau *top, d
 	return fall > LIMIT_NOISE * noise_g && fall * half * half / (4 * half + 4) > LIMIT_AGREE * noise_g;
 }
 
-/* About a straight line through the samples of a top. */
+/* About the mean of the samples of a top. */
 struct tremble {
-	double square, slope; /* sum of squares about their mean; of the line, in its standard deviations */
+	double square;      /* sum of squares */
+	double slope, bend; /* of a straight line, of a parabola outward, in their standard deviations */
 	double count;
 };
 
 static struct tremble plateau_tremble(const struct trace *trace, const struct plateau *top, double noise_g)
 {
-	double n = (double)(top->until - top->from + 1), mean = 0, along = 0;
-	struct tremble tremble = {0, 0, n};
+	double n = (double)(top->until - top->from + 1), mean = 0, along = 0, outward = 0;
+	struct tremble tremble = {0, 0, 0, n};
 
 	for (size_t k = top->from; k <= top->until; k++)
 		mean += trace->value_g[k] / n;
 	tremble.square = n * trace->step_g * trace->step_g / 12; /* that rounding hides */
 	for (size_t k = top->from; k <= top->until; k++) {
-		double off = trace->value_g[k] - mean;
+		double off = trace->value_g[k] - mean, place = (double)(k - top->from) - (n - 1) / 2;
 
 		tremble.square += off * off;
-		along += off * ((double)(k - top->from) - (n - 1) / 2);
+		along += off * place;
+		outward += off * place * place;
 	}
 	tremble.slope = fabs(along) / (noise_g * sqrt(n * (n * n - 1) / 12));
+	tremble.bend = outward / (noise_g * sqrt(n * (n * n - 1) * (n * n - 4) / 180));
 	return tremble;
 }
 
@@ -130,17 +133,17 @@ static bool plateau_cut(const struct trace *trace, const struct plateau *top, do
 	return pow(tremble.square / (2 * noise_g * noise_g), half) / tgamma(half + 1) < PLATEAU_CHANCE;
 }
 
-/* Whether they tremble as noise about a level top, and a round one as high would show by far. */
+/* Whether they tremble as noise about a level top, and bend far less than a round one that falls off so. */
 static bool plateau_flat(const struct trace *trace, const struct plateau *top, double noise_g)
 {
-	double half = (double)(top->until - top->from) / 2;
+	double half = (double)(top->until - top->from) / 2, sign = trace->value_g[top->from] < 0 ? 1 : -1;
 	double round_g = plateau_fall(trace, top) * half * half / (4 * half + 4);
 	struct tremble tremble = plateau_tremble(trace, top, noise_g);
-	double freedom = tremble.count - 1, square = pow(round_g / noise_g, 2);
+	double freedom = tremble.count - 1, bend = sign * tremble.bend;
 
-	return tremble.count > PLATEAU_SAMPLES && tremble.slope < LIMIT_AGREE &&
+	return tremble.count > PLATEAU_SAMPLES && tremble.slope < LIMIT_AGREE && bend < LIMIT_AGREE &&
 	       tremble.square < noise_g * noise_g * freedom * (1 + LIMIT_CHI * sqrt(2 / freedom)) &&
-	       ROUND_SPREAD * tremble.count * square > LIMIT_SIGNIFICANT * LIMIT_SIGNIFICANT;
+	       sqrt(ROUND_SPREAD * tremble.count) * round_g / noise_g - bend > LIMIT_NOISE;
 }
 
 /* Sample by sample outward from the largest one, to the ends of what is flat by that. */
