@@ -25,7 +25,7 @@ void clean_find(struct trace *trace, double *scratch, struct estimate_baseline *
 	if (settle_find(trace, &settle))
 		settle_remove(trace, &settle);
 	clean_baseline(trace, scratch, baseline);
-	marked = spike_mark(trace, baseline->noise_g);
+	marked = spike_mark(trace, baseline->noise_g > 0 ? baseline->noise_g : clip_step(trace) / sqrt(12.0));
 	marked |= dropout_mark(trace, baseline->noise_g);
 	if (marked) {
 		trace_marked(trace);

@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "common/units.h"
+#include "host/estimate/clip.h"
 #include "host/estimate/doubt.h"
 #include "host/estimate/gram.h"
 #include "host/estimate/limits.h"
@@ -95,11 +96,17 @@ static double contact_height(const struct trace *trace, size_t k, size_t until, 
 	return most;
 }
 
+/* What two samples of a contact reach: more than noise and one step of coarse numbers, which hide it. */
+static double contact_level(const struct trace *trace, double most_g, double sigma_g)
+{
+	return fmax(LIMIT_AGAIN * most_g, LIMIT_NOISE * fmax(sigma_g, clip_step(trace) / sqrt(12.0)));
+}
+
 double doubt_touch_s(const struct trace *trace)
 {
 	double sigma, zero = quiet_glance(trace, 0, trace->count, &sigma);
 	double most = contact_height(trace, trace->first, trace->last, zero);
-	size_t k = contact_begin(trace, trace->first, zero, fmax(LIMIT_AGAIN * most, LIMIT_NOISE * sigma));
+	size_t k = contact_begin(trace, trace->first, zero, contact_level(trace, most, sigma));
 	size_t foot = k, rise;
 
 	if (k >= trace->last)
@@ -113,16 +120,17 @@ double doubt_touch_s(const struct trace *trace)
 
 double doubt_slap_s(const struct trace *trace)
 {
-	double zero, most;
+	double zero, most, sigma, level;
 	size_t first, end, again;
 
 	if (trace->still == 0 || trace->still >= trace->last)
 		return INFINITY;
-	zero = quiet_glance(trace, 0, trace->still, NULL);
+	zero = quiet_glance(trace, 0, trace->still, &sigma);
 	most = contact_height(trace, trace->first, trace->last, zero);
-	first = contact_begin(trace, trace->first, zero, LIMIT_AGAIN * most);
+	level = contact_level(trace, most, sigma);
+	first = contact_begin(trace, trace->first, zero, level);
 	end = contact_end(trace, first, zero, LIMIT_EDGE * most);
-	again = contact_begin(trace, end, zero, LIMIT_AGAIN * most);
+	again = contact_begin(trace, end, zero, level);
 	if (again >= trace->last ||
 	    !(contact_height(trace, end, trace->last, zero) > contact_height(trace, first, end, zero)))
 		return INFINITY;

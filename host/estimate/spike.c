@@ -134,6 +134,15 @@ static bool is_extreme(const struct trace *trace, size_t k)
 	return fabs(trace->value_g[k]) >= LIMIT_MOST * trace_most(trace, k);
 }
 
+/* Whether two that stand off by off_g are spikes by what is beside them: of a step each is as high as what is
+ * outside of it, and of a vibration what is between them stands off too. */
+static bool spike_apart(const double *v, size_t behind, double off_g)
+{
+	if (behind == 1)
+		return fmin(fabs(v[0] - v[-1]), fabs(v[1] - v[2])) > LIMIT_EXPLAINS * off_g;
+	return behind > 2 || fabs(v[1] - (v[-1] + v[3]) / 2) < LIMIT_EXPLAINS * off_g;
+}
+
 /* Two so near that each is the other's neighbour: how far behind k the second one is; 0 if there is none.
  * Side by side to the same side they are spike_at's, or a kink. Lower ones than what is around them do no
  * harm, and may be a vibration. */
@@ -149,6 +158,7 @@ static size_t second_spike(const struct trace *trace, size_t k, double noise_g)
 		double one = off_line(v, 1, between), other = off_line(v + behind, between, 1);
 
 		if (fabs(one) > least && fabs(other) > least && (behind > 1 || one * other < 0) &&
+		    spike_apart(v, behind, fmin(fabs(one), fabs(other))) &&
 		    (is_extreme(trace, k) || is_extreme(trace, k + behind)) &&
 		    all_good(trace, k - SIDE, k + SIDE + 1) &&
 		    stands_alone_by_hole(trace, k, k + behind, noise_g) &&
@@ -330,11 +340,11 @@ void spike_of_noise(struct trace *trace, const struct estimate_baseline *baselin
 	if (!reaches_far(trace, from, until))
 		return;
 	reach = spike_reach(trace, from, until);
-	if (!(reach.ratio > TAIL_RATIO + LIMIT_AGREE * TAIL_SPREAD / sqrt(reach.count)))
+	if (!(reach.ratio > TAIL_RATIO + LIMIT_HINT * TAIL_SPREAD / sqrt(reach.count)))
 		return;
 	for (size_t k = 1; k + 1 < trace->count; k++)
 		if (trace->sample[k] & SAMPLE_SPIKE &&
-		    !(fabs(off_line(trace->value_g + k, 1, 1)) < LIMIT_GROSS * reach.most))
+		    !(fabs(off_line(trace->value_g + k, 1, 1)) < LIMIT_SURE * reach.most))
 			return;
 	trace->flags &= ~(unsigned)RECORD_FLAG_SPIKE;
 }

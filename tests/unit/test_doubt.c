@@ -12,6 +12,7 @@
 #include <stdio.h>
 #include <cmocka.h>
 
+#include "host/estimate/doubt.h"
 #include "host/estimate/estimate.h"
 #include "host/record/drop.h"
 #include "tests/unit/near.h"
@@ -240,8 +241,8 @@ static void spoilt(void **state)
 		}
 }
 
-/* Half-sines of 3 to 12 ms whose noise is a fiftieth to a hundredth of them: that of a round top hides how round
- * it is over a few samples, in some windows of many. */
+/* Half-sines of 3 to 12 ms whose noise is a fiftieth to a hundredth of them: that of a round top hides how
+ * round it is over a few samples, in some windows of many. */
 static void round_tops_in_noise(void **state)
 {
 	enum { DROPS = 1500 };
@@ -260,8 +261,7 @@ static void round_tops_in_noise(void **state)
 		for (size_t k = 0; k < channel.count; k++) {
 			double x = ((double)k / RATE_HZ - onset_s) / base_s;
 
-			channel.value_g[k] =
-			        100 * pulse_form(HALF_SINE, x) + noise_g * synth_normal(&random);
+			channel.value_g[k] = 100 * pulse_form(HALF_SINE, x) + noise_g * synth_normal(&random);
 		}
 		assert_int_equal(estimate_record(&record, &options, &analysis), 0);
 		level += (analysis.channels[0].peak.how.flags & ESTIMATE_FLAG_FLAT) != 0;
@@ -269,6 +269,25 @@ static void round_tops_in_noise(void **state)
 	}
 	print_message("%u of %u round tops level\n", level, DROPS);
 	assert_int_equal(level, 0);
+	synth_free(&channel);
+}
+
+/* Two samples of noise side by side, one step of coarse numbers high, are no contact before one of three. */
+static void no_contact_of_noise(void **state)
+{
+	struct channel channel = synth_channel("S2Z", RATE_HZ, 0, SAMPLES);
+	struct trace trace;
+
+	(void)state;
+	for (size_t k = 0; k < SAMPLES; k += 50)
+		channel.value_g[k] = 1;
+	channel.value_g[SAMPLES / 2 - 99] = 1;
+	for (size_t k = 0; k < 10; k++)
+		channel.value_g[SAMPLES / 2 + k] = round(3.4 * sin(0.314159265358979 * (double)k));
+	assert_int_equal(trace_open(&trace, &channel, 0.08, 0.2), 0);
+	trace.still = trace.first;
+	assert_true(doubt_slap_s(&trace) > trace_time(&trace, trace.count));
+	trace_close(&trace);
 	synth_free(&channel);
 }
 
@@ -380,8 +399,10 @@ static void what_is_quiet_before_a_drop(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(whole), cmocka_unit_test(spoilt),
+	const struct CMUnitTest tests[] = {cmocka_unit_test(whole),
+	                                   cmocka_unit_test(spoilt),
 	                                   cmocka_unit_test(round_tops_in_noise),
+	                                   cmocka_unit_test(no_contact_of_noise),
 	                                   cmocka_unit_test(a_high_pass_in_a_short_record),
 	                                   cmocka_unit_test(a_coarse_converter),
 	                                   cmocka_unit_test(what_is_quiet_before_a_drop)};
