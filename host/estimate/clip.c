@@ -125,7 +125,8 @@ static size_t clip_aside(size_t first, size_t last)
 	return 2 + (last - first) / 4;
 }
 
-/* Whether they foretell more than the equal ones show: a parabola through them, about their middle. */
+/* Whether they foretell more than the equal ones show: a parabola through them, about their middle, and each
+ * side of it alone, which a corner's level side does not. */
 static bool clip_foretold(const struct trace *trace, size_t first, size_t last, double noise_g)
 {
 	const double *v = trace->value_g;
@@ -134,11 +135,14 @@ static bool clip_foretold(const struct trace *trace, size_t first, size_t last, 
 	double reach = square / ((half + (double)aside) * (half + (double)aside) - square);
 	double near = (v[first - 1] + v[last + 1]) / 2, far = (v[first - aside] + v[last + aside]) / 2;
 	double beyond = near + reach * (near - far) - v[first];
-	double spread = sqrt(((1 + reach) * (1 + reach) + reach * reach) / 2 + 0.5);
+	double before = v[first - 1] + reach * (v[first - 1] - v[first - aside]) - v[first];
+	double after = v[last + 1] + reach * (v[last + 1] - v[last + aside]) - v[first];
+	double sigma = sqrt(((1 + reach) * (1 + reach) + reach * reach) / 2 + 0.5) *
+	               hypot(noise_g, clip_step(trace) / sqrt(12.0));
+	double sign = v[first] < 0 ? -1 : 1;
 
-	return beyond * (v[first] - near) > 0 &&
-	       fabs(beyond) > LIMIT_AGREE * spread * hypot(noise_g, clip_step(trace) / sqrt(12.0)) +
-	                              LIMIT_EDGE * fabs(v[first] - near);
+	return fmin(sign * before, sign * after) > LIMIT_HINT * sigma &&
+	       sign * beyond > LIMIT_SIGNIFICANT * sigma + LIMIT_EDGE * fabs(v[first] - near);
 }
 
 /* Whether n equal extremes make a limit: one at the known range, others where chance cannot make them equal,
@@ -156,7 +160,8 @@ static bool enough(const struct trace *trace, size_t first, size_t last, size_t 
 		return n >= EQUAL_EXTREMES - 1;
 	if (n >= EQUAL_EXTREMES && !clip_coarse(trace, first, last))
 		return true;
-	if (!isfinite(noise_g) || (n < EQUAL_EXTREMES && (n < 2 || last - first > 1)))
+	if (!isfinite(noise_g) || n < 2 ||
+	    n <= last - first) /* noise does not fall below a limit by chance */
 		return false;
 	if (first >= aside && last + aside < trace->count && trace_good(trace, first - aside) &&
 	    trace_good(trace, first - 1) && trace_good(trace, last + 1) && trace_good(trace, last + aside))

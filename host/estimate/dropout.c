@@ -17,10 +17,6 @@ enum {
  * by CLIP_TREMBLE steps one in seventy: a run is chance's once in a million. */
 #define HELD_STEPS 8.0
 
-/* In numbers coarser than noise the case at rest between two contacts reads nothing but zeros: so long they
- * are no hole. */
-#define REST_S 1.5e-3
-
 /* Of all samples, those that equal the one before, where half of what differs does so by more than LIMIT_OVER
  * steps: repeated all along. Of noise one in eight does. */
 #define REPEATED 0.25
@@ -83,6 +79,22 @@ static bool stands_off(const struct trace *trace, size_t k, double noise_g)
 	return trace_good(trace, k) && fabs(trace->value_g[k]) > LIMIT_SURE * noise_g;
 }
 
+/* Whether samples k and beyond, beside a run, led on by two samples into it still stand off. */
+static bool leads_off(const struct trace *trace, size_t k, size_t beyond, double noise_g)
+{
+	double led = 3 * trace->value_g[k] - 2 * trace->value_g[beyond];
+
+	return trace_good(trace, beyond) && led * trace->value_g[k] > 0 && fabs(led) > LIMIT_SURE * noise_g;
+}
+
+/* In numbers coarser than noise the case at rest reads nothing but zeros: what is beside them leads there. */
+static bool is_rest(const struct trace *trace, size_t first, size_t end, double noise_g)
+{
+	return trace->step_g > 0 &&
+	       !(first > 1 && end + 1 < trace->count && leads_off(trace, first - 1, first - 2, noise_g) &&
+	         leads_off(trace, end, end + 1, noise_g));
+}
+
 /* Whether the run was left by what is higher: it is no limit. */
 static bool is_passed(const struct trace *trace, size_t first, size_t end)
 {
@@ -96,8 +108,7 @@ static unsigned dropout_mark_run(struct trace *trace, size_t first, size_t end, 
 {
 	bool zeros = is_zero(trace, first);
 
-	if (first == 0 || end == trace->count ||
-	    (zeros && trace->step_g > 0 && (double)(end - first) > REST_S * trace->rate_hz))
+	if (first == 0 || end == trace->count || (zeros && is_rest(trace, first, end, noise_g)))
 		return 0;
 	if (zeros ? end - first < ZEROS || !stands_off(trace, first - 1, noise_g) ||
 	                    !stands_off(trace, end, noise_g)

@@ -472,6 +472,42 @@ static void dropouts(void **state)
 	synth_free(&channel);
 }
 
+/* In numbers coarser than the noise the case at rest reads zeros, between a contact's end and what rings on
+ * too; three to five zeros under the contact are a hole. */
+static void rest_in_coarse_numbers(void **state)
+{
+	struct channel channel = synth_channel("a", 7000, 0, 700);
+	struct synth_random random = {29};
+	size_t rest = 0, found = 0, holes = 0;
+
+	(void)state;
+	for (int run = 0; run < 4000; run++) {
+		size_t hole = run % 2 ? 3 + (size_t)run % 3 : 0,
+		       from = 105 + (size_t)(10 * synth_uniform(&random));
+		double base = 20 + 20 * synth_uniform(&random), again = 3 + 12 * synth_uniform(&random);
+		double w = 1 + synth_uniform(&random), begin = synth_uniform(&random);
+		struct trace trace;
+
+		for (size_t k = 0; k < 700; k++) {
+			double t = (double)k - 100 - begin, after = t - base - again;
+			double v = 250 * synth_pulse(SYNTH_HALF_SINE, t / base) +
+			           (after > 0 ? 12 * exp(-0.1 * w * after) * sin(w * after) : 0);
+
+			channel.value_g[k] =
+			        k >= from && k < from + hole ? 0 : round(v + 0.1 * synth_normal(&random));
+		}
+		assert_int_equal(trace_open(&trace, &channel, -INFINITY, INFINITY), 0);
+		trace.step_g = 1;
+		*(hole ? &found : &rest) += dropout_mark(&trace, 0.3);
+		holes += hole > 0;
+		trace_close(&trace);
+	}
+	printf("%zu of 2000 rests marked, %zu of %zu holes\n", rest, found, holes);
+	assert_int_equal(rest, 0);
+	assert_true(found > holes * 95 / 100);
+	synth_free(&channel);
+}
+
 /* One value held on the way up is left out but for its first sample, one on the way down too; a whole pulse
  * holds none. Codes of 1/32 g; a run that chance could make is none. */
 static void held(void **state)
@@ -552,6 +588,7 @@ int main(void)
 	        cmocka_unit_test(steps_and_rings),
 	        cmocka_unit_test(noise_that_reaches_far),
 	        cmocka_unit_test(level_before),
+	        cmocka_unit_test(rest_in_coarse_numbers),
 	};
 
 	for (int shape = 0; shape < SYNTH_SHAPES; shape++)

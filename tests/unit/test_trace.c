@@ -194,6 +194,41 @@ static void level_tops(void **state)
 	synth_free(&channel);
 }
 
+/* The corner of a level top, or of one that sags, is no limit, in numbers of one to two sigma and in fine
+ * ones; nor is the level top, whose samples between the equal ones lie lower. */
+static void corners(void **state)
+{
+	struct channel channel = synth_channel("a", 7000, 0, 300);
+	struct synth_random random = {43};
+	int seen = 0;
+
+	(void)state;
+	for (int run = 0; run < 4000; run++) {
+		double code = run % 2 ? 1.0 / 32 : 0.3 + 0.6 * synth_uniform(&random);
+		double noise = run % 2 ? 0.3 + 0.5 * synth_uniform(&random)
+		                       : code * (0.51 + 0.4 * synth_uniform(&random));
+		double rise = 2 + 8 * synth_uniform(&random), level = 8 + 30 * synth_uniform(&random);
+		double sag = run % 4 < 2 ? 0 : 0.2 * synth_uniform(&random);
+		struct trace trace;
+
+		for (size_t k = 0; k < 300; k++) {
+			double at = (double)k - 150, up = fmin(fmax(at / rise, 0), 1);
+			double down = fmin(fmax((2 * rise + level - at) / rise, 0), 1);
+			double v = 100 * up * up * (3 - 2 * up) * down * down * (3 - 2 * down) *
+			           (1 - sag * at / level);
+
+			channel.value_g[k] = code * round((v + noise * synth_normal(&random)) / code);
+		}
+		trace = open_trace(&channel);
+		clip_mark(&trace, noise);
+		seen += (trace.flags & RECORD_FLAG_CLIPPED) != 0;
+		trace_close(&trace);
+	}
+	printf("%d of 4000 corners marked\n", seen);
+	assert_true(seen <= 1);
+	synth_free(&channel);
+}
+
 /* Two equal extremes in coarse numbers: a limit where their neighbours say so, chance otherwise. */
 static void twins(void **state)
 {
@@ -374,17 +409,10 @@ static void follows_changes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(copies),
-	        cmocka_unit_test(extremes),
-	        cmocka_unit_test(no_acceleration),
-	        cmocka_unit_test(limits),
-	        cmocka_unit_test(level_tops),
-	        cmocka_unit_test(twins),
-	        cmocka_unit_test(stairs),
-	        cmocka_unit_test(without_a_rate),
-	        cmocka_unit_test(laid),
-	        cmocka_unit_test(edges),
-	        cmocka_unit_test(follows_changes),
+	        cmocka_unit_test(copies), cmocka_unit_test(extremes),   cmocka_unit_test(no_acceleration),
+	        cmocka_unit_test(limits), cmocka_unit_test(level_tops), cmocka_unit_test(corners),
+	        cmocka_unit_test(twins),  cmocka_unit_test(stairs),     cmocka_unit_test(without_a_rate),
+	        cmocka_unit_test(laid),   cmocka_unit_test(edges),      cmocka_unit_test(follows_changes),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
