@@ -48,9 +48,6 @@ double doubt_slap_s(const struct trace *trace);
 void doubt_share(const struct trace *const trace[2], struct peak *const peak[2],
                  struct estimate_pulse *const pulse[2]);
 
-/* Two axes of the case that peak apart: one is on another ripple of the top, into the bars of both. */
-void doubt_ripple(struct peak *const peak[2], double width_s);
-
 /* X and Y of S1, then of S2; all four are there. Flags that any of them got: their resultants have them too.
  */
 unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2]);

@@ -37,11 +37,8 @@ enum { SHAPE_SAMPLES = 12, SHAPE_PARTS = 4 };
 #define SHARE_NOISE 40.0
 #define SHARE_CHANCE 3.0
 
-/* Axes that peak further apart than this part of the width do so: no shape is asked then. By less than the
- * other they may, as the box turns. */
+/* Axes that peak further apart than this part of the width do so: no shape is asked then. */
 #define SHARE_TIME 0.1
-#define SHARE_TURNS 0.02
-#define SHARE_TOP 0.5
 
 /* Squared, over the mean square of what straight lines between samples miss of a bend, at kinks. */
 #define LINE_SQUARE 20.0
@@ -401,19 +398,6 @@ void doubt_share(const struct trace *const trace[2], struct peak *const peak[2],
 	}
 	if (clear < SHARE_NOISE)
 		share_near_noise(strong, peak[1], pulse[0], pulse[1]);
-}
-
-void doubt_ripple(struct peak *const peak[2], double width_s)
-{
-	double apart = fabs(peak[0]->result.time_s - peak[1]->result.time_s);
-	double chance = hypot(peak[0]->result.sigma_time_s, peak[1]->result.sigma_time_s);
-
-	if (!(apart > SHARE_TURNS * width_s + SHARE_CHANCE * chance) || apart > SHARE_TOP * width_s)
-		return;
-	for (unsigned i = 0; i < 2; i++) {
-		peak[i]->result.sigma_time_s = hypot(peak[i]->result.sigma_time_s, apart);
-		peak[i]->doubt_s = hypot(peak[i]->doubt_s, apart);
-	}
 }
 
 unsigned doubt_axes(const struct trace *const trace[2][2], struct estimate_channel *const channel[2][2])

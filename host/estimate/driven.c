@@ -462,8 +462,11 @@ void driven_find(const struct driven_axis *axis, struct driven *driven, struct d
 		driven_express(axis, &sampled, peak->result.time_s, peak->result.sigma_time_s,
 		               sampled.input_spread_s * s2->noise_g, driven);
 		driven->doubt_s = peak->doubt_s;
-	} else if (has_smooth)
-		driven_express(axis, &smooth, cosine.centre_s, cosine.sigma_centre_s, 0, driven);
+	} else if (has_smooth) {
+		driven_express(axis, &smooth, cosine.centre_s, hypot(cosine.sigma_centre_s, peak->ripple_s),
+		               0, driven);
+		driven->doubt_s = peak->ripple_s;
+	}
 	if (isnan(driven->peak_g))
 		return;
 	driven_draw(has_sampled ? &sampled : &smooth, driven, curve);

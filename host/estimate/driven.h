@@ -65,8 +65,8 @@ void driven_at(const struct driven_curve *curve, double time_s, double derivativ
  * Not where S2's peak is clipped or below 12 sigma, so that its shape is a guess, nor where
  * the pulse lasts 0.8 cycles and more, or, of a clipped S1, where its flanks are as certain:
  * there the smooth curve's value stays, and its time is less certain by what the two differ. Nor where S1's
- * largest sample is of another contact: nothing is changed. */
-bool peak_driven(const struct driven_axis *axis, const struct driven *driven,
-                 const struct driven_curve *curve, struct peak *peak);
+ * largest sample is of another contact: the peak stays, driven is flagged "rival". */
+bool peak_driven(const struct driven_axis *axis, struct driven *driven, const struct driven_curve *curve,
+                 struct peak *peak);
 
 #endif

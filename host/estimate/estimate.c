@@ -16,6 +16,7 @@
 #include "host/estimate/pulse.h"
 #include "host/estimate/quiet.h"
 #include "host/estimate/rebound.h"
+#include "host/estimate/ripple.h"
 #include "host/estimate/spike.h"
 
 /* Around the trigger, what belongs to the impact that fired it: the product comes back for another. */
@@ -73,6 +74,28 @@ size_t estimate_find(const struct desk *desk, const char *sensor, char axis)
 	return i;
 }
 
+/* What a ripple under the noise leaves in doubt of the case's peaks. */
+static void analyse_ripple(const struct desk *desk, struct analysis *analysis)
+{
+	const struct trace *trace[2];
+	struct peak *peak[2];
+	size_t at[2];
+	unsigned count = 0;
+
+	for (const char *axis = "XY"; *axis; axis++) {
+		size_t i = estimate_find(desk, "S2", *axis);
+
+		if (i == analysis->channel_count)
+			continue;
+		at[count] = i;
+		trace[count] = &desk->work[i].trace;
+		peak[count++] = &desk->work[i].peak;
+	}
+	ripple_widen(trace, peak, count);
+	for (unsigned i = 0; i < count; i++)
+		analysis->channels[at[i]].peak = peak[i]->result;
+}
+
 /* Weak axes of a sensor take the shape of its strongest one. */
 static void analyse_weak(const struct desk *desk, const char *sensor, struct analysis *analysis)
 {
@@ -100,11 +123,7 @@ static void analyse_weak(const struct desk *desk, const char *sensor, struct ana
 			            (struct peak *const[]){&desk->work[strong].peak, &work->peak},
 			            (struct estimate_pulse *const[]){&analysis->channels[strong].pulse,
 			                                             &analysis->channels[i].pulse});
-			if (sensor[1] == '2')
-				doubt_ripple((struct peak *const[]){&desk->work[strong].peak, &work->peak},
-				             analysis->channels[strong].pulse.duration_s);
 			analysis->channels[i].peak = work->peak.result;
-			analysis->channels[strong].peak = desk->work[strong].peak.result;
 			continue;
 		}
 		work->strong = &desk->work[strong].peak;
@@ -244,6 +263,7 @@ static int estimate_analyse(const struct desk *desk, struct analysis *analysis)
 	if (!has_good_sample(desk))
 		return DT_E_EMPTY;
 	analyse_weak(desk, "S1", analysis);
+	analyse_ripple(desk, analysis);
 	analyse_weak(desk, "S2", analysis);
 	flag_short(desk, analysis);
 	estimate_decays(desk, analysis);

@@ -94,7 +94,7 @@ static bool lag_usable(const struct resultant *resultant)
 
 static void lag_combine(const struct driven axis[2], struct estimate_lag *lag)
 {
-	double weight[2] = {0, 0}, sum = 0, doubt = 0, own = 0, both, apart;
+	double weight[2] = {0, 0}, sum = 0, doubt = 0, both, apart;
 	unsigned tried = 0;
 
 	if (axis[0].smooth || axis[1].smooth)
@@ -105,10 +105,9 @@ static void lag_combine(const struct driven axis[2], struct estimate_lag *lag)
 		lag->driven_axis_s[i] = axis[i].lag_s;
 		lag->sigma_driven_axis_s[i] = axis[i].sigma_s;
 		if (axis[i].status == ESTIMATE_OK && axis[i].sigma_s > 0) {
-			weight[i] = 1 / (axis[i].sigma_s * axis[i].sigma_s);
+			weight[i] = 1 / (pow(axis[i].sigma_s, 2) - pow(axis[i].doubt_s, 2));
 			sum += weight[i] * axis[i].lag_s;
 			doubt += weight[i] * axis[i].doubt_s;
-			own += weight[i] * (1 - pow(axis[i].doubt_s / axis[i].sigma_s, 2));
 			lag->driven.flags |= axis[i].flags;
 			lag->driven.chi_square = fmax(lag->driven.chi_square, axis[i].chi_square);
 		}
@@ -120,7 +119,7 @@ static void lag_combine(const struct driven axis[2], struct estimate_lag *lag)
 	lag->driven.status = ESTIMATE_OK;
 	lag->driven.method = "driven-oscillator";
 	lag->driven_s = sum / both;
-	lag->sigma_driven_s = hypot(doubt, sqrt(own)) / both;
+	lag->sigma_driven_s = hypot(doubt / both, 1 / sqrt(both));
 	apart = weight[0] > 0 && weight[1] > 0
 	                ? fabs(axis[0].lag_s - axis[1].lag_s) / hypot(axis[0].sigma_s, axis[1].sigma_s)
 	                : 0;

@@ -69,6 +69,7 @@ struct peak {
 	                               its value is 0 */
 	double noise_g;             /* of local */
 	double doubt_s; /* what of sigma_time_s is the polynomials', which have it alike on both axes */
+	double ripple_s; /* what of that a ripple under the noise is (ripple.h) */
 	double scale;   /* model to axis: 1 but for a weak axis */
 };
 

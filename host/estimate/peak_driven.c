@@ -63,15 +63,19 @@ static void peak_driven_take(const struct driven *driven, double sigma_g, struct
 		s1->how.flags |= ESTIMATE_FLAG_EXTRAPOLATED;
 }
 
-bool peak_driven(const struct driven_axis *axis, const struct driven *driven,
-                 const struct driven_curve *curve, struct peak *peak)
+bool peak_driven(const struct driven_axis *axis, struct driven *driven, const struct driven_curve *curve,
+                 struct peak *peak)
 {
 	struct estimate_peak *s1 = &peak->result;
 	bool clipped = s1->how.status == ESTIMATE_CLIPPED, taken;
 	double sigma;
 
-	if (isnan(driven->peak_g) || !peak_driven_same_contact(axis, driven, curve))
+	if (isnan(driven->peak_g))
 		return false;
+	if (!peak_driven_same_contact(axis, driven, curve)) {
+		driven->flags |= ESTIMATE_FLAG_RIVAL;
+		return false;
+	}
 	sigma = hypot(driven->sigma_peak_g,
 	              clipped ? LIMIT_UNSEEN * driven->peak_g : apart(s1, driven, curve));
 	taken = knows_better(axis, sigma);

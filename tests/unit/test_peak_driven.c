@@ -351,6 +351,7 @@ static void another_contact(void **state)
 		x = &drop.analysis.channels[S1X].peak;
 		assert_true(x->time_s - drop.s1_s > 0.02);
 		assert_true(fabs(x->value_g) > 1.19 * drop.s1_g); /* cut on both sides */
+		assert_true(i > 0 || drop.analysis.lag.driven.flags & ESTIMATE_FLAG_RIVAL);
 		assert_true(i > 0 || fabs(drop.analysis.resultants[0].time_s - x->time_s) < 0.5e-3);
 		drop_free(&drop);
 	}
