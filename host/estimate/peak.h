@@ -68,9 +68,9 @@ struct peak {
 	struct estimate_peak plain; /* the polynomials' result where a family's that nobody told stands; else
 	                               its value is 0 */
 	double noise_g;             /* of local */
-	double doubt_s; /* what of sigma_time_s is the polynomials', which have it alike on both axes */
+	double doubt_s;  /* what of sigma_time_s is the polynomials', which have it alike on both axes */
 	double ripple_s; /* what of that a ripple under the noise is (ripple.h) */
-	double scale;   /* model to axis: 1 but for a weak axis */
+	double scale;    /* model to axis: 1 but for a weak axis */
 };
 
 /* Everything but result is meaningful unless the status is short or no_peak. */
