@@ -155,13 +155,19 @@ static void axis_flag(struct estimate_channel *channel)
 	channel->pulse.flags |= ESTIMATE_FLAG_AXES;
 }
 
-/* X and Y of one sensor against the other's, whose Y shows nothing of what it should by far. */
+/* X and Y of one sensor against the other's, one of which shows nothing of what it should by far. */
 static bool axis_dead(struct estimate_channel *const alive[2], struct estimate_channel *const other[2])
 {
-	return axis_sure(alive[0]) && axis_sure(alive[1]) && axis_sure(other[0]) &&
-	       other[1]->peak.how.status == ESTIMATE_NO_PEAK &&
-	       fabs(alive[1]->peak.value_g / alive[0]->peak.value_g * other[0]->peak.value_g) >
-	               AXIS_SIGMAS * other[1]->baseline.noise_g;
+	for (unsigned i = 0; i < 2; i++) {
+		const struct estimate_channel *dead = other[i], *beside = other[1 - i];
+
+		if (dead->peak.how.status == ESTIMATE_NO_PEAK && axis_sure(alive[0]) && axis_sure(alive[1]) &&
+		    axis_sure(beside) &&
+		    fabs(alive[i]->peak.value_g / alive[1 - i]->peak.value_g * beside->peak.value_g) >
+		            AXIS_SIGMAS * dead->baseline.noise_g)
+			return true;
+	}
+	return false;
 }
 
 /* Exchanged X and Y explain what S1 and S2 read better than what they are called. */
