@@ -90,6 +90,10 @@ void estimate_sensors(const struct desk *desk, struct analysis *analysis)
 
 		estimate_sensors_drive(desk, i, &s2, &s1, &driven[i], &curve[i]);
 		channel->peak = desk->work[s1.at[i]].peak.result;
+		if (s1.axes.curve[i] && channel->peak.time_s > channel->pulse.start_s &&
+		    channel->peak.time_s < channel->pulse.end_s)
+			channel->pulse.flags &=
+			        ~(unsigned)ESTIMATE_FLAG_RIVAL; /* it knows which swing is the largest */
 		channel->ringdown = desk->work[s1.at[i]].ringdown.result;
 	}
 	time_weak(desk, analysis);

@@ -241,11 +241,22 @@ static bool fit(const struct trace *trace, const struct peak *peak, enum estimat
  * and of a haversine. */
 static const double free_base[] = {2.4, 5.3};
 
+/* Where neither of two powers is refused the base is as unsure as what their residuals ask lets the power be.
+ */
+static void pulse_between(struct shape *best, const struct shape *other)
+{
+	double per_sigma = fabs((best->base_s - other->base_s) / (best->power_z - other->power_z));
+
+	if (best->power_z * other->power_z < 0 && fabs(other->power_z) < LIMIT_SIGNIFICANT)
+		best->sigma_base_s = fmax(best->sigma_base_s, per_sigma * hypot(1, best->power_z));
+}
+
 /* The best of those that are not refused; best stays AUTO when all are. False where no symmetric pulse will
  * do. */
 static bool pulse_choose(const struct trace *trace, const struct peak *peak, enum estimate_family family,
                          struct shape *best, struct estimate_how *how)
 {
+	struct shape before = {.family = ESTIMATE_FAMILY_AUTO};
 	unsigned tried = 0;
 
 	for (unsigned i = 0; i < SHAPE_LADDER; i++) {
@@ -269,6 +280,11 @@ static bool pulse_choose(const struct trace *trace, const struct peak *peak, enu
 		verdict = shape_judge(&shape);
 		if (family == ESTIMATE_FAMILY_AUTO && i < sizeof(free_base) / sizeof(free_base[0]))
 			shape.sigma_base_s *= free_base[i];
+		if (before.family != ESTIMATE_FAMILY_AUTO) {
+			pulse_between(&shape, &before);
+			pulse_between(best, &shape);
+		}
+		before = shape;
 		/* A doubtful one is not preferred, but what was asked for is given. */
 		if (verdict > (family == ESTIMATE_FAMILY_AUTO ? SHAPE_FITS : SHAPE_DOUBTFUL) ||
 		    (best->family != ESTIMATE_FAMILY_AUTO && !(shape.chi_square < best->chi_square)))
@@ -383,8 +399,9 @@ void pulse_measure(const struct trace *trace, const struct peak *peak,
 	pulse->start_s = edge[0].time_s;
 	pulse->end_s = edge[1].time_s;
 	pulse->duration_s = pulse->end_s - pulse->start_s;
-	pulse->flags = (peak->result.how.flags & (ESTIMATE_FLAG_GAPS | ESTIMATE_FLAG_SPIKE)) |
-	               (baseline->doubtful ? ESTIMATE_FLAG_ZERO : 0u);
+	pulse->flags =
+	        (peak->result.how.flags & (ESTIMATE_FLAG_GAPS | ESTIMATE_FLAG_SPIKE | ESTIMATE_FLAG_RIVAL)) |
+	        (baseline->doubtful ? ESTIMATE_FLAG_ZERO : 0u);
 	pulse->sigma_duration_s =
 	        hypot(hypot(edge[0].sigma_s, edge[1].sigma_s), LIMIT_EDGE * peak->result.sigma_g * tilt);
 	/* In a peak near its noise a curve may have found one hump: its feet then are not the pulse's. */
