@@ -9,7 +9,7 @@
 
 enum {
 	PLATEAU_SAMPLES = 3,
-	REST_SAMPLES = 4,   /* at rest after a step */
+	JUMPS = 3,
 	LEFT_RISES = 4,     /* a pulse that has an end has ended so many rises after its peak */
 	WIDTH_SAMPLES = 12, /* of a pulse whose width straight lines and curves tell without a bias */
 	BATCHES_MIN = 8,    /* of the quiet part, for the scatter of their means */
@@ -25,15 +25,18 @@ enum {
 /* Variance of a parabola's samples about their mean, over the square of its height. */
 #define ROUND_SPREAD (4.0 / 45)
 
-/* A fall to rest over the steepest of the three steps before it: 1.2 at the end of a half-sine. */
+/* A step over what either side bends, and over those that are left when a few are taken away: a lost block
+ * has two, two in each other's place three. */
 #define STEP_STEEPER 3.0
 
 /* Noise of what is missing at a step, and of third differences, over that of samples. */
 #define JUMP_NOISE 3.23
 #define DIFFERENCES_NOISE 4.47
 
-/* Of a jump, between two samples. */
-#define JUMP_MOST 0.5
+/* How far a step is from what it looks like by its neighbour's rise on either side, over it; over what either
+ * side bends. */
+#define JUMP_APART 0.25
+#define JUMP_BENDS 2.0
 
 /* Third differences of a ring over its height, and over the swing they are of. A plate at 500 Hz has 0.09 at
  * 7 kHz, a loose sensor at 1.5 kHz 2.0. */
@@ -42,6 +45,9 @@ enum {
 
 /* A pulse's force has faded this part of its width after its 10 % point. */
 #define AFTER_FROM 0.3
+
+/* Beyond so much of a width before its 10 % point a pulse has a 200th of its area or less. */
+#define FOOT_PART 0.1
 
 /* What a width of n samples is off, times n squared: kinks between the samples. */
 #define WIDTH_BIAS 1.4
@@ -193,73 +199,82 @@ void doubt_plateau(struct trace *trace, double noise_g)
 		trace->sample[k] |= SAMPLE_CLIPPED | TRACE_LIMIT;
 }
 
-/* Where the pulse, on its way down, comes to rest within one sample, steeper than a sensor can stop. */
-static bool doubt_step(const struct trace *trace, const struct peak *peak, const struct estimate_pulse *pulse)
+/* |second difference| about a sample. */
+static double doubt_bend(const double *v)
 {
-	double rest = LIMIT_NOISE * trace->noise_g, height = fabs(peak->result.value_g);
-	size_t end = trace_index(trace, pulse->end_s), last = end < 1 ? 0 : end - 1;
-	double step, steepest = 0;
+	return fabs(v[-1] - 2 * v[0] + v[1]);
+}
 
-	if (last < 3 || end + REST_SAMPLES > trace->count)
-		return false;
-	for (size_t k = last - 3; k < end + REST_SAMPLES; k++)
-		if (!trace_usable(trace, k))
-			return false;
-	for (size_t k = end; k < end + REST_SAMPLES; k++)
-		if (fabs(trace->value_g[k]) > fmax(rest, LIMIT_PART * height))
-			return false;
-	step = fabs(trace->value_g[end] - trace->value_g[last]);
-	for (size_t k = last - 3; k < last; k++)
-		steepest = fmax(steepest, fabs(trace->value_g[k + 1] - trace->value_g[k]));
-	return step > LIMIT_EDGE * height && step > STEP_STEEPER * steepest + rest;
+/* The largest magnitude of three samples. */
+static double doubt_most(const double *v)
+{
+	return fmax(fmax(fabs(v[0]), fabs(v[1])), fabs(v[2]));
 }
 
 /* What is missing between samples k and k + 1 when parabolas through three to either side are led to their
- * middle; NAN where one of the six is missing or below level_g. */
-static double doubt_jump(const struct trace *trace, size_t k, double sign, double level_g)
+ * middle; 0 where it is a kink or an edge, which rise or bend beside as much, where a contact begins, or ends
+ * with little, and where one of the six is missing. */
+static double doubt_jump(const struct trace *trace, size_t k, double height_g)
 {
 	const double *v = trace->value_g + k;
+	double rise, before, after, jump;
 
 	if (k < 2 || k + 3 >= trace->count)
-		return NAN;
+		return 0;
+	rise = v[1] - v[0];
+	before = rise - (v[0] - v[-1]);
+	after = rise - (v[2] - v[1]);
+	jump = (15 * rise - 10 * (v[2] - v[-1]) + 3 * (v[3] - v[-2])) / 8;
+	if (!(fmax(fabs(before - jump), fabs(after - jump)) < JUMP_APART * fabs(jump)) ||
+	    !(fabs(jump) > JUMP_BENDS * fmax(doubt_bend(v - 1), doubt_bend(v + 2))) ||
+	    doubt_most(v - 2) < LIMIT_EDGE * height_g ||
+	    (doubt_most(v + 1) < LIMIT_EDGE * height_g && fabs(jump) < LIMIT_AGAIN * height_g))
+		return 0;
 	for (size_t i = k - 2; i <= k + 3; i++)
-		if (!trace_usable(trace, i) || sign * trace->value_g[i] < level_g)
-			return NAN;
-	return (15 * (v[1] - v[0]) - 10 * (v[2] - v[-1]) + 3 * (v[3] - v[-2])) / 8;
+		if (!trace_usable(trace, i))
+			return 0;
+	return fabs(jump);
 }
 
-/* Whether samples k and k + 1 are further apart than either is from its other neighbour, by most of a jump; a
- * kink is not. */
-static bool doubt_apart(const struct trace *trace, size_t k, double jump_g)
+/* Samples [from, until), and the jumps found among them so far. */
+struct jumps {
+	size_t from, until, found, at[JUMPS];
+};
+
+/* The next largest that is not beside one of those. */
+static double doubt_largest_jump(const struct trace *trace, struct jumps *jumps, double height_g)
 {
-	const double *v = trace->value_g + k;
-	double rise = v[1] - v[0], before = rise - (v[0] - v[-1]), after = rise - (v[2] - v[1]);
+	double most = 0;
 
-	return before * after > 0 && fmin(fabs(before), fabs(after)) > JUMP_MOST * jump_g;
-}
+	for (size_t k = jumps->from; k < jumps->until; k++) {
+		double jump = doubt_jump(trace, k, height_g);
+		bool other = jump > most;
 
-/* Whether there is a step under the pulse, whose like is not beside it: of a gain or of a contact. */
-static bool doubt_step_inside(const struct trace *trace, const struct peak *peak,
-                              const struct estimate_pulse *pulse)
-{
-	double level = LIMIT_AGAIN * fabs(peak->result.value_g), most = 0, beside = 0;
-	size_t from = trace_index(trace, pulse->start_s), until = trace_index(trace, pulse->end_s), at = from;
-
-	for (size_t k = from; k < until; k++) {
-		double jump = fabs(doubt_jump(trace, k, peak->sign, level));
-
-		if (jump > most) {
+		for (size_t i = 0; other && i < jumps->found; i++)
+			other = k + 2 < jumps->at[i] || k > jumps->at[i] + 2;
+		if (other) {
 			most = jump;
-			at = k;
+			jumps->at[jumps->found] = k;
 		}
 	}
-	if (!(most > LIMIT_EDGE * fabs(peak->result.value_g)) ||
-	    !(most > LIMIT_SIGNIFICANT * JUMP_NOISE * trace->noise_g) || !doubt_apart(trace, at, most))
+	jumps->found++;
+	return most;
+}
+
+/* Whether there is a step in the pulse or around it, whose like are few: of a gain, a cable, a block of
+ * samples. */
+static bool doubt_step(const struct trace *trace, const struct peak *peak, const struct estimate_pulse *pulse)
+{
+	double height = fabs(peak->result.value_g), most, next = 0;
+	struct jumps jumps = {.from = trace_index(trace, pulse->start_s - pulse->duration_s),
+	                      .until = trace_index(trace, pulse->end_s + pulse->duration_s)};
+
+	most = doubt_largest_jump(trace, &jumps, height);
+	if (!(most > LIMIT_EDGE * height) || !(most > LIMIT_SIGNIFICANT * JUMP_NOISE * trace->noise_g))
 		return false;
-	for (size_t k = from; k < until; k++)
-		if (k + 2 < at || k > at + 2)
-			beside = fmax(beside, fabs(doubt_jump(trace, k, peak->sign, level)));
-	return most > STEP_STEEPER * beside;
+	while (jumps.found < JUMPS)
+		next = doubt_largest_jump(trace, &jumps, height);
+	return most > STEP_STEEPER * next;
 }
 
 /* Whether it rings on after the pulse, faster than a plate does, by third differences. */
@@ -399,6 +414,19 @@ static double after_first(const struct trace *trace, const struct after *after)
 	return after->mean_g[0] * (double)after->samples / trace->rate_hz;
 }
 
+/* Area in g s of what comes before the pulse in its direction, within a width: an edge that touched first. */
+static double doubt_first_touch(const struct trace *trace, const struct peak *peak,
+                                const struct estimate_pulse *pulse)
+{
+	double from_s = pulse->start_s - (1 + FOOT_PART) * pulse->duration_s, mean;
+	size_t n = (size_t)fmax(pulse->duration_s * trace->rate_hz, 1);
+
+	if (!doubt_mean(trace, trace_index(trace, from_s), n, &mean) ||
+	    !(peak->sign * mean > LIMIT_SIGNIFICANT * trace->noise_g / sqrt((double)n)))
+		return 0;
+	return fabs(mean) * (double)n / trace->rate_hz;
+}
+
 /* Nobody knows when zero shifted: it may have by the peak, and before the pulse. */
 static void doubt_after(const struct trace *trace, const struct estimate_baseline *baseline,
                         struct peak *peak, struct estimate_pulse *pulse)
@@ -412,7 +440,7 @@ static void doubt_after(const struct trace *trace, const struct estimate_baselin
 	after_find(trace, baseline, peak, pulse, &after);
 	shift_g = after_shift(&after);
 	beyond_m_s = UNITS_G_M_S2 * fmax(shift_g * pulse->duration_s, after_tail(trace, &after));
-	next_m_s = UNITS_G_M_S2 * after_first(trace, &after);
+	next_m_s = UNITS_G_M_S2 * (after_first(trace, &after) + doubt_first_touch(trace, peak, pulse));
 	if (next_m_s > LIMIT_PART * fabs(pulse->velocity_change_m_s))
 		pulse->sigma_velocity_m_s = hypot(pulse->sigma_velocity_m_s, next_m_s);
 	if (beyond_m_s > LIMIT_PART * fabs(pulse->velocity_change_m_s)) {
@@ -468,8 +496,6 @@ void doubt_channel(const struct trace *trace, const struct estimate_baseline *ba
 		return;
 	}
 	if (doubt_step(trace, peak, pulse))
-		pulse->flags |= ESTIMATE_FLAG_STEP;
-	if (doubt_step_inside(trace, peak, pulse))
 		doubt_flag(peak, pulse, ESTIMATE_FLAG_STEP);
 	if (doubt_rough(trace, peak, pulse))
 		doubt_flag(peak, pulse, ESTIMATE_FLAG_ROUGH);

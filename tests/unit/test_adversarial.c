@@ -31,7 +31,20 @@
 
 enum { S1X, S1Y, S2X, S2Y, S2Z, CHANNELS, FINE = 110000, DROPS = 4, HELD_SAMPLES = 6 };
 
-enum form { HALF_SINE, HAVERSINE, HERTZ, GAMMA, TRAPEZOID, HUMPS, RING, BELL, FINAL, INITIAL, EXPONENTIALS };
+enum form {
+	HALF_SINE,
+	HAVERSINE,
+	HERTZ,
+	GAMMA,
+	TRAPEZOID,
+	HUMPS,
+	RING,
+	BELL,
+	FINAL,
+	INITIAL,
+	EXPONENTIALS,
+	EDGE
+};
 enum plate { PLAIN, HARDLY_DAMPED, MUCH_DAMPED, FAST, RIGID, TWO_MODES, SOFT };
 enum spoil {
 	NOTHING,
@@ -85,6 +98,8 @@ enum spoil {
 	SLEW,
 	DEAD,
 	SAG,
+	BLOCK_TWICE,
+	S1_DEAD,
 	SPOILS
 };
 
@@ -165,6 +180,9 @@ static const struct class classes[] = {
         {"slew rate", HALF_SINE, PLAIN, SLEW, true},
         {"Y dead", HALF_SINE, PLAIN, DEAD, false},
         {"high-pass of 10 ms untold", HALF_SINE, PLAIN, SAG, false},
+        {"an edge touches first", EDGE, PLAIN, NOTHING, false},
+        {"a block of S1 twice", HALF_SINE, PLAIN, BLOCK_TWICE, false},
+        {"S1X dead", HERTZ, PLAIN, S1_DEAD, false},
 };
 
 enum { CLASSES = sizeof(classes) / sizeof(classes[0]) };
@@ -188,6 +206,9 @@ static double smooth(double x)
 
 static double pulse_form(enum form form, double x)
 {
+	if (form == EDGE) /* 0.4 of the base before the rest of it */
+		return x < 0.4 ? 0.08 * pow(sin(PI * fmax(x, 0) / 0.4), 2)
+		               : fmax(sin(PI * fmin(x - 0.4, 1)), 0);
 	if (x <= 0 || (x >= 1 && form != GAMMA && form != BELL && form != EXPONENTIALS))
 		return 0;
 	switch (form) {
@@ -287,6 +308,8 @@ static struct drop draw(const struct class *class, struct synth_random *random)
 	d.part[S1X] = d.part[S2X] = height;
 	d.part[S1Y] = d.part[S2Y] = height * (0.35 + 0.4 * synth_uniform(random));
 	d.part[S2Z] = 0.03 * height;
+	if (class->spoil == S1_DEAD) /* a weak X: what S1 and S2 gain of speed does not tell */
+		d.part[S1X] = d.part[S2X] = height / 3;
 	return d;
 }
 
@@ -355,6 +378,8 @@ static double shown(const struct drop *d, int c, double t)
 		return c == S1X ? fmax(value, 0) : value;
 	case DEAD:
 		return c == S2Y ? 0 : value;
+	case S1_DEAD:
+		return c == S1X ? 0 : value;
 	default:
 		return value;
 	}
@@ -434,6 +459,7 @@ static void fill(struct drop *d, int c, struct synth_random *random)
 	size_t rise = (size_t)((d->onset_s + (0.2 + 0.2 * d->at) * d->base_s - channel->start_s) *
 	                       channel->rate_hz);
 	size_t top = (size_t)((d->onset_s + d->base_s / 2 - channel->start_s) * channel->rate_hz);
+	size_t fall = 2 * top - rise, block = (size_t)(1e-3 * channel->rate_hz);
 
 	for (size_t k = 0; k < channel->count; k++) {
 		double t = channel->start_s + (double)k / channel->rate_hz - d->onset_s;
@@ -449,6 +475,8 @@ static void fill(struct drop *d, int c, struct synth_random *random)
 	if (c == S2X && d->class->spoil == FROZEN)
 		for (size_t k = rise + 1; k < rise + HELD_SAMPLES; k++)
 			channel->value_g[k] = channel->value_g[rise];
+	if (c <= S1Y && d->class->spoil == BLOCK_TWICE)
+		memcpy(channel->value_g + fall, channel->value_g + fall - block, block * sizeof(double));
 	for (size_t k = 1; c == S2X && d->class->spoil == TWICE && k < channel->count; k += 2)
 		channel->value_g[k] = channel->value_g[k - 1];
 	for (int i = 0; d->class->spoil == SPIKES && i < 3; i++)
@@ -495,18 +523,18 @@ static struct truth truth_of(const double *value)
 	}
 	truth.peak = value[top];
 	truth.time_s = (double)top * FINE_S;
-	for (from = top; from > 0 && value[from] > 0.1 * truth.peak; from--)
+	for (from = top; from > 0 && value[from] / truth.peak > 0.1; from--)
 		;
-	for (until = top; until < n && value[until] > 0.1 * truth.peak; until++)
+	for (until = top; until < n && value[until] / truth.peak > 0.1; until++)
 		;
 	truth.width_s = (double)(until - from) * FINE_S;
 	return truth;
 }
 
-enum kind { PEAK, TIME, WIDTH, VELOCITY, RESULTANT, LAG, DRIVEN, FREQUENCY, DAMPING, KINDS };
+enum kind { PEAK, TIME, WIDTH, VELOCITY, CONTACT, RESULTANT, LAG, DRIVEN, FREQUENCY, DAMPING, KINDS };
 
-static const char *const kind_names[KINDS] = {"peak", "time",   "width",     "dv",     "resultant",
-                                              "lag",  "driven", "frequency", "damping"};
+static const char *const kind_names[KINDS] = {"peak",      "time", "width",  "dv",        "contact",
+                                              "resultant", "lag",  "driven", "frequency", "damping"};
 
 struct count {
 	unsigned values[KINDS], wrong[KINDS], alarms, drops;
@@ -544,10 +572,15 @@ static void judge_channel(struct count *count, const struct drop *d, const struc
 	      of_peak);
 	judge(count, TIME, e->peak.time_s, d->onset_s + truth.time_s, e->peak.sigma_time_s, d->base_s,
 	      of_peak);
-	if (c <= S1Y)
+	if (c <= S1Y && d->class->plate != HARDLY_DAMPED) /* whose swings are alike */
 		return;
 	judge(count, WIDTH, e->pulse.duration_s, truth.width_s, e->pulse.sigma_duration_s, truth.width_s,
 	      of_pulse);
+	if (c <= S1Y)
+		return;
+	if (d->class->form <= HERTZ)
+		judge(count, CONTACT, e->pulse.contact_time_s, d->base_s, e->pulse.sigma_contact_s, d->base_s,
+		      of_pulse | doubts(e->pulse.contact.flags, e->pulse.contact.status));
 	judge(count, VELOCITY, e->pulse.velocity_change_m_s, d->part[c] * truth.area * G_M_S2,
 	      e->pulse.sigma_velocity_m_s, e->pulse.velocity_change_m_s, of_pulse);
 }
