@@ -14,6 +14,12 @@
 /* What a family that was not told adds to the width at 10 % is its own: so much of it is its doubt. */
 #define FEET_PART 0.2
 
+/* Noise of a second difference over that of samples. */
+#define BEND_NOISE 2.45
+
+/* Standard deviation of what may lie anywhere between two samples. */
+#define STEP_DOUBT 0.29
+
 enum {
 	AGAIN_WITHIN = 4, /* samples */
 	SLOW_NEWTON = 4,  /* steps to where the parabola meets the level */
@@ -99,6 +105,39 @@ static void find_slow_edge(const struct trace *trace, const struct peak *peak, i
 	edge->sigma_s = noise * local_spread(&local, time, 0) / edge->slope_g_s;
 }
 
+/* Where between two samples, in parts of their distance, the level that a straight line meets at place is met
+ * when all that bends beside them is one kink between them; place where there is none. */
+static double kinked_place(double rise, double bend0, double bend1, double place)
+{
+	double at = bend1 / (bend0 + bend1), before = rise - bend0, behind = rise + bend1;
+	double beyond = (place * rise - before * at) / rise;
+
+	if (!(bend0 * bend1 > 0) || !((beyond > 0 ? behind : before) / rise > 0))
+		return place;
+	return beyond > 0 ? at + beyond * rise / behind : place * rise / before;
+}
+
+/* A rise that bends up before and down behind, as far as it may be a step within it, which is met anywhere.
+ */
+static double step_part(double rise, double bend0, double bend1)
+{
+	double part = fmin(bend0 / rise, -bend1 / rise);
+
+	return pow(fmin(fmax(part, 0), 1), 2);
+}
+
+/* What of the bend between samples before and before + 1 those beside them do not share, as a kink's: 0 to 1.
+ */
+static double kink_part(const struct trace *trace, size_t before, double bent)
+{
+	double shared = before == 0 ? 0 : fabs(agreed(pulse_bend(trace, before - 1), bent));
+
+	shared = fmax(shared, fabs(agreed(pulse_bend(trace, before + 2), bent)));
+	if (!(fabs(bent) > LIMIT_AGREE * BEND_NOISE * trace->noise_g))
+		return 0;
+	return fmax(1 - shared / fabs(bent), 0);
+}
+
 /* Where the pulse meets level_g on one side, by the parabola through the two samples as bent as both their
  * neighbourhoods say; and how well that is known: noise, the bend that they do not agree on, and the hole
  * when they are no neighbours. */
@@ -106,7 +145,7 @@ static bool find_edge(const struct trace *trace, const struct peak *peak, int st
                       struct edge *edge)
 {
 	size_t before, after;
-	double gap, rise, missing, bend0, bend1, bent, place, noise;
+	double gap, rise, missing, bend0, bend1, bent, place, noise, smooth, kinked, stepped;
 
 	if (!trace_edge(trace, peak->at, step, peak->sign, level_g, &edge->time_s))
 		return false;
@@ -127,11 +166,16 @@ static bool find_edge(const struct trace *trace, const struct peak *peak, int st
 	bent = after - before == 1 ? agreed(bend0, bend1) : 0;
 	place = (edge->time_s - trace_time(trace, before)) / gap;
 	/* linear + bent u (u - 1) / 2 meets the level this much of the interval later */
-	edge->time_s += gap * fmin(fmax(bent * place * (1 - place) / (2 * rise), -0.5), 0.5);
+	smooth = fmin(fmax(bent * place * (1 - place) / (2 * rise), -0.5), 0.5);
+	kinked = kink_part(trace, before, bent) * (kinked_place(rise, bend0, bend1, place) - place - smooth);
+	stepped = step_part(rise, bend0, bend1);
+	edge->time_s += gap * (smooth + kinked / 2 + stepped * (0.5 - place));
 	noise = trace->noise_g * (fabs(bent) > 0 ? parabola_spread(place) : hypot(place, 1 - place));
 	edge->sigma_s = hypot(noise, fmax(fabs(bend0 - bent), fabs(bend1 - bent)) / 16) / edge->slope_g_s;
-	edge->sigma_s = hypot(hypot(edge->sigma_s, missing),
-	                      crossed_again(trace, peak, step < 0 ? before : after, step, level_g));
+	edge->sigma_s = hypot(hypot(edge->sigma_s, gap * kinked / 2), missing);
+	edge->sigma_s = hypot(edge->sigma_s, gap * STEP_DOUBT * stepped);
+	edge->sigma_s =
+	        hypot(edge->sigma_s, crossed_again(trace, peak, step < 0 ? before : after, step, level_g));
 	/* Two samples tell its slope no more, and noise crosses the level before the pulse does. */
 	if (after - before == 1 && fabs(rise) < LIMIT_NOISE * trace->noise_g)
 		find_slow_edge(trace, peak, step, level_g, edge);
