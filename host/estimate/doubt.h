@@ -35,6 +35,9 @@ void doubt_channel(const struct trace *trace, const struct estimate_baseline *ba
 void doubt_chain(struct trace *trace, const struct estimate_baseline *baseline, struct peak *peak,
                  struct estimate_pulse *pulse);
 
+/* Of an axis of S2 as read, in its event: the largest of two samples side by side, from its middle. */
+double doubt_height_g(const struct trace *trace);
+
 /* Of an axis of S2 as read, in its event: until when it was quiet before its first contact; INFINITY where
  * noise hides that, or it begins so. */
 double doubt_touch_s(const struct trace *trace);

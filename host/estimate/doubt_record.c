@@ -99,10 +99,14 @@ static double contact_level(const struct trace *trace, double most_g, double sig
 	return fmax(LIMIT_AGAIN * most_g, LIMIT_NOISE * fmax(sigma_g, clip_step(trace) / sqrt(12.0)));
 }
 
+double doubt_height_g(const struct trace *trace)
+{
+	return contact_height(trace, trace->first, trace->last, quiet_glance(trace, 0, trace->count, NULL));
+}
+
 double doubt_touch_s(const struct trace *trace)
 {
-	double sigma, zero = quiet_glance(trace, 0, trace->count, &sigma);
-	double most = contact_height(trace, trace->first, trace->last, zero);
+	double sigma, zero = quiet_glance(trace, 0, trace->count, &sigma), most = doubt_height_g(trace);
 	size_t k = contact_begin(trace, trace->first, zero, contact_level(trace, most, sigma));
 	size_t foot = k, rise;
 

@@ -13,6 +13,7 @@
 #include "host/estimate/estimate_private.h"
 #include "host/estimate/filter.h"
 #include "host/estimate/iepe.h"
+#include "host/estimate/limits.h"
 #include "host/estimate/pulse.h"
 #include "host/estimate/quiet.h"
 #include "host/estimate/rebound.h"
@@ -53,6 +54,8 @@ static void analyse_channel(const struct desk *desk, size_t i, struct estimate_c
 	if (out->baseline.unsettled && work->peak.result.how.status == ESTIMATE_OK)
 		work->peak.result.how.status = ESTIMATE_AMBIGUOUS;
 	pulse_measure(&work->trace, &work->peak, &out->baseline, desk->options->family, &out->pulse);
+	if (work->first_of_two)
+		out->pulse.flags |= ESTIMATE_FLAG_FIRST;
 	doubt_channel(&work->trace, &out->baseline, &work->peak, &out->pulse);
 	doubt_chain(&work->trace, &out->baseline, &work->peak, &out->pulse);
 	if (out->baseline.unsettled && out->pulse.status == ESTIMATE_OK)
@@ -157,14 +160,19 @@ static void flag_short(const struct desk *desk, struct analysis *analysis)
  * instant for one. */
 static void estimate_touch(const struct desk *desk)
 {
-	double touch_s = INFINITY;
+	double touch_s = INFINITY, height[] = {0, 0, 0}, most = 0;
+	const char *axes = "XYZ";
 
-	for (const char *axis = "XYZ"; *axis; axis++) {
-		size_t i = estimate_find(desk, "S2", *axis);
+	for (unsigned j = 0; j < 3; j++) {
+		size_t i = estimate_find(desk, "S2", axes[j]);
 
 		if (i < desk->record->channel_count)
-			touch_s = fmin(touch_s, doubt_touch_s(&desk->work[i].trace));
+			most = fmax(most, height[j] = doubt_height_g(&desk->work[i].trace));
 	}
+	for (unsigned j = 0; j < 3; j++)
+		if (height[j] > LIMIT_EXPLAINS * most)
+			touch_s = fmin(touch_s,
+			               doubt_touch_s(&desk->work[estimate_find(desk, "S2", axes[j])].trace));
 	for (size_t i = 0; isfinite(touch_s) && desk->record->is_drop && i < desk->record->channel_count;
 	     i++) {
 		struct trace *trace = &desk->work[i].trace;
