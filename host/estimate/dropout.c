@@ -106,14 +106,16 @@ static bool is_passed(const struct trace *trace, size_t first, size_t end)
 /* Marks the run [first, end); what it is, as a flag of the record. */
 static unsigned dropout_mark_run(struct trace *trace, size_t first, size_t end, size_t held, double noise_g)
 {
-	bool zeros = is_zero(trace, first);
+	bool zeros = is_zero(trace, first), before, after, of_noise;
 
 	if (first == 0 || end == trace->count || (zeros && is_rest(trace, first, end, noise_g)))
 		return 0;
-	if (zeros ? end - first < ZEROS || !stands_off(trace, first - 1, noise_g) ||
-	                    !stands_off(trace, end, noise_g)
-	          : held == 0 || end - first < held || !stands_off(trace, first, noise_g) ||
-	                    !is_passed(trace, first, end))
+	before = stands_off(trace, first - 1, noise_g);
+	after = stands_off(trace, end, noise_g);
+	of_noise = held == 0 || end - first < held;
+	if (!(zeros && end - first >= ZEROS && before && after) &&
+	    (of_noise ||
+	     !(stands_off(trace, first, noise_g) ? is_passed(trace, first, end) : before || after)))
 		return 0;
 	for (size_t i = zeros ? first : first + 1; i < end; i++)
 		trace->sample[i] |= SAMPLE_BAD;

@@ -100,6 +100,7 @@ enum spoil {
 	SAG,
 	BLOCK_TWICE,
 	S1_DEAD,
+	BEGIN_HELD,
 	SPOILS
 };
 
@@ -183,6 +184,7 @@ static const struct class classes[] = {
         {"an edge touches first", EDGE, PLAIN, NOTHING, false},
         {"a block of S1 twice", HALF_SINE, PLAIN, BLOCK_TWICE, false},
         {"S1X dead", HERTZ, PLAIN, S1_DEAD, false},
+        {"held as it begins", HALF_SINE, PLAIN, BEGIN_HELD, false},
 };
 
 enum { CLASSES = sizeof(classes) / sizeof(classes[0]) };
@@ -477,6 +479,9 @@ static void fill(struct drop *d, int c, struct synth_random *random)
 			channel->value_g[k] = channel->value_g[rise];
 	if (c <= S1Y && d->class->spoil == BLOCK_TWICE)
 		memcpy(channel->value_g + fall, channel->value_g + fall - block, block * sizeof(double));
+	if (c >= S2X && d->class->spoil == BEGIN_HELD)
+		for (size_t k = rise - block; k < rise; k++)
+			channel->value_g[k] = channel->value_g[rise - block - 1];
 	for (size_t k = 1; c == S2X && d->class->spoil == TWICE && k < channel->count; k += 2)
 		channel->value_g[k] = channel->value_g[k - 1];
 	for (int i = 0; d->class->spoil == SPIKES && i < 3; i++)
@@ -568,6 +573,8 @@ static void judge_channel(struct count *count, const struct drop *d, const struc
 	unsigned of_peak = doubts(e->peak.how.flags, e->peak.how.status) | e->flags;
 	unsigned of_pulse = doubts(e->pulse.flags, e->pulse.status) | e->flags;
 
+	/* Which contact a pulse is of it says as its peak does. */
+	assert_true((e->pulse.flags & ESTIMATE_FLAG_FIRST) == (e->peak.how.flags & ESTIMATE_FLAG_FIRST));
 	judge(count, PEAK, e->peak.value_g, d->part[c] * truth.peak, e->peak.sigma_g, e->peak.value_g,
 	      of_peak);
 	judge(count, TIME, e->peak.time_s, d->onset_s + truth.time_s, e->peak.sigma_time_s, d->base_s,
