@@ -409,9 +409,9 @@ static double after_tail(const struct trace *trace, const struct after *after)
 /* Area in g s of what follows next in its direction: nobody knows whether it is of the pulse. */
 static double after_first(const struct trace *trace, const struct after *after)
 {
-	if (after->n == 0 || !(after->mean_g[0] > LIMIT_SIGNIFICANT * after->sigma_g))
+	if (after->n == 0 || !(after->mean_g[0] > LIMIT_HINT * after->sigma_g))
 		return 0;
-	return after->mean_g[0] * (double)after->samples / trace->rate_hz;
+	return after->mean_g[0] * (1 + 2 * AFTER_FROM) * (double)after->samples / trace->rate_hz;
 }
 
 /* Area in g s of what comes before the pulse in its direction, within a width: an edge that touched first. */
@@ -441,8 +441,7 @@ static void doubt_after(const struct trace *trace, const struct estimate_baselin
 	shift_g = after_shift(&after);
 	beyond_m_s = UNITS_G_M_S2 * fmax(shift_g * pulse->duration_s, after_tail(trace, &after));
 	next_m_s = UNITS_G_M_S2 * (after_first(trace, &after) + doubt_first_touch(trace, peak, pulse));
-	if (next_m_s > LIMIT_PART * fabs(pulse->velocity_change_m_s))
-		pulse->sigma_velocity_m_s = hypot(pulse->sigma_velocity_m_s, next_m_s);
+	pulse->sigma_velocity_m_s = hypot(pulse->sigma_velocity_m_s, next_m_s);
 	if (beyond_m_s > LIMIT_PART * fabs(pulse->velocity_change_m_s)) {
 		pulse->sigma_velocity_m_s = hypot(pulse->sigma_velocity_m_s, beyond_m_s);
 		pulse->flags |= ESTIMATE_FLAG_TAIL;

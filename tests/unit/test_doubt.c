@@ -397,6 +397,43 @@ static void what_is_quiet_before_a_drop(void **state)
 	assert_int_equal(unsure, 0);
 }
 
+/* A quarter of a sine, then a force that fades on by 2 ms, in a hundredth of noise: 132 of 200 where what
+ * follows has to be 5 sigma of its mean, and 1 % of the velocity change. */
+static void a_force_that_fades_on(void **state)
+{
+	enum { DROPS = 200 };
+	const double rise_s = 1.8e-3, fades_s = 2e-3;
+	struct synth_random random = {6};
+	struct channel channel = synth_channel("a", RATE_HZ, 0, SAMPLES);
+	const struct record record = {.channels = &channel, .channel_count = 1};
+	unsigned covered = 0;
+
+	(void)state;
+	for (unsigned i = 0; i < DROPS; i++) {
+		const struct estimate_options options = {0};
+		const double height_g = 150,
+		             truth = G_M_S2 * height_g * (rise_s * 2 / 3.14159265358979 + fades_s);
+		double onset_s = ONSET_S + synth_uniform(&random) / RATE_HZ;
+		const struct estimate_pulse *pulse;
+		struct analysis analysis;
+
+		for (size_t k = 0; k < SAMPLES; k++) {
+			double t = (double)k / RATE_HZ - onset_s;
+			double value = t < rise_s ? sin(fmax(t, 0) / rise_s * 3.14159265358979 / 2)
+			                          : exp(-(t - rise_s) / fades_s);
+
+			channel.value_g[k] = height_g * value + 1.5 * synth_normal(&random);
+		}
+		assert_int_equal(estimate_record(&record, &options, &analysis), 0);
+		pulse = &analysis.channels[0].pulse;
+		covered += fabs(pulse->velocity_change_m_s - truth) < 2 * pulse->sigma_velocity_m_s;
+		estimate_free(&analysis);
+	}
+	print_message("a force that fades on: %u of %u velocity changes within two bars\n", covered, DROPS);
+	assert_true(covered >= 0.88 * DROPS);
+	synth_free(&channel);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(whole),
@@ -405,6 +442,7 @@ int main(void)
 	                                   cmocka_unit_test(no_contact_of_noise),
 	                                   cmocka_unit_test(a_high_pass_in_a_short_record),
 	                                   cmocka_unit_test(a_coarse_converter),
+	                                   cmocka_unit_test(a_force_that_fades_on),
 	                                   cmocka_unit_test(what_is_quiet_before_a_drop)};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
