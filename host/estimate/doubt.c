@@ -335,13 +335,13 @@ static double doubt_mean_sigma(const struct trace *trace, const struct estimate_
 struct after {
 	size_t n, samples;
 	double mean_g[AFTER_BLOCKS], sigma_g; /* of each, by the quiet part */
+	double again_g;                       /* rises by so much are another contact's */
 };
 
 /* As far as to a hole or to what rises again. */
 static void after_find(const struct trace *trace, const struct estimate_baseline *baseline,
                        const struct peak *peak, const struct estimate_pulse *pulse, struct after *after)
 {
-	double again = LIMIT_EDGE * fabs(peak->result.value_g);
 	size_t k = trace_index(trace, pulse->end_s + AFTER_FROM * pulse->duration_s);
 
 	/* The sum of straight lines goes on to where the reading is back at zero. */
@@ -349,6 +349,7 @@ static void after_find(const struct trace *trace, const struct estimate_baseline
 	       trace_time(trace, k) < pulse->end_s + pulse->duration_s && peak->sign * trace->value_g[k] > 0)
 		k++;
 	after->n = 0;
+	after->again_g = LIMIT_EDGE * fabs(peak->result.value_g);
 	after->samples = (size_t)fmax(pulse->duration_s * trace->rate_hz / 2, 1);
 	after->sigma_g = doubt_mean_sigma(trace, baseline, after->samples);
 	for (; after->n < AFTER_BLOCKS; after->n++, k += after->samples) {
@@ -357,7 +358,7 @@ static void after_find(const struct trace *trace, const struct estimate_baseline
 		if (!doubt_mean(trace, k, after->samples, mean))
 			break;
 		*mean *= peak->sign;
-		if (after->n > 0 && *mean > fmax(mean[-1], 0) + again) {
+		if (after->n > 0 && *mean > fmax(mean[-1], 0) + after->again_g) {
 			after->n--; /* it may have begun there */
 			break;
 		}
@@ -369,7 +370,8 @@ static void after_find(const struct trace *trace, const struct estimate_baseline
 static double after_shift(const struct after *after)
 {
 	double mean = 0, first = 0, square = 0, n = (double)after->n, sigma;
-	bool below = true;
+	double least = after->mean_g[0] - LIMIT_AGREE * M_SQRT2 * after->sigma_g;
+	bool below = true, turns = false;
 
 	if (after->n < AFTER_FEWEST)
 		return 0;
@@ -377,10 +379,11 @@ static double after_shift(const struct after *after)
 		mean += after->mean_g[i] / n;
 		first += i < AFTER_BLOCKS / 2 ? after->mean_g[i] / (AFTER_BLOCKS / 2) : 0;
 		below = below && after->mean_g[i] < 0;
+		turns = turns || after->mean_g[i] < least;
 	}
 	if (after->n <
-	    AFTER_BLOCKS / 2) /* too few to tell a shift from a swing, but what never turns back is none */
-		return below && -mean > LIMIT_SIGNIFICANT * after->sigma_g ? -mean : 0;
+	    AFTER_BLOCKS / 2) /* too few to tell a shift from a swing, but what only falls back is none */
+		return below && !turns && -mean > LIMIT_SIGNIFICANT * after->sigma_g ? -mean : 0;
 	for (size_t i = 0; i < after->n; i++)
 		square += pow(after->mean_g[i] - mean, 2) / (n - 1);
 	sigma = fmax(after->sigma_g, sqrt(square)) / sqrt(n);
@@ -389,19 +392,23 @@ static double after_shift(const struct after *after)
 	return fabs(mean) > LIMIT_SIGNIFICANT * sigma ? fabs(mean) : 0;
 }
 
-/* Area in g s of a force that fades on: never below zero, and gone at last. */
+/* Area in g s of a force that fades on: never below zero, never rising, its second half less than half of its
+ * first, and no contact next. */
 static double after_tail(const struct trace *trace, const struct after *after)
 {
-	double sum = 0;
+	double sum = 0, first = 0, chance = LIMIT_AGREE * after->sigma_g;
 
-	if (after->n < AFTER_BLOCKS / 2)
+	if (after->n < AFTER_BLOCKS / 2 || after->mean_g[0] > after->again_g)
 		return 0;
 	for (size_t i = 0; i < after->n; i++) {
-		if (after->mean_g[i] < -LIMIT_AGREE * after->sigma_g)
+		if (after->mean_g[i] < -chance ||
+		    (i > 0 && after->mean_g[i] > fmax(after->mean_g[i - 1], 0) + M_SQRT2 * chance))
 			return 0;
 		sum += after->mean_g[i];
+		first += i < after->n / 2 ? after->mean_g[i] : 0;
 	}
-	if (!(sum > LIMIT_SIGNIFICANT * after->sigma_g * sqrt((double)after->n)))
+	if (!(sum > LIMIT_SIGNIFICANT * after->sigma_g * sqrt((double)after->n)) ||
+	    sum - first > LIMIT_EXPLAINS * first)
 		return 0;
 	return sum * (double)after->samples / trace->rate_hz;
 }

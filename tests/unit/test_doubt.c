@@ -272,6 +272,65 @@ static void round_tops_in_noise(void **state)
 	synth_free(&channel);
 }
 
+/* After a half-sine of base 1 and height 1, by kind: rattle, a second contact at once or late, a slow swing
+ * before one. */
+static double follows(unsigned kind, double x, struct synth_random *random, double part[6])
+{
+	double value = 0;
+
+	if (x < 0) {
+		for (unsigned i = 0; i < 6; i++)
+			part[i] = synth_uniform(random);
+		return 0;
+	}
+	for (unsigned i = 0; kind == 0 && i < 3; i++) {
+		double t = x - 3 * part[i], w = 18 + 12 * part[3 + i];
+
+		value += t > 0 ? 0.04 * exp(-0.1 * w * t) * sin(w * t) : 0;
+	}
+	if (kind == 1)
+		value = 0.6 * pulse_form(HALF_SINE, x - (part[1] < 0.5 ? 1 : 5 + 2 * part[0]));
+	if (kind == 2)
+		value = x < 2.8 ? -0.03 * pulse_form(HALF_SINE, (x - 1) / 1.8)
+		                : 0.3 * pulse_form(HALF_SINE, x - 2.8);
+	return value;
+}
+
+static void no_tail(void **state)
+{
+	enum { DROPS = 400, KINDS = 3 };
+	struct synth_random random = {6};
+	struct channel channel = synth_channel("a", RATE_HZ, 0, SAMPLES);
+	const struct record record = {.channels = &channel, .channel_count = 1};
+	unsigned tails[KINDS] = {0};
+
+	(void)state;
+	for (unsigned i = 0; i < DROPS * KINDS; i++) {
+		const struct estimate_options options = {0};
+		double base_s = 1.5e-3 * pow(4, synth_uniform(&random)),
+		       height_g = 100 * pow(4, synth_uniform(&random));
+		double onset_s = ONSET_S + synth_uniform(&random) / RATE_HZ, part[6];
+		struct analysis analysis;
+
+		for (size_t k = 0; k < SAMPLES; k++) {
+			double x = ((double)k / RATE_HZ - onset_s) / base_s;
+
+			channel.value_g[k] =
+			        height_g * (pulse_form(HALF_SINE, x) + follows(i % KINDS, x, &random, part)) +
+			        0.3 * synth_normal(&random);
+		}
+		assert_int_equal(estimate_record(&record, &options, &analysis), 0);
+		tails[i % KINDS] +=
+		        ((analysis.channels[0].pulse.flags | analysis.channels[0].peak.how.flags) &
+		         ESTIMATE_FLAG_TAIL) != 0;
+		estimate_free(&analysis);
+	}
+	print_message("of %u: tails of a rattle %u, a second contact %u, a swing %u\n", DROPS, tails[0],
+	              tails[1], tails[2]);
+	assert_true(tails[0] + tails[1] + tails[2] <= 6);
+	synth_free(&channel);
+}
+
 /* Two samples of noise side by side, one step of coarse numbers high, are no contact before one of three. */
 static void no_contact_of_noise(void **state)
 {
@@ -440,6 +499,7 @@ int main(void)
 	                                   cmocka_unit_test(spoilt),
 	                                   cmocka_unit_test(round_tops_in_noise),
 	                                   cmocka_unit_test(no_contact_of_noise),
+	                                   cmocka_unit_test(no_tail),
 	                                   cmocka_unit_test(a_high_pass_in_a_short_record),
 	                                   cmocka_unit_test(a_coarse_converter),
 	                                   cmocka_unit_test(a_force_that_fades_on),
