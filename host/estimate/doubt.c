@@ -149,7 +149,7 @@ static bool plateau_flat(const struct trace *trace, const struct plateau *top, d
 
 	return tremble.count > PLATEAU_SAMPLES && tremble.slope < LIMIT_AGREE && bend < LIMIT_AGREE &&
 	       tremble.square < noise_g * noise_g * freedom * (1 + LIMIT_CHI * sqrt(2 / freedom)) &&
-	       sqrt(ROUND_SPREAD * tremble.count) * round_g / noise_g - bend > LIMIT_NOISE;
+	       sqrt(ROUND_SPREAD * tremble.count) * round_g / noise_g - fmax(bend, 0) > LIMIT_NOISE;
 }
 
 /* Sample by sample outward from the largest one, to the ends of what is flat by that. */
@@ -396,14 +396,14 @@ static double after_shift(const struct after *after)
  * first, and no contact next. */
 static double after_tail(const struct trace *trace, const struct after *after)
 {
-	double sum = 0, first = 0, chance = LIMIT_AGREE * after->sigma_g;
+	double sum = 0, first = 0, chance = LIMIT_AGREE * after->sigma_g, least = INFINITY;
 
 	if (after->n < AFTER_BLOCKS / 2 || after->mean_g[0] > after->again_g)
 		return 0;
 	for (size_t i = 0; i < after->n; i++) {
-		if (after->mean_g[i] < -chance ||
-		    (i > 0 && after->mean_g[i] > fmax(after->mean_g[i - 1], 0) + M_SQRT2 * chance))
+		if (after->mean_g[i] < -chance || after->mean_g[i] > least + M_SQRT2 * chance)
 			return 0;
+		least = fmin(least, fmax(after->mean_g[i], 0));
 		sum += after->mean_g[i];
 		first += i < after->n / 2 ? after->mean_g[i] : 0;
 	}
@@ -435,23 +435,25 @@ static double doubt_first_touch(const struct trace *trace, const struct peak *pe
 }
 
 /* Nobody knows when zero shifted: it may have by the peak, and before the pulse. */
-static void doubt_after(const struct trace *trace, const struct estimate_baseline *baseline,
+static void doubt_after(const struct trace *trace, const struct estimate_baseline *baseline, bool swings,
                         struct peak *peak, struct estimate_pulse *pulse)
 {
 	struct estimate_peak *top = &peak->result;
 	struct after after;
-	double shift_g, beyond_m_s, next_m_s;
+	double shift_g, shift_m_s, tail_m_s, next_m_s;
 
 	if (baseline->samples == 0)
 		return;
 	after_find(trace, baseline, peak, pulse, &after);
 	shift_g = after_shift(&after);
-	beyond_m_s = UNITS_G_M_S2 * fmax(shift_g * pulse->duration_s, after_tail(trace, &after));
+	shift_m_s = UNITS_G_M_S2 * shift_g * pulse->duration_s;
+	tail_m_s = UNITS_G_M_S2 * after_tail(trace, &after);
 	next_m_s = UNITS_G_M_S2 * (after_first(trace, &after) + doubt_first_touch(trace, peak, pulse));
 	pulse->sigma_velocity_m_s = hypot(pulse->sigma_velocity_m_s, next_m_s);
-	if (beyond_m_s > LIMIT_PART * fabs(pulse->velocity_change_m_s)) {
-		pulse->sigma_velocity_m_s = hypot(pulse->sigma_velocity_m_s, beyond_m_s);
-		pulse->flags |= ESTIMATE_FLAG_TAIL;
+	if (fmax(shift_m_s, tail_m_s) > LIMIT_PART * fabs(pulse->velocity_change_m_s)) {
+		pulse->sigma_velocity_m_s = hypot(pulse->sigma_velocity_m_s, fmax(shift_m_s, tail_m_s));
+		if (!swings || shift_m_s > LIMIT_PART * fabs(pulse->velocity_change_m_s))
+			pulse->flags |= ESTIMATE_FLAG_TAIL;
 	}
 	if (shift_g > LIMIT_PART * fabs(top->value_g)) {
 		top->sigma_g = hypot(top->sigma_g, shift_g);
@@ -491,8 +493,8 @@ static void doubt_flag(struct peak *peak, struct estimate_pulse *pulse, unsigned
 	pulse->flags |= flag;
 }
 
-void doubt_channel(const struct trace *trace, const struct estimate_baseline *baseline, struct peak *peak,
-                   struct estimate_pulse *pulse)
+void doubt_channel(const struct trace *trace, const struct estimate_baseline *baseline, bool swings,
+                   struct peak *peak, struct estimate_pulse *pulse)
 {
 	double samples = pulse->duration_s * trace->rate_hz;
 	struct plateau top;
@@ -511,5 +513,5 @@ void doubt_channel(const struct trace *trace, const struct estimate_baseline *ba
 		pulse->sigma_duration_s =
 		        hypot(pulse->sigma_duration_s, WIDTH_BIAS / (samples * samples) * pulse->duration_s);
 	peak->result.sigma_g = hypot(peak->result.sigma_g, trace->step_g / sqrt(12.0));
-	doubt_after(trace, baseline, peak, pulse);
+	doubt_after(trace, baseline, swings, peak, pulse);
 }

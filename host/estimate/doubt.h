@@ -25,9 +25,10 @@
 /* Marks the samples of a cut top as at the limit. Zero is not taken off yet; noise_g is per sample. */
 void doubt_plateau(struct trace *trace, double noise_g);
 
-/* After pulse_measure: the channel's peak and pulse. */
-void doubt_channel(const struct trace *trace, const struct estimate_baseline *baseline, struct peak *peak,
-                   struct estimate_pulse *pulse);
+/* After pulse_measure: the channel's peak and pulse. Of a plate, which swings on by its nature, what fades is
+ * no "tail". */
+void doubt_channel(const struct trace *trace, const struct estimate_baseline *baseline, bool swings,
+                   struct peak *peak, struct estimate_pulse *pulse);
 
 /* After doubt_channel. What the chain leaves: noise that is gone at the record's end is a cable's, flagged
  * "cable"; a zero there that is not the one before is "tail" and widens; a sample left out or repeated on a

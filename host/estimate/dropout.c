@@ -91,8 +91,8 @@ static bool leads_off(const struct trace *trace, size_t k, size_t beyond, double
 static bool is_rest(const struct trace *trace, size_t first, size_t end, double noise_g)
 {
 	return trace->step_g > 0 &&
-	       !(first > 1 && end + 1 < trace->count && leads_off(trace, first - 1, first - 2, noise_g) &&
-	         leads_off(trace, end, end + 1, noise_g));
+	       !(first > 1 && trace->value_g[first - 1] * trace->value_g[end] > 0 && end + 1 < trace->count &&
+	         leads_off(trace, first - 1, first - 2, noise_g) && leads_off(trace, end, end + 1, noise_g));
 }
 
 /* Whether the run was left by what is higher: it is no limit. */

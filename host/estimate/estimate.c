@@ -56,7 +56,8 @@ static void analyse_channel(const struct desk *desk, size_t i, struct estimate_c
 	pulse_measure(&work->trace, &work->peak, &out->baseline, desk->options->family, &out->pulse);
 	if (work->first_of_two)
 		out->pulse.flags |= ESTIMATE_FLAG_FIRST;
-	doubt_channel(&work->trace, &out->baseline, &work->peak, &out->pulse);
+	doubt_channel(&work->trace, &out->baseline, desk->record->channels[i].sensor == 1, &work->peak,
+	              &out->pulse);
 	doubt_chain(&work->trace, &out->baseline, &work->peak, &out->pulse);
 	if (out->baseline.unsettled && out->pulse.status == ESTIMATE_OK)
 		out->pulse.status = ESTIMATE_AMBIGUOUS;
