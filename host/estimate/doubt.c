@@ -33,10 +33,8 @@ enum {
 #define JUMP_NOISE 3.23
 #define DIFFERENCES_NOISE 4.47
 
-/* How far a step is from what it looks like by its neighbour's rise on either side, over it; over what either
- * side bends. */
+/* How far a step is from what it looks like by its neighbour's rise on either side, over it. */
 #define JUMP_APART 0.25
-#define JUMP_BENDS 2.0
 
 /* Third differences of a ring over its height, and over the swing they are of. A plate at 500 Hz has 0.09 at
  * 7 kHz, a loose sensor at 1.5 kHz 2.0. */
@@ -199,10 +197,10 @@ void doubt_plateau(struct trace *trace, double noise_g)
 		trace->sample[k] |= SAMPLE_CLIPPED | TRACE_LIMIT;
 }
 
-/* |second difference| about a sample. */
-static double doubt_bend(const double *v)
+/* How far a sample is off the parabola through the three beyond it. */
+static double doubt_off(const double *v, ptrdiff_t away)
 {
-	return fabs(v[-1] - 2 * v[0] + v[1]);
+	return fabs(v[0] - v[3 * away] - 3 * (v[away] - v[2 * away]));
 }
 
 /* The largest magnitude of three samples. */
@@ -212,25 +210,26 @@ static double doubt_most(const double *v)
 }
 
 /* What is missing between samples k and k + 1 when parabolas through three to either side are led to their
- * middle; 0 where it is a kink or an edge, which rise or bend beside as much, where a contact begins, or ends
- * with little, and where one of the six is missing. */
+ * middle; 0 where it is a kink or an edge, which rise beside as much or whose samples next to it are off the
+ * others, where a contact begins, or ends with little, and where one of the eight is missing. */
 static double doubt_jump(const struct trace *trace, size_t k, double height_g)
 {
 	const double *v = trace->value_g + k;
 	double rise, before, after, jump;
 
-	if (k < 2 || k + 3 >= trace->count)
+	if (k < 3 || k + 4 >= trace->count)
 		return 0;
 	rise = v[1] - v[0];
 	before = rise - (v[0] - v[-1]);
 	after = rise - (v[2] - v[1]);
 	jump = (15 * rise - 10 * (v[2] - v[-1]) + 3 * (v[3] - v[-2])) / 8;
 	if (!(fmax(fabs(before - jump), fabs(after - jump)) < JUMP_APART * fabs(jump)) ||
-	    !(fabs(jump) > JUMP_BENDS * fmax(doubt_bend(v - 1), doubt_bend(v + 2))) ||
+	    !(fmax(doubt_off(v, -1), doubt_off(v + 1, 1)) <
+	      LIMIT_SLIGHT * fabs(jump) + LIMIT_HINT * DIFFERENCES_NOISE * trace->noise_g) ||
 	    doubt_most(v - 2) < LIMIT_EDGE * height_g ||
 	    (doubt_most(v + 1) < LIMIT_EDGE * height_g && fabs(jump) < LIMIT_AGAIN * height_g))
 		return 0;
-	for (size_t i = k - 2; i <= k + 3; i++)
+	for (size_t i = k - 3; i <= k + 4; i++)
 		if (!trace_usable(trace, i))
 			return 0;
 	return fabs(jump);

@@ -105,6 +105,15 @@ static bool chain_skip(const double *v, double noise_g)
 	       (fabs(times) < RISE_APART / 2 || fabs(times - 2) < RISE_APART);
 }
 
+/* Whether v[0] and v[1] are one fine number between rises that noise does not make level. */
+static bool chain_twice(const double *v, double noise_g)
+{
+	double before = v[0] - v[-1], after = v[2] - v[1];
+
+	return !(fabs(v[1] - v[0]) > 0) && before * after > 0 &&
+	       fmin(fabs(before), fabs(after)) > RISE_SIGMAS * noise_g;
+}
+
 /* Whether a sample on a flank is there twice, or one is missing. */
 static bool chain_skips(const struct trace *trace, const struct estimate_pulse *pulse)
 {
@@ -112,7 +121,8 @@ static bool chain_skips(const struct trace *trace, const struct estimate_pulse *
 
 	for (size_t k = from < SKIP_SIDE ? SKIP_SIDE : from; k < until && k + SKIP_SIDE + 1 < trace->count;
 	     k++) {
-		bool whole = chain_skip(trace->value_g + k, trace->noise_g);
+		bool whole = chain_skip(trace->value_g + k, trace->noise_g) ||
+		             (!(trace->step_g > 0) && chain_twice(trace->value_g + k, trace->noise_g));
 
 		for (size_t i = k - SKIP_SIDE; whole && i <= k + SKIP_SIDE + 1; i++)
 			whole = trace_usable(trace, i);

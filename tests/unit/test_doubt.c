@@ -331,6 +331,52 @@ static void no_tail(void **state)
 	synth_free(&channel);
 }
 
+/* One sample of a half-sine off by 9 to 15 sigma, which is too little for a spike under a pulse, and a back
+ * that falls within two samples are no steps; a gain that steps by a third is. */
+static void no_step(void **state)
+{
+	enum { DROPS = 600, KINDS = 3 };
+	struct synth_random random = {7};
+	struct channel channel = synth_channel("a", RATE_HZ, 0, SAMPLES);
+	const struct record record = {.channels = &channel, .channel_count = 1};
+	unsigned steps[KINDS] = {0};
+
+	(void)state;
+	for (unsigned i = 0; i < DROPS * KINDS; i++) {
+		const struct estimate_options options = {0};
+		double base_s = 2e-3 * pow(4, synth_uniform(&random)),
+		       height_g = 60 + 60 * synth_uniform(&random);
+		double onset_s = ONSET_S + synth_uniform(&random) / RATE_HZ,
+		       at = 0.35 + 0.3 * synth_uniform(&random);
+		double off_g = (synth_uniform(&random) < 0.5 ? -1 : 1) * (9 + 6 * synth_uniform(&random));
+		double fall = (1.6 + synth_uniform(&random)) / (RATE_HZ * base_s);
+		struct analysis analysis;
+
+		for (size_t k = 0; k < SAMPLES; k++) {
+			double x = ((double)k / RATE_HZ - onset_s) / base_s,
+			       v = height_g * pulse_form(HALF_SINE, x);
+
+			if (i % KINDS == 0 && x > at && x < at + 1 / (RATE_HZ * base_s))
+				v += off_g;
+			if (i % KINDS == 1)
+				v = height_g * fmax(x, 0) * smooth((1 - x) / fall);
+			if (i % KINDS == 2 && x > at)
+				v *= 0.67;
+			channel.value_g[k] = v + (i % KINDS == 1 ? 0.2 : 1) * synth_normal(&random);
+		}
+		assert_int_equal(estimate_record(&record, &options, &analysis), 0);
+		steps[i % KINDS] +=
+		        ((analysis.channels[0].pulse.flags | analysis.channels[0].peak.how.flags) &
+		         ESTIMATE_FLAG_STEP) != 0;
+		estimate_free(&analysis);
+	}
+	print_message("of %u: steps of an outlier %u, a steep back %u, a gain %u\n", DROPS, steps[0],
+	              steps[1], steps[2]);
+	assert_true(steps[0] <= 12 && steps[1] <= 1);
+	assert_true(steps[2] >= 0.8 * DROPS);
+	synth_free(&channel);
+}
+
 /* Two samples of noise side by side, one step of coarse numbers high, are no contact before one of three. */
 static void no_contact_of_noise(void **state)
 {
@@ -500,6 +546,7 @@ int main(void)
 	                                   cmocka_unit_test(round_tops_in_noise),
 	                                   cmocka_unit_test(no_contact_of_noise),
 	                                   cmocka_unit_test(no_tail),
+	                                   cmocka_unit_test(no_step),
 	                                   cmocka_unit_test(a_high_pass_in_a_short_record),
 	                                   cmocka_unit_test(a_coarse_converter),
 	                                   cmocka_unit_test(a_force_that_fades_on),
