@@ -78,8 +78,9 @@ size_t estimate_find(const struct desk *desk, const char *sensor, char axis)
 	return i;
 }
 
-/* What a ripple under the noise leaves in doubt of the case's peaks. */
-static void analyse_ripple(const struct desk *desk, struct analysis *analysis)
+/* What a ripple under the noise leaves in doubt of the case's peaks, or of a plate's that is as wide and
+ * follows. */
+static void analyse_ripple(const struct desk *desk, const char *sensor, struct analysis *analysis)
 {
 	const struct trace *trace[2];
 	struct peak *peak[2];
@@ -87,9 +88,11 @@ static void analyse_ripple(const struct desk *desk, struct analysis *analysis)
 	unsigned count = 0;
 
 	for (const char *axis = "XY"; *axis; axis++) {
-		size_t i = estimate_find(desk, "S2", *axis);
+		size_t box = estimate_find(desk, "S2", *axis), i = estimate_find(desk, sensor, *axis);
 
-		if (i == analysis->channel_count)
+		if (box == analysis->channel_count || i == analysis->channel_count ||
+		    !(fabs(desk->work[i].peak.width_s - desk->work[box].peak.width_s) <
+		      LIMIT_SLIGHT * desk->work[box].peak.width_s))
 			continue;
 		at[count] = i;
 		trace[count] = &desk->work[i].trace;
@@ -271,8 +274,9 @@ static int estimate_analyse(const struct desk *desk, struct analysis *analysis)
 	}
 	if (!has_good_sample(desk))
 		return DT_E_EMPTY;
+	analyse_ripple(desk, "S1", analysis);
+	analyse_ripple(desk, "S2", analysis);
 	analyse_weak(desk, "S1", analysis);
-	analyse_ripple(desk, analysis);
 	analyse_weak(desk, "S2", analysis);
 	flag_short(desk, analysis);
 	estimate_decays(desk, analysis);
