@@ -7,7 +7,8 @@
  * span; two where chance does not make samples equal; one at the channel's known range. Only extremes on the
  * outside count: half the largest magnitude or more, so that the small side of a one-sided shock is not taken
  * for one. Coarse numbers make two samples equal, or a round top level: those are marked once the noise is
- * known, if the samples to either side foretell more than they show. trace_open calls it without (NAN).
+ * known, if none between them is lower and the samples to either side foretell more than they show.
+ * trace_open calls it without (NAN).
  */
 #include "host/estimate/trace.h"
 

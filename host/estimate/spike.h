@@ -23,7 +23,7 @@ bool spike_mark(struct trace *trace, double noise_g);
 
 /* After baseline_remove. Noise that reaches far by its nature (Laplace, Student) leaves samples that are
  * marked: they stay left out, but are no defect of the sensor, and the flag is taken away, unless one stands
- * off further than the quiet part's own. */
+ * off far further than the quiet part's own. */
 void spike_of_noise(struct trace *trace, const struct estimate_baseline *baseline);
 
 #endif
