@@ -36,10 +36,9 @@ enum {
 /* How far a step is from what it looks like by its neighbour's rise on either side, over it. */
 #define JUMP_APART 0.25
 
-/* Third differences of a ring over its height, and over the swing they are of. A plate at 500 Hz has 0.09 at
- * 7 kHz, a loose sensor at 1.5 kHz 2.0. */
-#define ROUGH_HEIGHT 0.03
-#define ROUGH_SWING 0.13
+/* Differences of a ring over the peak; slower than this it may be a plate. */
+#define ROUGH_HEIGHT 0.01
+#define ROUGH_HZ 620.0
 
 /* A pulse's force has faded this part of its width after its 10 % point. */
 #define AFTER_FROM 0.3
@@ -276,27 +275,42 @@ static bool doubt_step(const struct trace *trace, const struct peak *peak, const
 	return most > STEP_STEEPER * next;
 }
 
-/* Whether it rings on after the pulse, faster than a plate does, by third differences. */
+/* Whether the mean square of n second or third differences is beyond noise's, and more than a hundredth of
+ * the peak and the swing, slower than a loose sensor's, have. */
+static bool rough_beyond(const struct trace *trace, const struct peak *peak, double rough, double swing,
+                         double n, unsigned order)
+{
+	static const double square[] = {6, 20}, spread[] = {3.9, 4.6}; /* of white noise */
+	double noise = square[order - 2] * trace->noise_g * trace->noise_g;
+	double slow = pow(2 * sin(UNITS_PI * ROUGH_HZ / trace->rate_hz), 2 * order);
+
+	rough -= noise;
+	return rough > LIMIT_SURE * noise * sqrt(spread[order - 2] / n) &&
+	       rough > pow(ROUGH_HEIGHT * peak->result.value_g, 2) && rough > slow * swing;
+}
+
+/* Whether it rings on after the pulse, faster than a plate does: second differences stand out of noise best,
+ * third ones of a swing. */
 static bool doubt_rough(const struct trace *trace, const struct peak *peak,
                         const struct estimate_pulse *pulse)
 {
 	size_t k = trace_index(trace, pulse->end_s + AFTER_FROM * pulse->duration_s);
-	size_t until = trace_index(trace, pulse->end_s + (AFTER_FROM + ROUGH_WIDTHS) * pulse->duration_s),
-	       n = 0;
-	double rough = 0, swing = 0, height = fabs(peak->result.value_g);
+	size_t until = trace_index(trace, pulse->end_s + (AFTER_FROM + ROUGH_WIDTHS) * pulse->duration_s);
+	double second = 0, third = 0, swing = 0, n = 0;
 	const double *v = trace->value_g;
 
 	for (; k + 3 < until; k++) {
 		if (!trace_usable(trace, k) || !trace_usable(trace, k + 1) || !trace_usable(trace, k + 2) ||
 		    !trace_usable(trace, k + 3))
 			continue;
-		rough += pow(v[k + 3] - v[k] - 3 * (v[k + 2] - v[k + 1]), 2);
+		second += pow(v[k] - 2 * v[k + 1] + v[k + 2], 2);
+		third += pow(doubt_off(v + k, 1), 2);
 		swing += v[k] * v[k];
 		n++;
 	}
-	rough = sqrt(rough / (double)n);
-	return n >= ROUGH_SAMPLES && rough > 2 * DIFFERENCES_NOISE * trace->noise_g &&
-	       rough > ROUGH_HEIGHT * height && rough > ROUGH_SWING * sqrt(swing / (double)n);
+	swing = swing / n - trace->noise_g * trace->noise_g;
+	return n >= ROUGH_SAMPLES && (rough_beyond(trace, peak, second / n, swing, n, 2) ||
+	                              rough_beyond(trace, peak, third / n, swing, n, 3));
 }
 
 /* Mean of n samples from k on; false where one of them is missing. */

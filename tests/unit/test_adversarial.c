@@ -101,6 +101,7 @@ enum spoil {
 	BLOCK_TWICE,
 	S1_DEAD,
 	BEGIN_HELD,
+	S2_LOOSE_LESS,
 	SPOILS
 };
 
@@ -185,6 +186,7 @@ static const struct class classes[] = {
         {"a block of S1 twice", HALF_SINE, PLAIN, BLOCK_TWICE, false},
         {"S1X dead", HERTZ, PLAIN, S1_DEAD, false},
         {"held as it begins", HALF_SINE, PLAIN, BEGIN_HELD, false},
+        {"S2 loose, by less", HALF_SINE, PLAIN, S2_LOOSE_LESS, true},
 };
 
 enum { CLASSES = sizeof(classes) / sizeof(classes[0]) };
@@ -362,6 +364,9 @@ static double shown(const struct drop *d, int c, double t)
 		if (c == S2X && t > 0)
 			value += 0.3 * height * exp(-t / 5e-3) * sin(2 * PI * 1500 * t + 9 * sin(900 * t));
 		return value;
+	case S2_LOOSE_LESS:
+		return value +
+		       (c >= S2X && t > 0 ? 0.12 * height * exp(-t / 5e-3) * sin(2 * PI * 1000 * t) : 0);
 	case BURST:
 		return value + 0.2 * height * table(case_g, t + 0.02);
 	case GAIN_STEP:
