@@ -37,7 +37,7 @@ accuracy: setup ## every estimate against its Cramer-Rao bound, thousands of dro
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(BUILD)/tests/test_budget
 	@DROPS=$(DROPS) $(BUILD)/tests/test_budget
 
-ADVERSARIAL_DROPS ?= 1750
+ADVERSARIAL_DROPS ?= 1400
 
 adversarial: setup ## silently wrong values and false alarms in 100 000 drops that nothing is fitted to (ADVERSARIAL_DROPS=)
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD) $(BUILD)/tests/test_adversarial
