@@ -105,7 +105,9 @@ static void lag_combine(const struct driven axis[2], struct estimate_lag *lag)
 		lag->driven_axis_s[i] = axis[i].lag_s;
 		lag->sigma_driven_axis_s[i] = axis[i].sigma_s;
 		if (axis[i].status == ESTIMATE_OK && axis[i].sigma_s > 0) {
-			weight[i] = 1 / (pow(axis[i].sigma_s, 2) - pow(axis[i].doubt_s, 2));
+			/* By what each has of its own, which is nothing without noise. */
+			weight[i] = 1 / fmax(pow(axis[i].sigma_s, 2) - pow(axis[i].doubt_s, 2),
+			                     LIMIT_SMALL * pow(axis[i].sigma_s, 2));
 			sum += weight[i] * axis[i].lag_s;
 			doubt += weight[i] * axis[i].doubt_s;
 			lag->driven.flags |= axis[i].flags;

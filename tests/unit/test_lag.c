@@ -264,11 +264,35 @@ static void flawed(void **state)
 	drop(&b);
 }
 
+/* Axes whose doubt, which both have, is all of their bars or more: their lag lies between them, and is no
+ * more certain than that doubt. */
+static void of_one_doubt(void **state)
+{
+	static const double doubt[][2] = {{10e-6, 10e-6}, {12e-6, 9e-6}, {0, 10e-6}, {0, 0}};
+	struct resultant none = {.result = {.time_s = NAN, .how.status = ESTIMATE_NO_PEAK}};
+	const struct lag_sensor sensor = {.resultant = &none};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(doubt) / sizeof(doubt[0]); i++) {
+		const struct driven driven[2] = {
+		        {.lag_s = 1.000e-3, .sigma_s = 10e-6, .doubt_s = doubt[i][0], .status = ESTIMATE_OK},
+		        {.lag_s = 1.010e-3, .sigma_s = 10e-6, .doubt_s = doubt[i][1], .status = ESTIMATE_OK}};
+		struct estimate_lag lag;
+
+		lag_find(&sensor, &sensor, driven, &lag);
+		assert_int_equal(lag.driven.status, ESTIMATE_OK);
+		assert_true(lag.driven_s >= 1.000e-3 && lag.driven_s <= 1.010e-3);
+		assert_true(lag.sigma_driven_s > fmin(doubt[i][0], doubt[i][1]) &&
+		            lag.sigma_driven_s < 13e-6);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-	        cmocka_unit_test(copies),    cmocka_unit_test(plates), cmocka_unit_test(skewed),
-	        cmocka_unit_test(ambiguous), cmocka_unit_test(flawed), cmocka_unit_test(one_axis),
+	        cmocka_unit_test(copies),   cmocka_unit_test(of_one_doubt), cmocka_unit_test(plates),
+	        cmocka_unit_test(skewed),   cmocka_unit_test(ambiguous),    cmocka_unit_test(flawed),
+	        cmocka_unit_test(one_axis),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
