@@ -25,7 +25,7 @@ $(BUILD)/tests/knockout: $(call obj,$(filter-out %_none.c,$(KNOCKOUT_C))) $(ACCU
 
 # Only the plain build measures.
 ifeq ($(SANITIZE)$(COVERAGE),)
-tests: $(BUILD)/tests/test_accuracy
+tests: $(BUILD)/tests/test_accuracy $(BUILD)/tests/knockout
 endif
 
 DROPS ?= 10000

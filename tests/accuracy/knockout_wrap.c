@@ -20,20 +20,23 @@
 #include "host/estimate/peak_private.h"
 #include "host/estimate/quiet.h"
 #include "host/estimate/ringdown_private.h"
+#include "host/estimate/ripple.h"
 #include "host/estimate/settle.h"
 #include "host/estimate/spike.h"
 
 const struct knockout *knocked_out;
 
 /* Calls from here go to the function itself; those of the estimators come to the wrapped one. */
-#define WRAP(type, function, parameters, arguments, mechanism, otherwise) \
-	type __real_##function parameters;                                \
-	type __wrap_##function parameters;                                \
-	type __wrap_##function parameters                                 \
-	{                                                                 \
-		if (is_off(mechanism))                                    \
-			return otherwise;                                 \
-		return __real_##function arguments;                       \
+#define WRAP(type, function, parameters, arguments, mechanism, otherwise)                               \
+	_Static_assert(__builtin_types_compatible_p(__typeof__(function), __typeof__(type parameters)), \
+	               "another function than its header's");                                           \
+	type __real_##function parameters;                                                              \
+	type __wrap_##function parameters;                                                              \
+	type __wrap_##function parameters                                                               \
+	{                                                                                               \
+		if (is_off(mechanism))                                                                  \
+			return otherwise;                                                               \
+		return __real_##function arguments;                                                     \
 	}
 
 static bool is_off(const char *name)
@@ -62,6 +65,7 @@ const struct knockout knockouts[] = {
         {"driven: holes as lines", "interpolate.c:interpolate_hole"},
         {"driven oscillator, all",
          "driven.c driven.h respond.c respond.h interpolate.c interpolate.h peak_driven.c"},
+        {"ripple under noise", "ripple.c ripple.h"},
         {"burst under noise", "burst.c burst.h"},
         {"decay: reach back", "ringdown_span.c:ringdown_reach_back"},
         {"decay: grid start", "grid_search.c grid_search.h"},
@@ -103,9 +107,10 @@ WRAP(bool, shape_hopeless, (const struct shape *s), (s), "families given up earl
 WRAP(bool, cosine_pulse_fit, (const struct trace *t, const struct peak *p, struct cosine_pulse *b), (t, p, b),
      "pulse without a family", false)
 WRAP(bool, peak_driven,
-     (const struct driven_axis *a, const struct driven *d, const struct driven_curve *c,
-      const struct estimate_options *o, struct peak *p),
-     (a, d, c, o, p), "driven: S1's peak", false)
+     (const struct driven_axis *a, struct driven *d, const struct driven_curve *c, struct peak *p),
+     (a, d, c, p), "driven: S1's peak", false)
+WRAP(void, ripple_widen, (const struct trace *const t[], struct peak *const p[], unsigned n), (t, p, n),
+     "ripple under noise", )
 WRAP(void, ringdown_refine, (const struct trace *t, const struct ringdown_span *s, struct ringdown *r),
      (t, s, r), "driven: decay's start", )
 WRAP(double, interpolate_hole, (const struct trace *t, ptrdiff_t k), (t, k), "driven: holes as lines", 0)
