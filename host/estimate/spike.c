@@ -344,7 +344,7 @@ void spike_of_noise(struct trace *trace, const struct estimate_baseline *baselin
 		return;
 	for (size_t k = 1; k + 1 < trace->count; k++)
 		if (trace->sample[k] & SAMPLE_SPIKE &&
-		    !(fabs(off_line(trace->value_g + k, 1, 1)) < LIMIT_SURE * reach.most))
+		    !(fabs(off_line(trace->value_g + k, 1, 1)) < LIMIT_NOISE * reach.most))
 			return;
 	trace->flags &= ~(unsigned)RECORD_FLAG_SPIKE;
 }
