@@ -106,7 +106,8 @@ double doubt_height_g(const struct trace *trace)
 
 double doubt_touch_s(const struct trace *trace)
 {
-	double sigma, zero = quiet_glance(trace, 0, trace->count, &sigma), most = doubt_height_g(trace);
+	double sigma = 0, zero = quiet_glance(trace, 0, trace->count, &sigma);
+	double most = contact_height(trace, trace->first, trace->last, zero);
 	size_t k = contact_begin(trace, trace->first, zero, contact_level(trace, most, sigma));
 	size_t foot = k, rise;
 
@@ -121,7 +122,7 @@ double doubt_touch_s(const struct trace *trace)
 
 double doubt_slap_s(const struct trace *trace)
 {
-	double zero, most, sigma, level;
+	double zero, most, sigma = 0, level;
 	size_t first, end, again;
 
 	if (trace->still == 0 || trace->still >= trace->last)
